@@ -1,0 +1,79 @@
+"""The one error tree.
+
+IvegError
+├── SettingsError           a setting that cannot be used; stops the start
+├── DataFileError           a greenhouse, scenario or log file that cannot be used
+├── UnreadableError         bytes that the contract does not describe (HTTP 400)
+├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
+├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
+├── NotAllowedError         somebody without the role (HTTP 403)
+└── HopError                a neighbour that cannot be reached or answered wrongly
+"""
+
+
+class IvegError(Exception):
+    """Root of everything that iVeg raises on purpose."""
+
+
+class SettingsError(IvegError):
+    """A setting has a value that iVeg cannot use."""
+
+    def __init__(self, name: str, value: str, allowed: str) -> None:
+        super().__init__(f"{name}={value!r} cannot be used: it must be {allowed}.")
+        self.name = name
+
+
+class DataFileError(IvegError):
+    """A data file cannot be used; says which file, where in it, and why."""
+
+    def __init__(self, file: str, where: str, reason: str) -> None:
+        place = f"{file}, {where}" if where else file
+        super().__init__(f"{place}: {reason}")
+
+
+class UnreadableError(IvegError):
+    """Something arrived that the contract does not describe.
+
+    Attributes:
+        reason: A short, stable code to count by, such as ``not_json``.
+    """
+
+    def __init__(self, reason: str, detail: str = "") -> None:
+        super().__init__(f"{reason}: {detail}" if detail else reason)
+        self.reason = reason
+        self.detail = detail
+
+
+class UnknownRobotError(IvegError):
+    """No robot of the fleet has this id."""
+
+    def __init__(self, robot_id: str) -> None:
+        super().__init__(f"There is no robot {robot_id!r} in this fleet.")
+
+
+class CommandRefusedError(IvegError):
+    """A release or resume is refused; STOP never is."""
+
+    def __init__(self, robot_id: str, asked: str, why: str) -> None:
+        super().__init__(f"{asked} of {robot_id} refused: {why}.")
+        self.why = why
+
+
+class NotAllowedError(IvegError):
+    """The caller is known and may not do this."""
+
+    def __init__(self, action: str, role: str) -> None:
+        super().__init__(f"{role} may not {action}.")
+
+
+class HopError(IvegError):
+    """A neighbour did not do its part.
+
+    Attributes:
+        hop: Which one: ``mqtt``, ``orion``, ``iot_agent``, ``database``.
+    """
+
+    def __init__(self, hop: str, detail: str) -> None:
+        super().__init__(f"{hop}: {detail}")
+        self.hop = hop
+        self.detail = detail

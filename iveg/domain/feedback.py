@@ -1,0 +1,78 @@
+"""What iVeg tells the fleet (Algorithm 2) and every robot reads (Algorithm 3).
+
+One ``Feedback`` goes out for each robot that observes; it carries the alerts that are
+alive and the mandates of the whole fleet (interfaces.md §4).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Origin
+
+FULL_SPEED = 1.0
+HALF_SPEED = 0.5
+"""The factor inside a ring; a constant of the paper, not a setting."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackAlert:
+    """A confirmed person or robot, or (``class_`` None) the stamp of another object.
+
+    Attributes:
+        position: In ``map`` (m).
+        radius_m: The ring at ``stamp``, grown with the age of the sighting.
+    """
+
+    decision_id: str
+    stamp: str
+    class_: str | None = None
+    class_id: str | None = None
+    confidence: float | None = None
+    position: tuple[float, float, float] | None = None
+    radius_m: float | None = None
+    observer: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mandate:
+    """The speed factor that one robot is told to keep, and why.
+
+    Attributes:
+        speed_factor: 0, 0.5 or 1.
+        reason: ``clear``, ``person``, ``robot`` or ``stale``.
+        cause: The person or robot that it is for.
+        distance_m: From ``base_link`` to the centre of the cause (m).
+    """
+
+    speed_factor: float = FULL_SPEED
+    reason: str = "clear"
+    cause: str | None = None
+    distance_m: float | None = None
+    decision_id: str | None = None
+
+
+CLEAR = Mandate()
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """One message on ``/{robot_id}/mqtt_feedback``.
+
+    Attributes:
+        robot_id: The observer that this topic belongs to.
+        alert: The newest; None when nobody is known.
+        alerts: All that are alive.
+        pose: Where iVeg believes the observer to be; None when unknown.
+        seen: Newest safety-report ``seq`` that iVeg has of each robot.
+    """
+
+    robot_id: str
+    origin: Origin
+    alert: FeedbackAlert | None = None
+    alerts: tuple[FeedbackAlert, ...] = ()
+    pose: Pose2D | None = None
+    twist: Twist2D | None = None
+    pose_stamp: str | None = None
+    mandates: Mapping[str, Mandate] = field(default_factory=dict)
+    seen: Mapping[str, int] = field(default_factory=dict)

@@ -1,0 +1,107 @@
+"""Plane geometry in the frames of REP-105, in metres and radians (REP-103).
+
+x points forward, y left, angles grow counter-clockwise.  A ``Pose2D`` is always "of A
+in B": the robot's pose in ``map``, the laser's pose in ``base_link``.
+"""
+
+import math
+from dataclasses import dataclass
+
+
+def wrap_angle(angle: float) -> float:
+    """Bring an angle (rad) into [-π, π)."""
+    return (angle + math.pi) % math.tau - math.pi
+
+
+@dataclass(frozen=True, slots=True)
+class Pose2D:
+    """Position (m) and heading (rad) of one frame in another."""
+
+    x: float
+    y: float
+    yaw: float
+
+    def transform(self, x: float, y: float) -> tuple[float, float]:
+        """Take a point from the inner frame to the outer one."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return self.x + c * x - s * y, self.y + s * x + c * y
+
+    def compose(self, inner: "Pose2D") -> "Pose2D":
+        """The pose of what ``inner`` describes, in the outer frame."""
+        x, y = self.transform(inner.x, inner.y)
+        return Pose2D(x, y, wrap_angle(self.yaw + inner.yaw))
+
+    def interpolate(self, later: "Pose2D", fraction: float) -> "Pose2D":
+        """The pose ``fraction`` (0 to 1) of the way to ``later``, turning least."""
+        turn = wrap_angle(later.yaw - self.yaw)
+        return Pose2D(
+            self.x + fraction * (later.x - self.x),
+            self.y + fraction * (later.y - self.y),
+            wrap_angle(self.yaw + fraction * turn),
+        )
+
+    def distance_to(self, x: float, y: float) -> float:
+        """Horizontal distance from this pose's origin to a point (m)."""
+        return math.hypot(x - self.x, y - self.y)
+
+
+@dataclass(frozen=True, slots=True)
+class Twist2D:
+    """Velocity: ``linear_x`` (m/s, forward) and ``angular_z`` (rad/s)."""
+
+    linear_x: float
+    angular_z: float
+
+
+@dataclass(frozen=True, slots=True)
+class Box3D:
+    """An axis-aligned box (m) in the frame that its owner names."""
+
+    xmin: float
+    xmax: float
+    ymin: float
+    ymax: float
+    zmin: float
+    zmax: float
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """The centroid c₃D of the paper's grounding equations."""
+        return (
+            (self.xmin + self.xmax) / 2,
+            (self.ymin + self.ymax) / 2,
+            (self.zmin + self.zmax) / 2,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """An axis-aligned rectangle in ``map`` (m): a crop row, a crate, a lane."""
+
+    xmin: float
+    ymin: float
+    xmax: float
+    ymax: float
+
+    def contains(self, x: float, y: float, margin: float = 0.0) -> bool:
+        """Whether a point lies inside, the rectangle grown by ``margin`` (m)."""
+        return (
+            self.xmin - margin <= x <= self.xmax + margin
+            and self.ymin - margin <= y <= self.ymax + margin
+        )
+
+    def crosses(self, ax: float, ay: float, bx: float, by: float) -> bool:
+        """Whether the segment a-b passes through (slab method)."""
+        low, high = 0.0, 1.0
+        for start, end, least, most in (
+            (ax, bx, self.xmin, self.xmax),
+            (ay, by, self.ymin, self.ymax),
+        ):
+            span = end - start
+            if span == 0.0:
+                if not least <= start <= most:
+                    return False
+                continue
+            near, far = sorted(((least - start) / span, (most - start) / span))
+            low, high = max(low, near), min(high, far)
+        return low <= high

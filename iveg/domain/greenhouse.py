@@ -1,0 +1,60 @@
+"""The house that robots drive in: one description for emulator, occlusion and map."""
+
+from dataclasses import dataclass
+
+from iveg.domain.geometry import Pose2D, Rectangle
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A corridor to drive in, with the label that people know it by."""
+
+    label: str
+    area: Rectangle
+
+
+@dataclass(frozen=True, slots=True)
+class Post:
+    """A round structural post (m)."""
+
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A crate stack or a trolley."""
+
+    kind: str
+    area: Rectangle
+
+
+@dataclass(frozen=True, slots=True)
+class Greenhouse:
+    """Everything in the house that does not move, in ``map`` (m).
+
+    Attributes:
+        bounds: The outer wall.
+        lanes: Where robots and people go.
+        rows: Crop; hides what is behind it from cameras and lasers.
+        starts: Where each robot of a scenario may begin, in order.
+    """
+
+    name: str
+    bounds: Rectangle
+    lanes: tuple[Lane, ...] = ()
+    rows: tuple[Rectangle, ...] = ()
+    posts: tuple[Post, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    starts: tuple[Pose2D, ...] = ()
+
+    def in_sight(self, ax: float, ay: float, bx: float, by: float) -> bool:
+        """Whether no crop row stands between two points."""
+        return not any(row.crosses(ax, ay, bx, by) for row in self.rows)
+
+    def lane_at(self, x: float, y: float) -> str | None:
+        """The label of the lane that holds a point."""
+        return next(
+            (lane.label for lane in self.lanes if lane.area.contains(x, y)), None
+        )

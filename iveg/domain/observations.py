@@ -1,0 +1,236 @@
+"""What arrives: frozen values, each naming the robot, its order and its age.
+
+The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; times
+are Unix seconds unless said otherwise.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+
+Road = Literal["orion", "mqtt"]
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """One moment on both clocks.
+
+    Deadlines and ages use ``mono``; ``wall`` is for people, logs and storage.
+    """
+
+    mono: float
+    wall: float
+
+    def later(self, seconds: float) -> "Instant":
+        """The moment ``seconds`` after this one."""
+        return Instant(self.mono + seconds, self.wall + seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Who counts this message and where it stands in the count (interfaces.md §1).
+
+    Attributes:
+        boot: Random, new at every start of the robot; None when the sender is silent.
+        seq: One more for each message of a topic; None when the sender is silent.
+        stamp: The robot's clock, exactly as sent; for display and clock offset only.
+        stamp_s: The same as Unix seconds; None where it cannot be read.
+    """
+
+    boot: str | None = None
+    seq: int | None = None
+    stamp: str | None = None
+    stamp_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Pose of ``base_link`` in ``map`` and the twist in ``base_link``."""
+
+    robot_id: str
+    origin: Origin
+    pose: Pose2D
+    twist: Twist2D
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaserScan:
+    """One sweep, field for field ``sensor_msgs/LaserScan``.
+
+    Attributes:
+        angle_min: Angle of ``ranges[0]`` about the sensor's z axis (rad).
+        angle_increment: Angle between neighbours (rad).
+        range_min: Shorter returns are the robot itself (m).
+        range_max: Longest range that counts (m).
+        mount: The sensor's pose in ``base_link``.
+        ranges: Shape (n,), float32 (m); ``inf`` where nothing came back.
+    """
+
+    robot_id: str
+    origin: Origin
+    angle_min: float
+    angle_increment: float
+    range_min: float
+    range_max: float
+    mount: Pose2D
+    ranges: NDArray[np.float32]
+
+    def points(self, pose: Pose2D) -> NDArray[np.float32]:
+        """Returns that count, in the frame that ``pose`` is in; shape (m, 2), (m)."""
+        ranges = self.ranges
+        counts = (
+            np.isfinite(ranges)
+            & (ranges >= self.range_min)
+            & (ranges <= self.range_max)
+        )
+        sensor = pose.compose(self.mount)
+        angles = (
+            sensor.yaw + self.angle_min + self.angle_increment * np.flatnonzero(counts)
+        )
+        hits = ranges[counts]
+        out = np.empty((hits.size, 2), np.float32)
+        out[:, 0] = sensor.x + hits * np.cos(angles)
+        out[:, 1] = sensor.y + hits * np.sin(angles)
+        return out
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One box that a robot's detector reported.
+
+    Attributes:
+        class_id: As sent (``farmer``); the rule's class comes from the alias table.
+        probability: 0 to 1.
+        box: In ``frame_id``.
+        frame_id: ``map`` or ``base_link``.
+    """
+
+    class_id: str
+    probability: float
+    box: Box3D
+    frame_id: Literal["map", "base_link"] = "base_link"
+    det_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DetectionFrame:
+    """Everything that one look of a detector found; empty means "looked, saw nothing".
+
+    Attributes:
+        unreadable: Boxes that could not be used (no confidence, no position).
+    """
+
+    robot_id: str
+    origin: Origin
+    detections: tuple[Detection, ...]
+    unreadable: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """A reason why a robot may not move (safety.md §2.1)."""
+
+    id: str
+    source: Literal["iveg", "boot", "hw", "bumper", "link"]
+    ack: Literal["remote", "local", "auto"]
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyReport:
+    """What the robot really applies, in its own words.
+
+    Attributes:
+        cause: Person, robot or hold that the factor is for.
+        released: The last 64 hold ids that were released.
+        challenge: Must be echoed by a release or resume.
+        linear: Measured speed (m/s); ``angular`` (rad/s).
+        feedback_age_s: How old the newest feedback is that the robot acts on (s).
+    """
+
+    robot_id: str
+    origin: Origin
+    speed_factor: float
+    reason: str
+    cause: str | None = None
+    decision_id: str | None = None
+    holds: tuple[Hold, ...] = ()
+    released: tuple[str, ...] = ()
+    challenge: str | None = None
+    linear: float = 0.0
+    angular: float = 0.0
+    feedback_age_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Navigation:
+    """A robot's intent: task, goal and path in ``map`` (m)."""
+
+    robot_id: str
+    origin: Origin
+    task: str
+    goal: tuple[float, float] | None = None
+    path: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CommandStatus:
+    """The IoT Agent's opinion of a command; displayed, never believed."""
+
+    robot_id: str
+    status: str
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAnswer:
+    """The robot's own answer on ``cmdexe`` (or ``cmd_info``)."""
+
+    robot_id: str
+    origin: Origin
+    id: str | None
+    result: str
+    holds: tuple[Hold, ...] = ()
+    challenge: str | None = None
+    linear: float = 0.0
+    why: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Climate:
+    """Air in the greenhouse: °C, 0–1, ppm; None where a sensor is silent."""
+
+    temperature: float | None = None
+    relative_humidity: float | None = None
+    co2: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Canary:
+    """iVeg's own probe, come back through the whole chain."""
+
+    origin: Origin
+
+
+Observation = (
+    Odometry
+    | LaserScan
+    | DetectionFrame
+    | SafetyReport
+    | Navigation
+    | CommandStatus
+    | CommandAnswer
+    | Climate
+    | Canary
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """An observation with the moment and the road that brought it."""
+
+    observation: Observation
+    at: Instant
+    road: Road = field(default="orion")

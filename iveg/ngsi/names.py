@@ -1,0 +1,96 @@
+"""The fixed names of the wire: topics, attributes, devices, entities."""
+
+import re
+from dataclasses import dataclass
+
+ROBOT_TYPE = "Robot"
+CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
+CANARY_ID, CANARY_TYPE = "iveg-canary", "Probe"
+CLIMATE_DEVICE = "climate"
+
+ODOMETRY = "base_pose_ground_truth"
+LIDAR, LIDAR_HEADER = "lidar_points", "lidar_header"
+BOXES, BOXES_HEADER = "bounding_boxes", "detection_header"
+SAFETY = "safety_state"
+NAVIGATION = "navigation"
+COMMAND, COMMAND_STATUS, COMMAND_INFO = "cmd", "cmd_status", "cmd_info"
+ALGORITHM_1 = ("class", "conf", "position_3D", "pose", "laser_scan", "timestamp")
+
+FEEDBACK_TOPIC = "/{robot_id}/mqtt_feedback"
+FEEDBACK_FILTER = "/+/mqtt_feedback"
+DESIRED_TOPIC = "/{robot_id}/iveg/desired"
+
+_ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
+_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID})
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One IoT Agent device: what it measures and whether it takes commands.
+
+    Attributes:
+        suffix: After the robot id in the device id and topic; empty for the robot.
+        attributes: NGSI attribute name and type.
+    """
+
+    suffix: str
+    attributes: tuple[tuple[str, str], ...]
+    has_command: bool = False
+
+
+ROBOT_DEVICES = (
+    Device(
+        "",
+        (
+            ("class", "Text"),
+            ("conf", "Number"),
+            ("position_3D", "object"),
+            ("pose", "object"),
+            ("laser_scan", "array"),
+            ("timestamp", "Text"),
+            (ODOMETRY, "object"),
+            (BOXES, "object"),
+            (BOXES_HEADER, "object"),
+            (SAFETY, "object"),
+            (NAVIGATION, "object"),
+            (LIDAR_HEADER, "object"),
+            (LIDAR, "array"),
+        ),
+        has_command=True,
+    ),
+    Device("_odom", ((ODOMETRY, "object"),)),
+    Device("_lidar2D", ((LIDAR, "array"), (LIDAR_HEADER, "object"))),
+    Device("_yolox_bounding_boxes", ((BOXES, "object"), (BOXES_HEADER, "object"))),
+    Device("_safety", ((SAFETY, "object"),)),
+    Device("_nav", ((NAVIGATION, "object"),)),
+)
+"""The command device sorts before its sensors, and is provisioned last where the agent
+keeps its registry in memory, so that either registry picks it (fiware.md §4)."""
+
+
+def is_robot_id(text: str) -> bool:
+    """Whether a text may name a robot."""
+    return _ROBOT_ID.fullmatch(text) is not None and text not in _RESERVED
+
+
+def measure_topic(apikey: str, device_id: str) -> str:
+    """Where a device publishes its measures."""
+    return f"/{apikey}/{device_id}/attrs"
+
+
+def command_topic(apikey: str, robot_id: str) -> str:
+    """Where a robot hears its commands."""
+    return f"/{apikey}/{robot_id}/cmd"
+
+
+def answer_topic(apikey: str, robot_id: str) -> str:
+    """Where a robot answers its commands."""
+    return f"/{apikey}/{robot_id}/cmdexe"
+
+
+def robot_of_device(device_id: str) -> str:
+    """The robot that a device belongs to: ``AGI_odom`` → ``AGI``."""
+    for device in ROBOT_DEVICES:
+        if device.suffix and device_id.endswith(device.suffix):
+            return device_id.removesuffix(device.suffix)
+    return device_id

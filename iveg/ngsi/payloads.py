@@ -1,0 +1,205 @@
+"""The shapes on the wire, strict: no coercion, no NaN, all bounded."""
+
+import unicodedata
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+MAX_BEAMS = 4096
+MAX_BOXES = 256
+MAX_PATH = 1024
+MAX_TEXT = 64
+
+
+def clean_text(text: str) -> str:
+    """Text that is safe to keep and show: NFC, no control or format marks, short."""
+    kept = "".join(
+        c
+        for c in unicodedata.normalize("NFC", text[: 4 * MAX_TEXT])
+        if unicodedata.category(c)[0] != "C"
+    )
+    return kept[:MAX_TEXT]
+
+
+Text = Annotated[str, AfterValidator(clean_text)]
+Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
+Radians = Annotated[float, Field(ge=-1e4, le=1e4)]
+Speed = Annotated[float, Field(ge=-1e3, le=1e3)]
+
+
+class Wire(BaseModel):
+    """Base of everything that comes over the wire."""
+
+    model_config = ConfigDict(
+        strict=True, extra="ignore", allow_inf_nan=False, frozen=True
+    )
+
+
+class OriginFields(Wire):
+    """Identity and order that each robot message carries."""
+
+    boot: Text | None = None
+    seq: int | None = Field(default=None, ge=0, le=2**53)
+    stamp: Text | None = None
+
+
+class OdometryValue(OriginFields):
+    """``base_pose_ground_truth``; Algorithm 1's ``pose`` has the same fields."""
+
+    x: Metres
+    y: Metres
+    yaw: Radians
+    linear_velocity: Speed = 0.0
+    angular_velocity: Speed = 0.0
+
+
+class LidarHeaderValue(OriginFields):
+    """``lidar_header``."""
+
+    angle_min: Radians
+    angle_increment: Radians
+    range_min: Metres = 0.0
+    range_max: Annotated[float, Field(gt=0, le=1e4)]
+    x: Metres = 0.0
+    y: Metres = 0.0
+    yaw: Radians = 0.0
+
+
+LidarPoints = Annotated[
+    list[Annotated[float, Field(ge=0, allow_inf_nan=False)] | None],
+    Field(max_length=MAX_BEAMS),
+]
+
+
+class PositionValue(Wire):
+    """A 3D box (m)."""
+
+    xmin: Metres
+    xmax: Metres
+    ymin: Metres
+    ymax: Metres
+    zmin: Metres
+    zmax: Metres
+
+
+class BoxValue(Wire):
+    """One element of ``bounding_boxes``."""
+
+    class_id: Text
+    probability: Annotated[float, Field(ge=0, le=1)]
+    position: PositionValue
+    frame_id: Literal["map", "base_link"] = "base_link"
+    det_id: Text | None = None
+
+
+class HoldValue(Wire):
+    """One element of ``holds``."""
+
+    id: Text
+    source: Literal["iveg", "boot", "hw", "bumper", "link"]
+    ack: Literal["remote", "local", "auto"]
+
+
+class SafetyValue(OriginFields):
+    """``safety_state``."""
+
+    speed_factor: Annotated[float, Field(ge=0, le=1)]
+    reason: Literal["clear", "person", "robot", "stale", "hold", "watchdog"]
+    cause: Text | None = None
+    decision_id: Text | None = None
+    holds: Annotated[list[HoldValue], Field(max_length=MAX_TEXT)] = []
+    released: Annotated[list[Text], Field(max_length=MAX_TEXT)] = []
+    ch: Text | None = None
+    v: Speed = 0.0
+    w: Speed = 0.0
+    feedback_age_s: Annotated[float, Field(ge=0)] | None = None
+
+
+class PointValue(Wire):
+    """A place in ``map`` (m)."""
+
+    x: Metres
+    y: Metres
+    z: Metres = 0.0
+
+
+class NavigationValue(OriginFields):
+    """``navigation``."""
+
+    task: Text
+    goal: PointValue | None = None
+    path: Annotated[
+        list[Annotated[list[Metres], Field(min_length=2, max_length=3)]],
+        Field(max_length=MAX_PATH),
+    ] = []
+
+
+class AnswerValue(OriginFields):
+    """What a robot says on ``cmdexe``."""
+
+    id: Text | None = None
+    r: Literal["LATCHED", "RELEASED", "RESUMED", "REFUSED"]
+    holds: Annotated[list[HoldValue], Field(max_length=MAX_TEXT)] = []
+    ch: Text | None = None
+    v: Speed = 0.0
+    why: Text | None = None
+
+
+class ClimateValue(Wire):
+    """The climate device's message."""
+
+    temperature: Annotated[float, Field(ge=-60, le=90)] | None = None
+    relativeHumidity: Annotated[float, Field(ge=0, le=1)] | None = None  # noqa: N815 - NGSI name
+    co2: Annotated[float, Field(ge=0, le=100_000)] | None = None
+
+
+class AlertValue(Wire):
+    """One alert inside the feedback."""
+
+    decision_id: Text | None = None
+    class_: Literal["person", "robot"] | None = Field(default=None, alias="class")
+    class_id: Text | None = None
+    conf: Annotated[float, Field(ge=0, le=1)] | None = None
+    position: PointValue | None = None
+    radius_m: Annotated[float, Field(gt=0, le=100)] | None = None
+    stamp: Text | None = None
+    observer: Text | None = None
+
+
+class MandateValue(Wire):
+    """One mandate inside the feedback."""
+
+    speed_factor: Annotated[float, Field(ge=0, le=1)]
+    reason: Text = "clear"
+    cause: Text | None = None
+    distance_m: Annotated[float, Field(ge=0)] | None = None
+    decision_id: Text | None = None
+
+
+class FeedbackPose(Wire):
+    """Where iVeg believes the observer to be."""
+
+    x: Metres
+    y: Metres
+    yaw: Radians
+    linear_velocity: Speed = 0.0
+    angular_velocity: Speed = 0.0
+    stamp: Text | None = None
+
+
+class FeedbackValue(OriginFields):
+    """``/{robot}/mqtt_feedback``."""
+
+    robot_id: Text
+    alert: AlertValue | None = None
+    alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
+    robot_pose: FeedbackPose | None = None
+    mandates: dict[str, MandateValue] = {}
+    seen: dict[str, int] = {}
+
+
+class NotificationValue(Wire):
+    """A notification of Orion; entities are read attribute by attribute."""
+
+    subscriptionId: Text  # noqa: N815 - NGSI name
+    data: Annotated[list[dict[str, Any]], Field(max_length=1000)]

@@ -1,0 +1,311 @@
+"""Every setting, its variable, its default and what it may be.
+
+Built once from an environment that is handed in; read by ``cli`` and ``app`` alone.
+``docs/settings.md`` is generated from the table below.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from dataclasses import field as _field
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from iveg.domain.errors import SettingsError
+
+_ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
+
+
+class _NotAllowedError(Exception):
+    """Says what a value must be."""
+
+
+def setting(variable: str, read: Callable[[str], Any], default: Any, help_: str) -> Any:
+    """One row of the table: a dataclass field with its variable and its reader."""
+    metadata = {"variable": variable, "read": read, "help": help_}
+    return _field(default=default, metadata=metadata)
+
+
+def _text(value: str) -> str:
+    return value
+
+
+def _matching(pattern: str, allowed: str) -> Callable[[str], str]:
+    def read(value: str) -> str:
+        if re.fullmatch(pattern, value) is None:
+            raise _NotAllowedError(allowed)
+        return value
+
+    return read
+
+
+def _number(least: float, most: float) -> Callable[[str], float]:
+    def read(value: str) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not least <= number <= most:
+            raise _NotAllowedError(f"a number from {least:g} to {most:g}")
+        return number
+
+    return read
+
+
+def _port(value: str) -> int:
+    if not value.isascii() or not value.isdigit() or not 1 <= int(value) <= 65535:
+        raise _NotAllowedError("a port from 1 to 65535")
+    return int(value)
+
+
+def _switch(value: str) -> bool:
+    if value.lower() not in ("on", "off"):
+        raise _NotAllowedError("on or off")
+    return value.lower() == "on"
+
+
+def _choice(*choices: str) -> Callable[[str], str]:
+    def read(value: str) -> str:
+        if value not in choices:
+            raise _NotAllowedError("one of " + ", ".join(choices))
+        return value
+
+    return read
+
+
+def _url(*schemes: str) -> Callable[[str], str]:
+    def read(value: str) -> str:
+        try:
+            parts = urlsplit(value)
+            usable = parts.scheme in schemes and bool(parts.hostname)
+            usable = usable and (parts.port is None or parts.port > 0)
+        except ValueError:
+            usable = False
+        if not usable:
+            raise _NotAllowedError(f"an address such as {schemes[0]}://host:port")
+        return value.rstrip("/")
+
+    return read
+
+
+def _robots(value: str) -> tuple[str, ...]:
+    robots = tuple(name.strip() for name in value.split(","))
+    usable = all(
+        _ROBOT_ID.fullmatch(name) and name not in ("climate", "iveg-canary")
+        for name in robots
+    )
+    if not usable or len(set(robots)) != len(robots):
+        raise _NotAllowedError(
+            "different names of letters, digits and hyphens, separated by commas"
+        )
+    return robots
+
+
+_SECRETS = frozenset(
+    {"IVEG_NOTIFY_TOKEN", "IVEG_API_TOKEN", "IVEG_SIGN_IN_TOKEN", "IVEG_MQTT_PASSWORD"}
+)
+_HEX = _matching(r"[0-9a-fA-F]{32,128}", "32 to 128 hexadecimal digits")
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """All settings of all parts."""
+
+    host: str = setting("IVEG_HOST", _text, "127.0.0.1", "Address of the page and API.")
+    port: int = setting("IVEG_PORT", _port, 8000, "Port of the page and API.")
+    mqtt_url: str = setting(
+        "IVEG_MQTT_URL",
+        _url("mqtt", "mqtts"),
+        "mqtt://127.0.0.1:1883",
+        "MQTT broker; may carry user and password; `mqtts` for TLS.",
+    )
+    mqtt_user: str = setting("IVEG_MQTT_USER", _text, "", "User at the broker.")
+    mqtt_password: str = setting(
+        "IVEG_MQTT_PASSWORD", _text, "", "Password at the broker."
+    )
+    orion_url: str = setting(
+        "IVEG_ORION_URL",
+        _url("http", "https"),
+        "http://127.0.0.1:1026",
+        "Orion Context Broker, NGSI-v2.",
+    )
+    iota_url: str = setting(
+        "IVEG_IOTA_URL",
+        _url("http", "https"),
+        "http://127.0.0.1:4041",
+        "North port of the IoT Agent JSON.",
+    )
+    iota_cb_url: str = setting(
+        "IVEG_IOTA_CB_URL",
+        _url("http", "https"),
+        "",
+        "Orion as the IoT Agent reaches it; empty: `IVEG_ORION_URL`.",
+    )
+    notify_url: str = setting(
+        "IVEG_NOTIFY_URL",
+        _url("http", "https"),
+        "",
+        "Where Orion posts notifications; empty: this host and port, "
+        "`/ngsi/notifications`.",
+    )
+    notify_token: str = setting(
+        "IVEG_NOTIFY_TOKEN",
+        _HEX,
+        "",
+        "Secret that notifications must carry; empty: made at each start.",
+    )
+    fiware_service: str = setting(
+        "IVEG_FIWARE_SERVICE",
+        _matching(r"[a-z0-9_]{1,50}", "1 to 50 of a-z, 0-9 and _"),
+        "agroconnect",
+        "Tenant at Orion and the agent.",
+    )
+    fiware_servicepath: str = setting(
+        "IVEG_FIWARE_SERVICEPATH",
+        _matching(r"(/[A-Za-z0-9_]{1,50}){1,10}", "a path such as /greenhouse"),
+        "/greenhouse",
+        "Service path at Orion and the agent.",
+    )
+    apikey: str = setting(
+        "IVEG_APIKEY",
+        _matching(r"[A-Za-z0-9_-]{1,64}", "1 to 64 letters, digits, _ and -"),
+        "iveg",
+        "First part of every measure topic.",
+    )
+    robots: tuple[str, ...] = setting(
+        "IVEG_ROBOTS", _robots, ("AGI", "AGII"), "The fleet."
+    )
+    database_url: str = setting(
+        "IVEG_DATABASE_URL",
+        _matching(r"(sqlite|postgresql)(\+\w+)?://.*", "an SQLAlchemy address"),
+        "",
+        "History; empty: an SQLite file in the user's data directory.",
+    )
+    api_token: str = setting(
+        "IVEG_API_TOKEN",
+        _matching(r"[\x21-\x7e]{16,256}", "16 to 256 visible characters"),
+        "",
+        "One bearer token for programs: read and STOP; empty: none.",
+    )
+    sign_in_token: str = setting(
+        "IVEG_SIGN_IN_TOKEN",
+        _HEX,
+        "",
+        "Token of the link that signs a browser in; empty: made at each start.",
+    )
+    confidence_threshold: float = setting(
+        "IVEG_CONFIDENCE_THRESHOLD",
+        _number(0.0, 1.0),
+        0.80,
+        "Least confidence that raises an alert, inclusive.",
+    )
+    safety_radius_m: float = setting(
+        "IVEG_SAFETY_RADIUS_M",
+        _number(0.5, 6.0),
+        2.0,
+        "Ring round a person or peer, inclusive (m).",
+    )
+    stop_direct: bool = setting(
+        "IVEG_STOP_DIRECT", _switch, True, "STOP also straight over MQTT."
+    )
+    direct_read: bool = setting(
+        "IVEG_DIRECT_READ",
+        _switch,
+        True,
+        "Detections and safety reports also straight from MQTT.",
+    )
+    feedback_slow_s: float = setting(
+        "IVEG_FEEDBACK_SLOW_S",
+        _number(0.1, 10.0),
+        1.0,
+        "Age of feedback at which a robot halves its speed (s).",
+    )
+    feedback_stand_s: float = setting(
+        "IVEG_FEEDBACK_STAND_S",
+        _number(0.2, 60.0),
+        3.0,
+        "Age of feedback at which a robot stands (s).",
+    )
+    uplink: str = setting(
+        "IVEG_UPLINK",
+        _choice("per-topic", "single"),
+        "per-topic",
+        "How emulated robots send: one message a topic, or one a robot.",
+    )
+    greenhouse: str = setting(
+        "IVEG_GREENHOUSE",
+        _text,
+        "mvsim-20x20",
+        "`mvsim-20x20`, `agroconnect`, `none` (open field), or a file.",
+    )
+
+    @classmethod
+    def from_environment(cls, environment: Mapping[str, str]) -> "Settings":
+        """Read the settings that an environment holds; the rest keep their defaults.
+
+        Raises:
+            SettingsError: a value that cannot be used.
+        """
+        values = {}
+        for name, row in cls.__dataclass_fields__.items():
+            text = environment.get(row.metadata["variable"])
+            if text is None or text == "":
+                continue
+            try:
+                values[name] = row.metadata["read"](text)
+            except _NotAllowedError as error:
+                variable = row.metadata["variable"]
+                shown = "(hidden)" if variable in _SECRETS else text
+                raise SettingsError(variable, shown, str(error)) from error
+        settings = cls(**values)
+        if settings.feedback_stand_s <= settings.feedback_slow_s:
+            raise SettingsError(
+                "IVEG_FEEDBACK_STAND_S",
+                f"{settings.feedback_stand_s:g}",
+                "more than IVEG_FEEDBACK_SLOW_S",
+            )
+        return settings
+
+    def to_environment(self) -> dict[str, str]:
+        """The environment that gives the same settings to a child process."""
+        return {
+            row.metadata["variable"]: _write(getattr(self, name))
+            for name, row in self.__dataclass_fields__.items()
+        }
+
+
+def _write(value: Any) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, tuple):
+        return ",".join(value)
+    return str(value)
+
+
+def default_data_directory(environment: Mapping[str, str], home: Path) -> Path:
+    """The user's data directory for iVeg (XDG base directory specification)."""
+    base = environment.get("XDG_DATA_HOME", "")
+    return (Path(base) if base else home / ".local" / "share") / "iveg"
+
+
+def describe() -> str:
+    """``docs/settings.md``, generated from the table."""
+    lines = [
+        "# Settings",
+        "",
+        "All by environment; an empty value means the default. A bad value stops "
+        "the start with one sentence that names the setting, the value and what is "
+        "allowed.",
+        "This page is generated: `python -m iveg settings > docs/settings.md`.",
+        "",
+    ]
+    for row in Settings.__dataclass_fields__.values():
+        default = _write(row.default) or "(empty)"
+        lines += [
+            f"## `{row.metadata['variable']}`",
+            "",
+            f"{row.metadata['help']} Default: `{default}`.",
+            "",
+        ]
+    return "\n".join(lines)
