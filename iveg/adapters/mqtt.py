@@ -1,0 +1,175 @@
+"""The door to MQTT: one connection that comes back by itself.
+
+``run`` connects, subscribes and hands every message on; when the broker goes it tries
+again with a growing, jittered pause.  ``publish`` waits for the broker's word (QoS 1)
+and fails loudly; ``offer`` keeps only the newest message of each topic, for telemetry.
+"""
+
+import asyncio
+import logging
+import random
+import socket
+import ssl
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from urllib.parse import unquote, urlsplit
+
+import aiomqtt
+
+from iveg.domain.errors import HopError
+
+_log = logging.getLogger(__name__)
+_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
+_KEEPALIVE_S = 5
+_MAX_INCOMING = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class BrokerAddress:
+    """Where the broker is and who we are there."""
+
+    host: str
+    port: int
+    user: str | None = None
+    password: str | None = None
+    tls: bool = False
+
+    @classmethod
+    def from_url(cls, url: str, user: str = "", password: str = "") -> "BrokerAddress":
+        """Read ``mqtt://user:password@host:port``; arguments win over the URL."""
+        parts = urlsplit(url)
+        tls = parts.scheme == "mqtts"
+        return cls(
+            parts.hostname or "127.0.0.1",
+            parts.port or (8883 if tls else 1883),
+            user or unquote(parts.username or "") or None,
+            password or unquote(parts.password or "") or None,
+            tls,
+        )
+
+
+class MqttLink:
+    """A connection to the broker that lives as long as ``run`` does.
+
+    Args:
+        address: The broker.
+        name: Says in logs whose connection this is; ids stay random.
+        subscriptions: Topic filter → QoS, asked for on every connect.
+        on_message: Called in the loop with topic and payload; must not block.
+        on_connect: Called after every (re)connect, subscriptions in place.
+        on_loss: Called once when a connection is lost.
+    """
+
+    def __init__(
+        self,
+        address: BrokerAddress,
+        name: str,
+        subscriptions: Mapping[str, int] | None = None,
+        on_message: Callable[[str, bytes], None] | None = None,
+        on_connect: Callable[[], None] | None = None,
+        on_loss: Callable[[], None] | None = None,
+    ) -> None:
+        self._address = address
+        self._name = name
+        self._subscriptions = dict(subscriptions or {})
+        self._on_message = on_message
+        self._on_connect = on_connect
+        self._on_loss = on_loss
+        self._client: aiomqtt.Client | None = None
+        self._offered: dict[str, tuple[bytes, int]] = {}
+        self._wake = asyncio.Event()
+        self.replaced = 0
+        """Offered messages that a newer one overtook."""
+        self.connects = 0
+
+    @property
+    def connected(self) -> bool:
+        """Whether the broker has accepted us and has not gone since."""
+        return self._client is not None
+
+    async def run(self) -> None:
+        """Stay connected until cancelled."""
+        pause = _FIRST_PAUSE_S
+        told = False
+        while True:
+            try:
+                await self._session()
+            except (aiomqtt.MqttError, OSError) as error:
+                if not told:
+                    _log.warning("%s: broker lost: %s", self._name, error)
+                    told = True
+            if self._client is not None:
+                self._client = None
+                pause, told = _FIRST_PAUSE_S, True
+                if self._on_loss is not None:
+                    self._on_loss()
+            await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - jitter
+            pause = min(_LONGEST_PAUSE_S, 2 * pause)
+
+    async def _session(self) -> None:
+        address = self._address
+        async with aiomqtt.Client(
+            address.host,
+            address.port,
+            username=address.user,
+            password=address.password,
+            keepalive=_KEEPALIVE_S,
+            timeout=5.0,
+            tls_context=ssl.create_default_context() if address.tls else None,
+            socket_options=_NODELAY,
+            max_queued_incoming_messages=_MAX_INCOMING,
+        ) as client:
+            for topic_filter, qos in self._subscriptions.items():
+                await client.subscribe(topic_filter, qos=qos)
+            self._client = client
+            self.connects += 1
+            _log.info("%s: connected to the broker", self._name)
+            if self._on_connect is not None:
+                self._on_connect()
+            sender = asyncio.create_task(
+                self._send_offered(client), name=f"mqtt-send-{self._name}"
+            )
+            try:
+                async for message in client.messages:
+                    if self._on_message is not None and isinstance(
+                        message.payload, bytes
+                    ):
+                        self._on_message(str(message.topic), message.payload)
+            finally:
+                sender.cancel()
+
+    async def _send_offered(self, client: aiomqtt.Client) -> None:
+        while True:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._offered:
+                topic = next(iter(self._offered))
+                payload, qos = self._offered.pop(topic)
+                try:
+                    await client.publish(topic, payload, qos=qos)
+                except aiomqtt.MqttError:
+                    return
+
+    def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
+        """Send when there is time; a newer message of the topic takes its place."""
+        if topic in self._offered:
+            self.replaced += 1
+        self._offered[topic] = (payload, qos)
+        self._wake.set()
+
+    async def publish(
+        self, topic: str, payload: bytes, qos: int = 1, *, retain: bool = False
+    ) -> None:
+        """Send now; at QoS 1 return when the broker has it.
+
+        Raises:
+            HopError: not connected, or the broker did not confirm.
+        """
+        client = self._client
+        if client is None:
+            raise HopError("mqtt", "not connected")
+        try:
+            await client.publish(topic, payload, qos=qos, retain=retain, timeout=1.5)
+        except aiomqtt.MqttError as error:
+            raise HopError("mqtt", str(error)) from error
