@@ -1,0 +1,94 @@
+/**
+ * How old a value is now, and what that makes of a robot's link.
+ *
+ * The server says how old a value was when it sent it (`age_s`); from then on the
+ * browser's own monotonic clock counts.  No wall clock enters, so a tablet with a wrong
+ * date shows right ages, and silence alone turns LIVE into LATE and LATE into LOST.
+ */
+
+/** Youngest age (s) that is no longer LIVE, and no longer LATE (product limits). */
+export const LIVE_LIMIT_S = 1;
+export const LATE_LIMIT_S = 3;
+
+/**
+ * @typedef {"LIVE" | "LATE" | "LOST" | "UNKNOWN"} Link
+ *
+ * What every stored value carries: `age_s` (s) at the server when sent, null for a value
+ * never heard; `receivedAtMs` (ms, `performance.now()`) when the browser got it.
+ * @typedef {{age_s?: number | null, receivedAtMs?: number}} Aged
+ */
+
+/**
+ * Age of a value now (s); Infinity for one that was never heard.
+ *
+ * @param {Aged | null | undefined} data
+ * @param {number} [nowMs] `performance.now()` (ms)
+ * @returns {number}
+ */
+export function ageOf(data, nowMs = performance.now()) {
+  if (!data || data.age_s === null) return Number.POSITIVE_INFINITY;
+  const waited = Math.max(0, nowMs - (data.receivedAtMs ?? nowMs)) / 1000;
+  return (data.age_s ?? 0) + waited;
+}
+
+/**
+ * The link that an age means.
+ *
+ * @param {number} ageS (s)
+ * @returns {Link}
+ */
+export function linkOf(ageS) {
+  if (ageS === Number.POSITIVE_INFINITY) return "UNKNOWN";
+  if (ageS <= LIVE_LIMIT_S) return "LIVE";
+  return ageS <= LATE_LIMIT_S ? "LATE" : "LOST";
+}
+
+/**
+ * The link of a robot now, judged here and not by what the server last wrote.
+ *
+ * @param {Aged | null | undefined} robot
+ * @param {number} [nowMs] `performance.now()` (ms)
+ * @returns {Link}
+ */
+export function linkOfRobot(robot, nowMs = performance.now()) {
+  return linkOf(ageOf(robot, nowMs));
+}
+
+/**
+ * The server's clock as the browser sees it, from pings.
+ *
+ * Of the last eight round trips the shortest counts: its answer spent the least time
+ * waiting somewhere, so half of it is the best guess of the way back (Cristian 1989).
+ *
+ * @typedef {{
+ *   note: (sentMs: number, receivedMs: number, serverS: number) => void,
+ *   serverNow: (nowMs: number) => number,
+ *   roundTripMs: () => number | null,
+ *   reset: () => void,
+ * }} ServerClock
+ *
+ * @param {number} [fallbackOriginS] Unix time (s) at `nowMs` = 0 until a ping is answered
+ * @returns {ServerClock}
+ */
+export function createServerClock(fallbackOriginS = performance.timeOrigin / 1000) {
+  /** @type {{roundTrip: number, origin: number}[]} */
+  let samples = [];
+  const best = () =>
+    samples.reduce((a, b) => (b.roundTrip < a.roundTrip ? b : a), samples[0]);
+  return {
+    note(sentMs, receivedMs, serverS) {
+      const middle = (sentMs + receivedMs) / 2;
+      const sample = {
+        roundTrip: receivedMs - sentMs,
+        origin: serverS - middle / 1000,
+      };
+      samples = [...samples.slice(-7), sample];
+    },
+    serverNow: (nowMs) =>
+      (samples.length ? best().origin : fallbackOriginS) + nowMs / 1000,
+    roundTripMs: () => (samples.length ? samples[samples.length - 1].roundTrip : null),
+    reset() {
+      samples = [];
+    },
+  };
+}

@@ -1,0 +1,190 @@
+/**
+ * The words of `/live`: what a frame says, and nothing about what is done with it.
+ *
+ * Shapes are those of docs/interfaces.md section 8, field for field; lengths are metres,
+ * angles radians, frames `map`.
+ *
+ * @typedef {import("./clock.js").Aged} Aged
+ * @typedef {{x: number, y: number}} Point
+ * @typedef {{x: number, y: number, z: number}} Position
+ * @typedef {{x: number, y: number, yaw: number}} Pose
+ * @typedef {{xmin: number, ymin: number, xmax: number, ymax: number}} Box2D
+ * @typedef {"LIVE" | "LATE" | "LOST" | "UNKNOWN"} Link
+ * @typedef {"RUNNING" | "SLOW" | "STOPPED"} Mode
+ * @typedef {{id: string, source: string, ack: string}} Hold
+ *
+ * @typedef {Aged & {
+ *   robot_id: string, link: Link, mode: Mode, pose: Pose | null,
+ *   twist: {linear: number, angular: number} | null,
+ *   stamp: string | null, received_at: string | null, speed_factor: number | null,
+ *   applied: {reason: string, cause: string | null, age_s: number,
+ *     feedback_age_s: number | null} | null,
+ *   mandate: {speed_factor: number, reason: string, cause: string | null,
+ *     distance_m: number | null, decision_id: string | null} | null,
+ *   holds: Hold[], stop: Command | null,
+ *   navigation: {task: string, goal: Point | null, path: [number, number][]} | null,
+ *   replay: boolean, clock_offset_s: number | null, road: string | null,
+ *   profile: {drive: string, length: number, width: number, max_speed: number,
+ *     turning_radius: number} | null,
+ *   cmd_status: string | null,
+ * }} Robot
+ *
+ * @typedef {Aged & {
+ *   person_id: string, class: "person" | "robot", class_id: string,
+ *   stage: "seen" | "remembered" | "last_seen", position: Position, radius_m: number,
+ *   confidence: number, first_seen: string, last_seen: string, observers: string[],
+ *   decision_id: string | null, lane: string | null,
+ *   acting: {robot_id: string, distance_m: number, in_sight: boolean}[],
+ * }} Person
+ *
+ * @typedef {{
+ *   robot_id: string, stamp: string, class: string | null, class_id: string,
+ *   probability: number, position: Position,
+ *   box: Box2D & {zmin?: number, zmax?: number, frame_id: string} | null,
+ *   confident: boolean, person_id: string | null, road?: string,
+ * }} Detection
+ *
+ * @typedef {Aged & {robot_id: string, stamp: string, road: string, items: Detection[]}
+ * } Look
+ *
+ * @typedef {Aged & {
+ *   command_id: string, robot_id: string, kind: "stop" | "release" | "resume",
+ *   state: string, requested_by: string, requesters: string[],
+ *   times: Record<string, string | null>, standstill_ms: number | null, tries: number,
+ *   reason: string | null, roads: Record<string, string>,
+ *   robot: {v: number | null, report_age_s: number | null, moved_m: number | null} | null,
+ *   challenge_fresh: boolean,
+ * }} Command
+ *
+ * @typedef {{
+ *   alert_id: string, priority: "P1" | "P2" | "P3", key: string,
+ *   slots: Record<string, string | number | null>, robot_id: string | null,
+ *   raised_at: string, cleared_at: string | null, acknowledged_at: string | null,
+ *   acknowledged_by: string | null, note: string | null, count: number,
+ * }} Alert
+ *
+ * @typedef {{
+ *   id: number, at: string, kind: string, robot_id: string | null, key: string,
+ *   slots: Record<string, string | number | boolean | null>, class: string | null,
+ *   decision_id: string | null,
+ * }} Entry
+ *
+ * @typedef {Aged & {
+ *   ok: boolean,
+ *   hops: {hop: string, state: "ok" | "late" | "down" | "unknown", age_s: number | null,
+ *     key: string, detail: string | null}[],
+ *   counters: Record<string, number>,
+ * }} Health
+ *
+ * @typedef {Aged & {temperature: number | null, relative_humidity: number | null,
+ *   co2: number | null, received_at: string}} Climate
+ *
+ * @typedef {{
+ *   name: string, bounds: Box2D | null, lanes: ({label: string} & Box2D)[],
+ *   rows: Box2D[], posts: {x: number, y: number, radius: number}[],
+ *   obstacles: ({kind: string} & Box2D)[],
+ * }} GreenhouseMap
+ *
+ * @typedef {Aged & {robot_id: string, stamp: string, points: Float32Array}} Scan
+ *
+ * @typedef {Aged & {
+ *   t: string, server: {boot: string, version: string, demo: boolean},
+ *   user: {name: string, role: string} | null,
+ *   rule: {id: string, version: string, confidence_threshold: number, radius_m: number,
+ *     factor: number} | null,
+ *   map: GreenhouseMap, robots: Robot[], people: Person[],
+ *   detections: Record<string, Look>, commands: Command[], alerts: Alert[],
+ *   log: Entry[], health: Health | null, climate: Climate | null,
+ * }} Snapshot
+ *
+ * @typedef {{topic: string, data: unknown}} Message
+ */
+
+/** A frame that does not follow the contract; the connection goes on without it. */
+export class ProtocolError extends Error {
+  /** @param {string} fact */
+  constructor(fact) {
+    super(`unreadable frame: ${fact}`);
+    this.name = "ProtocolError";
+  }
+}
+
+/**
+ * Reads one frame as the socket hands it over (`binaryType` "arraybuffer").
+ *
+ * @param {unknown} frame
+ * @returns {Message}
+ * @throws {ProtocolError}
+ */
+export function readFrame(frame) {
+  if (typeof frame === "string") return readText(frame);
+  if (frame instanceof ArrayBuffer) return readScan(frame);
+  throw new ProtocolError("neither text nor bytes");
+}
+
+/**
+ * @param {string} text `{"topic": T, "data": D}`
+ * @returns {Message}
+ * @throws {ProtocolError}
+ */
+export function readText(text) {
+  const message = parse(text);
+  if (typeof message?.topic !== "string" || !("data" in message)) {
+    throw new ProtocolError("no topic or no data");
+  }
+  return { topic: message.topic, data: message.data };
+}
+
+/**
+ * Reads a scan frame; the points stay where they arrived, no byte is copied.
+ *
+ * Little-endian, as every browser's hardware is: `uint32` length of the head, the head
+ * (JSON, padded to a multiple of four), then `float32` pairs x, y in `map` (m).
+ *
+ * @param {ArrayBuffer} bytes
+ * @returns {{topic: string, data: Scan}}
+ * @throws {ProtocolError}
+ */
+export function readScan(bytes) {
+  if (bytes.byteLength < 4) throw new ProtocolError("shorter than its length field");
+  const headLength = new DataView(bytes).getUint32(0, true);
+  const start = 4 + headLength;
+  if (start > bytes.byteLength) throw new ProtocolError("head longer than the frame");
+  if (headLength % 4) throw new ProtocolError("head not padded to four bytes");
+  if ((bytes.byteLength - start) % 8) throw new ProtocolError("half a point");
+  const head = parse(new TextDecoder().decode(new Uint8Array(bytes, 4, headLength)));
+  if (typeof head?.topic !== "string" || typeof head.robot_id !== "string") {
+    throw new ProtocolError("scan without topic or robot_id");
+  }
+  const { topic, robot_id, stamp, age_s } = head;
+  const points = new Float32Array(bytes, start);
+  return { topic, data: { robot_id, stamp, age_s, points } };
+}
+
+/**
+ * @param {number} t `performance.now()` (ms); the server sends it back
+ * @returns {string}
+ */
+export function writePing(t) {
+  return JSON.stringify({ type: "ping", t });
+}
+
+/**
+ * @param {string | null} robotId null = the whole fleet
+ * @param {string} pressId the same for every repetition of one press
+ * @param {number} pressedAt Unix time (s), corrected by the server clock's offset
+ * @returns {string}
+ */
+export function writeStop(robotId, pressId, pressedAt) {
+  const stop = { type: "stop", robot_id: robotId };
+  return JSON.stringify({ ...stop, press_id: pressId, pressed_at: pressedAt });
+}
+
+/** @param {string} text */
+function parse(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw new ProtocolError("not JSON");
+  }
+}

@@ -1,0 +1,338 @@
+/**
+ * What the browser knows: the newest value of every live topic, and who wants to hear.
+ *
+ * A snapshot replaces everything; after it the newest wins per topic, so memory is
+ * bounded by the fleet and not by time.  Panels hear of a topic at most once per
+ * animation frame; `log` and `commands/{id}` are told one by one, because each of them
+ * is a fact and not a state.
+ *
+ * On a snapshot `snapshot` is told first and every topic it brought after it, except the
+ * log's entries: who shows the log rebuilds it from `log()` when `snapshot` is told.
+ *
+ * @typedef {import("./protocol.js").Robot} Robot
+ * @typedef {import("./protocol.js").Person} Person
+ * @typedef {import("./protocol.js").Scan} Scan
+ * @typedef {import("./protocol.js").Look} Look
+ * @typedef {import("./protocol.js").Entry} Entry
+ * @typedef {import("./protocol.js").Snapshot} Snapshot
+ * @typedef {import("./protocol.js").GreenhouseMap} GreenhouseMap
+ * @typedef {"connecting" | "open" | "lost" | "signed-out"} ConnectionState
+ * @typedef {{state: ConnectionState, since: number}} Connection `since` (ms,
+ *   `performance.now()`)
+ * @typedef {(data: any, topic: string) => void} Listener
+ * @typedef {ReturnType<typeof createStore>} Store
+ */
+
+/** Entries of the log that a browser keeps. */
+export const LOG_SIZE = 500;
+
+/** Hues that the design has for robots (`--robot-1` … `--robot-8`). */
+const ROBOT_HUES = 8;
+
+/** A hidden page gets no animation frames; alarms must be heard there all the same. */
+const HIDDEN_FLUSH_MS = 250;
+
+/**
+ * @param {{now?: () => number, schedule?: (flush: () => void) => void}} [options]
+ *   `now` (ms) and the next animation frame; tests hand in their own
+ */
+export function createStore(options = {}) {
+  const { now = () => performance.now(), schedule = onNextFrame } = options;
+  const hub = createHub(schedule);
+  /** @type {Map<string, any>} */
+  let values = new Map();
+  /** @type {Map<string, Robot>} */
+  let robots = new Map();
+  /** @type {Map<string, Scan>} */
+  let scans = new Map();
+  /** @type {Map<string, Look>} */
+  let looks = new Map();
+  /** @type {Entry[]} */
+  let log = [];
+  /** @type {Map<string, number>} */
+  const slots = new Map();
+  /** @type {Connection} */
+  let connection = { state: "connecting", since: now() };
+
+  /** @param {Robot} robot */
+  function keepRobot(robot) {
+    const known = robots.get(robot.robot_id);
+    if (known && isOlder(robot, known)) return false;
+    robots.set(robot.robot_id, robot);
+    slotOf(robot.robot_id);
+    return true;
+  }
+
+  /** @param {Entry} entry */
+  function keepEntry(entry) {
+    if (log.length && entry.id <= log[log.length - 1].id) return false;
+    log.push(entry);
+    if (log.length > LOG_SIZE) log.splice(0, log.length - LOG_SIZE);
+    return true;
+  }
+
+  /**
+   * Keeps one value; false when it is older than what is known.
+   *
+   * @param {string} topic
+   * @param {any} data
+   */
+  function keep(topic, data) {
+    const [head, id, leaf] = topic.split("/");
+    if (topic === "log") return keepEntry(data);
+    if (head === "robots" && leaf === "scan") scans.set(id, data);
+    else if (head === "robots" && !keepRobot(data)) return false;
+    else if (head === "detections") looks.set(id, data);
+    values.set(topic, data);
+    return true;
+  }
+
+  /**
+   * @param {Snapshot} snapshot
+   * @param {number} atMs
+   */
+  function applySnapshot(snapshot, atMs) {
+    values = new Map();
+    robots = new Map();
+    scans = new Map();
+    looks = new Map();
+    log = (snapshot.log ?? []).slice(-LOG_SIZE);
+    values.set("snapshot", snapshot);
+    hub.tell("snapshot", snapshot);
+    for (const [topic, data] of topicsOf(snapshot)) {
+      keep(topic, received(data, atMs));
+      hub.tell(topic, data);
+    }
+  }
+
+  /** @param {string} robotId @returns {number} */
+  function slotOf(robotId) {
+    const slot = slots.get(robotId) ?? slots.size;
+    slots.set(robotId, slot);
+    return (slot % ROBOT_HUES) + 1;
+  }
+
+  return {
+    /**
+     * Takes one message in.
+     *
+     * @param {string} topic
+     * @param {any} data
+     * @param {number} [receivedAtMs] `performance.now()` when it arrived
+     */
+    apply(topic, data, receivedAtMs = now()) {
+      if (topic === "snapshot") applySnapshot(data, receivedAtMs);
+      else if (keep(topic, received(data, receivedAtMs))) hub.tell(topic, data);
+    },
+    /** The newest value of a topic. @param {string} topic @returns {any} */
+    get: (topic) => values.get(topic),
+    /**
+     * Calls `fn(data, topic)` for a topic, or for every topic one level below a prefix:
+     * `people`, `robots/AGI`, `robots/` (each robot, not its scan), `robots/+/scan`.
+     *
+     * @param {string} pattern
+     * @param {Listener} fn
+     * @returns {() => void} ends the subscription
+     */
+    subscribe: (pattern, fn) => hub.subscribe(pattern, fn),
+    /**
+     * Calls `fn` for every message at once, before the next frame: for the map, that
+     * must ask for its frame the moment a message comes.
+     *
+     * @param {Listener} fn
+     * @returns {() => void}
+     */
+    watch: (fn) => hub.watch(fn),
+    /** @returns {ReadonlyMap<string, Robot>} in the server's order */
+    robots: () => robots,
+    /** @returns {ReadonlyMap<string, Scan>} newest sweep per robot */
+    scans: () => scans,
+    /** @returns {ReadonlyMap<string, Look>} newest look per robot */
+    looks: () => looks,
+    /** @returns {Person[]} */
+    people: () => values.get("people") ?? [],
+    /** @returns {GreenhouseMap | null} */
+    map: () => values.get("map") ?? null,
+    /** @returns {readonly Entry[]} oldest first, at most LOG_SIZE */
+    log: () => log,
+    /** Which `--robot-n` is a robot's own (1–8), the same on map and cards. */
+    slotOf,
+    /** @returns {Connection} */
+    get connection() {
+      return connection;
+    },
+    /**
+     * Told by the socket; heard under the topic `connection`.
+     *
+     * @param {ConnectionState} state
+     * @param {number} [sinceMs]
+     */
+    setConnection(state, sinceMs = now()) {
+      if (state === connection.state) return;
+      connection = { state, since: sinceMs };
+      hub.tell("connection", connection);
+    },
+  };
+}
+
+/**
+ * Notes on a value, and on each value of a list, when it arrived.
+ *
+ * @template T
+ * @param {T} data
+ * @param {number} atMs
+ * @returns {T}
+ */
+function received(data, atMs) {
+  const values = Array.isArray(data) ? data : [data];
+  for (const value of values) {
+    if (value && typeof value === "object") value.receivedAtMs = atMs;
+  }
+  return data;
+}
+
+/**
+ * Whether a robot's state was taken in before the one that is known.  Times of one
+ * server in one format compare as text.
+ *
+ * @param {Robot} robot
+ * @param {Robot} known
+ */
+function isOlder(robot, known) {
+  if (!robot.received_at || !known.received_at) return false;
+  return robot.received_at < known.received_at;
+}
+
+/**
+ * A snapshot, as the messages that would have brought the same.
+ *
+ * @param {Snapshot} snapshot
+ * @returns {[string, unknown][]}
+ */
+function topicsOf(snapshot) {
+  return [
+    ["map", snapshot.map],
+    ...(snapshot.robots ?? []).map(under("robots", "robot_id")),
+    ["people", snapshot.people ?? []],
+    ...Object.entries(snapshot.detections ?? {}).map(
+      ([id, look]) =>
+        /** @type {[string, unknown]} */ ([
+          `detections/${id}`,
+          { ...look, age_s: look.age_s ?? secondsBetween(look.stamp, snapshot.t) },
+        ]),
+    ),
+    ...(snapshot.commands ?? []).map(under("commands", "command_id")),
+    ["alerts", snapshot.alerts ?? []],
+    ["health", snapshot.health],
+    ["climate", snapshot.climate],
+  ];
+}
+
+/**
+ * @param {string} head
+ * @param {string} key
+ * @returns {(value: any) => [string, unknown]}
+ */
+function under(head, key) {
+  return (value) => [`${head}/${value[key]}`, value];
+}
+
+/** @param {string} earlier ISO-8601 @param {string} later ISO-8601 */
+function secondsBetween(earlier, later) {
+  return Math.max(0, (Date.parse(later) - Date.parse(earlier)) / 1000) || 0;
+}
+
+/**
+ * Who listens to what.  State is told once per frame and topic, facts at once.
+ *
+ * @param {(flush: () => void) => void} schedule
+ */
+function createHub(schedule) {
+  /** @type {Set<{pattern: string, fn: Listener}>} */
+  const listeners = new Set();
+  /** @type {Set<Listener>} */
+  const watchers = new Set();
+  /** @type {Map<string, any>} */
+  let waiting = new Map();
+
+  /** @param {string} topic @param {any} data */
+  function deliver(topic, data) {
+    for (const { pattern, fn } of [...listeners]) {
+      if (matches(pattern, topic)) guarded(fn, data, topic);
+    }
+  }
+
+  function flush() {
+    const told = waiting;
+    waiting = new Map();
+    for (const [topic, data] of told) deliver(topic, data);
+  }
+
+  return {
+    /** @param {string} pattern @param {Listener} fn */
+    subscribe(pattern, fn) {
+      const listener = { pattern, fn };
+      listeners.add(listener);
+      return () => void listeners.delete(listener);
+    },
+    /** @param {Listener} fn */
+    watch(fn) {
+      watchers.add(fn);
+      return () => void watchers.delete(fn);
+    },
+    /** @param {string} topic @param {any} data */
+    tell(topic, data) {
+      for (const fn of watchers) guarded(fn, data, topic);
+      if (topic === "log" || topic.startsWith("commands/")) {
+        deliver(topic, data);
+        return;
+      }
+      if (!waiting.size) schedule(flush);
+      waiting.set(topic, data);
+    },
+  };
+}
+
+/**
+ * One panel's error must not silence the others, the STOP control among them.
+ *
+ * @param {Listener} fn
+ * @param {any} data
+ * @param {string} topic
+ */
+function guarded(fn, data, topic) {
+  try {
+    fn(data, topic);
+  } catch (error) {
+    reportError(error);
+  }
+}
+
+/**
+ * @param {string} pattern
+ * @param {string} topic
+ */
+export function matches(pattern, topic) {
+  if (pattern === topic) return true;
+  const wanted = (pattern.endsWith("/") ? `${pattern}+` : pattern).split("/");
+  if (wanted.length === 1) wanted.push("+");
+  const found = topic.split("/");
+  return (
+    wanted.length === found.length &&
+    wanted.every((word, i) => word === "+" || word === found[i])
+  );
+}
+
+/** @param {() => void} flush */
+function onNextFrame(flush) {
+  let done = false;
+  const once = () => {
+    if (done) return;
+    done = true;
+    clearTimeout(timer);
+    cancelAnimationFrame(frame);
+    flush();
+  };
+  const frame = requestAnimationFrame(once);
+  const timer = setTimeout(once, HIDDEN_FLUSH_MS);
+}
