@@ -1,0 +1,182 @@
+"""Where errors become HTTP: the one file that knows both.
+
+The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
+browser asked for one.  Nothing of the input is echoed, nothing of the inside is told.
+
+What can only go wrong at this door, under the tree of ``domain/errors``::
+
+    IvegError
+    └── DoorError
+        ├── NotSignedInError    401
+        ├── ForeignOriginError  403
+        └── NotJsonError        415
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from http import HTTPStatus
+
+from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from iveg.domain.errors import (
+    CommandRefusedError,
+    HopError,
+    IvegError,
+    NotAllowedError,
+    UnknownRobotError,
+    UnreadableError,
+)
+
+_MOST_COMPLAINTS = 20
+
+
+class DoorError(IvegError):
+    """Root of what the door refuses before anybody inside is asked."""
+
+
+class NotSignedInError(DoorError):
+    """Nobody is known behind this request."""
+
+    def __init__(self) -> None:
+        super().__init__("Sign in with the link that iVeg printed, or send a token.")
+
+
+class ForeignOriginError(DoorError):
+    """A browser sent this from another site, or without iVeg's own header."""
+
+    def __init__(self, missing: str) -> None:
+        super().__init__(f"This did not come from iVeg's own page: {missing}.")
+
+
+class NotJsonError(DoorError):
+    """A body that is not declared as JSON."""
+
+    def __init__(self) -> None:
+        super().__init__("Send the body as application/json.")
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One RFC 9457 problem.
+
+    Attributes:
+        code: Stable, for programs; the last part of ``type``.
+        extra: Further members, such as ``why`` of a refused release.
+        headers: What the status asks for, such as ``Allow`` with 405.
+    """
+
+    status: int
+    detail: str
+    code: str = ""
+    extra: Mapping[str, object] = field(default_factory=dict)
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """The status in words."""
+        return HTTPStatus(self.status).phrase
+
+    def response(self) -> Response:
+        """The problem as a program reads it."""
+        members = {
+            "type": f"urn:iveg:{self.code}" if self.code else "about:blank",
+            "title": self.title,
+            "status": self.status,
+            "detail": self.detail,
+            **self.extra,
+        }
+        return JSONResponse(
+            members,
+            self.status,
+            headers={"Cache-Control": "no-store", **self.headers},
+            media_type="application/problem+json",
+        )
+
+
+Page = Callable[[Request, Problem], Response]
+
+
+def install(app: FastAPI, page: Page | None = None) -> None:
+    """Turn every error of ``app`` into a problem.
+
+    Args:
+        app: The finished application.
+        page: Draws a problem for a person who navigated there; None answers JSON.
+    """
+
+    async def answer(request: Request, error: Exception) -> Response:
+        problem = problem_of(error)
+        if page is not None and _wants_a_page(request):
+            return page(request, problem)
+        return problem.response()
+
+    for kind in (IvegError, RequestValidationError, HTTPException, Exception):
+        app.add_exception_handler(kind, answer)
+
+
+def problem_of(error: Exception) -> Problem:
+    """The problem that an error is to the outside."""
+    match error:
+        case RequestValidationError():
+            return _invalid(error)
+        case HTTPException():
+            return Problem(
+                error.status_code, str(error.detail), headers=error.headers or {}
+            )
+        case CommandRefusedError():
+            return Problem(409, str(error), "command-refused", {"why": error.why})
+        case UnreadableError():
+            return Problem(400, str(error), "unreadable", {"reason": error.reason})
+        case HopError():
+            # Addresses and drivers' words stay inside.
+            return Problem(503, f"{error.hop} did not answer.", "hop", _hop(error))
+        case NotSignedInError():
+            challenge = {"WWW-Authenticate": "Bearer"}
+            return Problem(401, str(error), "not-signed-in", headers=challenge)
+    for kind, status, code in _PLAIN:
+        if isinstance(error, kind):
+            return Problem(status, str(error), code)
+    # The server logs the traceback: Starlette raises it again after this answer.
+    return Problem(500, "Something failed inside iVeg; its log says what.")
+
+
+_PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
+    (UnknownRobotError, 404, "unknown-robot"),
+    (NotAllowedError, 403, "not-allowed"),
+    (ForeignOriginError, 403, "foreign-origin"),
+    (NotJsonError, 415, "not-json"),
+)
+
+
+def _hop(error: HopError) -> dict[str, object]:
+    return {"hop": error.hop}
+
+
+def _invalid(error: RequestValidationError) -> Problem:
+    complaints = error.errors()
+    if any(complaint["type"] == "json_invalid" for complaint in complaints):
+        return Problem(400, "The body is not JSON.", "unreadable")
+    # Only where and what: the input itself may hold NaN, secrets or megabytes.
+    errors = [
+        {
+            "where": ".".join(str(part) for part in complaint["loc"])[:200],
+            "what": _what(str(complaint["type"]), str(complaint["msg"])),
+        }
+        for complaint in complaints[:_MOST_COMPLAINTS]
+    ]
+    detail = f"{len(complaints)} value(s) cannot be used."
+    return Problem(422, detail, "invalid", {"errors": errors})
+
+
+def _what(kind: str, message: str) -> str:
+    # A validator of our own writes its sentence itself and may quote the value.
+    return "not allowed" if kind == "value_error" else message[:200]
+
+
+def _wants_a_page(request: Request) -> bool:
+    accepts_html = "text/html" in request.headers.get("accept", "")
+    return accepts_html and not request.url.path.startswith("/api/")

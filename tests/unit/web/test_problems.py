@@ -1,0 +1,186 @@
+"""Every error becomes one honest problem and tells nothing of the inside."""
+
+from collections.abc import AsyncIterator
+from typing import Annotated
+
+import httpx
+import pytest
+from fastapi import Body, FastAPI
+from pydantic import BaseModel, ConfigDict
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+
+from iveg.domain.errors import (
+    CommandRefusedError,
+    DataFileError,
+    HopError,
+    IvegError,
+    NotAllowedError,
+    SettingsError,
+    UnknownRobotError,
+    UnreadableError,
+)
+from iveg.web.problems import (
+    ForeignOriginError,
+    NotJsonError,
+    NotSignedInError,
+    Problem,
+    install,
+    problem_of,
+)
+
+
+class Threshold(BaseModel):
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    value: float
+
+
+def build_app() -> FastAPI:
+    app = FastAPI()
+
+    @app.post("/threshold")
+    async def threshold(body: Annotated[Threshold, Body()]) -> None: ...
+
+    @app.get("/boom")
+    @app.get("/api/v1/boom")
+    async def boom() -> None:
+        raise ZeroDivisionError("the secret of the inside")
+
+    return app
+
+
+@pytest.fixture
+async def client() -> AsyncIterator[httpx.AsyncClient]:
+    app = build_app()
+    install(app)
+    async with browse(app) as client:
+        yield client
+
+
+def browse(app: FastAPI) -> httpx.AsyncClient:
+    transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+    return httpx.AsyncClient(transport=transport, base_url="http://iveg.test")
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (UnreadableError("not_json", "line 1"), 400),
+        (NotSignedInError(), 401),
+        (NotAllowedError("release", "viewer"), 403),
+        (ForeignOriginError("same origin"), 403),
+        (UnknownRobotError("R9"), 404),
+        (CommandRefusedError("AGI", "release", "not standing"), 409),
+        (NotJsonError(), 415),
+        (HopError("orion", "http://10.0.0.7:1026 refused"), 503),
+        (SettingsError("IVEG_PORT", "x", "a port"), 500),
+        (DataFileError("a.json", "", "broken"), 500),
+        (IvegError("unforeseen"), 500),
+        (HTTPException(405, headers={"Allow": "GET"}), 405),
+        (KeyError("AGI"), 500),
+    ],
+)
+def test_each_error_has_its_status(error: Exception, status: int) -> None:
+    assert problem_of(error).status == status
+
+
+def test_a_refused_command_says_why_for_people_and_programs() -> None:
+    problem = problem_of(CommandRefusedError("AGI", "release", "not_standing"))
+
+    assert problem.extra == {"why": "not_standing"}
+    assert "AGI" in problem.detail
+
+
+def test_a_broken_hop_keeps_its_address_inside() -> None:
+    problem = problem_of(HopError("orion", "http://10.0.0.7:1026 refused"))
+
+    assert "10.0.0.7" not in str(problem)
+    assert problem.extra == {"hop": "orion"}
+
+
+async def test_a_problem_is_problem_json(client: httpx.AsyncClient) -> None:
+    answer = await client.get("/nowhere")
+
+    assert answer.status_code == 404
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert answer.headers["cache-control"] == "no-store"
+    assert answer.json() == {
+        "type": "about:blank",
+        "title": "Not Found",
+        "status": 404,
+        "detail": "Not Found",
+    }
+
+
+async def test_a_wrong_method_names_the_right_ones(client: httpx.AsyncClient) -> None:
+    answer = await client.delete("/threshold")
+
+    assert answer.status_code == 405
+    assert answer.headers["allow"] == "POST"
+
+
+@pytest.mark.parametrize("body", [b"{", b'{"value": 1', b"\xff"])
+async def test_what_is_not_json_is_unreadable(
+    client: httpx.AsyncClient, body: bytes
+) -> None:
+    answer = await post(client, body)
+
+    assert answer.status_code == 400
+    assert answer.json()["status"] == 400
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b'{"value": NaN}', b'{"value": Infinity}', b'{"value": "12345678"}', b"{}", b"[]"],
+)
+async def test_what_is_readable_but_invalid_says_where_and_never_echoes_it(
+    client: httpx.AsyncClient, body: bytes
+) -> None:
+    answer = await post(client, body)
+
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["where"].startswith("body")
+    assert "12345678" not in answer.text
+    assert "NaN" not in answer.text
+    assert "Infinity" not in answer.text
+
+
+async def test_a_failure_inside_tells_nothing_of_it(client: httpx.AsyncClient) -> None:
+    answer = await client.get("/boom")
+
+    assert answer.status_code == 500
+    assert "secret" not in answer.text
+    assert "ZeroDivision" not in answer.text
+
+
+async def test_a_failure_inside_still_reaches_the_servers_log() -> None:
+    app = build_app()
+    install(app)
+    transport = httpx.ASGITransport(app)
+
+    async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
+        with pytest.raises(ZeroDivisionError):
+            await client.get("/boom")
+
+
+async def test_a_person_gets_a_page_and_a_program_never() -> None:
+    def page(request: Request, problem: Problem) -> Response:
+        return PlainTextResponse(f"page {problem.status}", problem.status)
+
+    app = build_app()
+    install(app, page)
+    async with browse(app) as client:
+        person = await client.get("/nowhere", headers={"Accept": "text/html,*/*"})
+        script = await client.get("/nowhere", headers={"Accept": "application/json"})
+        api = await client.get("/api/v1/boom", headers={"Accept": "text/html"})
+
+    assert person.text == "page 404"
+    assert script.json()["status"] == 404
+    assert api.json()["status"] == 500
+
+
+async def post(client: httpx.AsyncClient, body: bytes) -> httpx.Response:
+    headers = {"Content-Type": "application/json"}
+    return await client.post("/threshold", content=body, headers=headers)
