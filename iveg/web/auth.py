@@ -1,0 +1,442 @@
+"""The door: who is there, and what may they do.
+
+People come with a session cookie, programs with a bearer token, Orion with a shared
+secret.  Every route declares what it asks for with ``require``; ``undeclared`` finds
+those that forgot::
+
+    link with token ──> session cookie ──> operator: read, stop, release
+    bearer token ─────────────────────────> program:  read, stop
+    session past its age ─────────────────> expired:  stop, 12 h longer
+
+STOP outlives the session (safety.md §5.2): whoever was let in once can still stop.
+"""
+
+import hashlib
+import hmac
+import logging
+import secrets
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+from urllib.parse import parse_qs, urlsplit
+
+from fastapi import FastAPI
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import iter_route_contexts
+from starlette.exceptions import WebSocketException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import RedirectResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from iveg.domain.errors import NotAllowedError
+from iveg.web.problems import (
+    ForeignOriginError,
+    NotJsonError,
+    NotSignedInError,
+    Problem,
+)
+
+Role = Literal["viewer", "operator", "admin", "program", "expired"]
+Action = Literal["open", "read", "stop", "release", "admin"]
+
+MAY: Final[Mapping[Role, frozenset[Action]]] = {
+    "viewer": frozenset({"open", "read", "stop"}),
+    "operator": frozenset({"open", "read", "stop", "release"}),
+    "admin": frozenset({"open", "read", "stop", "release", "admin"}),
+    "program": frozenset({"open", "read", "stop"}),
+    "expired": frozenset({"open", "stop"}),
+}
+"""The table of safety.md §5.1; what is not here is refused."""
+
+NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
+"""Close codes of ``/live``."""
+
+_IDLE_S, _ABSOLUTE_S, _STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
+_MOST_SESSIONS = 1000
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Principal:
+    """Somebody the door knows.
+
+    Attributes:
+        name: For the audit and the page; opaque to robots.
+        session: Digest of the session that lets them in; None for programs.
+    """
+
+    name: str
+    role: Role
+    session: bytes | None = None
+
+    def may(self, action: Action) -> bool:
+        """Whether the role's row holds this action."""
+        return action in MAY[self.role]
+
+
+NOBODY = Principal("nobody", "expired")
+"""Who comes through an open route unknown; never handed to a route that asks more."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Session:
+    name: str
+    role: Role
+    began: float
+    seen: float
+
+    def role_at(self, now: float) -> Role | None:
+        """The role that is left at ``now`` (s, monotonic); None when all is over."""
+        over = now - min(self.seen + _IDLE_S, self.began + _ABSOLUTE_S)
+        if over <= 0:
+            return self.role
+        return "expired" if over <= _STOP_ONLY_S else None
+
+
+class Sessions:
+    """Who is signed in, in memory; only digests of the tokens are kept.
+
+    Bounded: when it is full, the session that was idle longest ends.
+    """
+
+    def __init__(self, now: Callable[[], float], most: int = _MOST_SESSIONS) -> None:
+        self._now = now
+        self._most = most
+        self._sessions: dict[bytes, _Session] = {}
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    def open(self, name: str, role: Role) -> str:
+        """Begin a session; returns its token, which is known to nobody else."""
+        if len(self._sessions) >= self._most:
+            idle = min(self._sessions, key=lambda digest: self._sessions[digest].seen)
+            del self._sessions[idle]
+        token = secrets.token_urlsafe(32)
+        now = self._now()
+        self._sessions[_digest(token)] = _Session(name, role, now, now)
+        return token
+
+    def find(self, token: str) -> Principal | None:
+        """Who holds this token; counts as a sign of life."""
+        return self._principal(_digest(token), touch=True)
+
+    def current(self, principal: Principal) -> Principal | None:
+        """The same person as of now: with the role that is left, or gone."""
+        if principal.session is None:
+            return principal
+        return self._principal(principal.session, touch=False)
+
+    def revoke(self, principal: Principal) -> None:
+        """End a session at once, STOP included."""
+        if principal.session is not None:
+            self._sessions.pop(principal.session, None)
+
+    def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
+        session = self._sessions.get(digest)
+        if session is None:
+            return None
+        now = self._now()
+        role = session.role_at(now)
+        if role is None:
+            del self._sessions[digest]
+            return None
+        if touch and role != "expired":
+            self._sessions[digest] = replace(session, seen=now)
+        return Principal(session.name, role, digest)
+
+
+class Door:
+    """Tells people and programs from strangers.
+
+    Args:
+        sign_in_token: The link's token (hex); it signs a browser in as operator.
+        api_token: The bearer token of programs; empty lets no program in.
+        now: Monotonic time (s).
+    """
+
+    def __init__(
+        self, *, sign_in_token: str, api_token: str, now: Callable[[], float]
+    ) -> None:
+        self._sign_in_token = sign_in_token
+        self._api_token = api_token
+        self._now = now
+        self.sessions = Sessions(now)
+        self.refused = 0
+        """Sign-ins with a wrong token."""
+        self._told_at: float | None = None
+
+    # --- people sign in ---------------------------------------------------------
+
+    def sign_in(self, request: Request, token: str) -> Response | None:
+        """Exchange the link's token for a session cookie; None when it is wrong."""
+        if not _same(token, self._sign_in_token):
+            self._tell_refused()
+            return None
+        response = RedirectResponse("/", 303)
+        response.headers["Cache-Control"] = "no-store"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        secure = request.url.scheme == "https"
+        response.set_cookie(
+            _cookie_name(secure=secure),
+            self.sessions.open("operator", "operator"),
+            path="/",
+            secure=secure,
+            httponly=True,
+            samesite="strict",
+        )
+        return response
+
+    def sign_out(self, request: Request) -> Response:
+        """End the session of this browser and go where one signs in."""
+        principal = self.identify(request)
+        if principal is not None:
+            self.sessions.revoke(principal)
+        response = RedirectResponse("/", 303)
+        secure = request.url.scheme == "https"
+        response.delete_cookie(
+            _cookie_name(secure=secure), secure=secure, httponly=True, samesite="strict"
+        )
+        return response
+
+    def _tell_refused(self) -> None:
+        """Count it and say so once a minute, so that nobody can flood the log."""
+        self.refused += 1
+        now = self._now()
+        if self._told_at is None or now - self._told_at >= 60.0:
+            self._told_at = now
+            _log.warning("sign-in refused: wrong token (%d so far)", self.refused)
+
+    # --- who is it --------------------------------------------------------------
+
+    def identify(self, connection: HTTPConnection) -> Principal | None:
+        """Whose cookie or bearer token this is; None for a stranger."""
+        scheme, _, token = connection.headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer":
+            known = bool(self._api_token) and _same(token.strip(), self._api_token)
+            return Principal("program", "program") if known else None
+        secure = connection.url.scheme in ("https", "wss")
+        cookie = connection.cookies.get(_cookie_name(secure=secure))
+        return None if cookie is None else self.sessions.find(cookie)
+
+    def authorise(self, request: Request, action: Action) -> Principal:
+        """Let a request in, or say why not.
+
+        Raises:
+            NotSignedInError: a stranger.
+            NotAllowedError: the role may not do this.
+            ForeignOriginError: another site's page sent it with our cookie.
+            NotJsonError: a body that is not JSON.
+        """
+        principal = self.identify(request)
+        if principal is None:
+            raise NotSignedInError
+        if not principal.may(action):
+            raise NotAllowedError(action, principal.role)
+        if request.method not in _SAFE_METHODS:
+            if principal.session is not None:
+                _refuse_forgery(request)
+            _refuse_other_bodies(request)
+        return principal
+
+    async def authorise_websocket(self, websocket: WebSocket) -> Principal:
+        """Let a WebSocket in; the caller accepts it.
+
+        A foreign origin is refused before the handshake ends (HTTP 403).  A missing
+        session is refused after it, because a browser sees close codes only then and
+        must tell "sign in again" from "try again".
+
+        Raises:
+            WebSocketException: 4403 foreign origin, 4401 nobody signed in; Starlette
+                closes the connection with it.
+        """
+        origin = websocket.headers.get("origin")
+        principal = self.identify(websocket)
+        by_cookie = principal is not None and principal.session is not None
+        # Programs send no Origin; browsers always do.
+        if (origin is not None or by_cookie) and not _is_own(origin, websocket):
+            raise WebSocketException(FOREIGN_ORIGIN)
+        if principal is None or not principal.may("read"):
+            await websocket.accept()
+            raise WebSocketException(NO_SESSION)
+        return principal
+
+
+class NotifySecret:
+    """The secret that Orion sends with each notification.
+
+    Args:
+        current: What new subscriptions carry.
+        previous: Still taken while the secret is being changed; empty: none.
+    """
+
+    def __init__(self, current: str, previous: str = "") -> None:
+        self.current = current
+        self._previous = previous
+
+    def admits(self, given: str | None) -> bool:
+        """Whether a notification with this ``X-Iveg-Notify-Token`` is Orion's."""
+        if not given:
+            return False
+        # Both are always compared, so that time does not tell which one matched.
+        matches = [_same(given, known) for known in (self.current, self._previous)]
+        return any(matches)
+
+
+class SignInLink:
+    """Takes ``GET /?token=…`` off the road before anything can log or keep it.
+
+    Args:
+        door: Where the token is looked at.
+        refusal: Draws the page for a wrong token; None answers a problem.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        door: Door,
+        refusal: Callable[[Request, Problem], Response] | None = None,
+    ) -> None:
+        self._app = app
+        self._door = door
+        self._refusal = refusal
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        token = _token_in_link(scope)
+        if token is None:
+            await self._app(scope, receive, send)
+            return
+        # Servers write the query into their access log after the answer.
+        scope["query_string"] = b""
+        request = Request(scope)
+        response = self._door.sign_in(request, token)
+        if response is None:
+            problem = Problem(401, "This link does not sign in here, or not any more.")
+            refuse = self._refusal or (lambda _, problem: problem.response())
+            response = refuse(request, problem)
+        await response(scope, receive, send)
+
+
+def _token_in_link(scope: Scope) -> str | None:
+    if scope["type"] != "http" or scope["path"] != "/" or scope["method"] != "GET":
+        return None
+    query: bytes = scope["query_string"]
+    return parse_qs(query.decode("latin-1")).get("token", [None])[0]
+
+
+# --- what a route asks for ----------------------------------------------------------
+
+
+class Requirement:
+    """A FastAPI dependency that lets a role in; made by ``require``.
+
+    It serves HTTP and WebSocket routes alike and finds its ``Door`` at
+    ``app.state.door``.
+    """
+
+    def __init__(self, action: Action) -> None:
+        self.action = action
+
+    async def __call__(self, connection: HTTPConnection) -> Principal:
+        """Who comes in, or the error that keeps them out."""
+        door: Door = connection.app.state.door
+        if self.action == "open":
+            return door.identify(connection) or NOBODY
+        if isinstance(connection, WebSocket):
+            return await door.authorise_websocket(connection)
+        return door.authorise(Request(connection.scope), self.action)
+
+
+_REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
+    action: Requirement(action)
+    for action in ("open", "read", "stop", "release", "admin")
+}
+
+
+def require(action: Action) -> Requirement:
+    """What a route declares: ``Depends(require("stop"))``; ``open`` asks nothing."""
+    return _REQUIREMENTS[action]
+
+
+def declared_action(route: Any) -> Action | None:
+    """What a route, or its FastAPI context, declares; None when it forgot."""
+    dependant = getattr(route, "dependant", None)
+    if not isinstance(dependant, Dependant):
+        return None
+    actions = [
+        call.action for call in _calls(dependant) if isinstance(call, Requirement)
+    ]
+    # A router's requirement comes before the route's own, which is stricter.
+    return actions[-1] if actions else None
+
+
+def undeclared(app: FastAPI, open_paths: Iterable[str] = ()) -> list[str]:
+    """All routes and WebSockets that declare nothing and are not in ``open_paths``."""
+    allowed = frozenset(open_paths)
+    return sorted(
+        str(route.path)
+        for route in iter_route_contexts(app.routes)
+        if declared_action(route) is None and route.path not in allowed
+    )
+
+
+def _calls(dependant: Dependant) -> Iterator[object]:
+    for child in dependant.dependencies:
+        yield child.call
+        yield from _calls(child)
+
+
+# --- small shared pieces ------------------------------------------------------------
+
+
+def _refuse_forgery(request: Request) -> None:
+    """Cookies come along with anybody's request; these two signs do not.
+
+    Browsers send Sec-Fetch-Site to trustworthy addresses only, so over plain HTTP in
+    a greenhouse Origin has to do.
+    """
+    if request.headers.get("x-iveg") != "1":
+        raise ForeignOriginError("header X-IVEG: 1")
+    site = request.headers.get("sec-fetch-site")
+    if site is None:
+        own = _is_own(request.headers.get("origin"), request)
+    else:
+        own = site in ("same-origin", "none")
+    if not own:
+        raise ForeignOriginError("same origin")
+
+
+def _refuse_other_bodies(request: Request) -> None:
+    content_type = request.headers.get("content-type")
+    if content_type is None:
+        has_body = request.headers.get("content-length", "0") != "0"
+        if has_body or "transfer-encoding" in request.headers:
+            raise NotJsonError
+    elif content_type.partition(";")[0].strip().lower() != "application/json":
+        raise NotJsonError
+
+
+def _is_own(origin: str | None, connection: HTTPConnection) -> bool:
+    """Whether a page of this very server sent it.
+
+    Only host and port are compared: behind a proxy the scheme differs.
+    """
+    host = connection.headers.get("host", "")
+    return bool(host) and urlsplit(origin or "").netloc.lower() == host.lower()
+
+
+def _cookie_name(*, secure: bool) -> str:
+    return "__Host-iveg" if secure else "iveg"
+
+
+def _digest(token: str) -> bytes:
+    return hashlib.sha256(token.encode()).digest()
+
+
+def _same(given: str, known: str) -> bool:
+    """Compare in constant time; an empty secret matches nothing."""
+    return hmac.compare_digest(given.encode(), known.encode()) and bool(known)
