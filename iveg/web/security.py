@@ -1,0 +1,124 @@
+"""What stands in front of every route: headers that bind browsers, and a size limit.
+
+Pure ASGI.  Notifications come hundreds of times a second and no browser reads their
+answers, so their path is told apart first and pays for the size limit alone.
+"""
+
+from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from iveg.web.problems import Problem
+
+MAX_BODY = 1_048_576
+"""1 MiB, as at Orion (bytes)."""
+
+NOTIFICATIONS_PATH = "/ngsi/notifications"
+
+CONTENT_SECURITY_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "font-src 'self'; connect-src 'self'; manifest-src 'self'; base-uri 'none'; "
+    "form-action 'self'; frame-ancestors 'none'; object-src 'none'; "
+    "require-trusted-types-for 'script'"
+)
+
+PLOTLY_CONTENT_SECURITY_POLICY = (
+    CONTENT_SECURITY_POLICY.replace(
+        "style-src 'self'", "style-src 'self' 'unsafe-inline'"
+    )
+    .replace("img-src 'self' data:", "img-src 'self' data: blob:")
+    .replace("; require-trusted-types-for 'script'", "")
+)
+"""For the History page alone: Plotly writes style elements and sets innerHTML itself.
+Scripts still come from this server only."""
+
+_ALWAYS = (
+    ("content-security-policy", CONTENT_SECURITY_POLICY),
+    ("x-content-type-options", "nosniff"),
+    ("referrer-policy", "no-referrer"),
+    ("cross-origin-opener-policy", "same-origin"),
+    ("cross-origin-resource-policy", "same-origin"),
+)
+_TLS = ("strict-transport-security", "max-age=31536000")
+
+
+class SecurityHeaders:
+    """Adds the headers of safety.md §5.2 that a response has not set itself."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http" or scope["path"] == NOTIFICATIONS_PATH:
+            await self._app(scope, receive, send)
+            return
+
+        async def send_guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                _guard(MutableHeaders(scope=message), scope)
+            await send(message)
+
+        await self._app(scope, receive, send_guarded)
+
+
+def _guard(headers: MutableHeaders, scope: Scope) -> None:
+    for name, value in _ALWAYS:
+        headers.setdefault(name, value)
+    # Files are asked for again each time and mostly answered 304, so that a page
+    # never runs with yesterday's scripts; everything else is somebody's data.
+    is_file = scope["path"].startswith("/static/")
+    headers.setdefault("cache-control", "no-cache" if is_file else "no-store")
+    if scope["scheme"] == "https":
+        headers.setdefault(*_TLS)
+
+
+class BodyLimit:
+    """Refuses a body over the limit: before it is read where its length is declared."""
+
+    def __init__(self, app: ASGIApp, max_body: int = MAX_BODY) -> None:
+        self._app = app
+        self._max_body = max_body
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http" or scope["method"] == "GET":
+            await self._app(scope, receive, send)
+            return
+        declared = _declared_length(scope)
+        if declared is None:
+            receive = self._counted(receive)
+        elif declared > self._max_body:
+            await self._refuse(scope, receive, send)
+            return
+        await self._app(scope, receive, send)
+
+    def _counted(self, receive: Receive) -> Receive:
+        taken = 0
+
+        async def receive_counted() -> Message:
+            nonlocal taken
+            message = await receive()
+            taken += len(message.get("body", b""))
+            if taken > self._max_body:
+                raise HTTPException(413, self._sentence)
+            return message
+
+        return receive_counted
+
+    @property
+    def _sentence(self) -> str:
+        return f"A body may have {self._max_body} bytes at most."
+
+    async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
+        # The unread body would be taken for the next request.
+        problem = Problem(413, self._sentence, headers={"Connection": "close"})
+        await problem.response()(scope, receive, send)
+
+
+def _declared_length(scope: Scope) -> int | None:
+    """What Content-Length says (bytes); None when the body comes in chunks."""
+    for name, value in scope["headers"]:
+        if name == b"content-length":
+            return int(value) if value.isdigit() else None
+    return None
