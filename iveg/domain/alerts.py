@@ -1,0 +1,82 @@
+"""The alert rule (Algorithm 2) and the ring that it draws.
+
+A detection with confidence at or above the threshold and of class person or robot is
+an alert; below the threshold it is faint; any other confident class is a time stamp.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Class = Literal["person", "robot"]
+Kind = Literal["alert", "faint", "other"]
+
+PAPER_RADIUS_M = 2.0
+PAPER_THRESHOLD = 0.80
+WALKING_SPEED = 1.6
+"""How fast a person may walk (m/s, ISO 13855; safety.md §6.1)."""
+GROWTH_GRACE_S = 0.32
+"""Age up to which the ring keeps its size: the paper's P95 from robot to broker."""
+MAX_RADIUS_M = 6.0
+
+ALIASES: Mapping[str, Class] = {
+    "person": "person",
+    "farmer": "person",
+    "human": "person",
+    "operator": "person",
+    "worker": "person",
+    "pedestrian": "person",
+    "robot": "robot",
+    "agi": "robot",
+    "agii": "robot",
+    "husky": "robot",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the rule says of one detection.
+
+    Attributes:
+        class_: ``person``, ``robot``, or None for a class that the rule does not name.
+    """
+
+    kind: Kind
+    class_: Class | None
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One version of the rule; part of every decision that it makes.
+
+    Attributes:
+        threshold: Least confidence, inclusive; ``class_thresholds`` by canonical class.
+        radius_m: Ring of a fresh sighting, inclusive (m).
+        aliases: Class as a detector names it, in lower case → canonical class.
+    """
+
+    id: str = "fleet-alert"
+    version: int = 1
+    threshold: float = PAPER_THRESHOLD
+    class_thresholds: Mapping[Class, float] = field(default_factory=dict)
+    radius_m: float = PAPER_RADIUS_M
+    aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
+
+    def canonical(self, class_id: str) -> Class | None:
+        """The class that a detector's word stands for."""
+        return self.aliases.get(class_id.strip().lower())
+
+    def judge(self, class_id: str, confidence: float) -> Verdict:
+        """Judge one detection (Algorithm 2, lines 4-10)."""
+        class_ = self.canonical(class_id)
+        threshold = self.threshold
+        if class_ is not None:
+            threshold = self.class_thresholds.get(class_, threshold)
+        if confidence < threshold:
+            return Verdict("faint", class_)
+        return Verdict("other" if class_ is None else "alert", class_)
+
+    def radius_at(self, age_s: float) -> float:
+        """The ring of a sighting that is ``age_s`` old (m; safety.md §3.4)."""
+        grown = self.radius_m + WALKING_SPEED * max(0.0, age_s - GROWTH_GRACE_S)
+        return max(self.radius_m, min(MAX_RADIUS_M, grown))

@@ -1,0 +1,164 @@
+"""The decision record: from who was seen to the observed slow-down, link by link.
+
+One ``Decision`` opens when a robot enters a ring and closes when it is let go.  Every
+link has a time and a verdict; a link that does not come in time is itself an alarm
+(product.md §6)::
+
+    detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from iveg.domain.alerts import Rule
+from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.mandates import Crossing
+from iveg.domain.observations import Instant, SafetyReport
+
+LinkVerdict = Literal["ok", "late", "missing", "n/a", "open"]
+LinkName = Literal[
+    "detection", "filter", "geometry", "rule", "feedback", "applied", "observed"
+]
+
+OBSERVED_SHARE = 0.55
+"""The slow-down counts when the speed is at most this share of what it was."""
+JUDGED_ABOVE = 0.2
+"""Slower than this (m/s) there is no slow-down to observe."""
+LATE_S, MISSING_S = 1.0, 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One step of the chain: when, what, and whether it held."""
+
+    name: LinkName
+    verdict: LinkVerdict
+    at: float | None = None
+    value: str | float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Why one robot was slowed once.
+
+    Attributes:
+        feedback: When the mandate was first published; ``applied`` when the robot
+            said so; ``observed`` when its odometry showed it.
+        speed_after: Speed at ``observed`` (m/s).
+    """
+
+    crossing: Crossing
+    rule: Rule
+    feedback: Instant | None = None
+    applied: Instant | None = None
+    observed: Instant | None = None
+    ended: Instant | None = None
+    speed_after: float | None = None
+    missed: bool = False
+
+    @property
+    def decision_id(self) -> str:
+        """Names the decision everywhere: feedback, log, record."""
+        return self.crossing.decision_id
+
+    @property
+    def judged(self) -> bool:
+        """Whether the robot was fast enough for a slow-down to be seen."""
+        return self.crossing.speed_before > JUDGED_ABOVE
+
+    def published(self, at: Instant) -> "Decision":
+        """The mandate went out."""
+        return self if self.feedback is not None else replace(self, feedback=at)
+
+    def reported(self, report: SafetyReport, at: Instant) -> "Decision":
+        """The robot said what it applies."""
+        obeys = report.speed_factor <= HALF_SPEED
+        if self.applied is not None or not obeys or self.ended is not None:
+            return self
+        return replace(self, applied=at)
+
+    def moved(self, speed: float, at: Instant) -> "Decision":
+        """Odometry came in with this speed (m/s)."""
+        limit = OBSERVED_SHARE * self.crossing.speed_before
+        if self.observed is not None or not self.judged or abs(speed) > limit:
+            return self
+        return replace(self, observed=at, speed_after=abs(speed))
+
+    def overdue(self, now: Instant) -> bool:
+        """Whether the slow-down should have been seen by now and was not."""
+        waited = now.mono - self.crossing.entered.mono
+        if self.ended is not None or waited < MISSING_S:
+            return False
+        return self.applied is None or (self.judged and self.observed is None)
+
+    def links(self, now: Instant) -> tuple[Link, ...]:
+        """The chain as it stands."""
+        crossing, rule = self.crossing, self.rule
+        sighting = crossing.hazard.sighting
+        entered = crossing.entered.wall
+        seen = (
+            Link("detection", "n/a", None, "odometry")
+            if sighting is None
+            else Link("detection", "ok", sighting.at.wall, sighting.class_id)
+        )
+        passed = (
+            Link("filter", "n/a")
+            if sighting is None
+            else Link("filter", "ok", sighting.at.wall, sighting.confidence)
+        )
+        return (
+            seen,
+            passed,
+            Link("geometry", "ok", entered, crossing.entered_m),
+            Link("rule", "ok", entered, f"{rule.id} {rule.version}"),
+            self._step("feedback", self.feedback, None, now),
+            self._step("applied", self.applied, HALF_SPEED, now),
+            self._step("observed", self.observed, self.speed_after, now)
+            if self.judged
+            else Link("observed", "n/a", None, crossing.speed_before),
+        )
+
+    def _step(
+        self, name: LinkName, at: Instant | None, value: float | None, now: Instant
+    ) -> Link:
+        start = self.crossing.entered.mono
+        if at is not None:
+            took = at.mono - start
+            return Link(name, "ok" if took <= LATE_S else "late", at.wall, value)
+        if self.ended is not None or now.mono - start >= MISSING_S:
+            return Link(name, "missing")
+        return Link(name, "open")
+
+
+class Decisions:
+    """Open decisions, and the last few that ended."""
+
+    def __init__(self, keep: int = 200) -> None:
+        self._keep = keep
+        self._all: dict[str, Decision] = {}
+
+    def get(self, decision_id: str) -> Decision | None:
+        """One decision that is still in memory."""
+        return self._all.get(decision_id)
+
+    def open_of(self, robot_id: str) -> Iterable[Decision]:
+        """The open decisions that slow one robot."""
+        return [
+            one
+            for one in self._all.values()
+            if one.ended is None and one.crossing.robot_id == robot_id
+        ]
+
+    def put(self, decision: Decision) -> None:
+        """Keep a decision, new or changed; the oldest ended ones make room."""
+        self._all[decision.decision_id] = decision
+        if len(self._all) > self._keep:
+            for key, one in list(self._all.items()):
+                if one.ended is not None:
+                    del self._all[key]
+                    break
+
+    def every_open(self) -> Iterable[Decision]:
+        """All open decisions."""
+        return [one for one in self._all.values() if one.ended is None]

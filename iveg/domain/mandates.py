@@ -1,0 +1,254 @@
+"""Who must drive slower, and why: the fleet's mandates at one moment.
+
+A robot inside the ring of a person or of a moving peer is mandated half speed at once;
+it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap
+(safety.md §6.2).  The least factor counts, never the product.  Silence is a reason of
+its own: a robot that is not seen, or a fleet whose eyes are shut, drives at half.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from iveg.domain.alerts import Rule
+from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
+from iveg.domain.geometry import Pose2D
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.people import RING_S, People, Sighting
+from iveg.domain.world import RobotState, World
+
+RELEASE_M, RELEASE_S = 0.3, 1.0
+SILENCE_S = 1.0
+OBSERVER_FORGOTTEN_S = 600.0
+"""A robot that has not looked for ten minutes is no longer one of the fleet's eyes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """One circle that slows whoever is inside.
+
+    Attributes:
+        cause: The person or robot at its centre.
+        observer: Who saw it; the peer itself for a peer's own odometry.
+        x: Centre in ``map`` (m); ``y`` likewise.
+        sighting: What was seen; None for a peer's own odometry.
+        recorded: A recording saw it; it slows recordings alone.
+    """
+
+    reason: Literal["person", "robot"]
+    cause: str
+    observer: str
+    x: float
+    y: float
+    radius_m: float
+    sighting: Sighting | None = None
+    recorded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """One robot inside one ring, from trigger to release.
+
+    Attributes:
+        hazard: The nearest circle of the cause at trigger.
+        distance_m: Now; ``entered_m`` at the trigger.
+        outside_since: When it was first found outside (monotonic, s).
+        in_sight: Whether the robot had a line of sight to the centre at the trigger.
+    """
+
+    decision_id: str
+    robot_id: str
+    hazard: Hazard
+    entered: Instant
+    entered_m: float
+    speed_before: float
+    in_sight: bool
+    distance_m: float
+    outside_since: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A crossing that began or ended."""
+
+    crossing: Crossing
+    began: bool
+
+
+class Mandates:
+    """Keeps the crossings of the fleet and gives every robot its mandate."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._greenhouse = greenhouse
+        self._open: dict[tuple[str, str], Crossing] = {}
+
+    @property
+    def crossings(self) -> Iterable[Crossing]:
+        """Every crossing that has begun and not ended."""
+        return self._open.values()
+
+    def evaluate(
+        self,
+        world: World,
+        people: People,
+        rule: Rule,
+        now: Instant,
+        new_id: str,
+    ) -> tuple[dict[str, Mandate], list[Change]]:
+        """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
+        hazards = list(_hazards(world, people, rule, now))
+        changes: list[Change] = []
+        for robot in world.robots.values():
+            changes += self._cross(robot, hazards, now, f"{new_id}-{len(changes)}")
+        silent = _silent_observer(world, now)
+        return {
+            robot.robot_id: self._mandate(robot, silent, now)
+            for robot in world.robots.values()
+        }, changes
+
+    def _cross(
+        self, robot: RobotState, hazards: list[Hazard], now: Instant, new_id: str
+    ) -> Iterator[Change]:
+        odometry = robot.odometry
+        nearest: dict[str, tuple[float, float, Hazard]] = {}
+        for hazard in hazards if odometry is not None else ():
+            if hazard.cause == robot.robot_id:
+                continue
+            if hazard.recorded and not robot.is_replay:
+                continue
+            assert odometry is not None  # noqa: S101 - hazards are empty without it
+            distance = odometry.pose.distance_to(hazard.x, hazard.y)
+            depth = distance - hazard.radius_m
+            if hazard.cause not in nearest or depth < nearest[hazard.cause][0]:
+                nearest[hazard.cause] = (depth, distance, hazard)
+        for number, (cause, (depth, distance, hazard)) in enumerate(nearest.items()):
+            key = robot.robot_id, cause
+            crossing = self._open.get(key)
+            if crossing is None:
+                if depth <= 0.0 and odometry is not None:
+                    crossing = self._enter(
+                        robot,
+                        odometry.pose,
+                        hazard,
+                        distance,
+                        now,
+                        f"{new_id}-{number}",
+                    )
+                    self._open[key] = crossing
+                    yield Change(crossing, began=True)
+                continue
+            outside = depth > RELEASE_M
+            since = crossing.outside_since or now.mono
+            self._open[key] = replace(
+                crossing,
+                distance_m=distance,
+                outside_since=since if outside else None,
+            )
+        yield from self._leave(robot.robot_id, nearest, now)
+
+    def _enter(
+        self,
+        robot: RobotState,
+        pose: Pose2D,
+        hazard: Hazard,
+        distance: float,
+        now: Instant,
+        decision_id: str,
+    ) -> Crossing:
+        speed = 0.0 if robot.odometry is None else abs(robot.odometry.twist.linear_x)
+        return Crossing(
+            decision_id,
+            robot.robot_id,
+            hazard,
+            entered=now,
+            entered_m=distance,
+            speed_before=speed,
+            in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
+            distance_m=distance,
+        )
+
+    def _leave(
+        self, robot_id: str, near: Mapping[str, object], now: Instant
+    ) -> Iterator[Change]:
+        for key, crossing in list(self._open.items()):
+            if key[0] != robot_id:
+                continue
+            if key[1] not in near and crossing.outside_since is None:
+                crossing = replace(crossing, outside_since=now.mono)
+                self._open[key] = crossing
+            since = crossing.outside_since
+            if since is not None and now.mono - since >= RELEASE_S:
+                del self._open[key]
+                yield Change(crossing, began=False)
+
+    def _mandate(self, robot: RobotState, silent: str | None, now: Instant) -> Mandate:
+        """The reason that says most: a person, then a peer, then silence."""
+        mine = [one for one in self._open.values() if one.robot_id == robot.robot_id]
+        if mine:
+            worst = min(
+                mine, key=lambda one: (one.hazard.reason != "person", one.distance_m)
+            )
+            return Mandate(
+                HALF_SPEED,
+                worst.hazard.reason,
+                worst.hazard.cause,
+                worst.distance_m,
+                worst.decision_id,
+            )
+        age = robot.age_s(now)
+        if age is None or age > SILENCE_S:
+            return Mandate(HALF_SPEED, "stale", robot.robot_id)
+        blinded = robot.unreadable_at
+        if blinded is not None and now.mono - blinded <= SILENCE_S:
+            return Mandate(HALF_SPEED, "stale", robot.robot_id)
+        if silent is not None and not robot.is_replay:
+            return Mandate(HALF_SPEED, "stale", silent or None)
+        return CLEAR
+
+
+def _hazards(
+    world: World, people: People, rule: Rule, now: Instant
+) -> Iterator[Hazard]:
+    for person in people.known.values():
+        for sighting, radius in person.rings(rule, now):
+            yield Hazard(
+                person.class_,
+                person.person_id,
+                sighting.observer,
+                sighting.x,
+                sighting.y,
+                radius,
+                sighting,
+                world.robot(sighting.observer).is_replay,
+            )
+    for peer in world.robots.values():
+        age = peer.age_s(now)
+        if peer.odometry is None or age is None or age > RING_S:
+            continue
+        if peer.stands and age <= SILENCE_S:
+            continue
+        pose = peer.odometry.pose
+        yield Hazard(
+            "robot",
+            peer.robot_id,
+            peer.robot_id,
+            pose.x,
+            pose.y,
+            rule.radius_at(age),
+            recorded=peer.is_replay,
+        )
+
+
+def _silent_observer(world: World, now: Instant) -> str | None:
+    """Who of the fleet's eyes is shut; an empty text when nobody looks at all."""
+    ages = {
+        robot.robot_id: now.mono - robot.detections_at
+        for robot in world.live_robots()
+        if robot.detections_at is not None
+    }
+    eyes = {name: age for name, age in ages.items() if age <= OBSERVER_FORGOTTEN_S}
+    if not eyes:
+        return ""
+    slowest = max(eyes, key=lambda name: eyes[name])
+    return slowest if eyes[slowest] > SILENCE_S else None

@@ -1,0 +1,85 @@
+"""Order and clocks of what one robot sends (safety.md §3.1, §3.2).
+
+Newest wins: nothing waits for a message that is late.  A robot's stamp says how long a
+message travelled, relative to its fastest one; it never decides which is newer.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Literal
+
+from iveg.domain.observations import Instant, Origin
+
+Verdict = Literal["new", "late", "duplicate"]
+
+_REMEMBERED_SEQS = 128
+_REMEMBERED_BOOTS = 16
+_BUCKET_S, _BUCKETS = 5.0, 12
+
+
+@dataclass(slots=True)
+class Order:
+    """Where one stream (robot and kind) stands."""
+
+    boot: str | None = None
+    seq: int = -1
+    _old_boots: deque[str] = field(
+        default_factory=lambda: deque(maxlen=_REMEMBERED_BOOTS)
+    )
+    _recent: deque[int] = field(default_factory=lambda: deque(maxlen=_REMEMBERED_SEQS))
+
+    def judge(self, origin: Origin) -> Verdict:
+        """Say whether a message is newer than all before, and remember it.
+
+        A message without identity is new by arrival.
+        """
+        if origin.boot is None or origin.seq is None:
+            return "new"
+        if origin.boot != self.boot:
+            if origin.boot in self._old_boots:
+                return "late"
+            if self.boot is not None:
+                self._old_boots.append(self.boot)
+            self.boot, self.seq = origin.boot, origin.seq
+            self._recent.clear()
+            self._recent.append(origin.seq)
+            return "new"
+        if origin.seq in self._recent:
+            return "duplicate"
+        self._recent.append(origin.seq)
+        if origin.seq < self.seq:
+            return "late"
+        self.seq = origin.seq
+        return "new"
+
+
+@dataclass(slots=True)
+class ClockEstimate:
+    """Offset of a robot's clock against ours, by the fastest message of a minute.
+
+    The minimum of (arrival - stamp) over 60 s is the offset plus the shortest path
+    delay; what a message took beyond it is its own delay (the min-filter of NTP).
+    """
+
+    _buckets: deque[tuple[float, float]] = field(
+        default_factory=lambda: deque(maxlen=_BUCKETS)
+    )
+
+    def observe(self, origin: Origin, at: Instant) -> float:
+        """Take one message in; return its extra delay (s), 0 without a stamp."""
+        if origin.stamp_s is None:
+            return 0.0
+        transit = at.wall - origin.stamp_s
+        if not self._buckets or at.mono - self._buckets[-1][0] > _BUCKET_S:
+            self._buckets.append((at.mono, transit))
+        elif transit < self._buckets[-1][1]:
+            self._buckets[-1] = (self._buckets[-1][0], transit)
+        return max(0.0, transit - self._least())
+
+    def _least(self) -> float:
+        return min(transit for _, transit in self._buckets)
+
+    @property
+    def offset_s(self) -> float | None:
+        """How far the robot's clock is behind ours (s); None without stamps."""
+        return self._least() if self._buckets else None

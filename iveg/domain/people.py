@@ -1,0 +1,254 @@
+"""Who is in the greenhouse: sightings of robots become people, and people age.
+
+::
+
+    seen (<= 1 s) ──> remembered (<= 10 s, ring grows) ──> last seen (<= 600 s, no ring)
+      ^________________________|____________________________|            └──> gone
+
+Several sightings are one person for the eye; for safety each robot's own sighting
+keeps its own circle, so a wrong merge never deletes protection (safety.md §3.4).
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from iveg.domain.alerts import Class, Rule
+from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.profiles import profile_of
+from iveg.domain.world import RobotState, World
+
+Stage = Literal["seen", "remembered", "last_seen", "gone"]
+
+SEEN_S, RING_S, LAST_SEEN_S = 1.0, 10.0, 600.0
+_GATE_M, _GATE_SPEED, _GATE_CAP_M = 1.0, 1.6, 2.0
+_PEER_GATE_M = 1.0
+_MAX_PEOPLE = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One robot's newest look at one person, in ``map``.
+
+    Attributes:
+        at: Source moment on our clocks.
+    """
+
+    observer: str
+    x: float
+    y: float
+    z: float
+    at: Instant
+    class_id: str
+    confidence: float
+
+    def age_s(self, now: Instant) -> float:
+        """Seconds since the look."""
+        return max(0.0, now.mono - self.at.mono)
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A person (or a robot that is none of ours) with everyone who saw them.
+
+    Attributes:
+        sightings: By observer, the newest of each.
+    """
+
+    person_id: str
+    class_: Class
+    decision_id: str
+    first_seen: Instant
+    newest: Sighting
+    sightings: dict[str, Sighting] = field(default_factory=dict)
+
+    def age_s(self, now: Instant) -> float:
+        """Seconds since the last look of any robot."""
+        return self.newest.age_s(now)
+
+    def stage(self, now: Instant) -> Stage:
+        """Where in the life of a sighting this person stands."""
+        age = self.age_s(now)
+        if age <= SEEN_S:
+            return "seen"
+        if age <= RING_S:
+            return "remembered"
+        return "last_seen" if age <= LAST_SEEN_S else "gone"
+
+    def rings(self, rule: Rule, now: Instant) -> Iterable[tuple[Sighting, float]]:
+        """Every circle that protects this person, with its radius now (m)."""
+        for sighting in self.sightings.values():
+            age = sighting.age_s(now)
+            if age <= RING_S:
+                yield sighting, rule.radius_at(age)
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A detection in ``map`` with what became of it.
+
+    Attributes:
+        person: The person it belongs to; None when faint, another class, or a peer.
+        peer: The fleet member that it is a sighting of.
+        peer_residual_m: How far from that member's own odometry (m).
+        appeared: Whether it made a new person.
+    """
+
+    detection: Detection
+    position: tuple[float, float, float]
+    kind: Literal["alert", "faint", "other"]
+    class_: Class | None
+    person: Person | None = None
+    peer: str | None = None
+    peer_residual_m: float | None = None
+    appeared: bool = False
+
+
+class People:
+    """Everyone who is known, in the order of their appearance."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, Person] = {}
+        self._count = 0
+
+    def sight(
+        self,
+        frame: DetectionFrame,
+        world: World,
+        rule: Rule,
+        at: Instant,
+        new_id: str,
+    ) -> list[Placed]:
+        """Take one look of one robot in.
+
+        ``at`` is the look's source moment on our clocks; ``new_id`` begins the
+        decision ids of whoever appears.
+
+        Returns:
+            Every detection that could be placed, judged and, if confident, assigned.
+        """
+        observer = world.robot(frame.robot_id)
+        placed = [
+            judged
+            for detection in frame.detections
+            if (judged := _place(detection, frame, observer, rule)) is not None
+        ]
+        placed = [_match_peer(one, observer, world, at) for one in placed]
+        return self._assign(placed, frame.robot_id, at, new_id)
+
+    def _assign(
+        self, placed: Sequence[Placed], observer: str, at: Instant, new_id: str
+    ) -> list[Placed]:
+        """Gated nearest neighbour, each person once a look, closest pairs first."""
+        out = list(placed)
+        wanting = [
+            index
+            for index, one in enumerate(out)
+            if one.kind == "alert" and one.peer is None
+        ]
+        pairs = sorted(
+            (distance, index, person_id)
+            for index in wanting
+            for person_id, person in self.known.items()
+            if person.class_ == out[index].class_
+            and (distance := _distance(person, out[index])) <= _gate(person, at)
+        )
+        taken: set[str] = set()
+        for _, index, person_id in pairs:
+            if index in wanting and person_id not in taken:
+                wanting.remove(index)
+                taken.add(person_id)
+                out[index] = self._seen_again(person_id, out[index], observer, at)
+        for index in wanting:
+            if len(self.known) < _MAX_PEOPLE:
+                out[index] = self._appear(out[index], observer, at, f"{new_id}-{index}")
+        return out
+
+    def _seen_again(
+        self, person_id: str, one: Placed, observer: str, at: Instant
+    ) -> Placed:
+        person, sighting = self.known[person_id], _sighting(one, observer, at)
+        older = person.sightings.get(observer)
+        if older is not None and older.at.mono > at.mono:
+            return replace(one, person=person)
+        newest = max(person.newest, sighting, key=lambda look: look.at.mono)
+        person = replace(
+            person,
+            newest=newest,
+            sightings={**person.sightings, observer: sighting},
+        )
+        self.known[person_id] = person
+        return replace(one, person=person)
+
+    def _appear(
+        self, one: Placed, observer: str, at: Instant, decision_id: str
+    ) -> Placed:
+        self._count += 1
+        sighting = _sighting(one, observer, at)
+        person = Person(
+            f"{'P' if one.class_ == 'person' else 'R'}{self._count}",
+            one.class_ or "person",
+            decision_id,
+            first_seen=at,
+            newest=sighting,
+            sightings={observer: sighting},
+        )
+        self.known[person.person_id] = person
+        return replace(one, person=person, appeared=True)
+
+    def forget(self, now: Instant) -> list[Person]:
+        """Drop who has not been seen for ten minutes; returns them."""
+        gone = [one for one in self.known.values() if one.stage(now) == "gone"]
+        for person in gone:
+            del self.known[person.person_id]
+        return gone
+
+
+def _place(
+    detection: Detection, frame: DetectionFrame, observer: RobotState, rule: Rule
+) -> Placed | None:
+    x, y, z = detection.box.centre
+    if detection.frame_id == "base_link":
+        pose = observer.pose_at_stamp(frame.origin.stamp_s)
+        if pose is None:
+            return None
+        x, y = pose.transform(x, y)
+    verdict = rule.judge(detection.class_id, detection.probability)
+    return Placed(detection, (x, y, z), verdict.kind, verdict.class_)
+
+
+def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) -> Placed:
+    """Recognise a sighted robot as the fleet member that stands there by odometry."""
+    if one.class_ != "robot":
+        return one
+    nearest: tuple[float, str] | None = None
+    for peer in world.robots.values():
+        if peer is observer or peer.odometry is None or peer.pose_at is None:
+            continue
+        reach = _PEER_GATE_M + profile_of(peer.robot_id).length / 2
+        reach += _GATE_SPEED * min(1.0, max(0.0, at.mono - peer.pose_at))
+        residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
+        if residual <= reach and (nearest is None or residual < nearest[0]):
+            nearest = (residual, peer.robot_id)
+    if nearest is None:
+        return one
+    return replace(one, peer=nearest[1], peer_residual_m=nearest[0])
+
+
+def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
+    x, y, z = one.position
+    detection = one.detection
+    return Sighting(observer, x, y, z, at, detection.class_id, detection.probability)
+
+
+def _distance(person: Person, one: Placed) -> float:
+    newest = person.newest
+    return math.hypot(newest.x - one.position[0], newest.y - one.position[1])
+
+
+def _gate(person: Person, at: Instant) -> float:
+    """How far one may have walked since the last look (m, capped)."""
+    return min(
+        _GATE_CAP_M, _GATE_M + _GATE_SPEED * abs(at.mono - person.newest.at.mono)
+    )

@@ -1,0 +1,520 @@
+"""The life of a STOP, as a pure state machine (safety.md §2.3).
+
+The operator's press is one fact; that the robot stands still is another.  This module
+keeps every step between the two apart, so the page never shows a wish as a result::
+
+    RUNNING ──> REQUESTED ──> SENT ──> DELIVERED ──> STANDING <──> STALE
+       ^            │  │        │          └──> STILL_MOVING ──┘ │
+       │            │  └────────┴─> UNCONFIRMED ─────────────────┤
+       │            └<── moved, hold lost, release unconfirmed ──┤
+       └── READY <────────────── RELEASING <─────────────────────┘
+
+STOP is a level: it is sent again until the robot reports our own hold, for ever.  A
+RELEASE is an edge: sent once, for the holds that a person saw; unconfirmed it becomes
+a STOP under a new id.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from iveg.domain.errors import CommandRefusedError
+from iveg.domain.observations import (
+    CommandAnswer,
+    Hold,
+    Instant,
+    Road,
+    SafetyReport,
+)
+from iveg.domain.world import STANDING_SPEED
+
+State = Literal[
+    "RUNNING",
+    "REQUESTED",
+    "SENT",
+    "DELIVERED",
+    "STANDING",
+    "UNCONFIRMED",
+    "STILL_MOVING",
+    "STALE",
+    "RELEASING",
+    "READY",
+]
+SendRoad = Literal["direct", "fiware"]
+
+_STEPS: dict[State, frozenset[State]] = {
+    "RUNNING": frozenset({"REQUESTED", "DELIVERED", "RELEASING"}),
+    "REQUESTED": frozenset({"REQUESTED", "SENT", "DELIVERED", "UNCONFIRMED"}),
+    "SENT": frozenset({"REQUESTED", "DELIVERED", "UNCONFIRMED"}),
+    "DELIVERED": frozenset({"REQUESTED", "STANDING", "STILL_MOVING"}),
+    "UNCONFIRMED": frozenset({"REQUESTED", "DELIVERED", "STANDING"}),
+    "STILL_MOVING": frozenset({"REQUESTED", "STANDING"}),
+    "STANDING": frozenset({"REQUESTED", "STALE", "RELEASING"}),
+    "STALE": frozenset({"REQUESTED", "STANDING"}),
+    "RELEASING": frozenset({"REQUESTED", "READY", "STANDING", "RUNNING"}),
+    "READY": frozenset({"REQUESTED", "RUNNING", "RELEASING", "DELIVERED"}),
+}
+
+UNCONFIRMED_S = 1.0
+STALE_S = 1.5
+FRESH_S = 1.0
+RELEASE_S = 2.0
+STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
+MOVED_SAMPLES = 3
+ASSUMED_BRAKING = 0.5
+"""Least braking that may be counted on (m/s²)."""
+BRAKING_EXTRA_S, BRAKING_CAP_S = 1.5, 5.0
+FIWARE_PAUSE_S = 2.0
+STANDING_RESEND_S = 5.0
+_EARLY_SENDS = (0.25, 0.5, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SendStop:
+    """Send this hold on this road, now."""
+
+    robot_id: str
+    hold_id: str
+    road: SendRoad
+
+
+@dataclass(frozen=True, slots=True)
+class SendOnce:
+    """Send a release (with ids) or a resume (without), once, through Orion alone."""
+
+    robot_id: str
+    kind: Literal["release", "resume"]
+    challenge: str
+    ids: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SetLevel:
+    """Publish the retained level that a reconnecting robot finds."""
+
+    robot_id: str
+    desired: Literal["stopped", "run"]
+    ids: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """The state changed: one audit row, one log line.
+
+    Attributes:
+        key: Names the sentence, such as ``standing`` or ``moved``.
+    """
+
+    robot_id: str
+    command_id: str
+    state: State
+    key: str
+    why: str | None = None
+
+
+Effect = SendStop | SendOnce | SetLevel | Changed
+
+
+@dataclass(slots=True)
+class Times:
+    """When each step of a command was taken; ``requested`` on our clocks."""
+
+    requested: Instant
+    sent_direct: Instant | None = None
+    sent_fiware: Instant | None = None
+    answer_direct: Instant | None = None
+    answer_fiware: Instant | None = None
+    standing: Instant | None = None
+
+
+@dataclass(slots=True)
+class Command:
+    """One STOP, RELEASE or RESUME as people follow it."""
+
+    command_id: str
+    robot_id: str
+    kind: Literal["stop", "release", "resume"]
+    state: State
+    times: Times
+    requesters: list[str] = field(default_factory=list)
+    tries: int = 0
+    reason: str | None = None
+    standstill_ms: float | None = None
+    roads: dict[SendRoad, str] = field(
+        default_factory=lambda: {"direct": "pending", "fiware": "pending"}
+    )
+
+
+class StopMachine:
+    """What iVeg wants of one robot, and how far that has come."""
+
+    def __init__(self, robot_id: str, *, direct: bool = True) -> None:
+        self.robot_id = robot_id
+        self.state: State = "RUNNING"
+        self.stop: Command | None = None
+        self.once: Command | None = None
+        self.report: SafetyReport | None = None
+        self.report_at: Instant | None = None
+        self._direct = direct
+        self._deadline = 0.0
+        self._next_direct = 0.0
+        self._next_fiware = 0.0
+        self._fiware_busy = False
+        self._standing_from: Instant | None = None
+        self._standing_count = 0
+        self._moving_samples = 0
+        self._moved_at = float("-inf")
+        self._speed = 0.0
+
+    # --- what is wanted -----------------------------------------------------------
+
+    @property
+    def wants_stop(self) -> bool:
+        """Whether a STOP stands that no reported release has ended."""
+        return self.stop is not None and self.state not in ("RUNNING", "READY")
+
+    @property
+    def hold_id(self) -> str | None:
+        """Our hold of this episode."""
+        return None if self.stop is None else self.stop.command_id
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """The holds that the robot last reported."""
+        return () if self.report is None else self.report.holds
+
+    def moved_m(self, now: Instant) -> float:
+        """How far it may have driven since its last word (m)."""
+        if self.report_at is None:
+            return 0.0
+        return self._speed * max(0.0, now.mono - self.report_at.mono)
+
+    # --- people -------------------------------------------------------------------
+
+    def press(
+        self, by: str, at: Instant, new_id: str, *, key: str = "requested"
+    ) -> list[Effect]:
+        """STOP: always accepted; a press during an episode joins it."""
+        if self.wants_stop and self.state != "RELEASING" and self.stop is not None:
+            if by not in self.stop.requesters:
+                self.stop.requesters.append(by)
+            return [] if self.state == "STANDING" else self._send_all(at)
+        return self._begin(by, at, new_id, key)
+
+    def _begin(self, by: str, at: Instant, new_id: str, key: str) -> list[Effect]:
+        """A new episode under an id that was never used before."""
+        self.stop = Command(new_id, self.robot_id, "stop", "REQUESTED", Times(at), [by])
+        if not self._direct:
+            self.stop.roads["direct"] = "off"
+        self.once = None
+        self._standing_from, self._standing_count = None, 0
+        self._deadline = at.mono + UNCONFIRMED_S
+        self._fiware_busy = False
+        effects = self._send_all(at)
+        effects.append(SetLevel(self.robot_id, "stopped", (new_id,)))
+        return [*effects, self._enter("REQUESTED", key)]
+
+    def release(
+        self, by: str, seen: Iterable[str], at: Instant, new_id: str
+    ) -> list[Effect]:
+        """Lift exactly the holds that a person saw.
+
+        Raises:
+            CommandRefusedError: not standing, no fresh report, or the set has changed.
+        """
+        report = self._may_release("release", at, allowed=("STANDING", "RUNNING"))
+        remote = [hold.id for hold in report.holds if hold.ack == "remote"]
+        asked = set(seen)
+        if asked not in (set(remote), {hold.id for hold in report.holds}):
+            raise CommandRefusedError(self.robot_id, "Release", "the holds changed")
+        if not remote:
+            raise CommandRefusedError(
+                self.robot_id, "Release", "nothing holds it that iVeg may lift"
+            )
+        return self._send_once("release", by, at, new_id, tuple(remote), report)
+
+    def resume(self, by: str, at: Instant, new_id: str) -> list[Effect]:
+        """Let a released robot drive.
+
+        Raises:
+            CommandRefusedError: still held, not standing, or no fresh report.
+        """
+        report = self._may_release("resume", at, allowed=("READY", "RUNNING"))
+        if report.holds:
+            raise CommandRefusedError(self.robot_id, "Resume", "it is still held")
+        return self._send_once("resume", by, at, new_id, (), report)
+
+    def _may_release(
+        self, kind: str, at: Instant, allowed: tuple[State, ...]
+    ) -> SafetyReport:
+        report, asked = self.report, kind.capitalize()
+        if self.state not in allowed:
+            why = f"its state is {self.state}"
+            raise CommandRefusedError(self.robot_id, asked, why)
+        if report is None or self._report_age(at) > FRESH_S:
+            raise CommandRefusedError(self.robot_id, asked, "its report is not fresh")
+        if not _stands(report):
+            raise CommandRefusedError(self.robot_id, asked, "it is moving")
+        if report.challenge is None:
+            raise CommandRefusedError(self.robot_id, asked, "it gave no challenge")
+        return report
+
+    def _send_once(
+        self,
+        kind: Literal["release", "resume"],
+        by: str,
+        at: Instant,
+        new_id: str,
+        ids: tuple[str, ...],
+        report: SafetyReport,
+    ) -> list[Effect]:
+        self.once = Command(
+            new_id, self.robot_id, kind, "RELEASING", Times(at), [by], tries=1
+        )
+        self.once.roads["direct"] = "off"
+        self._deadline = at.mono + RELEASE_S
+        changed = self._enter("RELEASING", "releasing")
+        return [
+            SendOnce(self.robot_id, kind, report.challenge or "", ids),
+            changed,
+        ]
+
+    # --- roads --------------------------------------------------------------------
+
+    def sent(self, road: SendRoad, at: Instant, *, ok: bool) -> list[Effect]:
+        """A road took our message (PUBACK, 2xx) or failed; neither is evidence."""
+        command = self.once if self.state == "RELEASING" else self.stop
+        if road == "fiware":
+            self._fiware_busy = False
+            self._next_fiware = at.mono + FIWARE_PAUSE_S
+        if command is None:
+            return []
+        command.roads[road] = "ok" if ok else "failed"
+        times = command.times
+        if not ok:
+            return []
+        if road == "direct":
+            times.sent_direct = times.sent_direct or at
+        else:
+            times.sent_fiware = times.sent_fiware or at
+        return [self._enter("SENT", "sent")] if self.state == "REQUESTED" else []
+
+    def _send_all(self, at: Instant) -> list[Effect]:
+        assert self.stop is not None  # noqa: S101 - callers have begun an episode
+        self.stop.tries += 1
+        effects: list[Effect] = []
+        if self._direct:
+            effects.append(SendStop(self.robot_id, self.stop.command_id, "direct"))
+        effects += self._send_fiware(at)
+        self._next_direct = at.mono + self._pause(at)
+        return effects
+
+    def _send_fiware(self, at: Instant) -> list[Effect]:
+        if self._fiware_busy or self.stop is None:
+            return []
+        self._fiware_busy = True
+        self._next_fiware = at.mono + FIWARE_PAUSE_S
+        return [SendStop(self.robot_id, self.stop.command_id, "fiware")]
+
+    def _pause(self, at: Instant) -> float:
+        """Direct at 0, 250, 500, 1000 ms, then 0.5 s, after 10 s every second."""
+        assert self.stop is not None  # noqa: S101 - as above
+        if self.state == "STANDING":
+            return STANDING_RESEND_S
+        age = at.mono - self.stop.times.requested.mono
+        for early in _EARLY_SENDS:
+            if age < early - 1e-3:
+                return early - age
+        return 0.5 if age < 10.0 else 1.0
+
+    # --- what comes back ----------------------------------------------------------
+
+    def answered(self, answer: CommandAnswer, at: Instant, road: Road) -> list[Effect]:
+        """The robot's own answer on ``cmdexe`` or ``cmd_info``."""
+        if self.state == "RELEASING" and self.once is not None:
+            return self._answered_once(answer, at, road)
+        if self.stop is None or answer.result != "LATCHED":
+            return []
+        if self.hold_id not in {answer.id, *(hold.id for hold in answer.holds)}:
+            return []
+        _note_answer(self.stop.times, at, road)
+        return self._delivered()
+
+    def _answered_once(
+        self, answer: CommandAnswer, at: Instant, road: Road
+    ) -> list[Effect]:
+        assert self.once is not None  # noqa: S101 - checked by the caller
+        if answer.result == "REFUSED":
+            _note_answer(self.once.times, at, road)
+            self.once.reason = answer.why
+            back: State = "STANDING" if self.once.kind == "release" else "READY"
+            changed = self._enter(back, "refused", answer.why)
+            self.once = None
+            return [changed]
+        if answer.result in ("RELEASED", "RESUMED"):
+            _note_answer(self.once.times, at, road)
+        return []
+
+    def _delivered(self) -> list[Effect]:
+        if self.state not in ("REQUESTED", "SENT", "UNCONFIRMED"):
+            return []
+        assert self.stop is not None  # noqa: S101 - these states have an episode
+        braking = min(self._speed / ASSUMED_BRAKING + BRAKING_EXTRA_S, BRAKING_CAP_S)
+        self._deadline = self.stop.times.requested.mono + braking
+        return [self._enter("DELIVERED", "delivered")]
+
+    def reported(
+        self, report: SafetyReport, at: Instant, road: Road, new_id: str
+    ) -> list[Effect]:
+        """The robot's safety report, new by (boot, seq), on either road."""
+        self.report, self.report_at = report, at
+        self._speed = abs(report.linear)
+        if self.state in ("RUNNING", "READY"):
+            return self._reported_free(report, at)
+        assert self.stop is not None or self.once is not None  # noqa: S101
+        if self.state == "RELEASING":
+            return self._reported_releasing(report)
+        assert self.stop is not None  # noqa: S101 - every other state has an episode
+        if self.hold_id not in {hold.id for hold in report.holds}:
+            self._standing_from, self._standing_count = None, 0
+            if self.state in ("STANDING", "STALE"):
+                return self._begin("iveg", at, new_id, "moved")
+            return []
+        _note_answer(self.stop.times, at, road)
+        effects = self._delivered()
+        if not _stands(report):
+            self._standing_from, self._standing_count = None, 0
+            if self.state in ("STANDING", "STALE"):
+                return [*effects, *self._begin("iveg", at, new_id, "moved")]
+            return effects
+        return [*effects, *self._stood(at)]
+
+    def _stood(self, at: Instant) -> list[Effect]:
+        """One more sample at rest; five over a second are a standstill."""
+        assert self.stop is not None  # noqa: S101 - called with an episode
+        if self._standing_from is None:
+            self._standing_from = at
+        self._standing_count += 1
+        if self.state == "STANDING":
+            return []
+        long_enough = at.mono - self._standing_from.mono >= STANDING_S
+        contradicted = at.mono - self._moved_at < STANDING_FRESH_S
+        if self._standing_count < STANDING_SAMPLES or not long_enough or contradicted:
+            return []
+        if self.stop.times.standing is None:
+            self.stop.times.standing = self._standing_from
+            took = self._standing_from.mono - self.stop.times.requested.mono
+            self.stop.standstill_ms = max(0.0, 1000.0 * took)
+        return [self._enter("STANDING", "standing")]
+
+    def _reported_free(self, report: SafetyReport, at: Instant) -> list[Effect]:
+        if self.state == "READY" and not report.holds and report.speed_factor > 0:
+            return self._finish("running")
+        ours = [hold.id for hold in report.holds if hold.source == "iveg"]
+        if not ours:
+            return []
+        # A hold of iVeg that this process did not ask for: adopt it, never drop it.
+        self.stop = Command(
+            ours[-1], self.robot_id, "stop", "DELIVERED", Times(at), ["iveg"]
+        )
+        self._standing_from, self._standing_count = None, 0
+        self._deadline = at.mono + BRAKING_CAP_S
+        self._next_direct = self._next_fiware = at.mono
+        level = SetLevel(self.robot_id, "stopped", (ours[-1],))
+        return [level, self._enter("DELIVERED", "adopted")]
+
+    def _reported_releasing(self, report: SafetyReport) -> list[Effect]:
+        assert self.once is not None  # noqa: S101 - RELEASING has one
+        if self.once.kind == "resume":
+            drives = not report.holds and report.speed_factor > 0
+            return self._finish("running") if drives else []
+        held = {hold.id for hold in report.holds}
+        ours = self.hold_id
+        if ours in held or (ours is not None and ours not in report.released):
+            return []
+        if ours is None and any(hold.ack == "remote" for hold in report.holds):
+            return []
+        changed = self._enter("READY", "ready")
+        self.once = None
+        return [SetLevel(self.robot_id, "run", ()), changed]
+
+    def _finish(self, key: str) -> list[Effect]:
+        changed = self._enter("RUNNING", key)
+        self.stop = self.once = None
+        return [changed]
+
+    def odometry(
+        self, linear: float, angular: float, at: Instant, new_id: str
+    ) -> list[Effect]:
+        """A fresh speed; three moving ones in a row contradict a standstill."""
+        moves = max(abs(linear), abs(angular)) >= STANDING_SPEED
+        self._moving_samples = self._moving_samples + 1 if moves else 0
+        self._moved_at = at.mono if moves else self._moved_at
+        self._speed = abs(linear)
+        if self.state == "STANDING" and self._moving_samples >= MOVED_SAMPLES:
+            return self._begin("iveg", at, new_id, "moved")
+        return []
+
+    # --- time ---------------------------------------------------------------------
+
+    def tick(self, now: Instant, new_id: str) -> list[Effect]:
+        """Let time pass: deadlines first, then what must be sent again."""
+        effects = self._overdue(now, new_id)
+        if not self.wants_stop or self.state == "RELEASING":
+            return effects
+        if now.mono >= self._next_direct:
+            resend = self.state == "STANDING"
+            effects += self._send_all(now) if not resend else self._remind(now)
+        elif now.mono >= self._next_fiware and self.state != "STANDING":
+            effects += self._send_fiware(now)
+        return effects
+
+    def _remind(self, now: Instant) -> list[Effect]:
+        assert self.stop is not None  # noqa: S101 - STANDING has an episode
+        self._next_direct = now.mono + STANDING_RESEND_S
+        road: SendRoad = "direct" if self._direct else "fiware"
+        return [SendStop(self.robot_id, self.stop.command_id, road)]
+
+    def _overdue(self, now: Instant, new_id: str) -> list[Effect]:
+        late = now.mono >= self._deadline
+        match self.state:
+            case "REQUESTED" | "SENT" if late:
+                return [self._enter("UNCONFIRMED", "unconfirmed")]
+            case "DELIVERED" if late:
+                return [self._enter("STILL_MOVING", "still_moving")]
+            case "STANDING" if self._report_age(now) > STALE_S:
+                self._standing_from, self._standing_count = None, 0
+                self._next_direct = now.mono
+                return [self._enter("STALE", "stale")]
+            case "RELEASING" if late:
+                return self._begin("iveg", now, new_id, "release_unconfirmed")
+        return []
+
+    def _report_age(self, now: Instant) -> float:
+        if self.report_at is None:
+            return float("inf")
+        return now.mono - self.report_at.mono
+
+    def _enter(self, state: State, key: str, why: str | None = None) -> Changed:
+        if state not in _STEPS[self.state]:
+            raise CommandRefusedError(
+                self.robot_id, state, f"no step leads there from {self.state}"
+            )
+        self.state = state
+        for command in (self.stop, self.once):
+            if command is not None:
+                command.state = state
+        about = self.once or self.stop
+        command_id = "" if about is None else about.command_id
+        return Changed(self.robot_id, command_id, state, key, why)
+
+
+def _stands(report: SafetyReport) -> bool:
+    return max(abs(report.linear), abs(report.angular)) < STANDING_SPEED
+
+
+def _note_answer(times: Times, at: Instant, road: Road) -> None:
+    if road == "mqtt":
+        times.answer_direct = times.answer_direct or at
+    else:
+        times.answer_fiware = times.answer_fiware or at

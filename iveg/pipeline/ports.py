@@ -1,0 +1,64 @@
+"""What the pipeline needs of the outside: a few verbs each."""
+
+from collections.abc import Iterable
+from typing import Literal, Protocol
+
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Instant
+
+
+class Fleet(Protocol):
+    """Straight to the robots over MQTT."""
+
+    def tell(self, feedback: Feedback) -> None:
+        """Offer feedback to the fleet; the newest of each topic counts."""
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Publish a STOP; returns when the broker has it.
+
+        Raises:
+            HopError: the broker did not take it.
+        """
+
+    async def set_level(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        """Publish the retained level.
+
+        Raises:
+            HopError: the broker did not take it.
+        """
+
+
+class ContextBroker(Protocol):
+    """Through Orion and the IoT Agent; an answer of 2xx is no evidence."""
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Ask for a STOP. Raises HopError."""
+
+    async def release(self, robot_id: str, ids: Iterable[str], challenge: str) -> None:
+        """Ask for a release, once. Raises HopError."""
+
+    async def resume(self, robot_id: str, challenge: str) -> None:
+        """Ask for a resume, once. Raises HopError."""
+
+
+class Journal(Protocol):
+    """Append-only file that outlives a crash and a lost database."""
+
+    async def wanted(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Write down what is wanted of a robot; returns when it is on disk."""
+
+
+class Ids(Protocol):
+    """Where new names come from: random, sortable, never reused (ULID)."""
+
+    def __call__(self) -> str:
+        """A new one."""
