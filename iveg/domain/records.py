@@ -1,0 +1,212 @@
+"""What is remembered: one frozen value for each row of the history.
+
+All times are Unix seconds UTC, positions are in ``map`` (m), speeds in m/s and rad/s.
+A decision, a command and an alert change state: a later record with the same id takes
+the place of the earlier one.  The other records are facts that are only ever added.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecisionRecord:
+    """Why one alert or mandate came to be and what it led to (product.md section 6).
+
+    Attributes:
+        kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
+        robot_id: The robot that was told; for an alert its observer.
+        class_: Canonical (``person``, ``robot``); ``class_id`` as the detector said.
+        confidence: 0 to 1.
+        distance_m: From the robot to the centre of the ring (m).
+        speed_factor: What was mandated: 0, 0.5 or 1.
+        rule_parameters: JSON text of the rule's parameters at that moment.
+        in_sight: Whether the robot itself could see the cause; None when unknown.
+        started_at: When the rule fired; ``ended_at`` when it let go.
+        observed_at: When the speed had come down.
+        speed_before: At ``started_at`` (m/s); ``speed_after`` at ``observed_at``.
+        links: JSON text: ``[{"link", "at", "value", "verdict"}, …]``.
+    """
+
+    decision_id: str
+    kind: Literal["alert", "mandate"]
+    robot_id: str
+    started_at: float
+    person_id: str | None = None
+    observer: str | None = None
+    class_: str | None = None
+    class_id: str | None = None
+    confidence: float | None = None
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    distance_m: float | None = None
+    speed_factor: float | None = None
+    reason: str | None = None
+    rule_id: str | None = None
+    rule_version: str | None = None
+    rule_parameters: str = "{}"
+    in_sight: bool | None = None
+    feedback_at: float | None = None
+    applied_at: float | None = None
+    observed_at: float | None = None
+    ended_at: float | None = None
+    speed_before: float | None = None
+    speed_after: float | None = None
+    links: str = "[]"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionRecord:
+    """One box of one look of one robot.
+
+    Attributes:
+        at: When it reached iVeg.
+        stamp: The robot's clock, exactly as sent.
+        class_: Canonical; None for a class that the alias table does not know.
+        confident: Whether it reached the threshold.
+        road: ``orion`` or ``mqtt``, whichever was first.
+        box: JSON text of the box with its ``frame_id``; None when it was not kept.
+    """
+
+    at: float
+    robot_id: str
+    class_id: str
+    probability: float
+    x: float
+    y: float
+    z: float
+    confident: bool
+    road: str
+    stamp: str | None = None
+    class_: str | None = None
+    person_id: str | None = None
+    box: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandRecord:
+    """One STOP, release or resume as it stands now.
+
+    Attributes:
+        state: One of the nine states of the STOP machine.
+        standing_at: First standing sample.
+        standstill_ms: ``standing_at`` − ``requested_at`` (ms).
+        tries: How often it was sent.
+        reason: A code for what is shown beside the state.
+    """
+
+    command_id: str
+    robot_id: str
+    kind: Literal["stop", "release", "resume"]
+    state: str
+    requested_by: str
+    requested_at: float
+    sent_fiware_at: float | None = None
+    sent_direct_at: float | None = None
+    answer_fiware_at: float | None = None
+    answer_direct_at: float | None = None
+    standing_at: float | None = None
+    standstill_ms: float | None = None
+    tries: int = 0
+    reason: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandEventRecord:
+    """One change of one command: a line of the audit trail, never altered."""
+
+    command_id: str
+    robot_id: str
+    at: float
+    state: str
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlertRecord:
+    """One notice to people, through its life (ISA-18.2).
+
+    Attributes:
+        priority: ``P1``, ``P2`` or ``P3``.
+        key: Template of its sentence; ``slots`` JSON text that fills it.
+        count: How often it was raised while it lived.
+    """
+
+    alert_id: str
+    priority: str
+    key: str
+    raised_at: float
+    slots: str = "{}"
+    robot_id: str | None = None
+    cleared_at: float | None = None
+    acknowledged_at: float | None = None
+    acknowledged_by: str | None = None
+    note: str | None = None
+    count: int = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogRecord:
+    """One line of the action and inference log.
+
+    Attributes:
+        id: The live log's number.
+        key: Template of its sentence; ``slots`` JSON text that fills it.
+    """
+
+    id: int
+    at: float
+    kind: str
+    key: str
+    slots: str = "{}"
+    robot_id: str | None = None
+    class_: str | None = None
+    decision_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryRecord:
+    """Where a robot was, how fast, and what it was told and applied.
+
+    Attributes:
+        linear: (m/s); ``angular`` (rad/s).
+        mandated_factor: What iVeg mandated; ``applied_factor`` what the robot reported.
+        link: ``LIVE``, ``LATE`` or ``LOST``.
+    """
+
+    at: float
+    robot_id: str
+    x: float
+    y: float
+    yaw: float
+    linear: float
+    angular: float
+    mandated_factor: float
+    applied_factor: float | None = None
+    link: str | None = None
+
+
+Record = (
+    DecisionRecord
+    | DetectionRecord
+    | CommandRecord
+    | CommandEventRecord
+    | AlertRecord
+    | LogRecord
+    | OdometryRecord
+)
+RECORD_TYPES: tuple[type[Record], ...] = (
+    DecisionRecord,
+    DetectionRecord,
+    CommandRecord,
+    CommandEventRecord,
+    AlertRecord,
+    LogRecord,
+    OdometryRecord,
+)
+
+
+def is_telemetry(record: Record) -> bool:
+    """Whether a record may be dropped under pressure; the others never are."""
+    return isinstance(record, OdometryRecord | DetectionRecord)
