@@ -1,0 +1,115 @@
+"""Connections to the history database, the same behaviour on both kinds.
+
+SQLite runs in WAL so that readers never wait for the writer; its driver's own hidden
+transactions are turned off, so that a transaction begins where we say so.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import ArgumentError
+from sqlalchemy.pool import ConnectionPoolEntry, NullPool
+
+from iveg.domain.errors import HopError, SettingsError
+
+BUSY_TIMEOUT_MS = 5000
+_POSTGRESQL = {
+    "connect_timeout": 5,
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+    # A failed-over server goes silent; without this a commit waits for minutes.
+    "tcp_user_timeout": 10_000,
+    "application_name": "iveg",
+}
+
+
+def sqlite_url(file: Path) -> str:
+    """The address of an SQLite file."""
+    return URL.create("sqlite", database=str(file)).render_as_string()
+
+
+def sqlite_file(database_url: str) -> Path | None:
+    """The file that an address names; None when it is a server's.
+
+    Raises:
+        SettingsError: not an address, or SQLite in memory, which forgets.
+    """
+    url = _parse(database_url)
+    if url.get_backend_name() != "sqlite":
+        return None
+    if url.database in (None, "", ":memory:"):
+        raise SettingsError("IVEG_DATABASE_URL", database_url, "a file for SQLite")
+    return Path(str(url.database))
+
+
+def describe(database_url: str) -> str:
+    """The address for people and logs, without its password."""
+    return _parse(database_url).render_as_string(hide_password=True)
+
+
+def writing_engine(database_url: str) -> Engine:
+    """For the one writer: its transactions take the write lock as they begin.
+
+    ``BEGIN IMMEDIATE`` waits its turn at the start; a transaction that finds out
+    half-way that it must write cannot wait at all.
+    """
+    return _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s")
+
+
+def reading_engine(database_url: str) -> Engine:
+    """For readers: short transactions, given up when they take too long."""
+    return _engine(database_url, "BEGIN", "-c statement_timeout=20s")
+
+
+def _engine(database_url: str, begin: str, options: str) -> Engine:
+    url = _parse(database_url)
+    if url.get_backend_name() == "sqlite":
+        # No pool: a file that was moved aside must not live on in an idle connection.
+        engine = create_engine(url, poolclass=NullPool)
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _beginner(begin))
+        return engine
+    try:
+        return create_engine(
+            url,
+            pool_size=4,
+            max_overflow=0,
+            pool_timeout=5,
+            pool_pre_ping=True,
+            connect_args=_POSTGRESQL | {"options": options},
+        )
+    except ModuleNotFoundError as error:
+        raise HopError("database", "PostgreSQL needs iveg[postgresql]") from error
+
+
+def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
+    connection.isolation_level = None
+    for pragma in (
+        f"busy_timeout={BUSY_TIMEOUT_MS}",
+        "journal_mode=WAL",
+        "synchronous=NORMAL",
+        "foreign_keys=ON",
+    ):
+        connection.cursor().execute(f"PRAGMA {pragma}")
+
+
+def _beginner(begin: str) -> Callable[[Connection], None]:
+    def start(connection: Connection) -> None:
+        connection.exec_driver_sql(begin)
+
+    return start
+
+
+def _parse(database_url: str) -> URL:
+    try:
+        url = make_url(database_url)
+    except ArgumentError as error:
+        raise SettingsError(
+            "IVEG_DATABASE_URL", "(hidden)", "an SQLAlchemy address"
+        ) from error
+    if url.drivername in ("postgresql", "postgres"):
+        return url.set(drivername="postgresql+psycopg")
+    return url

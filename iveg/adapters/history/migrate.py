@@ -1,0 +1,147 @@
+"""Bringing a database to the shape that this version of iVeg writes.
+
+The migrations lie beside the package in a checkout and inside it when installed.  Each
+start calls ``upgrade``: nothing to do costs a few milliseconds.
+"""
+
+import logging
+import sqlite3
+from datetime import UTC, datetime
+from pathlib import Path
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, text
+from sqlalchemy.exc import DatabaseError, OperationalError, SQLAlchemyError
+
+import iveg
+from iveg.adapters import clock
+from iveg.adapters.history.engine import describe, sqlite_file, writing_engine
+from iveg.domain.errors import DataFileError, HopError
+
+_log = logging.getLogger(__name__)
+_CHECK_LIMIT_S = 5.0
+_STEPS_BETWEEN_LOOKS = 100_000
+_ONE_AT_A_TIME = 0x69566567
+"""Any fixed number: the PostgreSQL lock that two starts at once would fight for."""
+
+
+def upgrade(database_url: str) -> None:
+    """Make the database fit to be written; a corrupt SQLite file is moved aside.
+
+    Raises:
+        DataFileError: it was written by a newer iVeg, or a migration broke off in it.
+        HopError: it cannot be reached.
+        SettingsError: the address cannot be used.
+    """
+    file = sqlite_file(database_url)
+    if file is not None:
+        _prepare_file(file)
+    engine = writing_engine(database_url)
+    try:
+        with engine.connect() as connection, connection.begin():
+            _upgrade(connection, describe(database_url))
+    except OperationalError as error:
+        raise HopError("database", reason_of(error)) from error
+    finally:
+        engine.dispose()
+
+
+def alembic_config(connection: Connection) -> Config:
+    """Alembic's settings made in code, so that a wheel needs no ini file."""
+    config = Config()
+    location = str(migrations_directory()).replace("%", "%%")
+    config.set_main_option("script_location", location)
+    config.set_main_option("path_separator", "os")
+    config.attributes["connection"] = connection
+    return config
+
+
+def migrations_directory() -> Path:
+    """Where the migrations are: inside an installed package, else in the checkout."""
+    package = Path(iveg.__file__).parent
+    installed = package / "_migrations"
+    return installed if installed.is_dir() else package.parent / "migrations"
+
+
+def reason_of(error: SQLAlchemyError) -> str:
+    """What the driver said, in one line, without statement and parameters."""
+    cause = getattr(error, "orig", None) or error
+    return " ".join(str(cause).split())
+
+
+def _upgrade(connection: Connection, where: str) -> None:
+    if connection.dialect.name == "postgresql":
+        lock = text("SELECT pg_advisory_xact_lock(:key)")
+        connection.execute(lock, {"key": _ONE_AT_A_TIME})
+    config = alembic_config(connection)
+    found = MigrationContext.configure(connection).get_current_revision()
+    known = {
+        step.revision for step in ScriptDirectory.from_config(config).walk_revisions()
+    }
+    if found is not None and found not in known:
+        raise DataFileError(
+            where,
+            "",
+            f"its history was written by a newer iVeg (revision {found}); start that "
+            "version, or name another database in IVEG_DATABASE_URL",
+        )
+    try:
+        command.upgrade(config, "head")
+    except DatabaseError as error:
+        raise DataFileError(
+            where,
+            "",
+            f"a migration of its history cannot be finished ({reason_of(error)}); "
+            "restore a backup, or name another database in IVEG_DATABASE_URL",
+        ) from error
+
+
+def _prepare_file(file: Path) -> None:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        damage = _damage(file) if file.exists() else None
+        if damage is not None:
+            _move_aside(file, damage)
+    except OSError as error:
+        raise HopError("database", f"{file}: {error.strerror}") from error
+
+
+def _damage(file: Path) -> str | None:
+    """What is wrong with a file's structure; None when nothing was found in 5 s.
+
+    A locked file is not a damaged one; it is left to those who come next.
+    """
+    deadline = clock.now().mono + _CHECK_LIMIT_S
+    connection = sqlite3.connect(file, isolation_level=None)
+    connection.set_progress_handler(
+        lambda: clock.now().mono > deadline, _STEPS_BETWEEN_LOOKS
+    )
+    try:
+        answer = connection.execute("PRAGMA quick_check(1)").fetchone()
+    except sqlite3.OperationalError:
+        return None
+    except sqlite3.DatabaseError as error:
+        return str(error)
+    finally:
+        connection.close()
+    return None if answer == ("ok",) else str(answer[0])
+
+
+def _move_aside(file: Path, damage: str) -> None:
+    moment = datetime.fromtimestamp(clock.now().wall, UTC)
+    mark = f".corrupt-{moment:%Y%m%dT%H%M%S%f}"
+    # The write-ahead files go along: left behind, they would play into the new one.
+    for part in ("", "-wal", "-shm"):
+        old = file.with_name(file.name + part)
+        if old.exists():
+            old.rename(file.with_name(file.name + mark + part))
+    _log.error(
+        "The history in %s is damaged (%s). It was moved aside as %s and a new one "
+        "begins; the past is missing until it is restored.",
+        file,
+        damage,
+        file.name + mark,
+    )

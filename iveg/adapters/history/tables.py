@@ -1,0 +1,234 @@
+"""The history as tables, the same on SQLite and PostgreSQL.
+
+A column's key is the field of its record, so that a row and a record are the same
+words.  Facts have a number that only grows; ``(robot_id, at)`` answers "what did this
+robot do then", which time travel, retention and charts all ask.  ``revision`` lets the
+newest state of a decision, command or alert win in whatever order states arrive.
+"""
+
+from dataclasses import dataclass
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Double,
+    Index,
+    Integer,
+    MetaData,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+from sqlalchemy.types import TypeEngine
+
+from iveg.domain.records import (
+    AlertRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    OdometryRecord,
+    Record,
+)
+
+metadata = MetaData(
+    naming_convention={
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "pk": "pk_%(table_name)s",
+    }
+)
+
+_BIG: TypeEngine[int] = BigInteger().with_variant(Integer(), "sqlite")
+
+
+def _number(name: str, *, null: bool = True) -> Column[float]:
+    return Column(name, Double, nullable=null)
+
+
+def _text(name: str, *, null: bool = True, key: str | None = None) -> Column[str]:
+    return Column(name, Text, nullable=null, key=key or name)
+
+
+def _row_id() -> Column[int]:
+    return Column("row_id", _BIG, primary_key=True, autoincrement=True)
+
+
+def _revision() -> Column[int]:
+    return Column("revision", BigInteger, nullable=False)
+
+
+decisions = Table(
+    "decisions",
+    metadata,
+    Column("decision_id", Text, primary_key=True),
+    _text("kind", null=False),
+    _text("robot_id", null=False),
+    _number("started_at", null=False),
+    _text("person_id"),
+    _text("observer"),
+    _text("class", key="class_"),
+    _text("class_id"),
+    _number("confidence"),
+    _number("x"),
+    _number("y"),
+    _number("z"),
+    _number("distance_m"),
+    _number("speed_factor"),
+    _text("reason"),
+    _text("rule_id"),
+    _text("rule_version"),
+    _text("rule_parameters", null=False),
+    Column("in_sight", Boolean),
+    _number("feedback_at"),
+    _number("applied_at"),
+    _number("observed_at"),
+    _number("ended_at"),
+    _number("speed_before"),
+    _number("speed_after"),
+    _text("links", null=False),
+    _revision(),
+    Index(None, "started_at", "decision_id"),
+    Index(None, "robot_id", "started_at"),
+)
+
+detections = Table(
+    "detections",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _text("robot_id", null=False),
+    _text("class_id", null=False),
+    _number("probability", null=False),
+    _number("x", null=False),
+    _number("y", null=False),
+    _number("z", null=False),
+    Column("confident", Boolean, nullable=False),
+    _text("road", null=False),
+    _text("stamp"),
+    _text("class", key="class_"),
+    _text("person_id"),
+    _text("box"),
+    Index(None, "at", "row_id"),
+    Index(None, "robot_id", "at"),
+    sqlite_autoincrement=True,
+)
+
+commands = Table(
+    "commands",
+    metadata,
+    Column("command_id", Text, primary_key=True),
+    _text("robot_id", null=False),
+    _text("kind", null=False),
+    _text("state", null=False),
+    _text("requested_by", null=False),
+    _number("requested_at", null=False),
+    _number("sent_fiware_at"),
+    _number("sent_direct_at"),
+    _number("answer_fiware_at"),
+    _number("answer_direct_at"),
+    _number("standing_at"),
+    _number("standstill_ms"),
+    Column("tries", Integer, nullable=False),
+    _text("reason"),
+    _revision(),
+    Index(None, "requested_at", "command_id"),
+    Index(None, "robot_id", "requested_at"),
+)
+
+command_events = Table(
+    "command_events",
+    metadata,
+    _row_id(),
+    _text("command_id", null=False),
+    _text("robot_id", null=False),
+    _number("at", null=False),
+    _text("state", null=False),
+    _text("why", null=False),
+    UniqueConstraint("command_id", "at", "state", "why"),
+    Index(None, "robot_id", "at"),
+    sqlite_autoincrement=True,
+)
+
+alerts = Table(
+    "alerts",
+    metadata,
+    Column("alert_id", Text, primary_key=True),
+    _text("priority", null=False),
+    _text("key", null=False),
+    _number("raised_at", null=False),
+    _text("slots", null=False),
+    _text("robot_id"),
+    _number("cleared_at"),
+    _number("acknowledged_at"),
+    _text("acknowledged_by"),
+    _text("note"),
+    Column("count", Integer, nullable=False),
+    _revision(),
+    Index(None, "raised_at", "alert_id"),
+    Index(None, "robot_id", "raised_at"),
+)
+
+log = Table(
+    "log",
+    metadata,
+    _row_id(),
+    Column("id", BigInteger, nullable=False),
+    _number("at", null=False),
+    _text("kind", null=False),
+    _text("key", null=False),
+    _text("slots", null=False),
+    _text("robot_id"),
+    _text("class", key="class_"),
+    _text("decision_id"),
+    UniqueConstraint("id", "at"),
+    Index(None, "at", "row_id"),
+    Index(None, "robot_id", "at"),
+    sqlite_autoincrement=True,
+)
+
+odometry = Table(
+    "odometry",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _text("robot_id", null=False),
+    _number("x", null=False),
+    _number("y", null=False),
+    _number("yaw", null=False),
+    _number("linear", null=False),
+    _number("angular", null=False),
+    _number("mandated_factor", null=False),
+    _number("applied_factor"),
+    _text("link"),
+    Index(None, "robot_id", "at"),
+    Index(None, "at"),
+    sqlite_autoincrement=True,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Shelf:
+    """Where one kind of record is kept.
+
+    Attributes:
+        identity: Columns that name the thing or fact; empty where every row is new.
+        changes: Whether a later record takes the place of an earlier one.
+    """
+
+    table: Table
+    identity: tuple[str, ...] = ()
+    changes: bool = False
+
+
+SHELVES: dict[type[Record], Shelf] = {
+    CommandRecord: Shelf(commands, ("command_id",), changes=True),
+    CommandEventRecord: Shelf(command_events, ("command_id", "at", "state", "why")),
+    DecisionRecord: Shelf(decisions, ("decision_id",), changes=True),
+    AlertRecord: Shelf(alerts, ("alert_id",), changes=True),
+    LogRecord: Shelf(log, ("id", "at")),
+    DetectionRecord: Shelf(detections),
+    OdometryRecord: Shelf(odometry),
+}
