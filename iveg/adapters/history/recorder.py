@@ -1,0 +1,267 @@
+"""Moves what the pipeline offers into the database, without ever making it wait.
+
+One task gathers batches, one thread writes them.  While the database is away, records
+that may not be lost go to the journal and telemetry waits its turn in the queue::
+
+    offer ──> queue ──> batch ──> database
+                └─ away ─> journal ─┘  on its return, and at the next start
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from iveg.adapters import clock
+from iveg.adapters.history.engine import sqlite_file
+from iveg.adapters.history.journal import Journal
+from iveg.adapters.history.store import Store
+from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.observations import Instant
+from iveg.domain.records import Record
+from iveg.pipeline.record import CAPACITY, RecordQueue, Waiting
+
+_log = logging.getLogger(__name__)
+_BATCH = 500
+_GATHER_S = 0.25
+_LATE_S = 2.0
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderHealth:
+    """How memory is doing.
+
+    Attributes:
+        state: ``ok``, ``late`` (something waits longer than 2 s) or ``down``.
+        age_s: How long the oldest record has waited to be stored (s).
+        detail: Why the database is away; empty when it is not.
+        counters: written, dropped, journalled, rejected, waiting.
+    """
+
+    state: Literal["ok", "late", "down"]
+    age_s: float
+    detail: str
+    counters: Mapping[str, int]
+
+
+class Recorder:
+    """The history's writing side; ``offer`` from the event loop's thread only.
+
+    Args:
+        database_url: Brought to the newest shape before the first write.
+        journal: File of the journal, beside the database.
+        read_clock: For the age of what waits and the order of revisions.
+    """
+
+    def __init__(
+        self,
+        database_url: str,
+        journal: Path,
+        *,
+        capacity: int = CAPACITY,
+        read_clock: Callable[[], Instant] = clock.now,
+    ) -> None:
+        self._store = Store(database_url)
+        self._journal = Journal(journal)
+        self._clock = read_clock
+        self._queue = RecordQueue(capacity)
+        self._thread = ThreadPoolExecutor(1, "history")
+        self._awake, self._full = asyncio.Event(), asyncio.Event()
+        self._writing: asyncio.Task[None] | None = None
+        self._closing = False
+        self._revision = 0
+        self._written = self._journalled = self._lost_at_close = 0
+        self._lost_since: float | None = None
+        self._detail = ""
+        self._pause_s = _FIRST_PAUSE_S
+        # What an earlier run could not store goes first.
+        self._awake.set()
+
+    # --- what the pipeline calls --------------------------------------------------
+
+    def offer(self, record: Record) -> None:
+        """Remember a record in a while; never blocks, never awaits, never fails."""
+        self._take(self._stamp(record))
+
+    async def secure(self, record: Record) -> bool:
+        """Remember a record, and return when it is on the disk in the journal.
+
+        For a STOP, which must survive a crash of the next millisecond.
+
+        Returns:
+            Whether the disk has it; when not, it waits in memory like any other.
+        """
+        waiting = self._stamp(record)
+        self._take(waiting)
+        return await self._append([waiting])
+
+    def health(self, now: Instant) -> RecorderHealth:
+        """How memory is doing at this moment."""
+        oldest = self._queue.oldest_since()
+        age = 0.0 if oldest is None else max(0.0, now.mono - oldest)
+        if self._lost_since is not None:
+            age = max(age, now.mono - self._lost_since)
+            return RecorderHealth("down", age, self._detail, self.counters)
+        state: Literal["ok", "late"] = "late" if age > _LATE_S else "ok"
+        return RecorderHealth(state, age, "", self.counters)
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Rows since the start, and rows that wait now."""
+        return {
+            "history_written": self._written,
+            "history_dropped": self._queue.dropped + self._lost_at_close,
+            "history_journalled": self._journalled,
+            "history_rejected": self._store.rejected + self._journal.unreadable,
+            "history_waiting": len(self._queue),
+        }
+
+    # --- the one writer -----------------------------------------------------------
+
+    async def run(self) -> None:
+        """Write until cancelled or closed; call ``close`` afterwards."""
+        await asyncio.to_thread(self._journal.keep_reserve)
+        while not self._closing:
+            await self._gather()
+            await self._round()
+
+    async def close(self) -> None:
+        """Store what is left, or journal it, and let go of the database."""
+        self._closing = True
+        self._awake.set()
+        self._full.set()
+        if self._writing is not None:
+            await asyncio.wait({self._writing})
+        while len(self._queue) and self._lost_since is None:
+            await self._write_batch(self._queue.take(_BATCH))
+        await self._spill()
+        self._lost_at_close += len(self._queue.take(len(self._queue)))
+        await asyncio.get_running_loop().run_in_executor(
+            self._thread, self._store.close
+        )
+        self._thread.shutdown(wait=False)
+
+    async def _gather(self) -> None:
+        """Wait for work, then a moment longer so that a batch is worth its commit."""
+        await self._awake.wait()
+        self._awake.clear()
+        try:
+            await asyncio.wait_for(self._full.wait(), _GATHER_S)
+        except TimeoutError:
+            return
+        finally:
+            self._full.clear()
+
+    async def _round(self) -> None:
+        batch = self._queue.take(_BATCH)
+        self._writing = asyncio.create_task(
+            self._write_batch(batch), name="history-batch"
+        )
+        # Cancelling us must not lose sight of a batch that the thread still writes.
+        while not self._writing.done():
+            await asyncio.wait({self._writing}, timeout=_GATHER_S)
+            if self._lost_since is not None:
+                await self._spill()
+        if self._lost_since is not None:
+            await self._rest()
+        if len(self._queue):
+            self._awake.set()
+        if len(self._queue) >= _BATCH:
+            self._full.set()
+
+    async def _rest(self) -> None:
+        pause, self._pause_s = self._pause_s, min(_LONGEST_PAUSE_S, 2 * self._pause_s)
+        self._awake.set()
+        while pause > 0.0 and not self._closing:
+            await asyncio.sleep(_GATHER_S)
+            await self._spill()
+            pause -= _GATHER_S
+
+    async def _write_batch(self, batch: list[Waiting]) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.run_in_executor(self._thread, self._write, batch)
+        except (HopError, DataFileError) as error:
+            self._queue.put_back(batch)
+            self._lose(str(error))
+            await self._spill()
+        else:
+            self._written += len(batch)
+            self._come_back()
+
+    def _write(self, batch: list[Waiting]) -> None:
+        """In the thread: what the journal holds is older, so it goes first."""
+        position = 0
+        while position < (end := self._journal.size):
+            rows, position = self._journal.read(position, _BATCH)
+            self._store.write(rows)
+            if position >= end and self._journal.clear(position):
+                break
+        if batch:
+            self._store.write(batch)
+
+    # --- away and back ------------------------------------------------------------
+
+    def _lose(self, detail: str) -> None:
+        if self._lost_since is None:
+            self._lost_since = self._clock().mono
+            _log.warning("history: database lost, keeping what matters: %s", detail)
+        self._detail = detail
+
+    def _come_back(self) -> None:
+        if self._lost_since is not None:
+            away = self._clock().mono - self._lost_since
+            _log.info("history: database is back after %.1f s", away)
+        self._lost_since, self._detail = None, ""
+        self._pause_s = _FIRST_PAUSE_S
+
+    async def _spill(self) -> None:
+        """Move what may not be lost from memory to the journal."""
+        kept = self._queue.take_kept(len(self._queue))
+        safe = not kept
+        try:
+            safe = safe or await self._append(kept)
+        finally:
+            # Cancelled half-way counts as not done: twice is harmless, never is not.
+            if not safe:
+                self._queue.put_back(kept)
+
+    async def _append(self, rows: list[Waiting]) -> bool:
+        try:
+            await asyncio.to_thread(self._journal.append, rows)
+        except HopError as error:
+            self._detail = str(error)
+            return False
+        self._journalled += len(rows)
+        self._awake.set()
+        return True
+
+    # --- the queue ----------------------------------------------------------------
+
+    def _stamp(self, record: Record) -> Waiting:
+        now = self._clock()
+        # The wall clock orders states across restarts, the count within one run.
+        self._revision = max(self._revision + 1, int(now.wall * 1e9))
+        return Waiting(record, self._revision, now.mono)
+
+    def _take(self, waiting: Waiting) -> None:
+        self._queue.offer(waiting)
+        self._awake.set()
+        if len(self._queue) >= _BATCH:
+            self._full.set()
+
+
+def journal_file(database_url: str, directory: Path) -> Path:
+    """Where the journal of a database is: beside an SQLite file, else in a directory.
+
+    Raises:
+        SettingsError: the address cannot be used.
+    """
+    file = sqlite_file(database_url)
+    if file is None:
+        return directory / "history.journal"
+    return file.with_name(file.name + ".journal")

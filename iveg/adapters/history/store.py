@@ -1,0 +1,170 @@
+"""Batches of records into the tables: one transaction each, all or nothing.
+
+A batch that fails because of one bad row is stored row by row; the bad one is counted
+and left out, so that it cannot hold up everything behind it.
+"""
+
+import logging
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+
+from sqlalchemy import Connection, Engine, Insert
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.exc import (
+    DataError,
+    DBAPIError,
+    IntegrityError,
+    InterfaceError,
+    ProgrammingError,
+    StatementError,
+)
+
+from iveg.adapters.history.engine import writing_engine
+from iveg.adapters.history.migrate import reason_of, upgrade
+from iveg.adapters.history.tables import SHELVES, Shelf
+from iveg.domain.errors import HopError
+from iveg.domain.records import CommandEventRecord, CommandRecord, Record
+from iveg.pipeline.record import Waiting
+
+_log = logging.getLogger(__name__)
+_Row = dict[str, object]
+_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in SHELVES}
+_VALUE_ERRORS = (ValueError, TypeError, OverflowError)
+
+
+class Store:
+    """The one writer's side of the database; blocks, so it lives in a thread."""
+
+    def __init__(self, database_url: str) -> None:
+        self._url = database_url
+        self._engine: Engine | None = None
+        self.rejected = 0
+        """Rows that the database can never take."""
+
+    def write(self, rows: Sequence[Waiting]) -> None:
+        """Store a batch; on failure nothing of it is stored.
+
+        Raises:
+            HopError: the database is away, locked, full or damaged.
+            DataFileError: it cannot be brought to the shape that is written here.
+        """
+        engine = self._ready()
+        try:
+            _write(engine, rows)
+        except (StatementError, *_VALUE_ERRORS) as error:
+            if not _is_fault_of_row(error, engine):
+                self._let_go(error)
+                raise HopError("database", _say(error)) from error
+            self._write_one_by_one(engine, rows)
+
+    def close(self) -> None:
+        """Let go of the connection; the next write makes a new one."""
+        if self._engine is not None:
+            self._engine.dispose()
+            self._engine = None
+
+    def _ready(self) -> Engine:
+        # Looking again after every loss heals a file that was damaged or replaced.
+        if self._engine is None:
+            upgrade(self._url)
+            self._engine = writing_engine(self._url)
+        return self._engine
+
+    def _let_go(self, error: Exception) -> None:
+        # A lock passes by itself; a check of the whole file would only add to it.
+        if "locked" not in str(error):
+            self.close()
+
+    def _write_one_by_one(self, engine: Engine, rows: Sequence[Waiting]) -> None:
+        with engine.connect() as connection:
+            _choose_durability(connection, rows)
+            try:
+                with connection.begin():
+                    for row in rows:
+                        self._try_one(connection, row)
+            except DBAPIError as error:
+                self._let_go(error)
+                raise HopError("database", _say(error)) from error
+
+    def _try_one(self, connection: Connection, row: Waiting) -> None:
+        try:
+            with connection.begin_nested():
+                _insert(connection, [row])
+        except (StatementError, *_VALUE_ERRORS) as error:
+            if not _is_fault_of_row(error, connection.engine):
+                raise
+            self.rejected += 1
+            kind = type(row.record).__name__
+            _log.error("history: a %s cannot be stored: %s", kind, _say(error))
+
+
+def _write(engine: Engine, rows: Sequence[Waiting]) -> None:
+    with engine.connect() as connection:
+        _choose_durability(connection, rows)
+        with connection.begin():
+            _insert(connection, rows)
+
+
+def _choose_durability(connection: Connection, rows: Sequence[Waiting]) -> None:
+    """SQLite waits for the disk where the batch holds commands or their audit trail.
+
+    Past the pool's back, because SQLAlchemy would begin a transaction for it, and
+    inside one SQLite ignores the change.
+    """
+    if connection.dialect.name != "sqlite":
+        return
+    audit = any(isinstance(r.record, CommandRecord | CommandEventRecord) for r in rows)
+    level = "FULL" if audit else "NORMAL"
+    connection.connection.cursor().execute(f"PRAGMA synchronous={level}")
+
+
+def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
+    for kind, shelf in SHELVES.items():
+        values = _values([row for row in rows if type(row.record) is kind], shelf)
+        if values:
+            connection.execute(_statement(shelf, connection.dialect.name), values)
+
+
+def _values(rows: Iterable[Waiting], shelf: Shelf) -> list[_Row]:
+    """Rows as columns; of several states of one thing only the newest."""
+    if not shelf.changes:
+        return [_columns(row.record) for row in rows]
+    newest: dict[tuple[object, ...], _Row] = {}
+    for row in sorted(rows, key=lambda row: row.revision):
+        values = _columns(row.record) | {"revision": row.revision}
+        newest[tuple(values[name] for name in shelf.identity)] = values
+    return list(newest.values())
+
+
+def _columns(record: Record) -> _Row:
+    return {name: getattr(record, name) for name in _FIELDS[type(record)]}
+
+
+def _statement(shelf: Shelf, dialect: str) -> Insert:
+    make = postgresql.insert if dialect == "postgresql" else sqlite.insert
+    statement = make(shelf.table)
+    if not shelf.identity:
+        return statement
+    names = [shelf.table.c[key] for key in shelf.identity]
+    if not shelf.changes:
+        return statement.on_conflict_do_nothing(index_elements=names)
+    return statement.on_conflict_do_update(
+        index_elements=names,
+        set_={c: statement.excluded[c.key] for c in shelf.table.c if c not in names},
+        where=shelf.table.c.revision <= statement.excluded.revision,
+    )
+
+
+def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
+    """Whether the values are to blame; else it is the database, and all can wait."""
+    if not isinstance(error, DBAPIError):
+        return True
+    if isinstance(error, IntegrityError | DataError):
+        return True
+    refused = (InterfaceError, ProgrammingError)
+    # Python's SQLite driver reports a type that it cannot bind in one of these two.
+    return engine.dialect.name == "sqlite" and isinstance(error, refused)
+
+
+def _say(error: Exception) -> str:
+    return reason_of(error) if isinstance(error, StatementError) else str(error)
