@@ -1,0 +1,10 @@
+"""What all tests share."""
+
+import os
+
+from hypothesis import settings
+
+# A busy machine may be slow without being wrong; the suite has its own time limits.
+settings.register_profile("iveg", deadline=None, max_examples=100)
+settings.register_profile("thorough", deadline=None, max_examples=2000)
+settings.load_profile(os.environ.get("IVEG_HYPOTHESIS", "iveg"))

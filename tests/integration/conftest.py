@@ -1,0 +1,48 @@
+"""Fixtures that run iVeg's programs on free ports and insist on clean logs."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.processes import Site, site
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Site]:
+    """Free ports, secrets and a data directory; nothing runs yet."""
+    with site(tmp_path) as found:
+        yield found
+
+
+@pytest.fixture
+def fiware(place: Site) -> Site:
+    """The embedded FIWARE runs."""
+    place.start("fiware")
+    for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
+        place.wait_for_port(setting)
+    return place
+
+
+@pytest.fixture
+def served(fiware: Site) -> Site:
+    """FIWARE and the dashboard run; no robot yet."""
+    fiware.start("serve")
+    fiware.wait_until_served()
+    return fiware
+
+
+@pytest.fixture
+def driving(served: Site) -> Site:
+    """FIWARE, dashboard and two emulated robots, each a process of its own."""
+    served.start("emulator")
+    served.wait_until_live()
+    return served
+
+
+@pytest.fixture
+def demo(place: Site) -> Site:
+    """``iveg demo``: all of it under one parent."""
+    place.start("demo")
+    place.wait_until_live()
+    return place

@@ -1,0 +1,253 @@
+"""iVeg's own programs, run as a user runs them: processes, ports, signals, logs."""
+
+import os
+import re
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+import httpx
+
+ROOT = Path(__file__).resolve().parents[1]
+_DIRTY = re.compile(r"^.*(?:\b(?:WARNING|ERROR|CRITICAL)\b|Traceback).*$", re.MULTILINE)
+_STOP_WITHIN_S = 15.0
+
+T = TypeVar("T")
+
+
+def until(probe: Callable[[], T | None], deadline_s: float, what: str) -> T:
+    """Ask again and again until there is an answer; the answer.
+
+    Raises:
+        AssertionError: none came within ``deadline_s``; says ``what`` was missing.
+    """
+    pause = threading.Event()
+    deadline = time.monotonic() + deadline_s
+    while time.monotonic() < deadline:
+        answer = probe()
+        if answer is not None and answer is not False:
+            return answer
+        pause.wait(0.05)
+    raise AssertionError(f"not within {deadline_s:g} s: {what}")
+
+
+def free_ports(count: int) -> tuple[int, ...]:
+    """Loopback ports that nobody listens on, all different."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for sock in sockets:
+            sock.bind(("127.0.0.1", 0))
+        return tuple(sock.getsockname()[1] for sock in sockets)
+
+
+@dataclass
+class Program:
+    """One ``python -m iveg WORD …``, its output in a file.
+
+    Attributes:
+        log_from: Where in the log the part begins that must be clean.
+    """
+
+    words: tuple[str, ...]
+    process: subprocess.Popen[bytes]
+    log: Path
+    log_from: int = 0
+
+    @property
+    def pid(self) -> int:
+        return self.process.pid
+
+    def text(self) -> str:
+        """All it said so far."""
+        return self.log.read_text(errors="replace")
+
+    def complaints(self) -> list[str]:
+        """Lines that a clean run does not have."""
+        return _DIRTY.findall(self.text()[self.log_from :])
+
+    def forgive(self) -> None:
+        """What was logged until now was provoked by the test."""
+        self.log_from = len(self.text())
+
+    def interrupt(self) -> int:
+        """What Ctrl-C does; returns the exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        return self.process.wait(_STOP_WITHIN_S)
+
+    def kill(self) -> None:
+        """What a power cut does."""
+        self.process.kill()
+        self.process.wait(_STOP_WITHIN_S)
+
+
+@dataclass
+class Site:
+    """A place of its own for one iVeg: ports, secrets, data directory."""
+
+    directory: Path
+    settings: dict[str, str] = field(default_factory=dict)
+    programs: list[Program] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        page, mqtt, orion, iota = free_ports(4)
+        self.settings = {
+            "IVEG_HOST": "127.0.0.1",
+            "IVEG_PORT": str(page),
+            "IVEG_MQTT_URL": f"mqtt://127.0.0.1:{mqtt}",
+            "IVEG_ORION_URL": f"http://127.0.0.1:{orion}",
+            "IVEG_IOTA_URL": f"http://127.0.0.1:{iota}",
+            "IVEG_NOTIFY_URL": f"http://127.0.0.1:{page}/ngsi/notifications",
+            "IVEG_NOTIFY_TOKEN": secrets.token_hex(32),
+            "IVEG_DATABASE_URL": f"sqlite:///{self.directory / 'history.sqlite'}",
+            "IVEG_SIGN_IN_TOKEN": secrets.token_hex(16),
+            "IVEG_API_TOKEN": secrets.token_urlsafe(24),
+            "XDG_DATA_HOME": str(self.directory),
+            **self.settings,
+        }
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://127.0.0.1:{self.settings['IVEG_PORT']}"
+
+    @property
+    def sign_in_link(self) -> str:
+        """What a grower opens first."""
+        return f"{self.url}/?token={self.settings['IVEG_SIGN_IN_TOKEN']}"
+
+    def start(self, *words: str) -> Program:
+        """Start ``python -m iveg WORD …`` here."""
+        log = self.directory / f"{len(self.programs)}-{words[0]}.log"
+        with log.open("wb") as output:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "iveg", *words],
+                cwd=self.directory,
+                env=self._environment(),
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                # Ctrl-C in the terminal of the tests is not Ctrl-C here.
+                start_new_session=True,
+            )
+        program = Program(words, process, log)
+        self.programs.append(program)
+        return program
+
+    def _environment(self) -> Mapping[str, str]:
+        inherited = ("PATH", "HOME", "LANG", "SYSTEMROOT", "TMPDIR")
+        kept = {name: os.environ[name] for name in inherited if name in os.environ}
+        return {
+            **kept,
+            "PYTHONPATH": str(ROOT),
+            "PYTHONUNBUFFERED": "1",
+            **self.settings,
+        }
+
+    def api(self) -> httpx.Client:
+        """A program's view of the API: may read and stop."""
+        bearer = {"Authorization": f"Bearer {self.settings['IVEG_API_TOKEN']}"}
+        return httpx.Client(
+            base_url=f"{self.url}/api/v1/", headers=bearer, timeout=5.0, trust_env=False
+        )
+
+    def wait_until_served(self, deadline_s: float = 30.0) -> None:
+        """Until the page answers."""
+        until(lambda: _answers(f"{self.url}/healthz"), deadline_s, "/healthz")
+
+    def wait_until_live(self, robots: int = 2, deadline_s: float = 30.0) -> None:
+        """Until that many robots are LIVE."""
+        self.wait_until_served(deadline_s)
+        with self.api() as api:
+            until(lambda: _live(api) >= robots, deadline_s, f"{robots} robots LIVE")
+
+    def wait_for_port(self, setting: str, deadline_s: float = 20.0) -> None:
+        """Until somebody listens where this setting points."""
+        address = httpx.URL(self.settings[setting])
+        place = (address.host, address.port or 0)
+        until(lambda: _listens(place), deadline_s, f"a listener at {setting}")
+
+    def stop_all(self) -> None:
+        """Ctrl-C for what still runs, last started first; a kill where that hangs."""
+        for program in reversed(self.programs):
+            if program.process.poll() is None:
+                try:
+                    program.interrupt()
+                except subprocess.TimeoutExpired:
+                    program.kill()
+
+    def assert_clean(self) -> None:
+        """No program said anything that a clean run does not say."""
+        said = {p.log.name: p.complaints() for p in self.programs if p.complaints()}
+        assert said == {}
+
+
+@contextmanager
+def site(directory: Path, **settings: str) -> Iterator[Site]:
+    """A place of its own that is cleared up afterwards."""
+    place = Site(directory, settings)
+    try:
+        yield place
+    finally:
+        place.stop_all()
+
+
+def children_of(pid: int) -> list[int]:
+    """All living descendants of a process, from ``/proc``."""
+    parents = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        fields = _stat_fields(stat)
+        if fields is not None:
+            parents[int(stat.parent.name)] = int(fields[1])
+    found: list[int] = []
+    wanted = {pid}
+    while wanted:
+        wanted = {child for child, parent in parents.items() if parent in wanted}
+        found += sorted(wanted)
+    return found
+
+
+def is_alive(pid: int) -> bool:
+    """Whether a process still runs (a zombie does not)."""
+    fields = _stat_fields(Path(f"/proc/{pid}/stat"))
+    return fields is not None and fields[0] != "Z"
+
+
+def _stat_fields(stat: Path) -> list[str] | None:
+    try:
+        # The name in brackets may hold spaces; what follows does not.
+        return stat.read_text().rpartition(")")[2].split()
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+
+
+def _answers(url: str) -> bool:
+    try:
+        return httpx.get(url, timeout=2.0, trust_env=False).status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+def _live(api: httpx.Client) -> int:
+    try:
+        answer = api.get("robots")
+    except httpx.TransportError:
+        return 0
+    if answer.status_code != 200:
+        return 0
+    return sum(robot["link"] == "LIVE" for robot in answer.json()["items"])
+
+
+def _listens(place: tuple[str, int]) -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(1.0)
+        return probe.connect_ex(place) == 0
