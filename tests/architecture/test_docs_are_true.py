@@ -1,0 +1,51 @@
+"""What the documents promise is what the code has.
+
+Routes and live topics are compared with a running iVeg in ``tests/e2e``.
+"""
+
+from dataclasses import fields
+
+import pytest
+
+from iveg import settings
+from iveg.ngsi import names
+from tests.processes import ROOT
+
+INTERFACES = (ROOT / "docs/interfaces.md").read_text()
+
+
+def test_the_settings_page_is_the_table_of_settings() -> None:
+    assert (ROOT / "docs/settings.md").read_text() == settings.describe()
+
+
+@pytest.mark.parametrize(
+    "variable",
+    [row.metadata["variable"] for row in fields(settings.Settings)],
+)
+def test_every_setting_has_its_heading(variable: str) -> None:
+    page = (ROOT / "docs/settings.md").read_text()
+
+    assert f"\n## `{variable}`\n" in page
+
+
+@pytest.mark.parametrize("device", names.ROBOT_DEVICES, ids=lambda d: d.suffix or "-")
+def test_every_measure_topic_is_in_the_contract(device: names.Device) -> None:
+    topic = names.measure_topic("{apikey}", "{robot}" + device.suffix)
+
+    assert f"`{topic}`" in INTERFACES
+
+
+@pytest.mark.parametrize(
+    "topic",
+    [
+        names.measure_topic("{apikey}", names.CLIMATE_DEVICE),
+        names.measure_topic("{apikey}", names.CANARY_ID),
+        names.command_topic("{apikey}", "{robot}"),
+        names.answer_topic("{apikey}", "{robot}"),
+        names.FEEDBACK_TOPIC.format(robot_id="{robot}"),
+        names.FEEDBACK_FILTER,
+        names.DESIRED_TOPIC.format(robot_id="{robot}"),
+    ],
+)
+def test_every_other_topic_is_in_the_contract(topic: str) -> None:
+    assert f"`{topic}`" in INTERFACES

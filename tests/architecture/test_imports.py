@@ -1,0 +1,94 @@
+"""The folder list is the dependency rule."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.processes import ROOT
+
+MODULES = sorted((ROOT / "iveg").rglob("*.py"))
+FORBIDDEN = ("TODO", "FIXME", "XXX", "NotImplementedError", "time.sleep(")
+EVERYTHING = sorted(
+    path
+    for folder in ("iveg", "tests", "benchmarks", "migrations")
+    for path in (ROOT / folder).rglob("*.py")
+    if path != Path(__file__)
+)
+
+
+def test_imports_point_down_the_page() -> None:
+    lint = Path(sys.executable).with_name("lint-imports")
+
+    run = subprocess.run(
+        [str(lint), "--no-cache"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_module_opens_with_its_one_reason_to_exist(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+
+    assert ast.get_docstring(tree) or not tree.body
+
+
+def test_only_the_clock_reads_the_clock() -> None:
+    readers = {
+        str(path.relative_to(ROOT))
+        for path in MODULES
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Import | ast.ImportFrom) and "time" in _names(node)
+    }
+
+    assert readers <= {"iveg/adapters/clock.py"}
+
+
+def test_nothing_is_left_half_done() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}: {word}"
+        for path in EVERYTHING
+        for word in FORBIDDEN
+        if word in path.read_text()
+    ]
+
+    assert found == []
+
+
+def test_front_end_modules_are_imported_relatively() -> None:
+    """A bare name needs an import map, which the security policy blocks."""
+    found = [
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for path in sorted((ROOT / "iveg/static/js").rglob("*.js"))
+        for line in path.read_text().splitlines()
+        if line.lstrip().startswith(("import ", "export ")) and " from " in line
+        if 'from "./' not in line and 'from "../' not in line
+    ]
+
+    assert found == []
+
+
+def test_nothing_is_loaded_from_another_host() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for folder, pattern in (("templates", "*.html"), ("static/css", "*.css"))
+        for path in sorted((ROOT / "iveg" / folder).rglob(pattern))
+        for line in path.read_text().splitlines()
+        if _loads_from_afar(line)
+    ]
+
+    assert found == []
+
+
+def _loads_from_afar(line: str) -> bool:
+    loads = ("src=", "<link", "url(", "@import")
+    return any(word in line for word in loads) and ("//" in line.split("<!--")[0])
+
+
+def _names(node: ast.Import | ast.ImportFrom) -> set[str]:
+    if isinstance(node, ast.ImportFrom):
+        return {node.module or ""}
+    return {alias.name for alias in node.names}
