@@ -55,7 +55,6 @@ class Decision:
     observed: Instant | None = None
     ended: Instant | None = None
     speed_after: float | None = None
-    missed: bool = False
 
     @property
     def decision_id(self) -> str:
@@ -65,7 +64,8 @@ class Decision:
     @property
     def judged(self) -> bool:
         """Whether the robot was fast enough for a slow-down to be seen."""
-        return self.crossing.speed_before > JUDGED_ABOVE
+        crossing = self.crossing
+        return crossing.speed_before > JUDGED_ABOVE and not crossing.already_slow
 
     def published(self, at: Instant) -> "Decision":
         """The mandate went out."""
@@ -84,6 +84,10 @@ class Decision:
         if self.observed is not None or not self.judged or abs(speed) > limit:
             return self
         return replace(self, observed=at, speed_after=abs(speed))
+
+    def closed(self, at: Instant) -> "Decision":
+        """The robot was let go."""
+        return replace(self, ended=at)
 
     def overdue(self, now: Instant) -> bool:
         """Whether the slow-down should have been seen by now and was not."""

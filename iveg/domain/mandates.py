@@ -54,6 +54,7 @@ class Crossing:
         hazard: The nearest circle of the cause at trigger.
         distance_m: Now; ``entered_m`` at the trigger.
         outside_since: When it was first found outside (monotonic, s).
+        already_slow: It was slowed for something else: no slow-down will be seen.
         in_sight: Whether the robot had a line of sight to the centre at the trigger.
     """
 
@@ -65,6 +66,7 @@ class Crossing:
     speed_before: float
     in_sight: bool
     distance_m: float
+    already_slow: bool = False
     outside_since: float | None = None
 
 
@@ -166,6 +168,8 @@ class Mandates:
             speed_before=speed,
             in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
             distance_m=distance,
+            already_slow=robot.safety is not None
+            and robot.safety.speed_factor <= HALF_SPEED,
         )
 
     def _leave(

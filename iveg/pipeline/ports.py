@@ -62,3 +62,10 @@ class Ids(Protocol):
 
     def __call__(self) -> str:
         """A new one."""
+
+
+class Clock(Protocol):
+    """Reads both clocks of this machine."""
+
+    def __call__(self) -> Instant:
+        """This moment."""

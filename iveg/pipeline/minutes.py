@@ -1,0 +1,231 @@
+"""The minutes: what happened, told to people at once and written down for later.
+
+One place turns domain values into log lines and history records, so that the page, the
+API and the database say the same.
+"""
+
+import json
+from collections import deque
+from dataclasses import asdict, replace
+
+from iveg.domain.alarms import Alarm
+from iveg.domain.decisions import Decision
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import Instant, Road
+from iveg.domain.people import Placed
+from iveg.domain.records import (
+    AlertRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    OdometryRecord,
+)
+from iveg.domain.stop import Changed, Command
+from iveg.domain.world import RobotState
+from iveg.pipeline.publish import Hub
+from iveg.pipeline.record import OdometryThinner, RecordSink
+
+_KEPT_LINES = 500
+
+
+class Minutes:
+    """Tells and writes down.
+
+    Attributes:
+        lines: The newest log lines, oldest first.
+    """
+
+    def __init__(self, hub: Hub, sink: RecordSink, start: Instant) -> None:
+        self._hub = hub
+        self._sink = sink
+        self._thinner = OdometryThinner()
+        # Starting at the clock keeps ids growing over restarts without asking anyone.
+        self._next_id = int(start.wall * 1000)
+        self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
+
+    def log(self, event: LogEvent, at: Instant) -> None:
+        """One line of the log."""
+        self._next_id += 1
+        record = LogRecord(
+            id=self._next_id,
+            at=at.wall,
+            kind=event.kind,
+            robot_id=event.robot_id,
+            key=event.key,
+            slots=json.dumps(dict(event.slots), ensure_ascii=False),
+            class_=event.class_,
+            decision_id=event.decision_id,
+        )
+        self.lines.append(record)
+        self._sink.offer(record)
+        self._hub.append("log", record)
+
+    def decision(self, decision: Decision, now: Instant) -> None:
+        """A decision is new or has grown a link."""
+        crossing, rule = decision.crossing, decision.rule
+        hazard, sighting = crossing.hazard, crossing.hazard.sighting
+        parameters = {
+            "threshold": rule.threshold,
+            "radius_m": rule.radius_m,
+            "ring_m": round(hazard.radius_m, 3),
+        }
+        self._sink.offer(
+            DecisionRecord(
+                decision_id=decision.decision_id,
+                kind="mandate",
+                robot_id=crossing.robot_id,
+                started_at=crossing.entered.wall,
+                person_id=hazard.cause,
+                observer=hazard.observer,
+                class_=hazard.reason,
+                class_id=None if sighting is None else sighting.class_id,
+                confidence=None if sighting is None else sighting.confidence,
+                x=hazard.x,
+                y=hazard.y,
+                z=None if sighting is None else sighting.z,
+                distance_m=crossing.entered_m,
+                speed_factor=0.5,
+                reason=hazard.reason,
+                rule_id=rule.id,
+                rule_version=str(rule.version),
+                rule_parameters=json.dumps(parameters),
+                in_sight=crossing.in_sight,
+                feedback_at=_wall(decision.feedback),
+                applied_at=_wall(decision.applied),
+                observed_at=_wall(decision.observed),
+                ended_at=_wall(decision.ended),
+                speed_before=crossing.speed_before,
+                speed_after=decision.speed_after,
+                links=json.dumps(
+                    [
+                        {
+                            "link": link.name,
+                            "at": link.at,
+                            "value": link.value,
+                            "verdict": link.verdict,
+                        }
+                        for link in decision.links(now)
+                    ]
+                ),
+            )
+        )
+
+    def detection(
+        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: Road
+    ) -> None:
+        """One detection that is worth a row."""
+        x, y, z = one.position
+        self._sink.offer(
+            DetectionRecord(
+                at=at.wall,
+                robot_id=robot_id,
+                class_id=one.detection.class_id,
+                probability=one.detection.probability,
+                x=x,
+                y=y,
+                z=z,
+                confident=one.kind != "faint",
+                road=road,
+                stamp=stamp,
+                class_=one.class_,
+                person_id=None if one.person is None else one.person.person_id,
+                box=json.dumps(
+                    {
+                        **asdict(one.detection.box),
+                        "frame_id": one.detection.frame_id,
+                    }
+                ),
+            )
+        )
+
+    def odometry(
+        self, robot: RobotState, mandated: float, link: str, at: Instant
+    ) -> None:
+        """A pose, if it is one of the two a second that are kept."""
+        if robot.odometry is None:
+            return
+        pose, twist = robot.odometry.pose, robot.odometry.twist
+        record = self._thinner.take(
+            OdometryRecord(
+                at=at.wall,
+                robot_id=robot.robot_id,
+                x=pose.x,
+                y=pose.y,
+                yaw=pose.yaw,
+                linear=twist.linear_x,
+                angular=twist.angular_z,
+                mandated_factor=mandated,
+                applied_factor=None
+                if robot.safety is None
+                else robot.safety.speed_factor,
+                link=link,
+            )
+        )
+        if record is not None:
+            self._sink.offer(record)
+
+    def command(self, command: Command, changed: Changed | None, at: Instant) -> None:
+        """A command is new or has taken a step."""
+        times = command.times
+        self._sink.offer(
+            CommandRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                kind=command.kind,
+                state=command.state,
+                requested_by=command.requesters[0],
+                requested_at=times.requested.wall,
+                sent_fiware_at=_wall(times.sent_fiware),
+                sent_direct_at=_wall(times.sent_direct),
+                answer_fiware_at=_wall(times.answer_fiware),
+                answer_direct_at=_wall(times.answer_direct),
+                standing_at=_wall(times.standing),
+                standstill_ms=command.standstill_ms,
+                tries=command.tries,
+                reason=command.reason,
+            )
+        )
+        if changed is not None:
+            self._sink.offer(
+                CommandEventRecord(
+                    command_id=command.command_id,
+                    robot_id=command.robot_id,
+                    at=at.wall,
+                    state=changed.state,
+                    why=changed.why or changed.key,
+                )
+            )
+        # A snapshot: what is sent later must still say what was true at this step.
+        step = replace(
+            command,
+            times=replace(times),
+            roads=dict(command.roads),
+            requesters=list(command.requesters),
+        )
+        self._hub.append(f"commands/{command.command_id}", step)
+
+    def alarm(self, alarm: Alarm) -> None:
+        """An alarm was raised, acknowledged or cleared."""
+        condition = alarm.condition
+        self._sink.offer(
+            AlertRecord(
+                alert_id=alarm.alert_id,
+                priority=condition.priority,
+                key=condition.key,
+                raised_at=alarm.raised.wall,
+                slots=json.dumps(dict(condition.slots), ensure_ascii=False),
+                robot_id=condition.robot_id,
+                cleared_at=_wall(alarm.cleared),
+                acknowledged_at=_wall(alarm.acknowledged),
+                acknowledged_by=alarm.acknowledged_by,
+                note=alarm.note or None,
+                count=alarm.count,
+            )
+        )
+        self._hub.changed("alerts")
+
+
+def _wall(at: Instant | None) -> float | None:
+    return None if at is None else at.wall
