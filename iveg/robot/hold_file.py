@@ -1,0 +1,55 @@
+"""The holds of a robot on its disk: whole or not at all.
+
+Written aside, forced to the disk and renamed, so a loss of power leaves the old set or
+the new one.  A file that cannot be read is not an empty one.
+"""
+
+import os
+from pathlib import Path
+
+import orjson
+from pydantic import TypeAdapter, ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import Hold
+from iveg.ngsi.codec import load_json
+from iveg.ngsi.payloads import HoldValue
+from iveg.robot.holds import HoldSet
+
+_HOLDS = TypeAdapter(list[HoldValue])
+_RELEASED = TypeAdapter(list[str])
+
+
+def read_holds(file: Path) -> HoldSet | None:
+    """The stored set, an empty one before the first start; None when unreadable."""
+    try:
+        stored = load_json(file.read_bytes())
+        holds = _HOLDS.validate_python(stored["holds"])
+        released = _RELEASED.validate_python(stored["released"])
+    except FileNotFoundError:
+        return HoldSet()
+    except (OSError, UnreadableError, ValidationError, KeyError, TypeError):
+        return None
+    return HoldSet(
+        tuple(Hold(hold.id, hold.source, hold.ack) for hold in holds), tuple(released)
+    )
+
+
+def write_holds(file: Path, holds: HoldSet) -> None:
+    """Store the set; returns when a loss of power can no longer lose it.
+
+    Raises:
+        OSError: the disk refused; the file is as it was.
+    """
+    file.parent.mkdir(parents=True, exist_ok=True)
+    aside = file.with_name(file.name + ".new")
+    with aside.open("wb") as stream:
+        stream.write(orjson.dumps({"holds": holds.holds, "released": holds.released}))
+        stream.flush()
+        os.fsync(stream.fileno())
+    aside.replace(file)
+    directory = os.open(file.parent, os.O_RDONLY)
+    try:
+        os.fsync(directory)
+    finally:
+        os.close(directory)

@@ -1,0 +1,109 @@
+"""The lane of safety: disk before answer, answers in order, the newest report.
+
+Telemetry has its own slots in the MQTT link, so however much of it waits, it never
+delays or drops what goes through here.
+"""
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from iveg.domain.errors import HopError
+from iveg.robot.holds import HoldSet
+
+_log = logging.getLogger(__name__)
+_MAX_ANSWERS = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Bytes for one topic, at QoS 1."""
+
+    topic: str
+    payload: bytes
+
+
+class SafetyLane:
+    """Keeps the hold set and sends answers and reports, in that order.
+
+    Args:
+        keep: Writes a hold set to disk; called in a thread, may raise OSError.
+        publish: Sends at QoS 1; raises HopError while the broker is away.
+    """
+
+    def __init__(
+        self,
+        keep: Callable[[HoldSet], None],
+        publish: Callable[[str, bytes], Awaitable[None]],
+    ) -> None:
+        self._keep = keep
+        self._publish = publish
+        self._to_keep: HoldSet | None = None
+        self._answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
+        self._kept_answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
+        self._newest_report: Message | None = None
+        self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
+        self._disk_fails = False
+        self.unsent = 0
+        """Answers and reports that found no broker; the next report says the same."""
+
+    def persist(self, holds: HoldSet) -> None:
+        """Keep this set; it describes everything before, so the newest is enough."""
+        self._to_keep = holds
+        self._keep_wake.set()
+
+    def answer(self, message: Message) -> None:
+        """Send after the set that it speaks of is on disk; the oldest gives way."""
+        self._answers.append(message)
+        self._keep_wake.set()
+
+    def report(self, message: Message) -> None:
+        """Send when there is time; a newer report takes its place."""
+        self._newest_report = message
+        self._send_wake.set()
+
+    async def keep_forever(self) -> None:
+        """Write sets and pass answers on until cancelled."""
+        while True:
+            await self._keep_wake.wait()
+            self._keep_wake.clear()
+            holds, self._to_keep = self._to_keep, None
+            answers = list(self._answers)
+            self._answers.clear()
+            if holds is not None:
+                await asyncio.to_thread(self._keep_once, holds)
+            self._kept_answers.extend(answers)
+            self._send_wake.set()
+
+    def _keep_once(self, holds: HoldSet) -> None:
+        # A full disk must not silence the robot: it is held in memory all the same,
+        # and it will boot held whatever the file says.
+        try:
+            self._keep(holds)
+        except OSError as error:
+            if not self._disk_fails:
+                _log.warning("the hold file cannot be written: %s", error)
+            self._disk_fails = True
+        else:
+            if self._disk_fails:
+                _log.warning("the hold file can be written again")
+            self._disk_fails = False
+
+    async def send_forever(self) -> None:
+        """Publish answers, then the newest report, until cancelled."""
+        while True:
+            await self._send_wake.wait()
+            self._send_wake.clear()
+            while self._kept_answers:
+                await self._send(self._kept_answers.popleft())
+            report, self._newest_report = self._newest_report, None
+            if report is not None:
+                await self._send(report)
+
+    async def _send(self, message: Message) -> None:
+        try:
+            await self._publish(message.topic, message.payload)
+        except HopError:
+            self.unsent += 1

@@ -1,0 +1,255 @@
+"""One robot's safety software at work: performs what the safety machine decides.
+
+The only publisher to the drive.  Effects are performed where they arise, zero first;
+disk and broker follow in their own lane and are never waited for.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import (
+    CommandAnswer,
+    DetectionFrame,
+    Hold,
+    LaserScan,
+    Navigation,
+    Odometry,
+    SafetyReport,
+)
+from iveg.domain.profiles import RobotProfile
+from iveg.ngsi import names
+from iveg.ngsi.codec import read_feedback
+from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.gate import REST
+from iveg.robot.hold_file import read_holds, write_holds
+from iveg.robot.lane import SafetyLane
+from iveg.robot.safety import Limits, SafetyMachine, State
+from iveg.robot.uplink import Form, Uplink
+
+_log = logging.getLogger(__name__)
+_GATE_EVERY_S = 0.04
+"""25 Hz, so that a late timer still gives the drive its 20."""
+
+
+class RobotNode:
+    """The software that rides on a robot.
+
+    Args:
+        robot_id: This robot.
+        address: The broker.
+        apikey: First part of the measure topics.
+        profile: Speeds of the drive.
+        hold_file: Where the holds survive a loss of power.
+        drive: Takes what the gate lets through; must not block.
+        slow_s: Feedback older than this halves the speed (s).
+        stand_s: Feedback older than this stops the robot (s).
+        uplink: One message a topic, or Algorithm 1's single payload.
+        held: Nobody is at the robot while it starts: ``release_locally`` does nothing
+            before ``run``.
+        on_link_loss: What ``stand_s`` of silence does.
+    """
+
+    def __init__(
+        self,
+        robot_id: str,
+        *,
+        address: BrokerAddress,
+        apikey: str,
+        profile: RobotProfile,
+        hold_file: Path,
+        drive: Callable[[Twist2D], None],
+        slow_s: float = 1.0,
+        stand_s: float = 3.0,
+        uplink: Form = "per-topic",
+        held: bool = False,
+        on_link_loss: Literal["stop", "slow"] = "stop",
+    ) -> None:
+        self.boot = secrets.token_hex(4)
+        self.clock_offset_s = 0.0
+        """Fault injection: the robot's wall clock is this far ahead; display only."""
+        self.mute = False
+        """Fault injection: publishes nothing."""
+        self.counters: Counter[str] = Counter()
+        self._id = robot_id
+        self._drive = drive
+        self._nobody_there = held
+        self._command_topic = names.command_topic(apikey, robot_id)
+        self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
+        self._link = MqttLink(
+            address,
+            f"robot {robot_id}",
+            {self._command_topic: 1, self._desired_topic: 1, names.FEEDBACK_FILTER: 1},
+            self._on_message,
+        )
+        self._lane = SafetyLane(
+            partial(write_holds, hold_file), partial(self._link.publish, qos=1)
+        )
+        self._uplink = Uplink(
+            robot_id,
+            apikey,
+            self.boot,
+            self._link.offer,
+            form=uplink,
+            first_report=1 + secrets.randbelow(2**31),
+        )
+        limits = Limits(
+            profile.max_speed, profile.max_turn, slow_s, stand_s, on_link_loss
+        )
+        stored = read_holds(hold_file)
+        if stored is None:
+            _log.warning("%s: unreadable hold file, held: %s", robot_id, hold_file)
+        self._machine = SafetyMachine(
+            robot_id,
+            self.boot,
+            clock.now().mono,
+            stored=stored,
+            fresh=partial(secrets.token_hex, 8),
+            limits=limits,
+        )
+
+    # --- what upstream may know ---------------------------------------------------
+
+    @property
+    def state(self) -> State:
+        """Where the safety machine stands."""
+        return self._machine.state(clock.now().mono)
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        """What holds the robot."""
+        return self._machine.holds.holds
+
+    @property
+    def may_drive(self) -> bool:
+        """Whether wishes count; while False upstream should wish for rest.
+
+        After a resume the robot moves only once upstream has wished for rest (or for
+        nothing at all) for 0.5 s.
+        """
+        return self._machine.may_drive
+
+    @property
+    def speed_factor(self) -> float:
+        """The factor of the gate; holds apart."""
+        return self._machine.cap.factor
+
+    @property
+    def connected(self) -> bool:
+        """Whether the broker hears us."""
+        return self._link.connected
+
+    @property
+    def deaf(self) -> bool:
+        """Fault injection: the gate ignores factors and mandates; holds still bite."""
+        return self._machine.deaf
+
+    @deaf.setter
+    def deaf(self, deaf: bool) -> None:
+        self._machine.deaf = deaf
+
+    # --- what happens to the robot ------------------------------------------------
+
+    async def run(self) -> None:
+        """Ride on the robot until cancelled; the drive is left at rest."""
+        self._nobody_there = False
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                for name, work in (
+                    ("gate", self._tick_forever()),
+                    ("link", self._link.run()),
+                    ("keep", self._lane.keep_forever()),
+                    ("send", self._lane.send_forever()),
+                ):
+                    tasks.create_task(work, name=f"robot-{self._id}-{name}")
+        finally:
+            self._drive(REST)
+
+    def sense(
+        self, observation: Odometry | LaserScan | DetectionFrame | Navigation
+    ) -> None:
+        """Take what the robot's own sensors say; the origin is filled in here."""
+        now = clock.now()
+        if isinstance(observation, Odometry):
+            self._perform(
+                self._machine.odometry(observation.pose, observation.twist, now.mono)
+            )
+        if self._link.connected and not self.mute:
+            self._uplink.send(observation, now.wall + self.clock_offset_s)
+
+    def wish(self, twist: Twist2D) -> None:
+        """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
+        self._perform(self._machine.wish(twist, clock.now().mono))
+
+    def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
+        """The red button or the bumper at the robot was pressed."""
+        self._perform(self._machine.local_hold(source, clock.now().mono))
+
+    def release_locally(self) -> None:
+        """A crew at the robot lifts boot, button and bumper holds and resumes."""
+        if not self._nobody_there:
+            self._perform(self._machine.release_locally(clock.now().mono))
+
+    async def _tick_forever(self) -> None:
+        while True:
+            self._perform(self._machine.tick(clock.now().mono))
+            await asyncio.sleep(_GATE_EVERY_S)
+
+    def _on_message(self, topic: str, payload: bytes) -> None:
+        now = clock.now().mono
+        if topic == self._command_topic:
+            self._perform(self._machine.command(payload, now))
+        elif topic == self._desired_topic:
+            self._perform(self._machine.desired(payload, now))
+        else:
+            self._on_feedback(topic, payload, now)
+
+    def _on_feedback(self, topic: str, payload: bytes, now: float) -> None:
+        try:
+            feedback = read_feedback(payload)
+        except UnreadableError as error:
+            # Counts as no feedback: the watchdog does the rest.
+            self.counters[error.reason] += 1
+            return
+        peer = topic.removeprefix("/").partition("/")[0]
+        self._perform(self._machine.feedback(peer, feedback, now))
+
+    # --- effects ------------------------------------------------------------------
+
+    def _perform(self, effects: tuple[Effect, ...]) -> None:
+        for effect in effects:
+            match effect:
+                case Drive(twist):
+                    self._drive(twist)
+                case Persist(holds):
+                    self._lane.persist(holds)
+                case Answer(answer):
+                    self._answer(answer)
+                case Report(report):
+                    self._report(report)
+
+    def _answer(self, answer: CommandAnswer) -> None:
+        self.counters[answer.result] += 1
+        _log.info(
+            "%s: %s %s %s", self._id, answer.result, answer.id or "", answer.why or ""
+        )
+        if not self.mute:
+            self._lane.answer(self._uplink.answer(answer, self._wall()))
+
+    def _report(self, report: SafetyReport) -> None:
+        if not self.mute:
+            seq, message = self._uplink.report(report, self._wall())
+            self._machine.reported(seq, clock.now().mono)
+            self._lane.report(message)
+
+    def _wall(self) -> float:
+        return clock.now().wall + self.clock_offset_s

@@ -1,0 +1,126 @@
+"""What a robot reads from its ``cmd`` topic: generous towards STOP, strict elsewhere.
+
+Whatever smells of a STOP is one; a release or resume must be exactly what the contract
+says, or it is refused with a reason (safety.md §2.2).
+"""
+
+from dataclasses import dataclass
+
+from iveg.domain.errors import UnreadableError
+from iveg.ngsi import names, payloads
+from iveg.ngsi.codec import load_json
+
+_STOP = "stop"
+_MAX_NAMED = 128
+_FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses reports that hold any of these
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Halt and hold; ``id`` None when the sender gave no usable name."""
+
+    id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """Lift exactly these holds."""
+
+    ids: tuple[str, ...]
+    challenge: str
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """Drive again after a release."""
+
+    challenge: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unusable:
+    """Neither; ``why`` is a short, stable code."""
+
+    why: str
+
+
+Order = Stop | Release | Resume | Unusable
+
+
+def read_order(payload: bytes) -> Order:
+    """Read one message of ``/{apikey}/{robot}/cmd``; never raises."""
+    try:
+        message = load_json(payload)
+    except UnreadableError:
+        return Stop() if _STOP.encode() in payload.lower() else Unusable("unreadable")
+    # A key that JSON dropped because it came twice still counts: look at the bytes.
+    if b'"stop"' in payload.lower() or _speaks_of_stop(message):
+        return Stop(_stop_id(message))
+    return _release_or_resume(message)
+
+
+def read_level(payload: bytes) -> tuple[str, ...] | None:
+    """Read ``/{robot}/iveg/desired``.
+
+    Returns:
+        The STOPs that hold (none named: one without a name); None where nothing holds.
+    """
+    try:
+        level = load_json(payload)
+    except UnreadableError:
+        return () if _STOP.encode() in payload.lower() else None
+    if not isinstance(level, dict) or level.get("desired") != "stopped":
+        return None
+    ids = level.get("ids")
+    usable = [_usable_id(one) for one in ids] if isinstance(ids, list) else []
+    return tuple(one for one in usable[:_MAX_NAMED] if one is not None)
+
+
+def _speaks_of_stop(value: object) -> bool:
+    if isinstance(value, str):
+        return value.strip().casefold() == _STOP
+    if isinstance(value, list):
+        return any(_speaks_of_stop(part) for part in value)
+    if isinstance(value, dict):
+        return any(_speaks_of_stop(part) for pair in value.items() for part in pair)
+    return False
+
+
+def _stop_id(message: object) -> str | None:
+    stop = _member(_member(message, names.COMMAND), _STOP)
+    return _usable_id(_member(stop, "id"))
+
+
+def _member(value: object, name: str) -> object:
+    return value.get(name) if isinstance(value, dict) else None
+
+
+def _usable_id(value: object) -> str | None:
+    if not isinstance(value, str) or not value or _FORBIDDEN & set(value):
+        return None
+    return value if payloads.clean_text(value) == value else None
+
+
+def _release_or_resume(message: object) -> Order:
+    command = _member(message, names.COMMAND)
+    if not isinstance(command, dict) or len(command) != 1:
+        return Unusable("malformed")
+    release, resume = command.get("release"), command.get("resume")
+    if isinstance(release, dict) and release.keys() == {"ids", "ch"}:
+        return _release(release["ids"], release["ch"])
+    if isinstance(resume, dict) and resume.keys() == {"ch"}:
+        challenge = resume["ch"]
+        if isinstance(challenge, str) and challenge:
+            return Resume(challenge)
+    return Unusable("malformed")
+
+
+def _release(ids: object, challenge: object) -> Order:
+    if not isinstance(challenge, str) or not challenge:
+        return Unusable("malformed")
+    if not isinstance(ids, list) or not 0 < len(ids) <= _MAX_NAMED:
+        return Unusable("malformed")
+    named = tuple(one for one in ids if isinstance(one, str) and one)
+    return (
+        Release(named, challenge) if len(named) == len(ids) else Unusable("malformed")
+    )

@@ -1,0 +1,427 @@
+r"""The safety machine of one robot, pure: facts and times in, frozen effects out.
+
+::
+
+    boot / unreadable file             release names every remote hold AND challenge
+    HELD ── brake ──> STANDING ───────────────────────────────────────────> READY
+                        ^   \__ any stop / hw / bumper, in any state __        │
+                        │                                             \       │ resume
+                     BRAKING <────────────────────────────────── RUNNING <────┘
+    RUNNING: upstream at rest for 0.5 s first, then the ramp;  factor = min(caps)
+             feedback older than 1.0 s, or a person or peer near  -> cap 0.5
+             feedback older than 3.0 s -> hold `link`, which clears itself when
+             feedback was fresh for 2.0 s, three times a minute, if no other hold came
+
+The state is never stored: it follows from the holds, the measured speed and whether
+somebody resumed.  Algorithm 3 of the paper is in ``hearsay``; here silence is added,
+which the paper takes for permission and iVeg does not.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.domain.feedback import HALF_SPEED, Feedback
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
+from iveg.robot.caps import FREE, Applied, Cap, lowest
+from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
+from iveg.robot.gate import Gate
+from iveg.robot.hearsay import Hearsay
+from iveg.robot.holds import MAX_HOLDS, HoldSet
+from iveg.robot.orders import Release, Resume, Stop, read_level, read_order
+from iveg.robot.watchdog import Watchdog
+
+State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
+
+STANDS_BELOW = 0.02
+"""Measured |v| (m/s) and |ω| (rad/s) of a robot that stands."""
+POSE_SLOW_S, POSE_STAND_S = 0.2, 0.5
+CHALLENGE_LIVES_S = 5.0
+REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.1
+"""Below the contract's 0.5 s, so that a late timer still keeps it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the machine must know of its robot.
+
+    Attributes:
+        max_speed: (m/s); ``max_turn`` (rad/s).
+        slow_s: Feedback older than this halves the speed (s).
+        stand_s: Feedback older than this holds the robot (s).
+        on_link_loss: ``slow`` stays at half speed however long the silence is.
+    """
+
+    max_speed: float = 1.0
+    max_turn: float = 1.0
+    slow_s: float = 1.0
+    stand_s: float = 3.0
+    on_link_loss: Literal["stop", "slow"] = "stop"
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """Newest odometry."""
+
+    pose: Pose2D
+    twist: Twist2D
+    at: float
+
+
+class SafetyMachine:
+    """Decides whether and how fast one robot may drive.
+
+    Every method takes ``now`` (monotonic, s) and returns effects in the order in which
+    they must be performed; the first is always what the drive is told.
+
+    Args:
+        robot_id: This robot.
+        boot: Random text of this start.
+        now: Monotonic (s).
+        stored: The hold set of the last run; None when it could not be read, which
+            counts as a STOP whose name was lost.
+        fresh: Makes random texts that never repeat, for challenges and hold ids.
+        limits: Speeds and waiting times.
+    """
+
+    def __init__(
+        self,
+        robot_id: str,
+        boot: str,
+        now: float,
+        *,
+        stored: HoldSet | None,
+        fresh: Callable[[], str],
+        limits: Limits | None = None,
+    ) -> None:
+        self._id = robot_id
+        self._fresh = fresh
+        self._limits = limits or Limits()
+        self._hearsay = Hearsay(robot_id)
+        self._watchdog = Watchdog(now, self._limits.slow_s)
+        self._gate = Gate(self._limits.max_speed, self._limits.max_turn)
+        self._motion: _Motion | None = None
+        self._applied = Applied(Cap(0.0, "watchdog"))
+        self._resumed = False
+        self._resumed_by: str | None = None
+        self._challenge, self._challenge_at = fresh(), now
+        self._holds = (stored or HoldSet()).after_reboot()
+        self._persisted: HoldSet | None = None
+        self._reported: SafetyReport | None = None
+        self._reported_at = now
+        if stored is None:
+            self._latch(self._nameless_stop(), now)
+        self._latch(Hold(f"boot-{boot}", "boot", "remote"), now)
+        self.deaf = False
+        """Fault injection: drive as wished whatever feedback says; holds still bite."""
+
+    # --- what can be asked --------------------------------------------------------
+
+    def state(self, now: float) -> State:
+        """Where the robot stands in the drawing above."""
+        if not self._holds.holds:
+            return "RUNNING" if self._resumed else "READY"
+        if self._own_motion(now) is None:
+            return "HELD"
+        return "STANDING" if self._stands(now) else "BRAKING"
+
+    @property
+    def holds(self) -> HoldSet:
+        """What holds the robot, and what did."""
+        return self._holds
+
+    @property
+    def challenge(self) -> str:
+        """What a release or resume must echo."""
+        return self._challenge
+
+    @property
+    def may_drive(self) -> bool:
+        """Whether a wish would move the robot: nothing holds it, and it was neutral."""
+        return self._free and not self._gate.neutral_needed
+
+    @property
+    def cap(self) -> Cap:
+        """The cap that the gate applies."""
+        return FREE if self.deaf else self._applied.cap
+
+    # --- what happens -------------------------------------------------------------
+
+    def tick(self, now: float) -> tuple[Effect, ...]:
+        """Time passed; call at least 20 times a second."""
+        self._judge(now)
+        return self._effects(now)
+
+    def wish(self, twist: Twist2D, now: float) -> tuple[Effect, ...]:
+        """Upstream navigation asks for this twist."""
+        self._gate.wish(twist, now)
+        return self.tick(now)
+
+    def odometry(self, pose: Pose2D, twist: Twist2D, now: float) -> tuple[Effect, ...]:
+        """The robot's sensors measured where it is and how fast."""
+        self._motion = _Motion(pose, twist, now)
+        return self.tick(now)
+
+    def feedback(
+        self, topic: str, feedback: Feedback, now: float
+    ) -> tuple[Effect, ...]:
+        """A message of ``/{topic}/mqtt_feedback`` came."""
+        motion = self._own_motion(now)
+        own = None if motion is None else motion.pose
+        if self._hearsay.take(topic, feedback, own, now):
+            self._watchdog.heard(feedback.seen.get(self._id), now)
+        return self.tick(now)
+
+    def reported(self, seq: int, now: float) -> None:
+        """The safety report that was wanted has left as ``seq``."""
+        self._watchdog.sent(seq, now)
+
+    def command(self, payload: bytes, now: float) -> tuple[Effect, ...]:
+        """Something came on ``/{apikey}/{robot}/cmd``."""
+        self._judge(now)
+        order = read_order(payload)
+        if isinstance(order, Stop):
+            answer = self._stop(order.id, now)
+        elif isinstance(order, Release):
+            answer = self._release(order, now)
+        elif isinstance(order, Resume):
+            answer = self._resume(order)
+        else:
+            answer = self._answer(None, "REFUSED", order.why)
+        self._judge(now)
+        return self._effects(now, answer)
+
+    def desired(self, payload: bytes, now: float) -> tuple[Effect, ...]:
+        """The retained level came; ``run`` releases nothing."""
+        level = read_level(payload)
+        if level is not None:
+            for hold_id in level or (None,):
+                self._stop(hold_id, now)
+        return self.tick(now)
+
+    def local_hold(
+        self, source: Literal["hw", "bumper"], now: float
+    ) -> tuple[Effect, ...]:
+        """The red button or the bumper was pressed at the robot."""
+        if all(hold.source != source for hold in self._holds.holds):
+            self._latch(Hold(f"{source}-{self._fresh()}", source, "local"), now)
+        return self.tick(now)
+
+    def release_locally(self, now: float) -> tuple[Effect, ...]:
+        """A crew at the robot lifts what is theirs to lift, and resumes.
+
+        A STOP from iVeg stays, and with it the robot.
+        """
+        local = {"boot", "hw", "bumper"}
+        self._holds = self._holds.lift(
+            hold.id for hold in self._holds.holds if hold.source in local
+        )
+        if not self._holds.holds and not self._resumed:
+            self._let_go()
+        return self.tick(now)
+
+    # --- commands -----------------------------------------------------------------
+
+    def _stop(self, hold_id: str | None, now: float) -> CommandAnswer:
+        if hold_id in self._holds.released:
+            return self._answer(hold_id, "RELEASED")
+        hold = self._held_as(hold_id)
+        if self._holds.find(hold.id) is None:
+            self._latch(hold, now)
+        return self._answer(hold_id or hold.id, "LATCHED")
+
+    def _held_as(self, hold_id: str | None) -> Hold:
+        """The hold that a STOP becomes, or the one that it joins."""
+        held = None if hold_id is None else self._holds.find(hold_id)
+        if held is not None and held.ack == "remote":
+            return held
+        full = len(self._holds.holds) >= MAX_HOLDS
+        if hold_id is None or held is not None or full:
+            return self._nameless_stop()
+        return Hold(hold_id, "iveg", "remote")
+
+    def _nameless_stop(self) -> Hold:
+        for hold in self._holds.holds:
+            if hold.source == "iveg" and hold.id.startswith("local-"):
+                return hold
+        return Hold(f"local-{self._fresh()}", "iveg", "remote")
+
+    def _release(self, order: Release, now: float) -> CommandAnswer:
+        why = self._why_not_release(order, now)
+        if why is not None:
+            return self._answer(order.ids[0], "REFUSED", why)
+        self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
+        return self._answer(order.ids[0], "RELEASED")
+
+    def _why_not_release(self, order: Release, now: float) -> str | None:
+        """The code that a release is refused with; None when it is perfect."""
+        remote = self._holds.remote
+        if set(order.ids) <= set(self._holds.released):
+            return None  # the same release again: nothing left to lift, answered alike
+        if not remote:
+            return "not_held"
+        if not remote <= set(order.ids):
+            return "holds_missing"
+        if order.challenge != self._challenge:
+            return "challenge"
+        return None if self._stands(now) else "not_standing"
+
+    def _resume(self, order: Resume) -> CommandAnswer:
+        if self._holds.holds:
+            return self._answer(None, "REFUSED", "held")
+        if self._resumed:
+            same = order.challenge == self._resumed_by
+            return self._answer(
+                None, "RESUMED" if same else "REFUSED", None if same else "not_ready"
+            )
+        if order.challenge != self._challenge:
+            return self._answer(None, "REFUSED", "challenge")
+        self._let_go()
+        self._resumed_by = order.challenge
+        return self._answer(None, "RESUMED")
+
+    def _answer(
+        self, answered: str | None, code: AnswerCode, why: str | None = None
+    ) -> CommandAnswer:
+        return CommandAnswer(
+            self._id,
+            Origin(),
+            answered,
+            code,
+            self._holds.holds,
+            self._challenge,
+            0.0 if self._motion is None else self._motion.twist.linear_x,
+            why,
+        )
+
+    # --- judgement ----------------------------------------------------------------
+
+    def _judge(self, now: float) -> None:
+        """Bring caps, the ``link`` hold and the challenge up to this moment."""
+        self._watchdog.look(now)
+        self._applied = self._applied.settle(lowest(self._caps(now)), now)
+        self._judge_link(now)
+        waited = now - self._challenge_at
+        if not self._free and waited >= CHALLENGE_LIVES_S:
+            self._challenge, self._challenge_at = self._fresh(), now
+
+    def _caps(self, now: float) -> list[Cap]:
+        motion = self._own_motion(now)
+        cap = self._applied.cap
+        slowed = cap.reason in ("person", "robot")
+        own = None if motion is None else motion.pose
+        return [
+            self._pose_cap(now),
+            self._silence_cap(now),
+            *self._hearsay.caps(own, slowed, now),
+        ]
+
+    def _pose_cap(self, now: float) -> Cap:
+        motion = self._own_motion(now)
+        if motion is None:
+            return Cap(0.0, "stale")
+        return Cap(HALF_SPEED, "stale") if now - motion.at > POSE_SLOW_S else FREE
+
+    def _silence_cap(self, now: float) -> Cap:
+        age = self._watchdog.age(now)
+        if age is not None and age <= self._limits.slow_s:
+            return FREE
+        stands = age is None or age > self._limits.stand_s
+        if stands and self._limits.on_link_loss == "stop":
+            return Cap(0.0, "watchdog")
+        return Cap(HALF_SPEED, "watchdog")
+
+    def _judge_link(self, now: float) -> None:
+        link = self._holds.link_alone
+        if link is not None and self._watchdog.steady(now):
+            self._holds = self._holds.lift([link.id])
+            self._watchdog.cleared(now)
+        silent = self._watchdog.silence(now) > self._limits.stand_s
+        stops = self._limits.on_link_loss == "stop"
+        if silent and stops and not self._holds.holds:
+            ack: Literal["auto", "remote"] = (
+                "auto" if self._watchdog.may_clear(now) else "remote"
+            )
+            self._latch(Hold(f"link-{self._fresh()}", "link", ack), now)
+
+    def _latch(self, hold: Hold, now: float) -> None:
+        self._holds = self._holds.latch(hold)
+        self._challenge, self._challenge_at = self._fresh(), now
+        if hold.ack != "auto":
+            self._resumed = False
+
+    def _let_go(self) -> None:
+        self._resumed = True
+        self._gate.require_neutral()
+
+    @property
+    def _free(self) -> bool:
+        return self._resumed and not self._holds.holds
+
+    def _own_motion(self, now: float) -> _Motion | None:
+        """Newest odometry; None when it is lost."""
+        motion = self._motion
+        if motion is None or now - motion.at > POSE_STAND_S:
+            return None
+        return motion
+
+    def _stands(self, now: float) -> bool:
+        motion = self._own_motion(now)
+        if motion is None:
+            return False
+        speeds = abs(motion.twist.linear_x), abs(motion.twist.angular_z)
+        return max(speeds) < STANDS_BELOW
+
+    # --- effects ------------------------------------------------------------------
+
+    def _effects(self, now: float, *answers: CommandAnswer) -> tuple[Effect, ...]:
+        twist = self._gate.output(self.cap.factor, self._free, now)
+        effects: list[Effect] = [Drive(twist)]
+        if self._holds != self._persisted:
+            self._persisted = self._holds
+            effects.append(Persist(self._holds))
+        effects += [Answer(answer) for answer in answers]
+        report = self._report(now)
+        if self._report_is_due(report, now):
+            self._reported, self._reported_at = report, now
+            effects.append(Report(report))
+        return tuple(effects)
+
+    def _report(self, now: float) -> SafetyReport:
+        """What is applied; a robot that waits for resume reports 0, ``hold``, none."""
+        cap, holds = self.cap, self._holds.holds
+        if not self._free:
+            cap = Cap(0.0, "clear", holds[0].id if holds else None)
+        twist = Twist2D(0.0, 0.0) if self._motion is None else self._motion.twist
+        return SafetyReport(
+            self._id,
+            Origin(),
+            cap.factor,
+            cap.reason if self._free else "hold",
+            cap.cause,
+            cap.decision_id,
+            holds,
+            self._holds.released,
+            self._challenge,
+            twist.linear_x,
+            twist.angular_z,
+            self._watchdog.age(now),
+        )
+
+    def _report_is_due(self, report: SafetyReport, now: float) -> bool:
+        if self._reported is None or _said(report) != _said(self._reported):
+            return True
+        every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
+        return now - self._reported_at >= every
+
+
+def _said(report: SafetyReport) -> tuple[object, ...]:
+    """What makes a report news; speeds and ages alone do not."""
+    return (
+        report.speed_factor,
+        report.reason,
+        report.cause,
+        report.holds,
+        report.challenge,
+    )

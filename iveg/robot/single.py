@@ -1,0 +1,95 @@
+"""Algorithm 1's single payload, as the paper writes it: one message a robot and tick.
+
+The payload has room for one detection, so those of one look take turns, surest first; a
+scan travels once; "looked, saw nothing", which the paper cannot say, is said with an
+empty ``bounding_boxes`` beside it.  ``pose`` and ``lidar_header`` carry the origin.
+"""
+
+import numpy as np
+import orjson
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    LaserScan,
+    Odometry,
+    Origin,
+)
+from iveg.ngsi import names
+
+
+class SinglePayload:
+    """Collects what sensors say until odometry sends it.
+
+    Args:
+        robot_id: This robot.
+    """
+
+    def __init__(self, robot_id: str) -> None:
+        self._id = robot_id
+        self.scan: LaserScan | None = None
+        """The sweep that has not travelled yet."""
+        self._detections: list[Detection] = []
+        self._saw_nothing = False
+
+    def look(self, frame: DetectionFrame) -> None:
+        """Take a look of the detector; it replaces what is left of the one before."""
+        self._detections = sorted(frame.detections, key=lambda one: one.probability)
+        self._saw_nothing = not frame.detections
+
+    def write(self, odometry: Odometry) -> bytes:
+        """The bytes of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
+        origin = _fields(odometry.origin)
+        payload: dict[str, object] = {
+            "pose": {
+                "x": round(odometry.pose.x, 4),
+                "y": round(odometry.pose.y, 4),
+                "yaw": round(odometry.pose.yaw, 5),
+                "linear_velocity": round(odometry.twist.linear_x, 4),
+                "angular_velocity": round(odometry.twist.angular_z, 4),
+                **origin,
+            },
+            "timestamp": odometry.origin.stamp,
+            "TimeInstant": odometry.origin.stamp,
+        }
+        if self._detections:
+            payload |= _detected(self._detections.pop(), odometry.pose)
+        elif self._saw_nothing:
+            self._saw_nothing = False
+            payload |= {names.BOXES: [], names.BOXES_HEADER: origin}
+        if self.scan is not None:
+            payload |= _swept(self.scan, origin)
+            self.scan = None
+        return orjson.dumps(payload, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
+    x, y, z = detection.box.centre
+    if detection.frame_id == "base_link":
+        x, y = pose.transform(x, y)
+    return {
+        "class": detection.class_id,
+        "conf": round(detection.probability, 4),
+        "position_3D": {"x": round(x, 4), "y": round(y, 4), "z": round(z, 4)},
+    }
+
+
+def _swept(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
+    return {
+        "laser_scan": np.round(scan.ranges.astype(np.float64), 3),
+        names.LIDAR_HEADER: {
+            "angle_min": scan.angle_min,
+            "angle_increment": scan.angle_increment,
+            "range_min": scan.range_min,
+            "range_max": scan.range_max,
+            "x": scan.mount.x,
+            "y": scan.mount.y,
+            "yaw": scan.mount.yaw,
+            **origin,
+        },
+    }
+
+
+def _fields(origin: Origin) -> dict[str, object]:
+    return {"boot": origin.boot, "seq": origin.seq, "stamp": origin.stamp}
