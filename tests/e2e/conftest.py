@@ -1,0 +1,99 @@
+"""A real browser before a real iVeg, its parts in processes of their own.
+
+Playwright's synchronous driver keeps an event loop of its own in the thread, so it
+lives for one module at a time and leaves asynchronous tests elsewhere alone.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from shutil import which
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.processes import Site, site
+
+_FLAGS = (
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+OpenPage = Callable[..., Page]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """The system's Chromium, or Playwright's own where there is none."""
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(
+            executable_path=which("chromium"), args=list(_FLAGS)
+        )
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """FIWARE, dashboard and emulator, driving; shared by the tests of a module."""
+    with site(tmp_path_factory.mktemp("iveg")) as place:
+        place.start("fiware")
+        for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
+            place.wait_for_port(setting)
+        place.start("serve")
+        place.wait_until_served()
+        place.start("emulator")
+        place.wait_until_live()
+        yield place
+
+
+@pytest.fixture
+def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
+    """Opens a signed-in page; at the end no page may have complained."""
+    complaints: list[str] = []
+    contexts = []
+
+    def open_one(
+        width: int = 1440, height: int = 900, locale: str = "es-ES", route: str = "/"
+    ) -> Page:
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, locale=locale
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on(
+            "console",
+            lambda said: complaints.append(said.text) if _bad(said.type) else None,
+        )
+        page.goto(stack.sign_in_link)
+        if route != "/":
+            page.goto(stack.url + route)
+        return page
+
+    yield open_one
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+@pytest.fixture
+def page(open_page: OpenPage) -> Page:
+    """The live page in Spanish on a desktop, both robots LIVE."""
+    live = open_page()
+    for robot in ("AGI", "AGII"):
+        live.wait_for_selector(f'[data-robot="{robot}"][data-link="LIVE"]')
+    return live
+
+
+@pytest.fixture
+def screens() -> Path:
+    """Where a test may leave pictures for people; only where they are asked for."""
+    folder = Path(os.environ.get("IVEG_SCREENS", "test-output/screens"))
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _bad(kind: str) -> bool:
+    return kind in ("error", "warning")

@@ -1,0 +1,50 @@
+"""What a person reads off the page."""
+
+from typing import Any
+
+from playwright.sync_api import Locator, Page
+
+
+def card(page: Page, robot: str) -> Locator:
+    """The card of a robot."""
+    return page.locator(f'.card[data-robot="{robot}"]')
+
+
+def number(page: Page, robot: str, field: str) -> float:
+    """A read-out of a robot's card, in either language's notation."""
+    text = card(page, robot).locator(f'[data-field="{field}"]').inner_text()
+    kept = "".join(c for c in text.replace("−", "-") if c.isdigit() or c in "-,.")
+    return float(kept.replace(",", "."))
+
+
+def strip_stop(page: Page, who: str) -> Locator:
+    """The STOP control of the strip that every route has: a robot's id or ``fleet``."""
+    return page.locator(f'#stops [data-stop="{who}"]')
+
+
+def wait_for_mode(page: Page, robot: str, *modes: str, seconds: float = 15.0) -> None:
+    """Until a card shows one of these modes."""
+    wanted = ", ".join(f'[data-robot="{robot}"][data-mode="{mode}"]' for mode in modes)
+    page.wait_for_selector(wanted, timeout=1000 * seconds)
+
+
+def evaluate(page: Page, script: str, *arguments: object) -> Any:
+    """The result of a function in the page."""
+    return page.evaluate(script, list(arguments))
+
+
+COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
+  .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
+  .filter((stop) => {
+    const box = stop.getBoundingClientRect();
+    const x = box.x + box.width / 2, y = box.y + box.height / 2;
+    const inside = x >= 0 && y >= 0 && x < innerWidth && y < innerHeight;
+    if (!inside) return Boolean(stop.closest('#stops'));
+    const top = document.elementFromPoint(x, y);
+    return !stop.contains(top);
+  }).map((stop) => stop.dataset.stop)"""
+"""Which visible STOPs a finger at their centre would miss.  Cards may be scrolled out
+of sight; the strip never."""
+
+OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
+"""By how much the page is wider than the screen (px)."""

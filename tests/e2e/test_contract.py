@@ -1,0 +1,103 @@
+"""Routes and live topics of a running iVeg, held against its documents."""
+
+import json
+import re
+
+import httpx
+import pytest
+from websockets.sync.client import ClientConnection, connect
+
+from tests.processes import ROOT, Site
+
+pytestmark = pytest.mark.e2e
+
+INTERFACES = (ROOT / "docs/interfaces.md").read_text()
+
+
+def test_every_route_has_its_mention(stack: Site) -> None:
+    document = _document(stack)
+    prefix = "/api/v1"
+
+    unmentioned = [
+        path
+        for path in document["paths"]
+        if _mention(path.removeprefix(prefix)) not in INTERFACES
+    ]
+
+    assert unmentioned == []
+
+
+def test_every_live_topic_has_its_row_and_every_row_is_spoken(stack: Site) -> None:
+    rows = set(re.findall(r"^\| `([a-z]+[^`]*)` \| (?:`|binary)", _section_8(), re.M))
+
+    spoken = _listen(stack, rows)
+
+    assert spoken <= rows
+    assert {"snapshot", "robots/{id}", "robots/{id}/scan", "people"} <= spoken
+
+
+def test_the_snapshot_comes_first_with_the_members_of_the_contract(
+    stack: Site,
+) -> None:
+    with _dial(stack) as live:
+        first = json.loads(live.recv(timeout=10))
+
+    row = re.search(r"^\| `snapshot` \| `(.+?)` \|", _section_8(), re.M)
+    assert row is not None
+    promised = set(re.findall(r'[{ ]"(\w+)": (?=ISO|\{|as|\[|health|climate)', row[1]))
+    assert first["topic"] == "snapshot"
+    assert promised <= set(first["data"])
+
+
+def test_a_robot_has_the_members_of_the_contract(stack: Site) -> None:
+    block = re.search(r"^robot\s+(\{.*?)^person", _section_8(), re.M | re.S)
+    assert block is not None
+    with stack.api() as api:
+        robot = api.get("robots/AGI").json()
+
+    assert set(robot) <= set(re.findall(r'"(\w+)"', block[1]))
+    assert {"robot_id", "link", "mode", "pose", "twist", "age_s", "mandate"} <= set(
+        robot
+    )
+
+
+def _document(stack: Site) -> dict[str, dict[str, object]]:
+    with stack.api() as api:
+        answer = api.get(f"{stack.url}/openapi.json")
+    assert answer.status_code == 200
+    document: dict[str, dict[str, object]] = answer.json()
+    return document
+
+
+def _mention(path: str) -> str:
+    """How the contract writes a path: every parameter is ``{id}``."""
+    return re.sub(r"\{\w+\}", "{id}", path)
+
+
+def _section_8() -> str:
+    return INTERFACES.split("## 8.")[1].split("\n## ")[0]
+
+
+def _dial(stack: Site) -> ClientConnection:
+    bearer = {"Authorization": f"Bearer {stack.settings['IVEG_API_TOKEN']}"}
+    address = httpx.URL(stack.url).copy_with(scheme="ws", path="/live")
+    return connect(str(address), additional_headers=bearer, proxy=None)
+
+
+def _listen(stack: Site, wanted: set[str]) -> set[str]:
+    """Topics that come within a while, robots' ids written ``{id}``."""
+    heard: set[str] = set()
+    with _dial(stack) as live:
+        for _ in range(600):
+            heard.add(_topic(live.recv(timeout=10)))
+            if heard >= wanted - {"alerts", "commands/{id}"}:
+                break
+    return heard
+
+
+def _topic(frame: str | bytes) -> str:
+    if isinstance(frame, bytes):
+        length = int.from_bytes(frame[:4], "little")
+        frame = frame[4 : 4 + length].decode()
+    topic = str(json.loads(frame)["topic"])
+    return re.sub(r"^(robots|detections|commands)/[^/]+", r"\1/{id}", topic)

@@ -1,0 +1,77 @@
+"""``iveg demo`` as somebody meets it: one line, one link, Ctrl-C."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.processes import Program, Site, children_of, is_alive, site, until
+
+pytestmark = pytest.mark.e2e
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    with site(tmp_path_factory.mktemp("demo")) as found:
+        found.start("demo")
+        found.wait_until_live(deadline_s=60.0)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def demo(place: Site) -> Program:
+    return place.programs[0]
+
+
+def test_the_demo_prints_one_line_with_the_link(demo: Program, place: Site) -> None:
+    lines = re.findall(r"^iVeg: (\S+)$", demo.text(), re.MULTILINE)
+
+    assert lines == [place.sign_in_link]
+
+
+def test_the_link_signs_in_and_leaves_no_token_in_the_address(place: Site) -> None:
+    with httpx.Client(trust_env=False) as browser:
+        answer = browser.get(place.sign_in_link)
+        landed = browser.get(place.url)
+
+    assert answer.status_code == 303
+    assert answer.headers["location"] == "/"
+    assert landed.status_code == 200
+
+
+def test_both_robots_drive_without_anybody_touching_them(place: Site) -> None:
+    with place.api() as api:
+
+        def moving() -> bool:
+            robots = api.get("robots").json()["items"]
+            speeds = [abs((robot["twist"] or {}).get("linear", 0)) for robot in robots]
+            return len(speeds) == 2 and min(speeds) > 0.05
+
+        until(moving, 60.0, "two robots driving at once")
+
+
+def test_a_clean_run_ends_with_ctrl_c_and_leaves_nothing_behind(
+    demo: Program, place: Site, tmp_path: Path
+) -> None:
+    family = children_of(demo.pid)
+    assert len(family) >= 3
+
+    status = demo.interrupt()
+
+    assert status == 0
+    assert demo.complaints() == []
+    until(lambda: not any(map(is_alive, family)), 5.0, "all children gone")
+
+
+def test_a_bad_setting_stops_the_start_with_one_sentence(tmp_path: Path) -> None:
+    with site(tmp_path, IVEG_CONFIDENCE_THRESHOLD="much") as wrong:
+        program = wrong.start("demo")
+        status = program.process.wait(20.0)
+
+    assert status != 0
+    assert "IVEG_CONFIDENCE_THRESHOLD='much'" in program.text()
+    assert "a number from 0 to 1" in program.text()
+    assert "Traceback" not in program.text()
+    assert len(program.text().strip().splitlines()) == 1

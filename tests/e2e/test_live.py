@@ -1,0 +1,195 @@
+"""The live page shows what the robots do, as they do it."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, number
+from tests.processes import Site, until
+
+pytestmark = pytest.mark.e2e
+
+ROUTES = ("/", "/history", "/docs", "/about")
+Json = Mapping[str, Any]
+SIZES = ((360, 740), (768, 1024), (1280, 800))
+
+
+@pytest.mark.parametrize("robot", ["AGI", "AGII"])
+def test_a_robot_that_drives_changes_its_read_outs(page: Page, robot: str) -> None:
+    x, y = number(page, robot, "x"), number(page, robot, "y")
+
+    def has_moved() -> bool:
+        now = number(page, robot, "x"), number(page, robot, "y")
+        return abs(now[0] - x) + abs(now[1] - y) > 0.5
+
+    until(has_moved, 20.0, f"{robot} half a metre away")
+
+
+def test_every_pose_and_scan_of_both_robots_is_painted(open_page: OpenPage) -> None:
+    page = open_page()
+    evaluate(
+        page,
+        """() => {
+            window.painted = {};
+            window.__onPaint = ({robot, kind, stamp}) => {
+              const key = `${robot} ${kind}`;
+              (window.painted[key] ??= new Set()).add(stamp);
+            };
+        }""",
+    )
+
+    for robot in ("AGI", "AGII"):
+        for kind in ("odom", "lidar"):
+            page.wait_for_function(
+                "key => window.painted[key]?.size > 30", arg=f"{robot} {kind}"
+            )
+
+
+def test_the_map_changes_as_robots_drive(page: Page) -> None:
+    canvas = page.locator("#map")
+    before = canvas.screenshot()
+
+    until(lambda: canvas.screenshot() != before, 10.0, "a different picture")
+
+
+def test_a_person_in_the_ring_halves_the_speed_and_the_log_says_why(
+    page: Page, stack: Site
+) -> None:
+    entry = page.locator('#log [data-kind="speed"]', has_text=re.compile("50.?%"))
+    entry.first.wait_for(timeout=90_000)
+
+    expect(entry.first).to_contain_text(re.compile(r"persona|robot"))
+    with stack.api() as api:
+        slowed = until(lambda: _slow_robot(api.get("robots").json()), 90.0, "SLOW")
+        limit = 0.5 * slowed["profile"]["max_speed"]
+        path = f"robots/{slowed['robot_id']}"
+        until(lambda: _obeys(api.get(path).json(), limit), 5.0, f"at most {limit} m/s")
+
+
+def test_a_robot_in_a_ring_shows_slow_and_why(page: Page) -> None:
+    page.wait_for_selector('.card[data-mode="SLOW"]', timeout=90_000)
+
+    slow = page.locator('.card[data-mode="SLOW"] [data-part="why"]').first
+    expect(slow).not_to_be_empty()
+
+
+def test_the_language_changes_without_a_reload(page: Page) -> None:
+    evaluate(page, "() => { window.sameDocument = true; }")
+    expect(page.locator('#stops [data-stop="fleet"]')).to_contain_text("PARAR TODO")
+
+    page.click('[data-language="en"]')
+
+    expect(page.locator("html")).to_have_attribute("lang", "en")
+    expect(page.locator('#stops [data-stop="fleet"]')).to_contain_text("STOP ALL")
+    expect(card(page, "AGI")).to_contain_text(re.compile("LIVE"))
+    assert evaluate(page, "() => window.sameDocument")
+
+    page.click('[data-language="es"]')
+    expect(page.locator('#stops [data-stop="fleet"]')).to_contain_text("PARAR TODO")
+
+
+def test_the_chosen_language_is_remembered(page: Page) -> None:
+    page.click('[data-language="en"]')
+    expect(page.locator("html")).to_have_attribute("lang", "en")
+
+    page.reload()
+
+    expect(page.locator("html")).to_have_attribute("lang", "en")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
+@pytest.mark.parametrize("route", ROUTES)
+def test_nothing_is_wider_than_the_screen_and_no_stop_is_covered(
+    open_page: OpenPage, size: tuple[int, int], route: str, screens: Path
+) -> None:
+    page = open_page(*size, route=route)
+    page.wait_for_load_state("load")
+    page.screenshot(path=screens / f"{route.strip('/') or 'live'}-{size[0]}.png")
+
+    assert evaluate(page, OVERFLOW) <= 0
+    assert page.locator("#stops [data-stop]:visible").count() >= 1
+    assert evaluate(page, COVERED_STOPS) == []
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
+def test_no_dialog_covers_a_stop(open_page: OpenPage, size: tuple[int, int]) -> None:
+    page = open_page(*size)
+    page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
+    openers = page.locator("[data-opens]:visible, .card__menu:visible")
+
+    for opener in openers.all():
+        opener.click()
+        page.wait_for_selector("dialog[open]")
+        assert evaluate(page, COVERED_STOPS) == []
+        page.keyboard.press("Escape")
+        page.wait_for_selector("dialog[open]", state="hidden")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
+def test_a_stop_is_large_enough_for_a_glove(
+    open_page: OpenPage, size: tuple[int, int]
+) -> None:
+    page = open_page(*size)
+
+    for stop in page.locator("#stops [data-stop]:visible").all():
+        box = stop.bounding_box()
+        assert box is not None
+        assert min(box["width"], box["height"]) >= 64
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_nothing_serious_stands_in_the_way_of_assistive_technology(
+    open_page: OpenPage, route: str
+) -> None:
+    page = open_page(route=route)
+    page.wait_for_load_state("load")
+
+    results = Axe().run(page)
+
+    serious = [
+        f"{violation['id']}: {violation['nodes'][0]['html']}"
+        for violation in results.response["violations"]
+        if violation["impact"] in ("serious", "critical")
+    ]
+    assert serious == []
+
+
+def test_a_stranger_is_shown_the_way_in_and_nothing_else(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page()
+    page.context.clear_cookies()
+
+    answer = page.request.get(stack.url, headers={"Accept": "text/html"})
+
+    assert answer.status == 401
+    assert "AGI" not in answer.text()
+
+
+def test_the_logs_are_clean(page: Page, stack: Site) -> None:
+    """Runs last in this module, after everything above."""
+    assert page.locator("#banner:visible").count() == 0
+    stack.assert_clean()
+
+
+def test_no_log_holds_a_secret(stack: Site) -> None:
+    names = ("IVEG_SIGN_IN_TOKEN", "IVEG_API_TOKEN", "IVEG_NOTIFY_TOKEN")
+    said = "\n".join(program.text() for program in stack.programs)
+    without_link = re.sub(r"^iVeg: http://\S+$", "", said, flags=re.MULTILINE)
+
+    assert [name for name in names if stack.settings[name] in without_link] == []
+
+
+def _slow_robot(robots: Mapping[str, list[Json]]) -> Json | None:
+    slow = [robot for robot in robots["items"] if robot["mode"] == "SLOW"]
+    return slow[0] if slow else None
+
+
+def _obeys(robot: Json, limit: float) -> bool:
+    return bool(abs(robot["twist"]["linear"]) <= 1.1 * limit)

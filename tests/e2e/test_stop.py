@@ -1,0 +1,138 @@
+"""From a press to a robot that stands, and back to one that drives."""
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.reading import card, number, strip_stop, wait_for_mode
+from tests.processes import Site, until
+
+pytestmark = pytest.mark.e2e
+
+STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+BOTH_STANDING = re.compile(r"TODO PARADO \(2/2\)")
+WITHIN_MS = 8000
+"""Braking, the window of 1.0 s in which standing is measured, and a busy machine."""
+
+
+@pytest.fixture(autouse=True)
+def driving(page: Page, stack: Site) -> None:
+    """Every test begins with two robots that nothing holds."""
+    for robot in ("AGI", "AGII"):
+        _set_going(page, robot)
+        expect(card(page, robot)).to_have_attribute(
+            "data-mode", re.compile("RUNNING|SLOW")
+        )
+
+
+def test_a_press_makes_the_robot_stand_and_says_how_long_it_took(page: Page) -> None:
+    strip_stop(page, "AGI").click()
+
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
+    assert abs(number(page, "AGI", "v")) < 0.02
+    expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
+
+
+def test_the_other_robot_drives_on(page: Page) -> None:
+    strip_stop(page, "AGI").click()
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+    expect(card(page, "AGII")).to_have_attribute(
+        "data-mode", re.compile("RUNNING|SLOW")
+    )
+
+
+def test_one_press_stops_the_fleet(page: Page) -> None:
+    strip_stop(page, "fleet").click()
+
+    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING, timeout=WITHIN_MS)
+
+
+def test_the_keyboard_stops_the_fleet_while_a_field_has_focus(page: Page) -> None:
+    page.locator('[data-opens="theme-panel"]:visible').first.click()
+    page.locator("#paper-colours").focus()
+
+    page.keyboard.press("Control+.")
+
+    expect(strip_stop(page, "fleet")).to_contain_text(BOTH_STANDING, timeout=WITHIN_MS)
+
+
+def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
+    with stack.api() as api:
+        before = len(api.get("commands", params={"limit": 100}).json()["items"])
+        strip_stop(page, "AGI").dblclick()
+        page.keyboard.press("Enter")
+        page.keyboard.press("Space")
+        expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+        after = len(api.get("commands", params={"limit": 100}).json()["items"])
+
+    assert after == before + 1
+
+
+def test_every_browser_sees_the_stop(page: Page, open_page: OpenPage) -> None:
+    other = open_page(390, 844)
+    other.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
+
+    strip_stop(page, "AGI").click()
+
+    wait_for_mode(other, "AGI", "STOPPED", seconds=5.0)
+
+
+def test_release_alone_moves_nothing_and_resume_drives_again(page: Page) -> None:
+    strip_stop(page, "AGI").click()
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+    _release(page, "AGI")
+    expect(page.locator('[data-resume="AGI"]')).to_be_enabled(timeout=WITHIN_MS)
+    assert abs(number(page, "AGI", "v")) < 0.02
+
+    page.locator('[data-resume="AGI"]').click()
+    wait_for_mode(page, "AGI", "RUNNING", "SLOW")
+    until(lambda: abs(number(page, "AGI", "v")) > 0.1, 15.0, "AGI drives")
+
+
+def test_a_release_that_is_not_held_for_two_seconds_does_nothing(page: Page) -> None:
+    strip_stop(page, "AGI").click()
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    card(page, "AGI").locator(".card__menu").click()
+    release = page.locator('[data-release="AGI"]')
+    expect(release).to_be_enabled(timeout=WITHIN_MS)
+
+    release.click(delay=1000)
+
+    page.wait_for_timeout(1500)
+    expect(page.locator('[data-resume="AGI"]')).to_be_disabled()
+    expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
+
+
+def test_a_program_may_stop_and_may_not_release(page: Page, stack: Site) -> None:
+    with stack.api() as api:
+        stop = api.post("robots/AGI/stop")
+        release = api.post("robots/AGI/release", json={"holds": ["x"]})
+        resume = api.post("robots/AGI/resume")
+
+    assert stop.status_code == 202
+    assert (release.status_code, resume.status_code) == (403, 403)
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+def _set_going(page: Page, robot: str) -> None:
+    """Release and resume a robot that an earlier test has stopped."""
+    if card(page, robot).get_attribute("data-mode") == "STOPPED":
+        _release(page, robot)
+        resume = page.locator(f'[data-resume="{robot}"]')
+        expect(resume).to_be_enabled(timeout=WITHIN_MS)
+        resume.click()
+        wait_for_mode(page, robot, "RUNNING", "SLOW")
+    page.keyboard.press("Escape")
+
+
+def _release(page: Page, robot: str) -> None:
+    """Hold the release for the two seconds that it asks for."""
+    card(page, robot).locator(".card__menu").click()
+    release = page.locator(f'[data-release="{robot}"]')
+    expect(release).to_be_enabled(timeout=WITHIN_MS)
+    release.click(delay=2300)
