@@ -30,7 +30,6 @@ from iveg.domain.records import (
     DetectionRecord,
     LogRecord,
     OdometryRecord,
-    Record,
 )
 
 metadata = MetaData(
@@ -223,7 +222,7 @@ class Shelf:
     changes: bool = False
 
 
-SHELVES: dict[type[Record], Shelf] = {
+SHELVES: dict[type, Shelf] = {
     CommandRecord: Shelf(commands, ("command_id",), changes=True),
     CommandEventRecord: Shelf(command_events, ("command_id", "at", "state", "why")),
     DecisionRecord: Shelf(decisions, ("decision_id",), changes=True),

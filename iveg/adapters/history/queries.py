@@ -1,0 +1,145 @@
+"""The history's reading side: questions that the REST API asks.
+
+Every question runs in a thread of its own small pool, so that a long look back neither
+holds up the event loop nor takes the threads that a STOP's journal needs.
+"""
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from sqlalchemy import Connection, func, select
+from sqlalchemy.exc import SQLAlchemyError
+
+from iveg.adapters.history import lists, series
+from iveg.adapters.history.engine import reading_engine
+from iveg.adapters.history.lists import Filter, Page, record_of
+from iveg.adapters.history.migrate import reason_of
+from iveg.adapters.history.tables import command_events, commands, decisions, log
+from iveg.domain.errors import HopError
+from iveg.domain.records import (
+    AlertRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+)
+
+_THREADS = 2
+_T = TypeVar("_T")
+
+
+class Queries:
+    """Reads the history.
+
+    Every method raises ``HopError`` when the database does not answer.
+    """
+
+    def __init__(self, database_url: str) -> None:
+        self._engine = reading_engine(database_url)
+        self._threads = ThreadPoolExecutor(_THREADS, "history-read")
+
+    async def decisions(self, asked: Filter) -> Page[DecisionRecord]:
+        """Decisions by ``started_at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.DECISIONS, asked))
+
+    async def detections(self, asked: Filter) -> Page[DetectionRecord]:
+        """Detections by ``at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.DETECTIONS, asked))
+
+    async def commands(self, asked: Filter) -> Page[CommandRecord]:
+        """Commands by ``requested_at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.COMMANDS, asked))
+
+    async def alerts(self, asked: Filter) -> Page[AlertRecord]:
+        """Alerts by ``raised_at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.ALERTS, asked))
+
+    async def log(self, asked: Filter) -> Page[LogRecord]:
+        """Log lines by ``at``."""
+        return await self._ask(lambda c: lists.read_page(c, lists.LOG, asked))
+
+    async def decision(self, decision_id: str) -> DecisionRecord | None:
+        """One decision; None when it is not known."""
+        wanted = select(decisions).where(decisions.c.decision_id == decision_id)
+
+        def read(connection: Connection) -> DecisionRecord | None:
+            row = connection.execute(wanted).mappings().first()
+            return None if row is None else record_of(DecisionRecord, row)
+
+        return await self._ask(read)
+
+    async def latest_stop(self, robot_id: str) -> CommandRecord | None:
+        """The newest STOP of a robot, which a restart must look at."""
+        wanted = (
+            select(commands)
+            .where(commands.c.robot_id == robot_id, commands.c.kind == "stop")
+            .order_by(commands.c.requested_at.desc(), commands.c.command_id.desc())
+            .limit(1)
+        )
+
+        def read(connection: Connection) -> CommandRecord | None:
+            row = connection.execute(wanted).mappings().first()
+            return None if row is None else record_of(CommandRecord, row)
+
+        return await self._ask(read)
+
+    async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
+        """The audit trail of a command, oldest first."""
+        events = command_events.c
+        wanted = (
+            select(command_events)
+            .where(events.command_id == command_id)
+            .order_by(events.at, events.row_id)
+        )
+
+        def read(connection: Connection) -> tuple[CommandEventRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(CommandEventRecord, row) for row in rows)
+
+        return await self._ask(read)
+
+    async def newest_log_id(self) -> int:
+        """The highest number of the log, so that a restart counts on; 0 when empty."""
+        newest = select(func.max(log.c.id))
+        return await self._ask(lambda c: c.scalar(newest) or 0)
+
+    async def speed_series(
+        self, since: float, until: float, robot: str | None = None
+    ) -> tuple[series.SpeedSeries, ...]:
+        """Speed and factors of each robot over a range, at most 2,000 points each."""
+        return await self._ask(lambda c: series.speed_series(c, since, until, robot))
+
+    async def confidence_counts(
+        self, since: float, until: float, robot: str | None = None
+    ) -> tuple[series.ConfidenceCount, ...]:
+        """Detections of a range by class and confidence."""
+        return await self._ask(
+            lambda c: series.confidence_counts(c, since, until, robot)
+        )
+
+    async def command_latencies(
+        self, since: float, until: float, robot: str | None = None
+    ) -> tuple[series.CommandLatency, ...]:
+        """How long the newest STOPs of a range took, oldest first."""
+        return await self._ask(
+            lambda c: series.command_latencies(c, since, until, robot)
+        )
+
+    def close(self) -> None:
+        """Let go of threads and connections."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._engine.dispose()
+
+    async def _ask(self, question: Callable[[Connection], _T]) -> _T:
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._threads, self._answer, question)
+
+    def _answer(self, question: Callable[[Connection], _T]) -> _T:
+        try:
+            with self._engine.connect() as connection:
+                return question(connection)
+        except SQLAlchemyError as error:
+            raise HopError("database", reason_of(error)) from error

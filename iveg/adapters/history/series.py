@@ -1,0 +1,205 @@
+"""Series for charts, thinned in the database to what a screen can show.
+
+A range with few rows is answered row by row; a longer one in equal slices of time, each
+with its mean speed and its strictest factor, so that a short slow-down is never lost.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Integer,
+    Select,
+    cast,
+    func,
+    select,
+)
+
+from iveg.adapters.history.lists import record_of
+from iveg.adapters.history.tables import commands, detections, odometry
+from iveg.domain.records import CommandRecord
+
+_Point = tuple[Any, ...]
+MOST_POINTS = 2000
+CONFIDENCE_BINS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedSeries:
+    """How fast one robot went and what it was told, over a range.
+
+    Attributes:
+        at: Unix seconds, rising; the others have its length.
+        linear: (m/s), mean of a slice.
+        mandated: Strictest factor that iVeg mandated in a slice.
+        applied: Strictest factor that the robot reported; None where it was silent.
+        slice_s: Length of a slice (s); 0 where each point is one row.
+    """
+
+    robot_id: str
+    at: tuple[float, ...]
+    linear: tuple[float, ...]
+    mandated: tuple[float, ...]
+    applied: tuple[float | None, ...]
+    slice_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ConfidenceCount:
+    """How many detections of a class fell into one slice of confidence.
+
+    Attributes:
+        class_id: As the detector said.
+        least: Lower edge, inclusive; the slice is 1 / ``CONFIDENCE_BINS`` wide.
+    """
+
+    class_id: str
+    least: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLatency:
+    """How long one STOP took from the press (ms); None where it never came.
+
+    Attributes:
+        direct_ms: To the answer on the direct road; ``fiware_ms`` on the other.
+        standstill_ms: To the first standing sample.
+    """
+
+    command_id: str
+    robot_id: str
+    requested_at: float
+    direct_ms: float | None
+    fiware_ms: float | None
+    standstill_ms: float | None
+
+
+def speed_series(
+    connection: Connection,
+    since: float,
+    until: float,
+    robot: str | None = None,
+    most: int = MOST_POINTS,
+) -> tuple[SpeedSeries, ...]:
+    """One series for each robot that was heard in ``since <= at < until``."""
+    robots = _robots(connection) if robot is None else [robot]
+    found = (_one(connection, one, since, until, most) for one in robots)
+    return tuple(series for series in found if series.at)
+
+
+def confidence_counts(
+    connection: Connection, since: float, until: float, robot: str | None = None
+) -> tuple[ConfidenceCount, ...]:
+    """Detections of ``since <= at < until`` by class and confidence."""
+    bins = detections.c.probability * CONFIDENCE_BINS
+    place = _whole(connection, bins).label("place")
+    statement = (
+        select(detections.c.class_id, place, func.count())
+        .where(detections.c.at >= since, detections.c.at < until)
+        .group_by(detections.c.class_id, place)
+    )
+    if robot is not None:
+        statement = statement.where(detections.c.robot_id == robot)
+    counts: dict[tuple[str, int], int] = {}
+    for class_id, number, count in connection.execute(statement):
+        # Certainty itself, 1.0, belongs to the uppermost slice.
+        slot = (class_id, min(int(number), CONFIDENCE_BINS - 1))
+        counts[slot] = counts.get(slot, 0) + count
+    return tuple(
+        ConfidenceCount(class_id, slot / CONFIDENCE_BINS, count)
+        for (class_id, slot), count in sorted(counts.items())
+    )
+
+
+def command_latencies(
+    connection: Connection, since: float, until: float, robot: str | None = None
+) -> tuple[CommandLatency, ...]:
+    """The newest STOPs of ``since <= requested_at < until``, oldest first."""
+    c = commands.c
+    statement = (
+        select(commands)
+        .where(c.kind == "stop", c.requested_at >= since, c.requested_at < until)
+        .order_by(c.requested_at.desc(), c.command_id.desc())
+        .limit(MOST_POINTS)
+    )
+    if robot is not None:
+        statement = statement.where(c.robot_id == robot)
+    rows = connection.execute(statement).mappings().all()
+    return tuple(_latency(record_of(CommandRecord, row)) for row in reversed(rows))
+
+
+def _latency(record: CommandRecord) -> CommandLatency:
+    asked = record.requested_at
+    return CommandLatency(
+        record.command_id,
+        record.robot_id,
+        asked,
+        _ms(asked, record.answer_direct_at),
+        _ms(asked, record.answer_fiware_at),
+        record.standstill_ms,
+    )
+
+
+def _ms(start: float, end: float | None) -> float | None:
+    return None if end is None else 1000.0 * (end - start)
+
+
+def _robots(connection: Connection) -> Iterator[str]:
+    """All robots in the table, by a hop along the index for each, not by a scan."""
+    last = ""
+    while True:
+        statement = select(func.min(odometry.c.robot_id))
+        found = connection.scalar(statement.where(odometry.c.robot_id > last))
+        if found is None:
+            return
+        last = found
+        yield last
+
+
+def _one(
+    connection: Connection, robot: str, since: float, until: float, most: int
+) -> SpeedSeries:
+    o = odometry.c
+    asked = (o.robot_id == robot, o.at >= since, o.at < until)
+    first, last, count = connection.execute(
+        select(func.min(o.at), func.max(o.at), func.count()).where(*asked)
+    ).one()
+    if count <= most:
+        columns = (o.at, o.linear, o.mandated_factor, o.applied_factor)
+        rows = select(*columns).where(*asked).order_by(o.at)
+        return _series(robot, _points(connection, rows), 0.0)
+    # One slice fewer than asked for: the last row may stand on the last edge.
+    slice_s = (last - first) / (most - 1) or 1.0
+    place = _whole(connection, (o.at - first) / slice_s)
+    slices = (
+        select(
+            func.min(o.at),
+            func.avg(o.linear),
+            func.min(o.mandated_factor),
+            func.min(o.applied_factor),
+        )
+        .where(*asked)
+        .group_by(place)
+        .order_by(func.min(o.at))
+    )
+    return _series(robot, _points(connection, slices), slice_s)
+
+
+def _points(connection: Connection, statement: Select[Any]) -> list[_Point]:
+    return [tuple(row) for row in connection.execute(statement)]
+
+
+def _series(robot: str, rows: list[_Point], slice_s: float) -> SpeedSeries:
+    at, linear, mandated, applied = zip(*rows, strict=True) if rows else ((),) * 4
+    return SpeedSeries(robot, at, linear, mandated, applied, slice_s)
+
+
+def _whole(connection: Connection, value: ColumnElement[float]) -> ColumnElement[int]:
+    """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
+    if connection.dialect.name == "sqlite":
+        return cast(value, Integer)
+    return cast(func.floor(value), Integer)
