@@ -1,0 +1,177 @@
+/** The house: walls, lanes with their labels, crop rows, posts, crates and trolleys. */
+
+import { screenX, screenY } from "../viewport.js";
+import { circle, isolated, label } from "./paint.js";
+
+/**
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {import("../protocol.js").Box2D} Box2D
+ */
+
+/** A plant every so many metres along a row; drawn only where it can be told apart. */
+const PLANT_EVERY_M = 0.5;
+const PLANT_FROM_SCALE = 14;
+
+/** @param {Paint} paint */
+export function draw(paint) {
+  const { ctx, scene } = paint;
+  const map = scene.map;
+  if (!map) return;
+  isolated(ctx, () => {
+    if (hasArea(map.bounds)) drawWalls(paint, map.bounds);
+    for (const lane of map.lanes) fillBox(paint, lane, paint.theme.lane);
+    for (const row of map.rows) drawRow(paint, row);
+    for (const thing of map.obstacles) drawObstacle(paint, thing);
+    for (const post of map.posts) drawPost(paint, post);
+    for (const lane of map.lanes) drawLaneLabel(paint, lane);
+  });
+}
+
+/**
+ * Whether a map has walls; an open field has none.
+ *
+ * @param {Box2D | null | undefined} bounds
+ * @returns {bounds is Box2D}
+ */
+export function hasArea(bounds) {
+  return !!bounds && bounds.xmax > bounds.xmin && bounds.ymax > bounds.ymin;
+}
+
+/** @param {Paint} paint @param {Box2D} bounds */
+function drawWalls(paint, bounds) {
+  const { ctx, theme } = paint;
+  const [x, y, width, height] = rectOf(paint, bounds);
+  ctx.strokeStyle = theme.post;
+  ctx.lineWidth = 3;
+  ctx.beginPath();
+  ctx.roundRect(x - 1.5, y - 1.5, width + 3, height + 3, 4);
+  ctx.stroke();
+}
+
+/** @param {Paint} paint @param {Box2D} row */
+function drawRow(paint, row) {
+  const { ctx, theme, view } = paint;
+  const [x, y, width, height] = rectOf(paint, row);
+  ctx.fillStyle = theme.crop;
+  ctx.beginPath();
+  ctx.roundRect(x, y, width, height, Math.min(6, width / 3, height / 3));
+  ctx.fill();
+  if (view.scale >= PLANT_FROM_SCALE) drawPlants(paint, row);
+}
+
+/**
+ * Leaves as discs lighter than the row: texture that tells crop from wall at a glance.
+ *
+ * @param {Paint} paint
+ * @param {Box2D} row
+ */
+function drawPlants({ ctx, view, theme }, row) {
+  const isTall = row.ymax - row.ymin > row.xmax - row.xmin;
+  const length = isTall ? row.ymax - row.ymin : row.xmax - row.xmin;
+  const thickness = isTall ? row.xmax - row.xmin : row.ymax - row.ymin;
+  const radius = Math.min(0.38 * PLANT_EVERY_M, 0.38 * thickness) * view.scale;
+  const count = Math.max(1, Math.floor(length / PLANT_EVERY_M));
+  ctx.save();
+  ctx.globalAlpha = 0.28;
+  ctx.fillStyle = theme.lane;
+  ctx.beginPath();
+  for (let i = 0; i < count; i += 1) {
+    const along = ((i + 0.5) / count) * length;
+    const x = isTall ? (row.xmin + row.xmax) / 2 : row.xmin + along;
+    const y = isTall ? row.ymin + along : (row.ymin + row.ymax) / 2;
+    const [px, py] = [screenX(view, x), screenY(view, y)];
+    ctx.moveTo(px + radius, py);
+    ctx.arc(px, py, radius, 0, 2 * Math.PI);
+  }
+  ctx.fill();
+  ctx.restore();
+}
+
+/** @param {Paint} paint @param {{x: number, y: number, radius: number}} post */
+function drawPost({ ctx, view, theme }, post) {
+  const radius = Math.max(2, post.radius * view.scale);
+  circle(ctx, screenX(view, post.x), screenY(view, post.y), radius);
+  ctx.fillStyle = theme.post;
+  ctx.fill();
+}
+
+/**
+ * A crate stack carries a cross, anything else on wheels two axles.
+ *
+ * @param {Paint} paint
+ * @param {{kind: string} & Box2D} thing
+ */
+function drawObstacle(paint, thing) {
+  const { ctx, theme } = paint;
+  const [x, y, width, height] = rectOf(paint, thing);
+  ctx.strokeStyle = theme.post;
+  ctx.fillStyle = theme.bg;
+  ctx.lineWidth = 1.5;
+  ctx.beginPath();
+  ctx.roundRect(x, y, width, height, 2);
+  ctx.fill();
+  ctx.stroke();
+  ctx.beginPath();
+  if (thing.kind.startsWith("crate")) {
+    ctx.moveTo(x, y);
+    ctx.lineTo(x + width, y + height);
+    ctx.moveTo(x + width, y);
+    ctx.lineTo(x, y + height);
+  } else {
+    ctx.moveTo(x, y + height / 4);
+    ctx.lineTo(x + width, y + height / 4);
+    ctx.moveTo(x, y + (3 * height) / 4);
+    ctx.lineTo(x + width, y + (3 * height) / 4);
+  }
+  ctx.lineWidth = 1;
+  ctx.stroke();
+}
+
+/**
+ * The lane's name at its near end, turned along a lane that is taller than wide.
+ *
+ * @param {Paint} paint
+ * @param {{label: string} & Box2D} lane
+ */
+function drawLaneLabel(paint, lane) {
+  const { ctx, theme, view, words } = paint;
+  const [x, y, width, height] = rectOf(paint, lane);
+  const isTall = height > width;
+  const thickness = isTall ? width : height;
+  const length = isTall ? height : width;
+  const text = words.lane(lane.label);
+  const size = Math.min(13, thickness * 0.6);
+  if (size < 8 || length < text.length * size * 0.7) return;
+  ctx.save();
+  ctx.globalAlpha = 0.72;
+  const inset = text.length * size * 0.3 + 8;
+  if (isTall) {
+    const end = Math.min(y + height, view.height) - inset;
+    ctx.translate(x + width / 2, Math.max(y + inset, end));
+    ctx.rotate(-Math.PI / 2);
+  } else {
+    const start = Math.max(x, 0) + inset;
+    ctx.translate(Math.min(start, x + width - inset), y + height / 2);
+  }
+  label({ ...paint, theme: { ...theme, bg: theme.lane } }, text, 0, 0, { size });
+  ctx.restore();
+}
+
+/** @param {Paint} paint @param {Box2D} box @param {string} colour */
+function fillBox(paint, box, colour) {
+  const [x, y, width, height] = rectOf(paint, box);
+  paint.ctx.fillStyle = colour;
+  paint.ctx.fillRect(x, y, width, height);
+}
+
+/**
+ * @param {Paint} paint
+ * @param {Box2D} box (m)
+ * @returns {[number, number, number, number]} x, y, width, height (px)
+ */
+function rectOf({ view }, box) {
+  const x = screenX(view, box.xmin);
+  const y = screenY(view, box.ymax);
+  const width = (box.xmax - box.xmin) * view.scale;
+  return [x, y, width, (box.ymax - box.ymin) * view.scale];
+}

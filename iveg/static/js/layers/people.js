@@ -1,0 +1,87 @@
+/**
+ * People, and peers seen by robots, with the ring that the rule keeps around them.
+ *
+ * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
+ * marker alone: nobody knows where the person is now.
+ */
+
+import { screenX, screenY } from "../viewport.js";
+import { circle, isolated, label } from "./paint.js";
+
+/**
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {import("../scene.js").ScenePerson} ScenePerson
+ */
+
+/** @param {Paint} paint */
+export function draw(paint) {
+  for (const person of paint.scene.people) {
+    isolated(paint.ctx, () => drawPerson(paint, person));
+  }
+}
+
+/** @param {Paint} paint @param {ScenePerson} person */
+function drawPerson(paint, person) {
+  const { ctx, view, words } = paint;
+  ctx.translate(screenX(view, person.x), screenY(view, person.y));
+  if (person.stage !== "last_seen") drawRing(paint, person);
+  if (person.peer) drawPeer(paint, person);
+  else drawFigure(paint, person);
+  if (person.stage === "seen") return;
+  const isGone = person.stage === "last_seen";
+  const text = isGone ? words.lastSeen(person.ageS) : words.ago(person.ageS);
+  label(paint, text, 0, 20, { size: 11, colour: paint.theme.muted });
+}
+
+/** @param {Paint} paint @param {ScenePerson} person */
+function drawRing({ ctx, view, theme }, person) {
+  const isSeen = person.stage === "seen";
+  circle(ctx, 0, 0, person.ringM * view.scale);
+  ctx.fillStyle = theme.ring;
+  ctx.globalAlpha = isSeen ? 0.1 : 0.05;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.strokeStyle = theme.ring;
+  ctx.lineWidth = 2;
+  ctx.setLineDash(isSeen ? [] : [8, 6]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** Head and shoulders. @param {Paint} paint @param {ScenePerson} person */
+function drawFigure({ ctx, theme }, person) {
+  ctx.globalAlpha = person.stage === "last_seen" ? 0.55 : 1;
+  ctx.strokeStyle = theme.bg;
+  ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.person;
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  ctx.ellipse(0, 6, 9, 7, 0, Math.PI, 2 * Math.PI);
+  ctx.closePath();
+  ctx.stroke();
+  ctx.fill();
+  circle(ctx, 0, -5, 5);
+  ctx.stroke();
+  ctx.fill();
+  ctx.globalAlpha = 1;
+}
+
+/** A diamond: a machine, but one that nobody steers from here. @param {Paint} paint
+ * @param {ScenePerson} person */
+function drawPeer({ ctx, theme }, person) {
+  ctx.globalAlpha = person.stage === "last_seen" ? 0.55 : 1;
+  ctx.strokeStyle = theme.bg;
+  ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.peer;
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  for (const [x, y] of [
+    [0, -9],
+    [9, 0],
+    [0, 9],
+    [-9, 0],
+  ])
+    ctx.lineTo(x, y);
+  ctx.closePath();
+  ctx.stroke();
+  ctx.fill();
+  ctx.globalAlpha = 1;
+}

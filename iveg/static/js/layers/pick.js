@@ -1,0 +1,64 @@
+/**
+ * What lies under a finger: the robot before the person, the person before its ring.
+ *
+ * @typedef {import("../scene.js").Scene} Scene
+ * @typedef {import("../viewport.js").Viewport} Viewport
+ * @typedef {{kind: "robot" | "person" | "detection", id: string}} Picked
+ */
+
+import { screenX, screenY } from "../viewport.js";
+import { bodySize } from "./robot.js";
+
+/** Half of the smallest target that a finger can be asked to hit (44 px). */
+const FINGER_PX = 22;
+
+/**
+ * @param {Scene} scene
+ * @param {Viewport} view
+ * @param {number} px
+ * @param {number} py
+ * @param {(layer: string) => boolean} isOn what is switched off cannot be touched
+ * @returns {Picked | null}
+ */
+export function pick(scene, view, px, py, isOn) {
+  const { robots, people, detections } = scene;
+  /** @param {{x: number, y: number}} at */
+  const gapTo = (at) => Math.hypot(screenX(view, at.x) - px, screenY(view, at.y) - py);
+  const robot = nearest(
+    robots,
+    (it) => gapTo(it.pose),
+    (it) => Math.max(FINGER_PX, bodySize(it, view.scale)[0] / 2),
+  );
+  if (robot && isOn("robot")) return { kind: "robot", id: robot.id };
+  const person = nearest(people, gapTo, () => FINGER_PX);
+  if (person && isOn("people")) return { kind: "person", id: person.id };
+  const seen = nearest(detections, gapTo, () => FINGER_PX);
+  if (seen && isOn("detections")) return { kind: "detection", id: seen.id };
+  const ring = nearest(people, gapTo, (it) => ringOf(it) * view.scale);
+  return ring && isOn("people") ? { kind: "person", id: ring.id } : null;
+}
+
+/** @param {Scene["people"][number]} person */
+function ringOf(person) {
+  return person.stage === "last_seen" ? 0 : person.ringM;
+}
+
+/**
+ * @template T
+ * @param {readonly T[]} things
+ * @param {(thing: T) => number} gapTo (px)
+ * @param {(thing: T) => number} reach (px)
+ * @returns {T | null}
+ */
+function nearest(things, gapTo, reach) {
+  /** @type {T | null} */
+  let best = null;
+  let least = Number.POSITIVE_INFINITY;
+  for (const thing of things) {
+    const gap = gapTo(thing);
+    if (gap > reach(thing) || gap >= least) continue;
+    best = thing;
+    least = gap;
+  }
+  return best;
+}

@@ -1,0 +1,248 @@
+/**
+ * What the map has to say at one instant: the store read with the eyes of a clock.
+ *
+ * Layers only paint; whether a robot is a ghost, how far a ring has grown, whether a
+ * sweep is too old to show is decided here, purely, from values and `nowMs`.
+ *
+ * @typedef {import("./store.js").Store} Store
+ * @typedef {import("./protocol.js").Robot} Robot
+ * @typedef {import("./protocol.js").Person} Person
+ * @typedef {import("./protocol.js").Detection} Detection
+ * @typedef {import("./protocol.js").GreenhouseMap} GreenhouseMap
+ * @typedef {import("./protocol.js").Pose} Pose
+ * @typedef {import("./protocol.js").Point} Point
+ *
+ * @typedef {{
+ *   id: string, slot: number, pose: Pose, link: import("./protocol.js").Link,
+ *   ageS: number, mode: import("./protocol.js").Mode, factor: number, replay: boolean,
+ *   drive: string, length: number, width: number,
+ *   task: string | null, goal: Point | null, path: [number, number][],
+ *   unsureM: number,
+ * }} SceneRobot `slot` 1–8 its hue; `unsureM` how far it may have driven since a STOP
+ *   that nobody confirmed (m), 0 when that is not the case
+ *
+ * @typedef {{
+ *   id: string, peer: boolean, stage: "seen" | "remembered" | "last_seen",
+ *   x: number, y: number, ageS: number, ringM: number, confidence: number,
+ *   observers: string[], acting: Person["acting"], decisionId: string | null,
+ * }} ScenePerson
+ *
+ * @typedef {{
+ *   id: string, robotId: string, slot: number, x: number, y: number, yaw: number,
+ *   length: number, width: number, probability: number, confident: boolean,
+ *   named: boolean, item: Detection,
+ * }} SceneDetection `yaw` of its box (rad); `named` = already drawn as a person
+ *
+ * @typedef {{robotId: string, slot: number, strength: number, points: Float32Array}
+ * } SceneScan `strength` 1 fresh … 0 gone
+ *
+ * @typedef {{
+ *   nowMs: number, map: GreenhouseMap | null, isVeiled: boolean,
+ *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
+ *   scans: SceneScan[],
+ * }} Scene
+ */
+
+import { ageOf, LATE_LIMIT_S, LIVE_LIMIT_S, linkOf } from "./clock.js";
+
+/** Ring growth after the last sighting (safety: 1.6 m/s from 0.32 s on, at most 6 m). */
+const WALK_M_S = 1.6;
+const GRACE_S = 0.32;
+const RING_MAX_M = 6;
+/** From here on only a marker is left of a person. */
+const REMEMBERED_LIMIT_S = 10;
+/** The server is silent for two seconds when the line is called lost; one more. */
+const VEIL_AFTER_MS = 1000;
+/** Commands whose robot may still be driving without anybody knowing. */
+const UNSURE_STATES = new Set(["UNCONFIRMED", "STILL_MOVING"]);
+/** A body for a robot that nobody described (m). */
+const PLAIN = { drive: "differential", length: 1, width: 0.6 };
+const BOX_WITHOUT_SIZE_M = 0.5;
+
+/**
+ * @param {Store} store
+ * @param {number} nowMs `performance.now()` (ms)
+ * @returns {Scene}
+ */
+export function readScene(store, nowMs) {
+  const { state, since } = store.connection;
+  const isGone = state === "lost" || state === "signed-out";
+  return {
+    nowMs,
+    map: store.map(),
+    isVeiled: isGone && nowMs - since > VEIL_AFTER_MS,
+    robots: readRobots(store, nowMs),
+    people: store.people().map((person) => readPerson(person, nowMs)),
+    detections: readDetections(store, nowMs),
+    scans: readScans(store, nowMs),
+  };
+}
+
+/** @param {Store} store @param {number} nowMs */
+function readRobots(store, nowMs) {
+  /** @type {SceneRobot[]} */
+  const robots = [];
+  for (const robot of store.robots().values()) {
+    if (robot.pose) robots.push(readRobot(robot, robot.pose, store, nowMs));
+  }
+  return robots;
+}
+
+/**
+ * @param {Robot} robot
+ * @param {Pose} pose
+ * @param {Store} store
+ * @param {number} nowMs
+ * @returns {SceneRobot}
+ */
+function readRobot(robot, pose, store, nowMs) {
+  const ageS = ageOf(robot, nowMs);
+  const { drive, length, width } = robot.profile ?? PLAIN;
+  return {
+    id: robot.robot_id,
+    slot: store.slotOf(robot.robot_id),
+    pose,
+    link: linkOf(ageS),
+    ageS,
+    mode: robot.mode,
+    factor: robot.speed_factor ?? 1,
+    replay: robot.replay,
+    drive,
+    length,
+    width,
+    task: robot.navigation?.task ?? null,
+    goal: robot.navigation?.goal ?? null,
+    path: robot.navigation?.path ?? [],
+    unsureM: unsureDistance(robot, store, nowMs),
+  };
+}
+
+/**
+ * How far a robot may have gone since a STOP that it has not obeyed as far as anybody
+ * knows: what the server says, and from then on its last speed times the silence.
+ *
+ * @param {Robot} robot
+ * @param {Store} store
+ * @param {number} nowMs
+ */
+function unsureDistance(robot, store, nowMs) {
+  const id = robot.stop?.command_id;
+  const stop = (id && store.get(`commands/${id}`)) || robot.stop;
+  if (!stop?.robot || !UNSURE_STATES.has(stop.state)) return 0;
+  const waitedS = Math.max(0, nowMs - (stop.receivedAtMs ?? nowMs)) / 1000;
+  return (stop.robot.moved_m ?? 0) + Math.abs(stop.robot.v ?? 0) * waitedS;
+}
+
+/**
+ * @param {Person} person
+ * @param {number} nowMs
+ * @returns {ScenePerson}
+ */
+export function readPerson(person, nowMs) {
+  const ageS = ageOf(person, nowMs);
+  const stage = stageAt(person.stage, ageS);
+  return {
+    id: person.person_id,
+    peer: person.class === "robot",
+    stage,
+    x: person.position.x,
+    y: person.position.y,
+    ageS,
+    ringM: stage === "seen" ? person.radius_m : grownRing(person, ageS),
+    confidence: person.confidence,
+    observers: person.observers,
+    acting: person.acting,
+    decisionId: person.decision_id,
+  };
+}
+
+/**
+ * The ring as the server drew it, grown on for as long as the server has been silent.
+ *
+ * @param {Person} person
+ * @param {number} ageS
+ */
+function grownRing(person, ageS) {
+  const walkedS = beyondGrace(ageS) - beyondGrace(person.age_s ?? 0);
+  const limit = Math.max(RING_MAX_M, person.radius_m);
+  return Math.min(limit, person.radius_m + WALK_M_S * walkedS);
+}
+
+/** @param {number} ageS */
+function beyondGrace(ageS) {
+  return Math.max(0, ageS - GRACE_S);
+}
+
+/**
+ * A person never gets fresher here than the server said, only older.
+ *
+ * @param {Person["stage"]} stage
+ * @param {number} ageS
+ * @returns {Person["stage"]}
+ */
+function stageAt(stage, ageS) {
+  if (stage === "last_seen" || ageS > REMEMBERED_LIMIT_S) return "last_seen";
+  return stage === "seen" && ageS <= LIVE_LIMIT_S ? "seen" : "remembered";
+}
+
+/** @param {Store} store @param {number} nowMs */
+function readDetections(store, nowMs) {
+  /** @type {SceneDetection[]} */
+  const detections = [];
+  for (const [robotId, look] of store.looks()) {
+    if (ageOf(look, nowMs) > LIVE_LIMIT_S) continue;
+    const yaw = store.robots().get(robotId)?.pose?.yaw ?? 0;
+    const slot = store.slotOf(robotId);
+    look.items.forEach((item, i) => {
+      detections.push(readDetection(item, `${robotId}/${i}`, slot, yaw));
+    });
+  }
+  return detections;
+}
+
+/**
+ * @param {Detection} item
+ * @param {string} id
+ * @param {number} slot
+ * @param {number} robotYaw a box in the robot's frame is turned as the robot is
+ * @returns {SceneDetection}
+ */
+function readDetection(item, id, slot, robotYaw) {
+  const box = item.box;
+  return {
+    id,
+    robotId: item.robot_id,
+    slot,
+    x: item.position.x,
+    y: item.position.y,
+    yaw: box && box.frame_id !== "map" ? robotYaw : 0,
+    length: box ? box.xmax - box.xmin : BOX_WITHOUT_SIZE_M,
+    width: box ? box.ymax - box.ymin : BOX_WITHOUT_SIZE_M,
+    probability: item.probability,
+    confident: item.confident,
+    named: item.person_id !== null && item.person_id !== undefined,
+    item,
+  };
+}
+
+/** @param {Store} store @param {number} nowMs */
+function readScans(store, nowMs) {
+  /** @type {SceneScan[]} */
+  const scans = [];
+  for (const [robotId, { points, ...scan }] of store.scans()) {
+    const strength = strengthAt(ageOf(scan, nowMs));
+    if (!strength) continue;
+    scans.push({ robotId, slot: store.slotOf(robotId), strength, points });
+  }
+  return scans;
+}
+
+/**
+ * Old laser points say where things were; they fade while LATE and go when LOST.
+ *
+ * @param {number} ageS
+ */
+function strengthAt(ageS) {
+  if (ageS <= LIVE_LIMIT_S) return 1;
+  return ageS <= LATE_LIMIT_S ? 0.35 : 0;
+}
