@@ -13,7 +13,7 @@ from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, Mandate
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.mandates import Change, Mandates
+from iveg.domain.mandates import Change, Crossing, Mandates
 from iveg.domain.observations import (
     DetectionFrame,
     Instant,
@@ -79,6 +79,11 @@ class Assessor:
         self._stages: dict[str, str] = {}
         self._looks: dict[tuple[str, str], float] = {}
         self._other: dict[str, FeedbackAlert] = {}
+
+    @property
+    def crossings(self) -> Iterable[Crossing]:
+        """Who is inside whose ring now."""
+        return self._mandates.crossings
 
     # --- one observation ----------------------------------------------------------
 

@@ -1,0 +1,89 @@
+"""The rule loop: takes what has arrived, lets time pass, and is the only heartbeat.
+
+If this loop hangs, feedback stops and every robot slows down by itself (fault F14).
+"""
+
+from collections.abc import Callable, Iterable
+
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import CommandAnswer, Instant, Received
+from iveg.pipeline.assess import Assessor
+from iveg.pipeline.chain import Chain, HopState
+from iveg.pipeline.command import Commander
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.ports import Clock
+from iveg.pipeline.publish import Hub
+
+TICK_S = 0.05
+_HEALTH_PERIOD_S = 1.0
+
+
+class RuleLoop:
+    """Runs ingest, assess and command in one order, in one task."""
+
+    def __init__(
+        self,
+        ingest: Ingest,
+        assessor: Assessor,
+        commander: Commander,
+        chain: Chain,
+        minutes: Minutes,
+        hub: Hub,
+        clock: Clock,
+        database_state: Callable[[], HopState],
+    ) -> None:
+        self._ingest = ingest
+        self._assessor = assessor
+        self._commander = commander
+        self._chain = chain
+        self._minutes = minutes
+        self._hub = hub
+        self._clock = clock
+        self._database_state = database_state
+        self._ticked = float("-inf")
+        self._health_at = float("-inf")
+        self._states: dict[str, HopState] = {}
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        while True:
+            await self._ingest.wait(TICK_S)
+            self.step(self._ingest.drain(), self._clock())
+
+    def step(self, arrived: Iterable[Received], now: Instant) -> None:
+        """Take everything that arrived, then let time pass if it is due."""
+        for received in arrived:
+            fresh = self._assessor.take(received)
+            # The second road's answer is no news, but its time is kept.
+            if fresh or isinstance(received.observation, CommandAnswer):
+                self._commander.take(received)
+        if now.mono - self._ticked >= TICK_S - 1e-3:
+            self._ticked = now.mono
+            self._commander.tick(now)
+            self._assessor.tick(now, self._commander.conditions(now))
+            self._watch_chain(now)
+
+    def _watch_chain(self, now: Instant) -> None:
+        self._chain.canary_at = self._assessor.world.canary_at
+        self._chain.database = self._database_state()
+        changed = False
+        for hop in self._chain.hops(now):
+            before = self._states.get(hop.name)
+            if hop.state == before:
+                continue
+            self._states[hop.name] = hop.state
+            changed = True
+            key = _HOP_KEYS.get((before in ("down", "late"), hop.state))
+            if key is not None:
+                slots = {"hop": hop.name, "detail": hop.detail}
+                self._minutes.log(LogEvent("system", key, slots), now)
+        if changed or now.mono - self._health_at >= _HEALTH_PERIOD_S:
+            self._health_at = now.mono
+            self._hub.changed("health")
+
+
+_HOP_KEYS: dict[tuple[bool, HopState], str] = {
+    (False, "down"): "log.hop.down",
+    (True, "ok"): "log.hop.back",
+}

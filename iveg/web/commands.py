@@ -1,0 +1,84 @@
+"""STOP, release, resume (docs/interfaces.md §5).
+
+STOP is accepted from everyone who is signed in, in any state, without limit.  Release
+and resume are refused unless the robot stands and its report is fresh.
+"""
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from iveg.domain.observations import Instant
+from iveg.domain.stop import Command
+from iveg.pipeline.command import Commander
+from iveg.web import schemas
+from iveg.web.auth import Principal, require
+from iveg.web.robots import Json
+
+Pressing = Annotated[Principal, Depends(require("stop"))]
+Releasing = Annotated[Principal, Depends(require("release"))]
+HoldId = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class Release(BaseModel):
+    """The holds that the person saw."""
+
+    model_config = ConfigDict(strict=True, extra="ignore")
+
+    holds: Annotated[list[HoldId], Field(min_length=1, max_length=64)]
+
+
+def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
+    """Commands to robots."""
+    routes = APIRouter(prefix="/api/v1", tags=["commands"])
+
+    @routes.post(
+        "/robots/{robot_id}/stop",
+        status_code=202,
+        response_model=schemas.PressedJson,
+    )
+    async def stop(robot_id: str, who: Pressing) -> Response:
+        """STOP one robot, on both roads at once."""
+        pressed = await commander.stop([robot_id], who.name, clock())
+        return Json(_pressed(pressed[0]), 202)
+
+    @routes.post(
+        "/fleet/stop", status_code=202, response_model=schemas.FleetPressedJson
+    )
+    async def stop_fleet(who: Pressing) -> Response:
+        """STOP every robot, in parallel."""
+        pressed = await commander.stop(commander.machines, who.name, clock())
+        return Json({"commands": [_pressed(command) for command in pressed]}, 202)
+
+    @routes.post(
+        "/robots/{robot_id}/release",
+        status_code=202,
+        response_model=schemas.PressedJson,
+    )
+    async def release(robot_id: str, body: Release, who: Releasing) -> Response:
+        """Lift exactly the holds that the person saw; 409 when they have changed."""
+        command = await commander.release(robot_id, body.holds, who.name, clock())
+        return Json(_pressed(command), 202)
+
+    @routes.post(
+        "/robots/{robot_id}/resume",
+        status_code=202,
+        response_model=schemas.PressedJson,
+    )
+    async def resume(robot_id: str, who: Releasing) -> Response:
+        """Let a released robot drive again."""
+        command = await commander.resume(robot_id, who.name, clock())
+        return Json(_pressed(command), 202)
+
+    return routes
+
+
+def _pressed(command: Command) -> schemas.PressedJson:
+    return {
+        "robot_id": command.robot_id,
+        "command_id": command.command_id,
+        "state": command.state,
+    }

@@ -1,0 +1,71 @@
+"""Whether the chain is whole: for people, for supervisors, for Prometheus."""
+
+from collections import Counter
+from collections.abc import Callable
+
+from fastapi import APIRouter, Depends
+from starlette.responses import PlainTextResponse, Response
+
+from iveg.domain.observations import Instant
+from iveg.pipeline.chain import Chain
+from iveg.web import schemas
+from iveg.web.auth import require
+from iveg.web.robots import Json
+
+
+def health_of(
+    chain: Chain, counters: Callable[[], Counter[str]], now: Instant
+) -> schemas.HealthJson:
+    """Every hop with its state and age, and all counters."""
+    hops: list[schemas.HopJson] = [
+        {
+            "hop": hop.name,
+            "state": hop.state,
+            "age_s": None if hop.age_s is None else round(hop.age_s, 1),
+            "key": f"health.hop.{hop.name}.{hop.state}",
+            "detail": hop.detail,
+        }
+        for hop in chain.hops(now)
+    ]
+    return {
+        "ok": all(hop["state"] == "ok" for hop in hops),
+        "hops": hops,
+        "counters": dict(sorted(counters().items())),
+    }
+
+
+def router(
+    clock: Callable[[], Instant],
+    health: Callable[[Instant], schemas.HealthJson],
+) -> APIRouter:
+    """The endpoints that machines ask."""
+    routes = APIRouter(tags=["health"])
+
+    @routes.get("/healthz", dependencies=[Depends(require("open"))])
+    async def alive() -> Response:
+        """The process answers; says nothing else to strangers."""
+        return PlainTextResponse("ok\n")
+
+    @routes.get("/readyz", dependencies=[Depends(require("read"))])
+    async def ready() -> Response:
+        """200 when every hop is well, else 503."""
+        state = health(clock())
+        return Json({"ok": state["ok"]}, 200 if state["ok"] else 503)
+
+    @routes.get("/metrics", dependencies=[Depends(require("read"))])
+    async def metrics() -> Response:
+        """Counters in Prometheus' text format."""
+        state = health(clock())
+        lines = ["# TYPE iveg_events_total counter"]
+        lines += [
+            f'iveg_events_total{{name="{name}"}} {count}'
+            for name, count in state["counters"].items()
+        ]
+        lines.append("# TYPE iveg_hop_up gauge")
+        lines += [
+            f'iveg_hop_up{{hop="{hop["hop"]}"}} {int(hop["state"] == "ok")}'
+            for hop in state["hops"]
+        ]
+        return PlainTextResponse("\n".join(lines) + "\n")
+
+    return routes

@@ -1,0 +1,294 @@
+"""JSON as browsers and integrators see it: the same shapes in REST and live topics.
+
+Lengths in metres, angles in radians, times ISO-8601 UTC, ages in seconds
+(docs/interfaces.md §5 and §8).
+"""
+
+from typing import Any, Literal, TypedDict
+
+
+class Point(TypedDict):
+    """A place in ``map`` (m)."""
+
+    x: float
+    y: float
+
+
+class Point3(TypedDict):
+    """A place in ``map`` with its height (m)."""
+
+    x: float
+    y: float
+    z: float
+
+
+class PoseJson(TypedDict):
+    """Pose of ``base_link`` in ``map``."""
+
+    x: float
+    y: float
+    yaw: float
+
+
+class TwistJson(TypedDict):
+    """Speed (m/s) and turn rate (rad/s)."""
+
+    linear: float
+    angular: float
+
+
+class HoldJson(TypedDict):
+    """A reason why a robot may not move."""
+
+    id: str
+    source: str
+    ack: str
+
+
+class AppliedJson(TypedDict):
+    """What the robot itself says it applies."""
+
+    reason: str
+    cause: str | None
+    age_s: float
+    feedback_age_s: float | None
+
+
+class MandateJson(TypedDict):
+    """What iVeg tells the robot."""
+
+    speed_factor: float
+    reason: str
+    cause: str | None
+    distance_m: float | None
+    decision_id: str | None
+
+
+class NavigationJson(TypedDict):
+    """The robot's intent."""
+
+    task: str
+    goal: Point | None
+    path: list[list[float]]
+
+
+class ProfileJson(TypedDict):
+    """What is known of this kind of robot."""
+
+    drive: str
+    length: float
+    width: float
+    max_speed: float
+    turning_radius: float
+
+
+class TimesJson(TypedDict):
+    """When each step of a command was taken."""
+
+    requested: str
+    sent_fiware: str | None
+    sent_direct: str | None
+    answer_fiware: str | None
+    answer_direct: str | None
+    standing: str | None
+
+
+class CommandRobotJson(TypedDict):
+    """The robot's last word, while a command is open."""
+
+    v: float
+    report_age_s: float | None
+    moved_m: float
+
+
+class CommandJson(TypedDict):
+    """One STOP, release or resume."""
+
+    command_id: str
+    robot_id: str
+    kind: str
+    state: str
+    requested_by: str
+    requesters: list[str]
+    times: TimesJson
+    standstill_ms: float | None
+    age_s: float
+    tries: int
+    reason: str | None
+    roads: dict[str, str]
+    robot: CommandRobotJson
+    challenge_fresh: bool
+
+
+class RobotJson(TypedDict):
+    """One robot with the age of what is said of it."""
+
+    robot_id: str
+    link: str
+    mode: Literal["RUNNING", "SLOW", "STOPPED"]
+    pose: PoseJson | None
+    twist: TwistJson | None
+    stamp: str | None
+    received_at: str | None
+    age_s: float | None
+    speed_factor: float | None
+    applied: AppliedJson | None
+    mandate: MandateJson
+    holds: list[HoldJson]
+    stop: CommandJson | None
+    stop_state: str
+    navigation: NavigationJson | None
+    replay: bool
+    clock_offset_s: float | None
+    road: str
+    profile: ProfileJson
+    cmd_status: str | None
+
+
+class ActingJson(TypedDict):
+    """A robot that is slowed for somebody."""
+
+    robot_id: str
+    distance_m: float
+    in_sight: bool
+
+
+PersonJson = TypedDict(
+    "PersonJson",
+    {
+        "person_id": str,
+        "class": str,
+        "class_id": str,
+        "stage": str,
+        "position": Point3,
+        "radius_m": float | None,
+        "confidence": float,
+        "first_seen": str,
+        "last_seen": str,
+        "age_s": float,
+        "observers": list[str],
+        "decision_id": str,
+        "lane": str | None,
+        "acting": list[ActingJson],
+    },
+)
+"""A person, or a robot that is none of the fleet."""
+
+DetectionJson = TypedDict(
+    "DetectionJson",
+    {
+        "robot_id": str,
+        "stamp": str | None,
+        "class": str | None,
+        "class_id": str,
+        "probability": float,
+        "position": Point3,
+        "box": dict[str, Any],
+        "confident": bool,
+        "person_id": str | None,
+        "peer": str | None,
+        "road": str,
+    },
+)
+"""One box of one look, placed in ``map``."""
+
+
+class FrameJson(TypedDict):
+    """One look of one robot."""
+
+    robot_id: str
+    stamp: str | None
+    road: str
+    items: list[DetectionJson]
+
+
+class AlertJson(TypedDict):
+    """A notice to people."""
+
+    alert_id: str
+    priority: str
+    key: str
+    slots: dict[str, Any]
+    robot_id: str | None
+    raised_at: str
+    cleared_at: str | None
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str | None
+    count: int
+
+
+LogJson = TypedDict(
+    "LogJson",
+    {
+        "id": int,
+        "at": str,
+        "kind": str,
+        "robot_id": str | None,
+        "key": str,
+        "slots": dict[str, Any],
+        "class": str | None,
+        "decision_id": str | None,
+    },
+)
+"""One line of the action and inference log."""
+
+
+class HopJson(TypedDict):
+    """One hop of the chain from robot to screen."""
+
+    hop: str
+    state: Literal["ok", "late", "down", "unknown"]
+    age_s: float | None
+    key: str
+    detail: str
+
+
+class HealthJson(TypedDict):
+    """Whether the chain is whole, and what was counted."""
+
+    ok: bool
+    hops: list[HopJson]
+    counters: dict[str, int]
+
+
+class ClimateJson(TypedDict):
+    """Air in the greenhouse."""
+
+    temperature: float | None
+    relative_humidity: float | None
+    co2: float | None
+    received_at: str
+    age_s: float
+
+
+class ScanJson(TypedDict):
+    """One sweep in ``map``."""
+
+    robot_id: str
+    stamp: str | None
+    frame_id: str
+    points: list[list[float]]
+
+
+class PressedJson(TypedDict):
+    """A STOP, release or resume that was accepted."""
+
+    robot_id: str
+    command_id: str
+    state: str
+
+
+class FleetPressedJson(TypedDict):
+    """A fleet STOP: one command a robot."""
+
+    commands: list[PressedJson]
+
+
+class LinkJson(TypedDict):
+    """One step of a decision's chain."""
+
+    link: str
+    at: str | None
+    value: str | float | None
+    verdict: str
