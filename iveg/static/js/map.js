@@ -46,8 +46,8 @@ export const LAYERS = [
   "scan",
   "intent",
   "links",
-  "people",
   "detections",
+  "people",
   "robot",
   "scalebar",
 ];

@@ -41,6 +41,11 @@ export function hasArea(bounds) {
 function drawWalls(paint, bounds) {
   const { ctx, theme } = paint;
   const [x, y, width, height] = rectOf(paint, bounds);
+  ctx.save();
+  ctx.globalAlpha = 0.4;
+  ctx.fillStyle = theme.lane;
+  ctx.fillRect(x, y, width, height);
+  ctx.restore();
   ctx.strokeStyle = theme.post;
   ctx.lineWidth = 3;
   ctx.beginPath();

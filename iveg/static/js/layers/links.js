@@ -14,6 +14,10 @@ import { isolated, label } from "./paint.js";
  * @typedef {import("../scene.js").SceneRobot} SceneRobot
  */
 
+/** On a shorter link a distance would cover what it is about. */
+const WORDS_FROM_PX = 48;
+const BESIDE_PX = 13;
+
 /** @param {Paint} paint */
 export function draw(paint) {
   const { ctx, scene } = paint;
@@ -24,7 +28,8 @@ export function draw(paint) {
       for (const id of person.observers) drawSight(paint, robots.get(id), person);
       for (const act of person.acting) {
         const robot = robots.get(act.robot_id);
-        if (!act.in_sight && robot) drawBlind(paint, robot, person, act.distance_m);
+        if (act.in_sight || !robot || robot.link === "LOST") continue;
+        drawBlind(paint, robot, person, act.distance_m);
       }
     }
   });
@@ -58,8 +63,13 @@ function drawBlind(paint, robot, person, distanceM) {
   ctx.setLineDash([9, 6]);
   line(paint, robot, person);
   ctx.setLineDash([]);
-  const x = screenX(view, (robot.pose.x + person.x) / 2);
-  const y = screenY(view, (robot.pose.y + person.y) / 2);
+  const [x1, y1] = [screenX(view, robot.pose.x), screenY(view, robot.pose.y)];
+  const [x2, y2] = [screenX(view, person.x), screenY(view, person.y)];
+  const length = Math.hypot(x2 - x1, y2 - y1);
+  if (length < WORDS_FROM_PX) return;
+  // Beside the line and not on it, nearer to the person than to the robot's body.
+  const x = x1 + 0.6 * (x2 - x1) + (BESIDE_PX * (y1 - y2)) / length;
+  const y = y1 + 0.6 * (y2 - y1) - (BESIDE_PX * Math.abs(x2 - x1)) / length;
   label(paint, words.distance(distanceM), x, y, { size: 11 });
 }
 

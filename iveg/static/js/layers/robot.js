@@ -16,6 +16,7 @@ import { circle, isolated, label, pill } from "./paint.js";
 
 /** A body is never drawn shorter than this (px), however far away the eye is. */
 const SHORTEST_PX = 20;
+const PADLOCK_PX = 12;
 
 /** @param {Paint} paint */
 export function draw(paint) {
@@ -47,7 +48,6 @@ function drawRobot(paint, robot) {
   ctx.rotate(-robot.pose.yaw);
   drawBody(paint, robot, length, width);
   ctx.restore();
-  if (robot.mode === "STOPPED") drawPadlock(paint);
   drawWords(paint, robot, length);
 }
 
@@ -90,10 +90,11 @@ function drawFollowed({ ctx, theme }, length) {
 function drawBody({ ctx, theme }, robot, length, width) {
   const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
   const hue = isLost ? theme.muted : theme.robots[robot.slot - 1];
-  if (!isLost) drawWheels(ctx, robot, length, width, theme.text);
   outline(ctx, robot.drive, length, width);
   if (robot.link === "LATE") halo(ctx, theme.alarm[1]);
   else if (!isLost) halo(ctx, theme.bg);
+  if (!isLost) drawWheels(ctx, robot, length, width, theme.text);
+  outline(ctx, robot.drive, length, width);
   ctx.globalAlpha = isLost ? 0.15 : 1;
   ctx.fillStyle = hue;
   ctx.fill();
@@ -163,7 +164,7 @@ function outline(ctx, drive, length, width) {
  */
 function drawWheels(ctx, robot, length, width, colour) {
   if (length < 28) return;
-  const [long, thick] = [length * 0.24, Math.max(2.5, width * 0.16)];
+  const [long, thick] = [length * 0.24, Math.max(3.5, width * 0.18)];
   const axles = robot.drive === "ackermann" ? [-0.3, 0.24] : [-0.26, 0.26];
   ctx.fillStyle = colour;
   for (const axle of axles) {
@@ -203,13 +204,20 @@ function drawHeading(ctx, length, width, hue, ink) {
   ctx.fill();
 }
 
-/** A dark octagon with a padlock: held, and not by accident. @param {Paint} paint */
-function drawPadlock({ ctx, theme }) {
-  const radius = 12;
+/**
+ * A dark octagon with a padlock: held, and not by accident.
+ *
+ * @param {Paint} paint
+ * @param {number} x (px)
+ * @param {number} y (px)
+ */
+function drawPadlock({ ctx, theme }, x, y) {
+  ctx.save();
+  ctx.translate(x, y);
   ctx.beginPath();
   for (let i = 0; i < 8; i += 1) {
     const angle = (Math.PI / 4) * (i + 0.5);
-    ctx.lineTo(radius * Math.cos(angle), radius * Math.sin(angle));
+    ctx.lineTo(PADLOCK_PX * Math.cos(angle), PADLOCK_PX * Math.sin(angle));
   }
   ctx.closePath();
   ctx.strokeStyle = theme.bg;
@@ -224,6 +232,7 @@ function drawPadlock({ ctx, theme }) {
   ctx.stroke();
   ctx.fillStyle = theme.bg;
   ctx.fillRect(-4.5, -1.5, 9, 7);
+  ctx.restore();
 }
 
 /**
@@ -243,6 +252,7 @@ function drawWords(paint, robot, length) {
     colour: isLost ? theme.muted : theme.text,
   });
   let x = ctx.measureText(robot.id).width / 2 + 6;
+  if (robot.mode === "STOPPED") drawPadlock(paint, -x - PADLOCK_PX, y);
   for (const [text, fill] of tagsOf(paint, robot)) {
     x += pill(paint, text, x, y, fill, theme.bg) + 4;
   }
