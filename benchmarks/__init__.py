@@ -1,0 +1,1 @@
+"""What iVeg costs and how fast it is, measured: ``python -m benchmarks``."""

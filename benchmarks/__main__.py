@@ -1,0 +1,17 @@
+"""Run every benchmark that takes minutes, not longer: ``python -m benchmarks``.
+
+``python -m benchmarks.soak`` is a run of its own (``make soak``).
+"""
+
+import runpy
+
+BENCHMARKS = ("lidar_cost", "fiware_road", "paint")
+
+
+def main() -> None:
+    for name in BENCHMARKS:
+        runpy.run_module(f"benchmarks.{name}", run_name="__main__")
+
+
+if __name__ == "__main__":
+    main()

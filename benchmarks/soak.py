@@ -1,0 +1,165 @@
+"""Minutes of driving: nothing is lost on the way and nothing grows.
+
+``python -m benchmarks.soak [MINUTES]`` (10).  Three counts must agree for each kind of
+message: what the robots numbered, what the broker passed on, what the dashboard took
+from Orion.  The dashboard's memory must be flat and all of iVeg must fit in one core.
+Exit status 1 where one of these does not hold.
+"""
+
+import asyncio
+import json
+import socket
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import aiomqtt
+
+from benchmarks.process import Usage, machine, print_table
+from iveg.adapters.mqtt import BrokerAddress
+from tests.processes import Site, site
+
+KINDS = {
+    "_odom": ("base_pose_ground_truth", "orion.Odometry"),
+    "_lidar2D": ("lidar_header", "orion.LaserScan"),
+    "_yolox_bounding_boxes": ("detection_header", "orion.DetectionFrame"),
+    "_safety": ("safety_state", "orion.SafetyReport"),
+}
+"""Device suffix → attribute with the robot's own count, counter at the dashboard."""
+
+MOST_CORES = 1.0
+MOST_GROWTH_MIB = 8.0
+_SETTLE_S = 3.0
+
+
+@dataclass
+class Heard:
+    """What one listener at the broker counted.
+
+    Attributes:
+        messages: By device suffix.
+        numbers: First and last number of each robot's topic.
+    """
+
+    messages: Counter[str] = field(default_factory=Counter)
+    numbers: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
+
+    def take(self, device: str, payload: bytes) -> None:
+        """Count one measure."""
+        suffix = next((known for known in KINDS if device.endswith(known)), None)
+        if suffix is None:
+            return
+        self.messages[suffix] += 1
+        number = int(json.loads(payload)[KINDS[suffix][0]]["seq"])
+        first, last = self.numbers.get((device, suffix), (number, number))
+        self.numbers[device, suffix] = (min(first, number), max(last, number))
+
+    def numbered(self) -> dict[str, int]:
+        """How many messages the robots themselves counted, by device suffix."""
+        total: dict[str, int] = defaultdict(int)
+        for (_, suffix), (first, last) in self.numbers.items():
+            total[suffix] += last - first + 1
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Memory of the dashboard (MiB) and processor time of all (s) at one moment."""
+
+    minute: float
+    rss_mib: float
+    cpu_s: float
+
+
+def main() -> None:
+    minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
+    with tempfile.TemporaryDirectory() as directory, site(Path(directory)) as place:
+        place.start("fiware")
+        for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
+            place.wait_for_port(setting)
+        place.start("serve")
+        place.wait_until_served()
+        heard, samples = asyncio.run(_run(place, minutes))
+        with place.api() as api:
+            counters = api.get("health").json()["counters"]
+    failures = _report(heard, counters, samples, minutes)
+    for failure in failures:
+        print(f"FAILED: {failure}")
+    sys.exit(1 if failures else 0)
+
+
+async def _run(place: Site, minutes: float) -> tuple[Heard, list[Sample]]:
+    """Listen first, then start the robots, so that both ends see every message."""
+    heard = Heard()
+    broker = BrokerAddress.from_url(place.settings["IVEG_MQTT_URL"])
+    nodelay = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+    async with aiomqtt.Client(
+        broker.host, broker.port, socket_options=nodelay
+    ) as client:
+        await client.subscribe("/+/+/attrs", qos=0)
+        listener = asyncio.create_task(_listen(client, heard))
+        emulator = place.start("emulator")
+        samples = []
+        for tick in range(1, 21):
+            await asyncio.sleep(3 * minutes)
+            samples.append(_sample(place, tick * minutes / 20))
+        await asyncio.to_thread(emulator.interrupt)
+        await asyncio.sleep(_SETTLE_S)
+        listener.cancel()
+    return heard, samples
+
+
+async def _listen(client: aiomqtt.Client, heard: Heard) -> None:
+    async for message in client.messages:
+        if isinstance(message.payload, bytes):
+            heard.take(str(message.topic).split("/")[2], message.payload)
+
+
+def _sample(place: Site, minute: float) -> Sample:
+    usages = {program.words[0]: Usage.of(program.pid) for program in place.programs}
+    return Sample(
+        minute, usages["serve"].rss_mib, sum(usage.cpu_s for usage in usages.values())
+    )
+
+
+def _report(
+    heard: Heard, counters: dict[str, int], samples: list[Sample], minutes: float
+) -> list[str]:
+    failures = []
+    rows = []
+    numbered = heard.numbered()
+    for suffix, (_, counter) in KINDS.items():
+        counts = (numbered[suffix], heard.messages[suffix], counters.get(counter, 0))
+        rows.append([suffix[1:], *map(str, counts)])
+        if len(set(counts)) != 1 or counts[0] == 0:
+            failures.append(f"{suffix[1:]}: counts differ: {counts}")
+    head = ["measure", "numbered by robots", "at the broker", "taken by iVeg"]
+    print_table(f"Messages in {minutes:g} min ({machine()})", head, rows)
+    # The first quarter fills caches and trails; growth is what comes after it.
+    settled, last = samples[len(samples) // 4], samples[-1]
+    growth = last.rss_mib - settled.rss_mib
+    cores = (last.cpu_s - settled.cpu_s) / (60 * (last.minute - settled.minute))
+    print_table(
+        "What it costs",
+        ["", "from", "to", "limit"],
+        [
+            [
+                "dashboard RSS, MiB",
+                f"{settled.rss_mib:.1f}",
+                f"{last.rss_mib:.1f}",
+                f"+{MOST_GROWTH_MIB:g}",
+            ],
+            ["all of iVeg, cores", "", f"{cores:.2f}", f"{MOST_CORES:g}"],
+        ],
+    )
+    if growth > MOST_GROWTH_MIB:
+        failures.append(f"the dashboard grew by {growth:.1f} MiB")
+    if cores > MOST_CORES:
+        failures.append(f"{cores:.2f} cores")
+    return failures
+
+
+if __name__ == "__main__":
+    main()
