@@ -79,6 +79,7 @@ class MqttLink:
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._wake = asyncio.Event()
+        self._loss_told = False
         self.replaced = 0
         """Offered messages that a newer one overtook."""
         self.connects = 0
@@ -91,17 +92,16 @@ class MqttLink:
     async def run(self) -> None:
         """Stay connected until cancelled."""
         pause = _FIRST_PAUSE_S
-        told = False
         while True:
             try:
                 await self._session()
             except (aiomqtt.MqttError, OSError) as error:
-                if not told:
+                if not self._loss_told:
                     _log.warning("%s: broker lost: %s", self._name, error)
-                    told = True
+                    self._loss_told = True
             if self._client is not None:
                 self._client = None
-                pause, told = _FIRST_PAUSE_S, True
+                pause = _FIRST_PAUSE_S
                 if self._on_loss is not None:
                     self._on_loss()
             await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - jitter
@@ -123,6 +123,7 @@ class MqttLink:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
             self._client = client
+            self._loss_told = False
             self.connects += 1
             _log.info("%s: connected to the broker", self._name)
             if self._on_connect is not None:

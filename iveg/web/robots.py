@@ -1,6 +1,7 @@
 """REST twins of what is live: robots, people, map, climate (docs/interfaces.md §5)."""
 
 from collections.abc import Callable
+from typing import TypedDict
 
 import orjson
 from fastapi import APIRouter, Depends
@@ -22,14 +23,14 @@ class Json(Response):
         return orjson.dumps(content)
 
 
-class RobotList(schemas.TypedDict):
+class RobotList(TypedDict):
     """A page of robots."""
 
     items: list[schemas.RobotJson]
     next: str | None
 
 
-class PersonList(schemas.TypedDict):
+class PersonList(TypedDict):
     """A page of people."""
 
     items: list[schemas.PersonJson]

@@ -1,0 +1,90 @@
+"""What is wanted of each robot, on disk before anybody is told that it was accepted.
+
+An append-only file of JSON lines, flushed to the disk at each line; it outlives a
+crash of iVeg and a lost database, and is read once at the start.
+"""
+
+import asyncio
+import logging
+import os
+from pathlib import Path
+from typing import IO, Literal
+
+import orjson
+
+from iveg.domain.observations import Instant
+
+_log = logging.getLogger(__name__)
+
+
+class FileJournal:
+    """The journal in one file; implements ``pipeline.ports.Journal``."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file: IO[bytes] | None = None
+        self._lock = asyncio.Lock()
+
+    def read(self) -> dict[str, str]:
+        """Robots that were to stand when iVeg last ran → who asked.
+
+        A line that a crash cut short is skipped.
+        """
+        wanted: dict[str, str] = {}
+        try:
+            lines = self._path.read_bytes().splitlines()
+        except FileNotFoundError:
+            return wanted
+        for number, line in enumerate(lines, 1):
+            try:
+                entry = orjson.loads(line)
+                robot_id, desired = entry["robot_id"], entry["desired"]
+                by = str(entry["by"])
+            except (orjson.JSONDecodeError, KeyError, TypeError):
+                _log.warning("%s, line %d: not readable, skipped", self._path, number)
+                continue
+            if desired == "stopped":
+                wanted[robot_id] = by
+            else:
+                wanted.pop(robot_id, None)
+        return wanted
+
+    async def wanted(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Append one line; returns when it is on disk.
+
+        A disk that fails is logged and does not hold up the STOP.
+        """
+        line = orjson.dumps(
+            {
+                "at": at.wall,
+                "robot_id": robot_id,
+                "desired": desired,
+                "hold_id": hold_id,
+                "by": by,
+            }
+        )
+        async with self._lock:
+            try:
+                await asyncio.to_thread(self._append, line + b"\n")
+            except OSError:
+                _log.exception("the command journal could not be written")
+
+    def _append(self, line: bytes) -> None:
+        if self._file is None:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = self._path.open("ab", buffering=0)
+        self._file.write(line)
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Let the file go."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None

@@ -1,0 +1,58 @@
+"""The two roads to a robot: straight over MQTT, and through Orion and the IoT Agent.
+
+They share nothing, so that what breaks one leaves the other alone.
+"""
+
+from collections.abc import Iterable
+from typing import Literal
+
+from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.orion import OrionClient
+from iveg.domain.feedback import Feedback
+from iveg.ngsi import codec, names
+
+
+class MqttRoad:
+    """Straight to the robots; implements ``pipeline.ports.Fleet``."""
+
+    def __init__(self, link: MqttLink, apikey: str) -> None:
+        self._link = link
+        self._apikey = apikey
+
+    def tell(self, feedback: Feedback) -> None:
+        """Offer feedback; a newer one overtakes what has not left yet."""
+        topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
+        self._link.offer(topic, codec.write_feedback(feedback), qos=1)
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Publish a STOP, never retained; returns when the broker has it."""
+        topic = names.command_topic(self._apikey, robot_id)
+        payload = codec.write_command(codec.write_stop(hold_id, by))
+        await self._link.publish(topic, payload, qos=1)
+
+    async def set_level(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        """Publish the retained level that a reconnecting robot finds."""
+        topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
+        payload = codec.write_desired(desired, ids)
+        await self._link.publish(topic, payload, qos=1, retain=True)
+
+
+class OrionRoad:
+    """Through Orion; implements ``pipeline.ports.ContextBroker``."""
+
+    def __init__(self, orion: OrionClient) -> None:
+        self._orion = orion
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Ask for a STOP; Orion's 204 is no evidence."""
+        await self._orion.update_command(robot_id, codec.write_stop(hold_id, by))
+
+    async def release(self, robot_id: str, ids: Iterable[str], challenge: str) -> None:
+        """Ask for a release, once."""
+        await self._orion.update_command(robot_id, codec.write_release(ids, challenge))
+
+    async def resume(self, robot_id: str, challenge: str) -> None:
+        """Ask for a resume, once."""
+        await self._orion.update_command(robot_id, codec.write_resume(challenge))
