@@ -1,9 +1,9 @@
 """What a robot knows from others: feedback of every peer topic, kept and aged.
 
-Algorithm 3 of the paper, judged against the robot's own pose.  It differs in three
+Algorithm 3 of the paper, judged against the robot's own pose.  It differs in four
 ways: a person who is missing from a message ages out instead of vanishing, a ring grows
-while its topic is silent (safety.md §3.4), and an alert about the robot itself is
-ignored, or it would slow for ever.
+while its topic is silent (safety.md §3.4), a peer that is known to stand slows nobody,
+and an alert about the robot itself is ignored, or it would slow for ever.
 """
 
 from collections.abc import Iterator
@@ -12,8 +12,11 @@ from dataclasses import dataclass, field, replace
 from iveg.domain.feedback import CLEAR, HALF_SPEED, Feedback, FeedbackAlert, Mandate
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Origin
-from iveg.robot.caps import RELEASE_BEYOND_M, Cap, known_reason, quantised
+from iveg.robot.caps import FREE, RELEASE_BEYOND_M, Cap, known_reason, quantised
 
+STANDS_BELOW = 0.02
+"""|v| (m/s) and |ω| (rad/s) of a robot that stands."""
+PEER_FRESH_S = 1.0
 RING_M = 2.0
 KEPT_S = 10.0
 MOVED_ON_S = 1.0
@@ -21,7 +24,8 @@ MYSELF_WITHIN_M = 1.0
 WALK_M_S, FRESH_S, WIDEST_RING_M = 1.6, 0.32, 6.0
 _MAX_TOPICS, _MAX_ALERTS, _MAX_BOOTS = 64, 512, 32
 
-_Key = tuple[str, str | None, str | None, tuple[float, float, float] | None]
+_Key = tuple[str, str | None, str | None, int]
+"""Decision, observer, class, and which of those that share them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,30 @@ class _Kept:
     myself: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class _Peer:
+    """The observer of a topic, where iVeg believes it to be.
+
+    Attributes:
+        stamp: As told; while it stays the same, the pose grows old.
+        at: When this stamp was first told (monotonic, s).
+    """
+
+    pose: Pose2D
+    stands: bool
+    stamp: str | None
+    at: float
+
+    def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
+        """What the peer asks of a robot at ``own``."""
+        age = now - self.at
+        if age > KEPT_S or (self.stands and age <= PEER_FRESH_S):
+            return FREE
+        ring = min(WIDEST_RING_M, RING_M + _growth(age)) + beyond
+        near = own.distance_to(self.pose.x, self.pose.y) <= ring
+        return Cap(HALF_SPEED, "robot", name) if near else FREE
+
+
 @dataclass(slots=True)
 class _Topic:
     """What one topic said last; ``boots`` are all it ever had, newest last."""
@@ -46,7 +74,7 @@ class _Topic:
     origin: Origin
     at: float
     boots: list[str | None]
-    pose: Pose2D | None = None
+    peer: _Peer | None = None
     mandate: Mandate = CLEAR
     alerts: dict[_Key, _Kept] = field(default_factory=dict)
 
@@ -78,7 +106,7 @@ class Hearsay:
         elif not _newer(feedback.origin, memory):
             return False
         memory.origin, memory.at = feedback.origin, now
-        memory.pose = None if feedback.robot_id == self._me else feedback.pose
+        memory.peer = self._peer(memory.peer, feedback, now)
         memory.mandate = feedback.mandates.get(self._me, CLEAR)
         self._remember(memory, feedback, own, now)
         return True
@@ -97,15 +125,28 @@ class Hearsay:
             if silence > KEPT_S:
                 continue
             yield _mandated(topic.mandate)
-            growth = WALK_M_S * max(0.0, silence - FRESH_S)
-            for kept in self._alive(topic, now):
-                ring = _ring(kept.alert, growth) + beyond
-                if not kept.myself and _inside(kept.alert, topic.pose, own, ring):
+            for kept in topic.alerts.values():
+                if kept.myself or not _alive(kept, topic, now):
+                    continue
+                ring = _ring(kept.alert, _growth(silence)) + beyond
+                if _inside(kept.alert, topic.peer, own, ring):
                     yield _alerted(kept.alert)
-            if topic.pose is not None and own is not None:
-                ring = min(WIDEST_RING_M, RING_M + growth) + beyond
-                if own.distance_to(topic.pose.x, topic.pose.y) <= ring:
-                    yield Cap(HALF_SPEED, "robot", name)
+            if topic.peer is not None and own is not None:
+                yield topic.peer.cap(name, own, beyond, now)
+
+    def _peer(
+        self, before: _Peer | None, feedback: Feedback, now: float
+    ) -> _Peer | None:
+        if feedback.robot_id == self._me or feedback.pose is None:
+            return None
+        twist, stamp = feedback.twist, feedback.pose_stamp
+        stands = (
+            twist is not None
+            and max(abs(twist.linear_x), abs(twist.angular_z)) < STANDS_BELOW
+        )
+        repeated = before is not None and stamp is not None and before.stamp == stamp
+        at = before.at if before is not None and repeated else now
+        return _Peer(feedback.pose, stands, stamp, at)
 
     def _make_room(self) -> None:
         if len(self._topics) >= _MAX_TOPICS:
@@ -114,12 +155,10 @@ class Hearsay:
     def _remember(
         self, topic: _Topic, feedback: Feedback, own: Pose2D | None, now: float
     ) -> None:
-        told = {
-            _key(alert): alert
-            for alert in (*feedback.alerts, feedback.alert)
-            if alert is not None and alert.class_ is not None
+        told = _told(feedback)
+        kept = {
+            key: one for key, one in topic.alerts.items() if _alive(one, topic, now)
         }
-        kept = {_key(one.alert): one for one in self._alive(topic, now)}
         for key, one in kept.items():
             if key not in told and one.missing_since is None:
                 kept[key] = replace(one, missing_since=now)
@@ -127,13 +166,6 @@ class Hearsay:
             myself = self._is_me(alert, topic, own, kept.get(key))
             kept[key] = _Kept(alert, now, None, myself)
         topic.alerts = dict(list(kept.items())[-_MAX_ALERTS:])
-
-    def _alive(self, topic: _Topic, now: float) -> Iterator[_Kept]:
-        for kept in topic.alerts.values():
-            missing = kept.missing_since
-            moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
-            if not moved_on and now - kept.at <= KEPT_S:
-                yield kept
 
     def _is_me(
         self,
@@ -155,6 +187,13 @@ class Hearsay:
         return near or (same_spot and before is not None and before.myself)
 
 
+def _alive(kept: _Kept, topic: _Topic, now: float) -> bool:
+    """Whether an alert still counts: told lately, and its topic has not moved on."""
+    missing = kept.missing_since
+    moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
+    return not moved_on and now - kept.at <= KEPT_S
+
+
 def _newer(origin: Origin, topic: _Topic) -> bool:
     """Whether a message counts: a boot not met before, or further in the count."""
     if origin.boot != topic.origin.boot:
@@ -167,9 +206,28 @@ def _newer(origin: Origin, topic: _Topic) -> bool:
     return origin.seq > topic.origin.seq
 
 
-def _key(alert: FeedbackAlert) -> _Key:
-    place = None if alert.decision_id else alert.position
-    return alert.decision_id, alert.observer, alert.class_, place
+def _told(feedback: Feedback) -> dict[_Key, FeedbackAlert]:
+    """The people and robots of one message; the newest is usually in the list too."""
+    alerts = list(feedback.alerts)
+    if feedback.alert is not None and feedback.alert not in alerts:
+        alerts.append(feedback.alert)
+    told: dict[_Key, FeedbackAlert] = {}
+    for alert in alerts:
+        if alert.class_ is None:
+            continue
+        number = 0
+        while (key := (*_whose(alert), number)) in told:
+            number += 1
+        told[key] = alert
+    return told
+
+
+def _whose(alert: FeedbackAlert) -> tuple[str, str | None, str | None]:
+    return alert.decision_id, alert.observer, alert.class_
+
+
+def _growth(age: float) -> float:
+    return WALK_M_S * max(0.0, age - FRESH_S)
 
 
 def _mandated(mandate: Mandate) -> Cap:
@@ -192,13 +250,13 @@ def _ring(alert: FeedbackAlert, growth: float) -> float:
 
 
 def _inside(
-    alert: FeedbackAlert, observer: Pose2D | None, own: Pose2D | None, ring: float
+    alert: FeedbackAlert, observer: _Peer | None, own: Pose2D | None, ring: float
 ) -> bool:
     """Whether I am in the ring; somebody of unknown place is where the observer is."""
     if alert.position is not None:
         place = alert.position[:2]
     elif observer is not None:
-        place = (observer.x, observer.y)
+        place = (observer.pose.x, observer.pose.y)
     else:
         return True
     return own is None or own.distance_to(*place) <= ring

@@ -32,8 +32,9 @@ from iveg.ngsi.codec import read_feedback
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.gate import REST
 from iveg.robot.hold_file import read_holds, write_holds
+from iveg.robot.judgement import Limits
 from iveg.robot.lane import SafetyLane
-from iveg.robot.safety import Limits, SafetyMachine, State
+from iveg.robot.safety import SafetyMachine, State
 from iveg.robot.uplink import Form, Uplink
 
 _log = logging.getLogger(__name__)

@@ -18,55 +18,23 @@ which the paper takes for permission and iVeg does not.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.feedback import HALF_SPEED, Feedback
+from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
-from iveg.robot.caps import FREE, Applied, Cap, lowest
+from iveg.robot.caps import FREE, Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
-from iveg.robot.hearsay import Hearsay
 from iveg.robot.holds import MAX_HOLDS, HoldSet
+from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
 from iveg.robot.orders import Release, Resume, Stop, read_level, read_order
-from iveg.robot.watchdog import Watchdog
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
-STANDS_BELOW = 0.02
-"""Measured |v| (m/s) and |ω| (rad/s) of a robot that stands."""
-POSE_SLOW_S, POSE_STAND_S = 0.2, 0.5
 CHALLENGE_LIVES_S = 5.0
 REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.1
 """Below the contract's 0.5 s, so that a late timer still keeps it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What the machine must know of its robot.
-
-    Attributes:
-        max_speed: (m/s); ``max_turn`` (rad/s).
-        slow_s: Feedback older than this halves the speed (s).
-        stand_s: Feedback older than this holds the robot (s).
-        on_link_loss: ``slow`` stays at half speed however long the silence is.
-    """
-
-    max_speed: float = 1.0
-    max_turn: float = 1.0
-    slow_s: float = 1.0
-    stand_s: float = 3.0
-    on_link_loss: Literal["stop", "slow"] = "stop"
-
-
-@dataclass(frozen=True, slots=True)
-class _Motion:
-    """Newest odometry."""
-
-    pose: Pose2D
-    twist: Twist2D
-    at: float
 
 
 class SafetyMachine:
@@ -93,16 +61,12 @@ class SafetyMachine:
         *,
         stored: HoldSet | None,
         fresh: Callable[[], str],
-        limits: Limits | None = None,
+        limits: Limits = DEFAULT_LIMITS,
     ) -> None:
         self._id = robot_id
         self._fresh = fresh
-        self._limits = limits or Limits()
-        self._hearsay = Hearsay(robot_id)
-        self._watchdog = Watchdog(now, self._limits.slow_s)
-        self._gate = Gate(self._limits.max_speed, self._limits.max_turn)
-        self._motion: _Motion | None = None
-        self._applied = Applied(Cap(0.0, "watchdog"))
+        self._gate = Gate(limits.max_speed, limits.max_turn)
+        self._judgement = Judgement(robot_id, now, limits)
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
@@ -122,9 +86,9 @@ class SafetyMachine:
         """Where the robot stands in the drawing above."""
         if not self._holds.holds:
             return "RUNNING" if self._resumed else "READY"
-        if self._own_motion(now) is None:
+        if self._judgement.motion(now) is None:
             return "HELD"
-        return "STANDING" if self._stands(now) else "BRAKING"
+        return "STANDING" if self._judgement.stands(now) else "BRAKING"
 
     @property
     def holds(self) -> HoldSet:
@@ -144,7 +108,7 @@ class SafetyMachine:
     @property
     def cap(self) -> Cap:
         """The cap that the gate applies."""
-        return FREE if self.deaf else self._applied.cap
+        return FREE if self.deaf else self._judgement.cap
 
     # --- what happens -------------------------------------------------------------
 
@@ -160,22 +124,19 @@ class SafetyMachine:
 
     def odometry(self, pose: Pose2D, twist: Twist2D, now: float) -> tuple[Effect, ...]:
         """The robot's sensors measured where it is and how fast."""
-        self._motion = _Motion(pose, twist, now)
+        self._judgement.moved(pose, twist, now)
         return self.tick(now)
 
     def feedback(
         self, topic: str, feedback: Feedback, now: float
     ) -> tuple[Effect, ...]:
         """A message of ``/{topic}/mqtt_feedback`` came."""
-        motion = self._own_motion(now)
-        own = None if motion is None else motion.pose
-        if self._hearsay.take(topic, feedback, own, now):
-            self._watchdog.heard(feedback.seen.get(self._id), now)
+        self._judgement.told(topic, feedback, now)
         return self.tick(now)
 
     def reported(self, seq: int, now: float) -> None:
         """The safety report that was wanted has left as ``seq``."""
-        self._watchdog.sent(seq, now)
+        self._judgement.watchdog.sent(seq, now)
 
     def command(self, payload: bytes, now: float) -> tuple[Effect, ...]:
         """Something came on ``/{apikey}/{robot}/cmd``."""
@@ -265,7 +226,7 @@ class SafetyMachine:
             return "holds_missing"
         if order.challenge != self._challenge:
             return "challenge"
-        return None if self._stands(now) else "not_standing"
+        return None if self._judgement.stands(now) else "not_standing"
 
     def _resume(self, order: Resume) -> CommandAnswer:
         if self._holds.holds:
@@ -291,7 +252,7 @@ class SafetyMachine:
             code,
             self._holds.holds,
             self._challenge,
-            0.0 if self._motion is None else self._motion.twist.linear_x,
+            self._judgement.twist.linear_x,
             why,
         )
 
@@ -299,49 +260,21 @@ class SafetyMachine:
 
     def _judge(self, now: float) -> None:
         """Bring caps, the ``link`` hold and the challenge up to this moment."""
-        self._watchdog.look(now)
-        self._applied = self._applied.settle(lowest(self._caps(now)), now)
+        self._judgement.settle(now)
         self._judge_link(now)
         waited = now - self._challenge_at
         if not self._free and waited >= CHALLENGE_LIVES_S:
             self._challenge, self._challenge_at = self._fresh(), now
 
-    def _caps(self, now: float) -> list[Cap]:
-        motion = self._own_motion(now)
-        cap = self._applied.cap
-        slowed = cap.reason in ("person", "robot")
-        own = None if motion is None else motion.pose
-        return [
-            self._pose_cap(now),
-            self._silence_cap(now),
-            *self._hearsay.caps(own, slowed, now),
-        ]
-
-    def _pose_cap(self, now: float) -> Cap:
-        motion = self._own_motion(now)
-        if motion is None:
-            return Cap(0.0, "stale")
-        return Cap(HALF_SPEED, "stale") if now - motion.at > POSE_SLOW_S else FREE
-
-    def _silence_cap(self, now: float) -> Cap:
-        age = self._watchdog.age(now)
-        if age is not None and age <= self._limits.slow_s:
-            return FREE
-        stands = age is None or age > self._limits.stand_s
-        if stands and self._limits.on_link_loss == "stop":
-            return Cap(0.0, "watchdog")
-        return Cap(HALF_SPEED, "watchdog")
-
     def _judge_link(self, now: float) -> None:
+        watchdog = self._judgement.watchdog
         link = self._holds.link_alone
-        if link is not None and self._watchdog.steady(now):
+        if link is not None and watchdog.steady(now):
             self._holds = self._holds.lift([link.id])
-            self._watchdog.cleared(now)
-        silent = self._watchdog.silence(now) > self._limits.stand_s
-        stops = self._limits.on_link_loss == "stop"
-        if silent and stops and not self._holds.holds:
+            watchdog.cleared(now)
+        if self._judgement.must_stand(now) and not self._holds.holds:
             ack: Literal["auto", "remote"] = (
-                "auto" if self._watchdog.may_clear(now) else "remote"
+                "auto" if watchdog.may_clear(now) else "remote"
             )
             self._latch(Hold(f"link-{self._fresh()}", "link", ack), now)
 
@@ -358,20 +291,6 @@ class SafetyMachine:
     @property
     def _free(self) -> bool:
         return self._resumed and not self._holds.holds
-
-    def _own_motion(self, now: float) -> _Motion | None:
-        """Newest odometry; None when it is lost."""
-        motion = self._motion
-        if motion is None or now - motion.at > POSE_STAND_S:
-            return None
-        return motion
-
-    def _stands(self, now: float) -> bool:
-        motion = self._own_motion(now)
-        if motion is None:
-            return False
-        speeds = abs(motion.twist.linear_x), abs(motion.twist.angular_z)
-        return max(speeds) < STANDS_BELOW
 
     # --- effects ------------------------------------------------------------------
 
@@ -393,7 +312,7 @@ class SafetyMachine:
         cap, holds = self.cap, self._holds.holds
         if not self._free:
             cap = Cap(0.0, "clear", holds[0].id if holds else None)
-        twist = Twist2D(0.0, 0.0) if self._motion is None else self._motion.twist
+        twist = self._judgement.twist
         return SafetyReport(
             self._id,
             Origin(),
@@ -406,7 +325,7 @@ class SafetyMachine:
             self._challenge,
             twist.linear_x,
             twist.angular_z,
-            self._watchdog.age(now),
+            self._judgement.watchdog.age(now),
         )
 
     def _report_is_due(self, report: SafetyReport, now: float) -> bool:
@@ -422,6 +341,7 @@ def _said(report: SafetyReport) -> tuple[object, ...]:
         report.speed_factor,
         report.reason,
         report.cause,
+        report.decision_id,
         report.holds,
         report.challenge,
     )

@@ -1,0 +1,141 @@
+"""How fast a robot may drive at this moment, by all that it knows; holds apart.
+
+Own pose, iVeg's silence, and what others told: each is a cap, the lowest counts, and
+what is unknown is slow (safety.md §3.3, §3.5).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.domain.feedback import HALF_SPEED, Feedback
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.robot.caps import FREE, Applied, Cap, lowest
+from iveg.robot.hearsay import STANDS_BELOW, Hearsay
+from iveg.robot.watchdog import Watchdog
+
+POSE_SLOW_S, POSE_STAND_S = 0.2, 0.5
+_REST = Twist2D(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What the machine must know of its robot.
+
+    Attributes:
+        max_speed: (m/s); ``max_turn`` (rad/s).
+        slow_s: Feedback older than this halves the speed (s).
+        stand_s: Feedback older than this holds the robot (s).
+        on_link_loss: ``slow`` stays at half speed however long the silence is.
+    """
+
+    max_speed: float = 1.0
+    max_turn: float = 1.0
+    slow_s: float = 1.0
+    stand_s: float = 3.0
+    on_link_loss: Literal["stop", "slow"] = "stop"
+
+
+DEFAULT_LIMITS = Limits()
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Newest odometry; ``at`` monotonic (s)."""
+
+    pose: Pose2D
+    twist: Twist2D
+    at: float
+
+
+class Judgement:
+    """Keeps what one robot knows and judges it; times are monotonic seconds.
+
+    Args:
+        robot_id: This robot.
+        boot_at: When it started.
+        limits: Waiting times and the policy on silence.
+    """
+
+    def __init__(self, robot_id: str, boot_at: float, limits: Limits) -> None:
+        self._id = robot_id
+        self._limits = limits
+        self._hearsay = Hearsay(robot_id)
+        self._motion: Motion | None = None
+        self._applied = Applied(Cap(0.0, "watchdog"))
+        self.watchdog = Watchdog(boot_at, limits.slow_s)
+
+    @property
+    def cap(self) -> Cap:
+        """What is in force since ``settle``."""
+        return self._applied.cap
+
+    @property
+    def twist(self) -> Twist2D:
+        """The measured twist, however old; at rest before the first."""
+        return _REST if self._motion is None else self._motion.twist
+
+    def motion(self, now: float) -> Motion | None:
+        """Newest odometry; None when it is lost (0.5 s)."""
+        motion = self._motion
+        if motion is None or now - motion.at > POSE_STAND_S:
+            return None
+        return motion
+
+    def stands(self, now: float) -> bool:
+        """Whether the robot is measured to be at rest, and lately."""
+        motion = self.motion(now)
+        if motion is None:
+            return False
+        return (
+            abs(motion.twist.linear_x) < STANDS_BELOW
+            and abs(motion.twist.angular_z) < STANDS_BELOW
+        )
+
+    def moved(self, pose: Pose2D, twist: Twist2D, now: float) -> None:
+        """Take odometry; one that holds no number is none."""
+        numbers = pose.x, pose.y, pose.yaw, twist.linear_x, twist.angular_z
+        if all(map(math.isfinite, numbers)):
+            self._motion = Motion(pose, twist, now)
+
+    def told(self, topic: str, feedback: Feedback, now: float) -> None:
+        """Take a message of ``/{topic}/mqtt_feedback``."""
+        if self._hearsay.take(topic, feedback, self._own(now), now):
+            self.watchdog.heard(feedback.seen.get(self._id), now)
+
+    def settle(self, now: float) -> None:
+        """Judge this moment."""
+        self.watchdog.look(now)
+        slowed = self.cap.reason in ("person", "robot")
+        raw = lowest(
+            (
+                self._pose_cap(now),
+                self._silence_cap(now),
+                *self._hearsay.caps(self._own(now), slowed, now),
+            )
+        )
+        self._applied = self._applied.settle(raw, now)
+
+    def must_stand(self, now: float) -> bool:
+        """Whether iVeg's silence holds the robot."""
+        silent = self.watchdog.silence(now) > self._limits.stand_s
+        return silent and self._limits.on_link_loss == "stop"
+
+    def _own(self, now: float) -> Pose2D | None:
+        motion = self.motion(now)
+        return None if motion is None else motion.pose
+
+    def _pose_cap(self, now: float) -> Cap:
+        motion = self.motion(now)
+        if motion is None:
+            return Cap(0.0, "stale")
+        return Cap(HALF_SPEED, "stale") if now - motion.at > POSE_SLOW_S else FREE
+
+    def _silence_cap(self, now: float) -> Cap:
+        age = self.watchdog.age(now)
+        if age is not None and age <= self._limits.slow_s:
+            return FREE
+        stands = age is None or age > self._limits.stand_s
+        if stands and self._limits.on_link_loss == "stop":
+            return Cap(0.0, "watchdog")
+        return Cap(HALF_SPEED, "watchdog")
