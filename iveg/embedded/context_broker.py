@@ -1,0 +1,470 @@
+"""A context broker in memory that speaks NGSI-v2 as Orion 4.7 does.
+
+What it does not do is told in ``docs/fiware.md``.  HTTP is in ``ngsi_api``; here are
+the operations, which the embedded IoT Agent also calls directly.
+"""
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from iveg.adapters import clock
+from iveg.embedded.entities import (
+    Attribute,
+    Change,
+    Entity,
+    EntityStore,
+    Touched,
+    apply,
+    fresh,
+    touch_all,
+    under,
+)
+from iveg.embedded.orion_errors import NgsiError, not_found
+from iveg.embedded.outbox import Outbox
+from iveg.embedded.registrations import (
+    Asking,
+    Registration,
+    forward_query,
+    forward_update,
+)
+from iveg.embedded.subscriptions import Subscription
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """Whose data a request is about, and when it came.
+
+    Attributes:
+        service: Tenant, lower case; empty for the default one.
+        path: Service path, or several, or ``/#`` for reading.
+        correlator: Name of the chain of requests.
+        now: Seconds, Unix time.
+    """
+
+    service: str
+    path: str
+    correlator: str
+    now: float
+
+    @property
+    def asking(self) -> Asking:
+        """The same, for a provider."""
+        return Asking(self.service, self.path, self.correlator)
+
+
+@dataclass(slots=True)
+class Tenant:
+    """Everything of one tenant."""
+
+    entities: EntityStore = field(default_factory=EntityStore)
+    subscriptions: dict[str, Subscription] = field(default_factory=dict)
+    registrations: dict[str, Registration] = field(default_factory=dict)
+    concerned: dict[tuple[str, str, str], list[Subscription]] = field(
+        default_factory=dict
+    )
+    """Entity → its subscriptions; emptied whenever a subscription changes."""
+
+
+Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
+
+
+class ContextBroker:
+    """Entities, subscriptions and registrations of all tenants."""
+
+    def __init__(self) -> None:
+        self._tenants: dict[str, Tenant] = {}
+        self.outbox = Outbox(lambda: clock.now().wall)
+
+    def tenant(self, service: str) -> Tenant:
+        """A tenant; one that was never heard of is empty."""
+        known = self._tenants.get(service)
+        if known is None:
+            known = self._tenants[service] = Tenant()
+        return known
+
+    def close(self) -> None:
+        """Close the connections to receivers."""
+        self.outbox.close()
+
+    # --- entities ---------------------------------------------------------------
+
+    def find(self, scope: Scope, entity_id: str, entity_type: str = "") -> Entity:
+        """The entity that an id and perhaps a type stand for.
+
+        Raises:
+            NgsiError: 404 none, 409 several.
+        """
+        found = self.tenant(scope.service).entities.find(
+            scope.path, entity_id, entity_type
+        )
+        if found is None:
+            raise not_found()
+        return found
+
+    def create(
+        self,
+        scope: Scope,
+        entity_id: str,
+        entity_type: str,
+        changes: Mapping[str, Change],
+    ) -> Entity:
+        """Make a new entity and tell of it.
+
+        Raises:
+            NgsiError: 422, there is one already.
+        """
+        entities = self.tenant(scope.service).entities
+        if entities.get(scope.path, entity_id, entity_type) is not None:
+            raise NgsiError(422, "Unprocessable", "Already Exists")
+        entity = Entity(entity_id, entity_type, scope.path, scope.now, scope.now)
+        touched = apply(entity, changes, scope.now)
+        entities.add(entity)
+        self._tell(scope, entity, touched, "entityCreate")
+        return entity
+
+    def upsert(
+        self,
+        scope: Scope,
+        entity_id: str,
+        entity_type: str,
+        changes: Mapping[str, Change],
+    ) -> None:
+        """Make an entity, or add to and change its attributes."""
+        entity = self.tenant(scope.service).entities.get(
+            scope.path, entity_id, entity_type
+        )
+        if entity is None:
+            self.create(scope, entity_id, entity_type, changes)
+        else:
+            self.append(scope, entity, changes)
+
+    def append(
+        self,
+        scope: Scope,
+        entity: Entity,
+        changes: Mapping[str, Change],
+        *,
+        forced: bool = False,
+        strict: bool = False,
+    ) -> None:
+        """Change attributes; make those that are not there.
+
+        Raises:
+            NgsiError: 422, strict and some are there already; the others are made.
+        """
+        there = [name for name in changes if name in entity.attributes]
+        if strict:
+            changes = {n: c for n, c in changes.items() if n not in entity.attributes}
+        self._change(scope, entity, changes, forced=forced)
+        if strict and there:
+            raise _not_all(
+                bool(changes), f"already exist: {entity.id} - [ {_listed(there)} ]"
+            )
+
+    def replace(
+        self, scope: Scope, entity: Entity, changes: Mapping[str, Change]
+    ) -> None:
+        """Put attributes in place of all there were."""
+        fresh(entity, scope.now)
+        self._change(scope, entity, changes)
+
+    def _change(
+        self,
+        scope: Scope,
+        entity: Entity,
+        changes: Mapping[str, Change],
+        *,
+        forced: bool = False,
+    ) -> None:
+        if changes:
+            touched = apply(entity, changes, scope.now, forced=forced)
+            self._tell(scope, entity, touched, "entityChange")
+
+    def delete(self, scope: Scope, entity: Entity) -> None:
+        """Forget an entity and tell those who asked to know."""
+        self.tenant(scope.service).entities.remove(entity)
+        self._tell(scope, entity, touch_all(entity), "entityDelete")
+
+    def delete_attributes(
+        self, scope: Scope, entity: Entity, names: Iterable[str]
+    ) -> None:
+        """Forget attributes.
+
+        Raises:
+            NgsiError: 404, one is not there; nothing is forgotten.
+        """
+        names = list(names)
+        if not set(names) <= entity.attributes.keys():
+            raise not_found("The entity does not have such an attribute")
+        for name in names:
+            del entity.attributes[name]
+        entity.modified = scope.now
+
+    # --- updates that may have to be passed on ----------------------------------
+
+    async def update(
+        self,
+        scope: Scope,
+        entity_id: str,
+        entity_type: str,
+        changes: Mapping[str, Change],
+        *,
+        forced: bool = False,
+    ) -> None:
+        """Change attributes that are there; pass on those that are registered.
+
+        Raises:
+            NgsiError: 404 or 422, as Orion says it; what could be done is done.
+        """
+        outcome = await self._update(
+            scope, entity_id, entity_type, changes, forced=forced
+        )
+        outcome.raise_for_one()
+
+    async def _update(
+        self,
+        scope: Scope,
+        entity_id: str,
+        entity_type: str,
+        changes: Mapping[str, Change],
+        *,
+        forced: bool = False,
+    ) -> "Outcome":
+        tenant = self.tenant(scope.service)
+        entity = tenant.entities.find(scope.path, entity_id, entity_type)
+        kind = entity.type if entity else entity_type
+        own = entity.attributes if entity else {}
+        local = {name: change for name, change in changes.items() if name in own}
+        if entity is not None and local:
+            self._change(scope, entity, local, forced=forced)
+        rest = {name: one for name, one in changes.items() if name not in own}
+        forwards = self._providers(scope, entity_id, kind, rest)
+        taken = await asyncio.gather(
+            *(
+                forward_update(
+                    registration,
+                    entity_id,
+                    kind,
+                    {name: rest[name] for name in names},
+                    scope.asking,
+                )
+                for registration, names in forwards
+            )
+        )
+        passed = {name for _, names in forwards for name in names}
+        return Outcome(
+            entity_id,
+            kind,
+            exists=entity is not None,
+            updated=tuple(local),
+            passed=tuple(
+                name
+                for (_, names), ok in zip(forwards, taken, strict=True)
+                if ok
+                for name in names
+            ),
+            failed=tuple(
+                name
+                for (_, names), ok in zip(forwards, taken, strict=True)
+                if not ok
+                for name in names
+            ),
+            missing=tuple(name for name in rest if name not in passed),
+        )
+
+    async def update_many(
+        self,
+        scope: Scope,
+        entities: Iterable[tuple[str, str, Mapping[str, Change]]],
+    ) -> None:
+        """``op/update`` with action ``update``.
+
+        Raises:
+            NgsiError: 404 or 422, as Orion says it; what could be done is done.
+        """
+        outcomes = [
+            await self._update(scope, entity_id, kind, changes)
+            for entity_id, kind, changes in entities
+        ]
+        if len(outcomes) == 1:
+            outcomes[0].raise_for_one()
+        bad = [one for one in outcomes if not one.complete]
+        if not bad:
+            return
+        if any(one.passed or one.failed for one in outcomes):
+            raise NgsiError(404, "PartialUpdate", _not_passed_on(bad))
+        raise _not_all(
+            len(bad) < len(outcomes) or any(one.updated for one in bad),
+            "do not exist: " + ", ".join(one.missing_text() for one in bad),
+        )
+
+    def _providers(
+        self, scope: Scope, entity_id: str, kind: str, names: Iterable[str]
+    ) -> list[tuple[Registration, list[str]]]:
+        """Which registration takes which names; the oldest one takes a name."""
+        left = list(names)
+        found = []
+        for registration in self.tenant(scope.service).registrations.values():
+            mine = [
+                name
+                for name in left
+                if not registration.attributes or name in registration.attributes
+            ]
+            if (
+                mine
+                and under(scope.path, registration.path)
+                and registration.concerns(entity_id, kind)
+            ):
+                found.append((registration, mine))
+                left = [name for name in left if name not in mine]
+        return found
+
+    # --- reads that may have to be passed on ------------------------------------
+
+    async def foreign(
+        self, scope: Scope, entity_id: str, entity_type: str, names: tuple[str, ...]
+    ) -> Foreign:
+        """What providers tell of one entity, or of all (empty id).
+
+        Args:
+            scope: Whose data.
+            entity_id: One entity; empty for all.
+            entity_type: Its type; empty for any.
+            names: The attributes wanted; none for all.
+        """
+        found = self.tenant(scope.service).registrations.values()
+        asked = []
+        for registration in found:
+            attrs = [n for n in registration.attributes if not names or n in names]
+            entities = [
+                one
+                for one in registration.entities
+                if "id" in one
+                and (not entity_id or one["id"] == entity_id)
+                and (not entity_type or one.get("type") in (entity_type, None))
+            ]
+            if attrs and entities and under(scope.path, registration.path):
+                asked.append(
+                    forward_query(
+                        registration, entities, attrs, scope.asking, scope.now
+                    )
+                )
+        told: dict[tuple[str, str], dict[str, Attribute]] = {}
+        for answer in await asyncio.gather(*asked):
+            for key, attributes in answer.items():
+                told[key] = {**attributes, **told.get(key, {})}
+        return told
+
+    # --- subscriptions and registrations ----------------------------------------
+
+    def subscribe(self, subscription: Subscription) -> None:
+        """Keep a subscription; it hears of changes from now on."""
+        tenant = self.tenant(subscription.service)
+        tenant.subscriptions[subscription.id] = subscription
+        tenant.concerned.clear()
+
+    def resubscribe(self, subscription: Subscription) -> None:
+        """A subscription was changed."""
+        self.tenant(subscription.service).concerned.clear()
+
+    def unsubscribe(self, subscription: Subscription) -> None:
+        """Forget a subscription and hang up on its receiver."""
+        tenant = self.tenant(subscription.service)
+        del tenant.subscriptions[subscription.id]
+        tenant.concerned.clear()
+        self.outbox.forget(subscription.id)
+
+    def register(self, scope: Scope, registration: Registration) -> None:
+        """Keep a registration; Orion keeps duplicates too."""
+        self.tenant(scope.service).registrations[registration.id] = registration
+
+    def unregister(self, scope: Scope, registration_id: str) -> bool:
+        """Forget a registration; whether there was one."""
+        known = self.tenant(scope.service).registrations
+        return known.pop(registration_id, None) is not None
+
+    def _tell(
+        self, scope: Scope, entity: Entity, touched: Touched, alteration: str
+    ) -> None:
+        tenant = self.tenant(scope.service)
+        concerned = tenant.concerned.get(entity.key)
+        if concerned is None:
+            concerned = tenant.concerned[entity.key] = [
+                one
+                for one in tenant.subscriptions.values()
+                if one.concerns(entity.id, entity.type) and under(one.path, entity.path)
+            ]
+        for subscription in concerned:
+            if subscription.wants(touched, alteration, scope.now):
+                self.outbox.post(
+                    subscription,
+                    entity,
+                    touched,
+                    alteration,
+                    scope.correlator,
+                    scope.now,
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an update of one entity.
+
+    Attributes:
+        exists: Whether the entity is one of ours.
+        updated: Attributes of ours that were changed.
+        passed: Attributes that a provider took.
+        failed: Attributes that a provider did not take.
+        missing: Attributes that nobody has.
+    """
+
+    entity_id: str
+    kind: str
+    exists: bool
+    updated: tuple[str, ...]
+    passed: tuple[str, ...]
+    failed: tuple[str, ...]
+    missing: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything asked for was done."""
+        return not self.missing and not self.failed
+
+    def missing_text(self) -> str:
+        """The entity and what it lacks, as Orion lists it."""
+        names = _listed(self.missing) if self.exists else "entity itself"
+        return f"{self.entity_id} - [ {names} ]"
+
+    def raise_for_one(self) -> None:
+        """Raise what Orion answers to an update of one entity, if it complains.
+
+        An attribute of ours that was changed hides a command that was not passed on.
+
+        Raises:
+            NgsiError: 404 or 422.
+        """
+        if self.complete or (self.updated and not self.missing):
+            return
+        if not self.updated and not self.passed and (self.failed or not self.exists):
+            raise not_found()
+        if self.passed or self.failed:
+            raise NgsiError(404, "PartialUpdate", _not_passed_on([self]))
+        raise _not_all(bool(self.updated), f"do not exist: {self.missing_text()}")
+
+
+def _not_all(some: bool, description: str) -> NgsiError:
+    return NgsiError(422, "PartialUpdate" if some else "Unprocessable", description)
+
+
+def _not_passed_on(outcomes: Iterable[Outcome]) -> str:
+    named = ", ".join(
+        f"{one.entity_id}-{one.kind} : [{', '.join((*one.missing, *one.failed))}]"
+        for one in outcomes
+    )
+    return f"Some of the following attributes were not updated: {{ {named} }}"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return " ".join(names)

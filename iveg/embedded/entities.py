@@ -1,0 +1,361 @@
+"""Entities as Orion keeps them, and the changes that may be made to them.
+
+An attribute holds JSON text, not objects: what arrives once is shown many times.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import orjson
+
+from iveg.embedded.orion_errors import bad_request, too_many
+from iveg.embedded.orion_text import (
+    UNRESTRICTED,
+    check_name,
+    holds_forbidden,
+    print_value,
+    quoted,
+)
+
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}(T\d{2}:\d{2}(:\d{2}([.,]\d+)?)?)?(Z|[+-].*)?")
+_BUILTIN = ("dateCreated", "dateModified")
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """One attribute of an entity.
+
+    Attributes:
+        type: NGSI type.
+        json: The value, as Orion prints it.
+        metadata: Name → ``{"type": …, "value": …}`` as Orion prints it.
+        created: When it came to be (s, Unix time).
+        modified: When value or metadata last changed (s, Unix time).
+    """
+
+    type: str
+    json: bytes
+    metadata: Mapping[str, bytes]
+    created: float
+    modified: float
+
+    def normalized(self, wanted: Iterable[str] = ()) -> bytes:
+        """``{"type", "value", "metadata"}``, with the wanted metadata first."""
+        metadata = self._metadata(wanted) if wanted else self.metadata
+        inner = b",".join(quoted(name) + b":" + text for name, text in metadata.items())
+        return b'{"type":%b,"value":%b,"metadata":{%b}}' % (
+            quoted(self.type),
+            self.json,
+            inner,
+        )
+
+    def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
+        chosen: dict[str, bytes] = {}
+        for name in wanted:
+            if name == "*":
+                chosen.update(self.metadata)
+            elif name in _BUILTIN:
+                at = self.created if name == "dateCreated" else self.modified
+                chosen[name] = b'{"type":"DateTime","value":%b}' % date_json(at)
+            elif name in self.metadata:
+                chosen[name] = self.metadata[name]
+        return chosen
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """What a request asks of one attribute; ``None`` leaves what is there."""
+
+    type: str | None
+    value: Any
+    metadata: Mapping[str, bytes] | None = None
+
+
+@dataclass(slots=True)
+class Entity:
+    """One entity; its attributes are replaced, never altered.
+
+    Attributes:
+        path: Service path that it lives under.
+        created: When it came to be (s, Unix time).
+        modified: When it last changed (s, Unix time).
+    """
+
+    id: str
+    type: str
+    path: str
+    created: float
+    modified: float
+    attributes: dict[str, Attribute] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What no two entities of a tenant share."""
+        return self.path, self.id, self.type
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """What a change did, for the subscriptions to judge.
+
+    Attributes:
+        named: Attributes that the request named, in its order.
+        changed: Those whose value or metadata is different now.
+        values: Those whose value is different now.
+    """
+
+    named: tuple[str, ...] = ()
+    changed: frozenset[str] = frozenset()
+    values: frozenset[str] = frozenset()
+
+
+class EntityStore:
+    """All entities of one tenant."""
+
+    def __init__(self) -> None:
+        self._by_key: dict[tuple[str, str, str], Entity] = {}
+        self._by_id: dict[str, list[Entity]] = {}
+
+    def get(self, path: str, entity_id: str, entity_type: str) -> Entity | None:
+        """The entity of exactly this key."""
+        return self._by_key.get((path, entity_id, entity_type))
+
+    def find(self, paths: str, entity_id: str, entity_type: str = "") -> Entity | None:
+        """The entity that an id, and perhaps a type, stands for.
+
+        Raises:
+            NgsiError: 409, several answer to it.
+        """
+        found = [
+            entity
+            for entity in self._by_id.get(entity_id, ())
+            if (not entity_type or entity.type == entity_type)
+            and under(paths, entity.path)
+        ]
+        if len(found) > 1:
+            raise too_many()
+        return found[0] if found else None
+
+    def all(self, paths: str) -> list[Entity]:
+        """Every entity under a service path, oldest first."""
+        return [one for one in self._by_key.values() if under(paths, one.path)]
+
+    def add(self, entity: Entity) -> None:
+        """Keep a new entity."""
+        self._by_key[entity.key] = entity
+        self._by_id.setdefault(entity.id, []).append(entity)
+
+    def remove(self, entity: Entity) -> None:
+        """Forget an entity."""
+        del self._by_key[entity.key]
+        self._by_id[entity.id].remove(entity)
+
+
+def under(paths: str, path: str) -> bool:
+    """Whether a service path is one of those asked for (``/a,/b/#``)."""
+    for wanted in paths.split(","):
+        if wanted == path or wanted == "/#":
+            return True
+        if wanted.endswith("/#") and (path + "/").startswith(wanted[:-1]):
+            return True
+    return False
+
+
+def apply(
+    entity: Entity, changes: Mapping[str, Change], now: float, *, forced: bool = False
+) -> Touched:
+    """Carry out changes; attributes that are not there yet are made.
+
+    Args:
+        entity: Changed in place.
+        changes: By attribute name.
+        now: Seconds, Unix time.
+        forced: Count every named attribute as changed (``forcedUpdate``).
+    """
+    changed, values = [], []
+    for name, change in changes.items():
+        old = entity.attributes.get(name)
+        new = _changed(old, change, now)
+        entity.attributes[name] = new
+        if old is None or forced or old.json != new.json:
+            values.append(name)
+            changed.append(name)
+        elif old.type != new.type or old.metadata != new.metadata:
+            changed.append(name)
+    entity.modified = now
+    return Touched(tuple(changes), frozenset(changed), frozenset(values))
+
+
+def _changed(old: Attribute | None, change: Change, now: float) -> Attribute:
+    kind = change.type or (old.type if old else default_type(change.value))
+    value = change.value
+    if isinstance(value, dict) and any(key.startswith("$") for key in value):
+        value = _operated(orjson.loads(old.json) if old else None, value)
+    json = date_text(value) if kind == "DateTime" else print_value(value)
+    if old is None:
+        return Attribute(kind, json, change.metadata or {}, now, now)
+    metadata = old.metadata
+    if change.metadata is not None:
+        metadata = _merged(metadata, change.metadata)
+    return Attribute(kind, json, metadata, old.created, now)
+
+
+def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, bytes]:
+    return new if old.keys() <= new.keys() else {**old, **new}
+
+
+def _operated(old: Any, operation: Mapping[str, Any]) -> Any:
+    """Orion's update operators, which any key with ``$`` is taken for."""
+    name, argument = next(
+        (key, value) for key, value in operation.items() if key.startswith("$")
+    )
+    number = old if isinstance(old, int | float) else 0
+    if name == "$inc" and isinstance(argument, int | float):
+        return number + argument
+    if name in ("$min", "$max") and isinstance(argument, int | float):
+        return (min if name == "$min" else max)(number, argument)
+    items = old if isinstance(old, list) else []
+    if name == "$push":
+        return [*items, argument]
+    if name == "$addToSet":
+        return items if argument in items else [*items, argument]
+    if name == "$pull":
+        return [item for item in items if item != argument]
+    return argument
+
+
+def default_type(value: Any) -> str:
+    """The type that Orion gives to a value that came without one."""
+    if isinstance(value, bool):
+        return "Boolean"
+    if isinstance(value, int | float):
+        return "Number"
+    if value is None:
+        return "None"
+    return "Text" if isinstance(value, str) else "StructuredValue"
+
+
+def touch_all(entity: Entity) -> Touched:
+    """As if everything had changed: an entity that is new or gone."""
+    names = tuple(entity.attributes)
+    return Touched(names, frozenset(names), frozenset(names))
+
+
+def fresh(entity: Entity, now: float) -> None:
+    """Drop all attributes, keep the entity."""
+    entity.attributes = {}
+    entity.modified = now
+
+
+# --- reading what clients send ------------------------------------------------------
+
+
+def read_changes(
+    attributes: Mapping[str, Any], *, key_values: bool, clean: bool
+) -> dict[str, Change]:
+    """Read attributes from a request.
+
+    Args:
+        attributes: Name → attribute, without ``id`` and ``type``.
+        key_values: Whether an attribute is its bare value.
+        clean: Whether the body is known to hold no forbidden character.
+
+    Raises:
+        NgsiError: 400, with the sentence of the first complaint.
+    """
+    return {
+        name: _read_change(name, attribute, key_values=key_values, clean=clean)
+        for name, attribute in attributes.items()
+    }
+
+
+def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> Change:
+    check_name(name, "attribute name")
+    if key_values:
+        raw = {"value": raw}
+    elif not isinstance(raw, dict):
+        raise bad_request(
+            "attribute must be a JSON object, unless keyValues option is used"
+        )
+    if not raw.keys() <= {"type", "value", "metadata"}:
+        raise bad_request("unrecognized property for context attribute")
+    kind = _read_type(raw, "attribute type")
+    value = raw.get("value")
+    if not clean and kind != UNRESTRICTED and holds_forbidden(value):
+        raise bad_request("Invalid characters in attribute value")
+    if kind == "DateTime" and value is not None:
+        date_text(value)
+    metadata = raw.get("metadata")
+    return Change(
+        kind, value, None if metadata is None else _read_metadata(metadata, clean=clean)
+    )
+
+
+def _read_type(raw: Mapping[str, Any], what: str) -> str | None:
+    kind = raw.get("type")
+    if kind is None:
+        return None
+    if not isinstance(kind, str):
+        raise bad_request(f"invalid JSON type for {what}")
+    check_name(kind, what)
+    return kind
+
+
+def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
+    if not isinstance(raw, dict):
+        raise bad_request("metadata must be a JSON object")
+    metadata = {}
+    for name, one in raw.items():
+        check_name(name, "metadata name")
+        if not isinstance(one, dict) or not one.keys() <= {"type", "value"}:
+            raise bad_request("unrecognized property for metadata")
+        value = one.get("value")
+        if not clean and holds_forbidden(value):
+            raise bad_request("Invalid characters in metadata value")
+        kind = _read_type(one, "metadata type") or default_type(value)
+        metadata[name] = metadata_json(kind, value)
+    return metadata
+
+
+def metadata_json(kind: str, value: Any) -> bytes:
+    """One metadata as Orion prints it."""
+    text = date_text(value) if kind == "DateTime" else print_value(value)
+    return b'{"type":%b,"value":%b}' % (quoted(kind), text)
+
+
+# --- dates --------------------------------------------------------------------------
+
+
+def date_text(value: Any) -> bytes:
+    """A ``DateTime`` as Orion prints it: UTC with milliseconds.
+
+    Raises:
+        NgsiError: 400, not a date.
+    """
+    if value is None:
+        return b"null"
+    if isinstance(value, str) and _DATE.fullmatch(value):
+        try:
+            moment = datetime.fromisoformat(value.replace(",", "."))
+        except ValueError:
+            moment = None
+        if moment is not None:
+            return date_json(moment.replace(tzinfo=moment.tzinfo or UTC).timestamp())
+    raise bad_request("date has invalid format in attribute value")
+
+
+def date_json(at: float) -> bytes:
+    """Unix seconds as JSON text with milliseconds."""
+    return b'"%b"' % date_iso(at).encode()
+
+
+def date_iso(at: float) -> str:
+    """Unix seconds as ISO-8601 with milliseconds and Z."""
+    return (
+        datetime.fromtimestamp(round(at * 1000) / 1000, UTC)
+        .isoformat(timespec="milliseconds")
+        .replace("+00:00", "Z")
+    )

@@ -1,0 +1,188 @@
+"""A small HTTP/1.1 server: a request in, an answer out, connections kept alive.
+
+Orion and the agent put their own headers on answers, refuse bodies before reading them
+and never tell who they are, which a framework would have to be talked out of.
+"""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+import httptools
+
+_log = logging.getLogger(__name__)
+_MAX_BODY = 8 << 20
+_MAX_WAITING = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One request as it was read.
+
+    Attributes:
+        path: Decoded, without the query.
+        query: Names and decoded values; the last of a name wins.
+        headers: Names in lower case.
+    """
+
+    method: str
+    path: str
+    query: dict[str, str]
+    headers: dict[str, str]
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """One answer; ``Content-Length`` is added."""
+
+    status: int
+    body: bytes = b""
+    headers: dict[str, str] = field(default_factory=dict)
+    content_type: str = "application/json"
+
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+@asynccontextmanager
+async def http_server(handler: Handler, host: str, port: int) -> AsyncIterator[int]:
+    """Serve while the block lasts.
+
+    Args:
+        handler: Answers every request; one at a time for each connection.
+        host: Address to bind.
+        port: TCP port; 0 for a free one.
+
+    Yields:
+        The port that is listened on.
+    """
+    connections: set[_Connection] = set()
+    server = await asyncio.get_running_loop().create_server(
+        lambda: _Connection(handler, connections), host, port
+    )
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        server.close()
+        tasks = [connection.close() for connection in list(connections)]
+        await asyncio.gather(*tasks, return_exceptions=True)
+        await server.wait_closed()
+
+
+class _Connection(asyncio.Protocol):
+    """One client: bytes → requests → handler, in order → bytes."""
+
+    def __init__(self, handler: Handler, connections: "set[_Connection]") -> None:
+        self._handler = handler
+        self._connections = connections
+        self._requests: asyncio.Queue[tuple[Request, bool]] = asyncio.Queue()
+        self._parser = httptools.HttpRequestParser(self)
+        self._transport: asyncio.Transport | None = None
+        self._task: asyncio.Task[None] | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = transport  # type: ignore[assignment]
+        self._connections.add(self)
+        self._task = asyncio.get_running_loop().create_task(
+            self._answer_all(), name="embedded-http-connection"
+        )
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        self._connections.discard(self)
+        if self._task is not None:
+            self._task.cancel()
+
+    async def close(self) -> None:
+        """Drop the client and wait until its handler has gone."""
+        if self._transport is not None:
+            self._transport.abort()
+        if self._task is not None:
+            self._task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await self._task
+
+    def data_received(self, data: bytes) -> None:
+        try:
+            self._parser.feed_data(data)
+        except (httptools.HttpParserError, UnicodeDecodeError, ValueError):
+            if self._transport is not None:
+                self._transport.write(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+                self._transport.close()
+
+    # --- what httptools calls ---------------------------------------------------
+
+    def on_message_begin(self) -> None:
+        """A request starts."""
+        self._url = b""
+        self._headers: dict[str, str] = {}
+        self._body: list[bytes] = []
+        self._size = 0
+
+    def on_url(self, url: bytes) -> None:
+        """A part of its target."""
+        self._url += url
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """One of its headers."""
+        self._headers[name.decode("latin-1").lower()] = value.decode("latin-1")
+
+    def on_body(self, body: bytes) -> None:
+        """A part of its body; what is beyond all limits is counted, not kept."""
+        self._size += len(body)
+        if self._size <= _MAX_BODY:
+            self._body.append(body)
+
+    def on_message_complete(self) -> None:
+        """The whole request is here."""
+        target = urlsplit(self._url.decode("ascii"), allow_fragments=False)
+        # urlsplit takes "//op/update" for a host, and that is how Orion calls agents.
+        path = self._url.decode("ascii").partition("?")[0]
+        request = Request(
+            self._parser.get_method().decode("ascii"),
+            unquote(path),
+            dict(parse_qsl(target.query, keep_blank_values=True)),
+            self._headers,
+            b"".join(self._body),
+        )
+        self._requests.put_nowait((request, self._parser.should_keep_alive()))
+        if self._requests.qsize() > _MAX_WAITING and self._transport is not None:
+            self._transport.pause_reading()
+
+    # --- answers ----------------------------------------------------------------
+
+    async def _answer_all(self) -> None:
+        keep = True
+        while keep and self._transport is not None:
+            request, keep = await self._requests.get()
+            if self._requests.qsize() <= _MAX_WAITING:
+                self._transport.resume_reading()
+            response = await self._answer(request)
+            self._transport.write(_written(response, request.method, keep))
+        if self._transport is not None:
+            self._transport.close()
+
+    async def _answer(self, request: Request) -> Response:
+        try:
+            return await self._handler(request)
+        except Exception:
+            _log.exception("%s %s failed", request.method, request.path)
+            return Response(500)
+
+
+def _written(response: Response, method: str, keep: bool) -> bytes:
+    head = [f"HTTP/1.1 {response.status} {HTTPStatus(response.status).phrase}"]
+    if response.body:
+        head.append(f"Content-Type: {response.content_type}")
+    if response.status != 204:
+        head.append(f"Content-Length: {len(response.body)}")
+    if not keep:
+        head.append("Connection: close")
+    head += [f"{name}: {value}" for name, value in response.headers.items()]
+    body = b"" if method == "HEAD" else response.body
+    return "\r\n".join((*head, "", "")).encode("latin-1") + body

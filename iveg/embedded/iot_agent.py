@@ -1,0 +1,302 @@
+"""An IoT Agent for JSON: measures from MQTT into the context broker, commands back.
+
+It shares the process with the broker and hands measures over by a call; its MQTT side
+and its north port are what the real one shows.  What it does not do is told in
+``docs/fiware.md``.
+"""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import orjson
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.errors import HopError
+from iveg.embedded.context_broker import ContextBroker, Scope
+from iveg.embedded.devices import (
+    DEFAULT_APIKEY,
+    AgentError,
+    Device,
+    Group,
+    Registry,
+    Tenancy,
+    read_device,
+)
+from iveg.embedded.entities import Change
+from iveg.embedded.measures import read_measures, read_single, status_changes
+from iveg.embedded.orion_errors import NgsiError
+from iveg.embedded.registrations import read_registration
+
+_log = logging.getLogger(__name__)
+
+FILTERS = tuple(
+    prefix + topic
+    for prefix in ("", "/json", "json")
+    for topic in ("/+/+/attrs", "/+/+/attrs/+", "/+/+/cmdexe")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """Ways in which an agent fails in the field, for tests.
+
+    Attributes:
+        deaf: Measures and answers are not heard; the north port says all is well.
+        slow_s: Everything is done so much later (s), in order.
+        stuck: Requests of the context broker are taken and not answered until this
+            ends; then they are carried out, late.
+    """
+
+    deaf: bool = False
+    slow_s: float = 0.0
+    stuck: bool = False
+
+
+class IotAgent:
+    """Devices, their measures and their commands.
+
+    Args:
+        broker: Where entities live.
+        mqtt: The MQTT broker that devices use.
+    """
+
+    def __init__(self, broker: ContextBroker, mqtt: tuple[str, int]) -> None:
+        self._broker = broker
+        self.registry = Registry()
+        self.faults = Faults()
+        self.url = ""
+        """Address of the north port, for registrations; set when it is known."""
+        self.discarded = 0
+        """Messages that were not taken; devices are never told."""
+        self._unstuck = asyncio.Event()
+        self._unstuck.set()
+        self._ready = asyncio.Event()
+        self.link = MqttLink(
+            BrokerAddress(*mqtt),
+            "embedded IoT Agent",
+            dict.fromkeys(FILTERS, 0),
+            on_message=self.hear,
+            on_connect=self._ready.set,
+        )
+
+    async def run(self) -> None:
+        """Stay connected to MQTT until cancelled."""
+        await self.link.run()
+
+    async def ready(self) -> None:
+        """Wait until devices are heard."""
+        await self._ready.wait()
+
+    def fail(self, faults: Faults) -> None:
+        """From now on, fail like this."""
+        self.faults = faults
+        if faults.stuck:
+            self._unstuck.clear()
+        else:
+            self._unstuck.set()
+
+    # --- from devices -----------------------------------------------------------
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """Take one MQTT message."""
+        if self.faults.deaf:
+            return
+        if self.faults.slow_s > 0:
+            loop = asyncio.get_running_loop()
+            loop.call_later(self.faults.slow_s, self._take, topic, payload)
+        else:
+            self._take(topic, payload)
+
+    def _take(self, topic: str, payload: bytes) -> None:
+        parts = topic.split("/")
+        if parts[0] == "json" or parts[:2] == ["", "json"]:
+            parts = parts[parts.index("json") :]
+        _, apikey, device_id, kind, *name = parts
+        try:
+            taken = self._take_from(apikey, device_id, kind, name, payload)
+        except (NgsiError, AgentError) as error:
+            _log.debug("%s discarded: %s", topic, error)
+            taken = False
+        if not taken:
+            self.discarded += 1
+
+    def _take_from(
+        self, apikey: str, device_id: str, kind: str, name: list[str], payload: bytes
+    ) -> bool:
+        now = clock.now().wall
+        device = self.registry.device_of(apikey, device_id)
+        if device is None:
+            device = self._autoprovision(apikey, device_id, now)
+        if device is None:
+            return False
+        if kind == "cmdexe":
+            return self._take_answer(device, payload, now)
+        if name:
+            single = read_single(device, name[0], payload, now)
+            measures = None if single is None else [single]
+        else:
+            measures = read_measures(device, payload, now)
+        for changes in measures or ():
+            self._write(device, changes, now)
+        return measures is not None
+
+    def _take_answer(self, device: Device, payload: bytes, now: float) -> bool:
+        try:
+            answers = orjson.loads(payload)
+        except orjson.JSONDecodeError:
+            return False
+        if not isinstance(answers, dict):
+            return False
+        known = {
+            name: ("OK", answers[name]) for name in answers if name in device.commands
+        }
+        if known:
+            self._write(device, status_changes(known, now), now)
+        return bool(known)
+
+    def _write(self, device: Device, changes: Mapping[str, Change], now: float) -> None:
+        scope = self._scope(device.tenancy, now)
+        self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
+
+    def _scope(self, tenancy: Tenancy, now: float) -> Scope:
+        correlator = self._broker.outbox.correlator()
+        return Scope(tenancy.service, tenancy.subservice, correlator, now)
+
+    def _autoprovision(self, apikey: str, device_id: str, now: float) -> Device | None:
+        group = None if apikey == DEFAULT_APIKEY else self.registry.group_of(apikey)
+        if group is None:
+            return None
+        raw: dict[str, Any] = {"device_id": device_id}
+        if group.commands:
+            raw["commands"] = group.commands
+        device = read_device(raw, group.tenancy, group)
+        return self._keep(device, now)
+
+    # --- devices ----------------------------------------------------------------
+
+    def provision(self, raw: Any, tenancy: Tenancy) -> None:
+        """Make one device from a ``POST``.
+
+        Raises:
+            AgentError: 400, or 409 where there is such a device.
+        """
+        group = self._group_for(raw, tenancy)
+        device = read_device(raw, tenancy, group)
+        if self.registry.is_known(device):
+            raise AgentError(
+                409,
+                "DUPLICATE_DEVICE_ID",
+                "A device with the same info (DeviceId, ApiKey, Service, Subservice) "
+                f"was found:{device.device_id}",
+            )
+        self._keep(device, clock.now().wall)
+
+    def _group_for(self, raw: Any, tenancy: Tenancy) -> Group | None:
+        apikey = raw.get("apikey", "") if isinstance(raw, dict) else ""
+        return self.registry.group_in(tenancy, apikey or "")
+
+    def _keep(self, device: Device, now: float) -> Device:
+        if device.commands:
+            device = self._register(device, now)
+        self.registry.put(device)
+        return device
+
+    def _register(self, device: Device, now: float) -> Device:
+        """Tell the context broker that commands of this entity come here."""
+        scope = self._scope(device.tenancy, now)
+        entity = {"type": device.entity_type, "id": device.entity_name}
+        document = {
+            "dataProvided": {"entities": [entity], "attrs": list(device.commands)},
+            "provider": {"http": {"url": self.url}},
+        }
+        registration = read_registration(document, device.tenancy.subservice)
+        self._broker.register(scope, registration)
+        return replace(device, registration_id=registration.id)
+
+    def change(self, old: Device, new: Device) -> None:
+        """Put a device in another's place; attributes it gained are written as null."""
+        now = clock.now().wall
+        self._unregister(old, now)
+        self.registry.remove(old)
+        self._keep(replace(new, registration_id=""), now)
+        gained = dict(new.mapping.values()).items() - dict(old.mapping.values()).items()
+        tenant = self._broker.tenant(new.tenancy.service)
+        key = (new.tenancy.subservice, new.entity_name, new.entity_type)
+        if gained and tenant.entities.get(*key) is not None:
+            self._write(new, {name: Change(kind, None) for name, kind in gained}, now)
+
+    def forget(self, device: Device) -> None:
+        """Forget a device and what was registered for it."""
+        self._unregister(device, clock.now().wall)
+        self.registry.remove(device)
+
+    def _unregister(self, device: Device, now: float) -> None:
+        if device.registration_id:
+            scope = self._scope(device.tenancy, now)
+            self._broker.unregister(scope, device.registration_id)
+
+    # --- from the context broker --------------------------------------------------
+
+    async def command(
+        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
+    ) -> None:
+        """Carry out an ``op/update`` of one entity: publish its commands.
+
+        A command that the device does not have is passed over in silence, and one that
+        MQTT does not take is lost: the agent says 204 to both.
+
+        Raises:
+            AgentError: 404, no device has this entity.
+        """
+        await self._unstuck.wait()
+        if self.faults.slow_s > 0:
+            await asyncio.sleep(self.faults.slow_s)
+        device = self._device_for(tenancy, name, kind)
+        now = clock.now().wall
+        known = {one: values[one] for one in values if one in device.commands}
+        for command, value in known.items():
+            await self._publish(device, command, value)
+        if known:
+            pending = dict.fromkeys(known, ("PENDING", None))
+            self._write(device, status_changes(pending, now), now)
+
+    async def _publish(self, device: Device, command: str, value: Any) -> None:
+        options = device.commands[command].get("mqtt") or {}
+        try:
+            await self.link.publish(
+                f"/{device.apikey}/{device.device_id}/cmd",
+                orjson.dumps({command: value}),
+                qos=int(options.get("qos", 0)),
+                retain=bool(options.get("retain", False)),
+            )
+        except HopError as error:
+            _log.info("a command for %s was lost: %s", device.device_id, error)
+
+    async def query(
+        self, tenancy: Tenancy, name: str, kind: str, names: list[str]
+    ) -> dict[str, Any]:
+        """Carry out an ``op/query`` of one entity: its commands, all empty.
+
+        Raises:
+            AgentError: 404, no device has this entity.
+        """
+        await self._unstuck.wait()
+        device = self._device_for(tenancy, name, kind)
+        told = {
+            command: {"type": "command", "value": ""}
+            for command in device.commands
+            if not names or command in names
+        }
+        return {"type": kind, "id": name, **told}
+
+    def _device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device:
+        device = self.registry.device_for(tenancy, name, kind)
+        if device is None:
+            raise AgentError(
+                404, "DEVICE_NOT_FOUND", f"No device was found with id:{name}"
+            )
+        return device

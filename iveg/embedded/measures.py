@@ -1,0 +1,138 @@
+"""From the bytes that a device publishes to changes of its entity.
+
+What the agent discards without telling the device is discarded here too: text that is
+not JSON, bare numbers and strings, lists of numbers, a ``TimeInstant`` that is no date.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import orjson
+
+from iveg.embedded.devices import Device
+from iveg.embedded.entities import Change, date_json, date_text, default_type
+from iveg.embedded.orion_errors import NgsiError, bad_request
+from iveg.embedded.orion_text import (
+    UNRESTRICTED,
+    check_name,
+    holds_forbidden,
+    looks_clean,
+)
+
+MAX_MEASURE = (1 << 20) - 256
+_INSTANT = "TimeInstant"
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
+_RENAMED = {"id": "measure_id", "type": "measure_type"}
+_NOTHING: dict[str, Any] = {"undefined": None}
+
+
+def read_measures(
+    device: Device, payload: bytes, now: float
+) -> list[dict[str, Change]] | None:
+    """Read what came on an ``attrs`` topic.
+
+    Returns:
+        One set of changes for each measure; None for what the agent discards.
+
+    Raises:
+        NgsiError: 400 or 413, what Orion says to the agent about it.
+    """
+    try:
+        value = orjson.loads(payload)
+    except orjson.JSONDecodeError:
+        return None
+    clean = _check(payload)
+    if value is None or value == {}:
+        value = _NOTHING
+    if isinstance(value, dict):
+        measures = [value]
+    elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
+        # A list of one is not a list of measures; the agent walks its index instead.
+        measures = value if len(value) > 1 else [{"0": value[0]}]
+    else:
+        return None
+    read = [_read_one(device, one, now, clean=clean) for one in measures]
+    return None if None in read else [one for one in read if one is not None]
+
+
+def read_single(
+    device: Device, name: str, payload: bytes, now: float
+) -> dict[str, Change] | None:
+    """Read what came on ``attrs/{name}``; what is not JSON is kept as hexadecimal.
+
+    Raises:
+        NgsiError: 400 or 413, what Orion says to the agent about it.
+    """
+    if not payload:
+        return None
+    try:
+        value = orjson.loads(payload)
+        clean = _check(payload)
+    except orjson.JSONDecodeError:
+        value, clean = payload.hex(), True
+    return _read_one(device, {name: value}, now, clean=clean)
+
+
+def _check(payload: bytes) -> bool:
+    if len(payload) > MAX_MEASURE:
+        raise NgsiError(413, "RequestEntityTooLarge", f"payload size: {len(payload)}")
+    return looks_clean(payload)
+
+
+def _read_one(
+    device: Device, measure: Mapping[str, Any], now: float, *, clean: bool
+) -> dict[str, Change] | None:
+    given = measure.get(_INSTANT)
+    if given is None:
+        instant = date_json(now)
+    elif isinstance(given, str) and _DATE.match(given):
+        try:
+            instant = date_text(given)
+        except NgsiError:
+            return None
+    else:
+        return None
+    metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
+    changes = {}
+    for key, value in measure.items():
+        if key == _INSTANT:
+            continue
+        name, kind = device.mapping.get(key) or (_RENAMED.get(key, key), "Text")
+        check_name(name, "attribute name")
+        if not clean and kind != UNRESTRICTED and holds_forbidden(value):
+            raise bad_request("Invalid characters in attribute value")
+        changes[name] = Change(kind, value, metadata)
+    for one in device.static_attributes:
+        changes[one["name"]] = Change(
+            one.get("type") or default_type(one.get("value")),
+            one.get("value"),
+            metadata,
+        )
+    changes[_INSTANT] = Change("DateTime", instant.decode().strip('"'))
+    return changes
+
+
+def status_changes(
+    results: Mapping[str, tuple[str, Any]], now: float
+) -> dict[str, Change]:
+    """What the agent writes about commands.
+
+    Args:
+        results: Command → status, and the answer (for a status of ``OK``).
+        now: Seconds, Unix time.
+
+    Raises:
+        NgsiError: 400, a forbidden character in an answer.
+    """
+    instant = date_json(now)
+    metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
+    changes = {}
+    for name, (status, answer) in results.items():
+        changes[f"{name}_status"] = Change("commandStatus", status, metadata)
+        if status == "OK":
+            if holds_forbidden(answer):
+                raise bad_request("Invalid characters in attribute value")
+            changes[f"{name}_info"] = Change("commandResult", answer, metadata)
+    changes[_INSTANT] = Change("DateTime", instant.decode().strip('"'))
+    return changes

@@ -1,0 +1,270 @@
+"""Posts notifications: kept-alive HTTP/1.1, in order, never waiting for the slow.
+
+Each subscription has one lane: a bounded queue and one connection.  Once a receiver has
+shown that it keeps connections open, a lane sends ahead of the answers (pipelining), so
+that a busy receiver costs no round trip a message.  Nothing is tried again except what
+a receiver never looked at because it had closed an idle connection.
+"""
+
+import asyncio
+import logging
+import ssl
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import httptools
+
+_log = logging.getLogger(__name__)
+_AHEAD = 8
+_MAX_QUEUED = 1000
+
+REFUSED = "Couldn't connect to server"
+TIMED_OUT = "Timeout was reached"
+CLOSED = "Server returned nothing (no headers, no data)"
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where a lane goes."""
+
+    host: str
+    port: int
+    tls: bool = False
+
+    @classmethod
+    def from_url(cls, url: str) -> "Target":
+        """The server of an ``http`` or ``https`` address."""
+        parts = urlsplit(url)
+        tls = parts.scheme == "https"
+        return cls(parts.hostname or "", parts.port or (443 if tls else 80), tls)
+
+
+@dataclass(slots=True)
+class Delivery:
+    """One request on its way.
+
+    Attributes:
+        request: Head and body, ready to send.
+        timeout_s: How long the answer may take.
+        done: Told the status and the body, or 0 and libcurl's words for what failed.
+    """
+
+    request: bytes
+    timeout_s: float
+    done: Callable[[int, bytes | str], None]
+    tried: bool = False
+
+
+class Lane:
+    """A queue and one connection to one receiver; what is sent first arrives first."""
+
+    def __init__(self, target: Target) -> None:
+        self._target = target
+        self._waiting: deque[Delivery] = deque()
+        self._flying: deque[Delivery] = deque()
+        self._wire: _Wire | None = None
+        self._connecting: asyncio.Task[None] | None = None
+        self._proven = False
+        self._closed = False
+        self._overflowing = False
+        self._timer: asyncio.TimerHandle | None = None
+        self.dropped = 0
+        """Deliveries that gave way to newer ones."""
+
+    def send(self, delivery: Delivery) -> None:
+        """Queue one delivery; beyond a thousand the oldest gives way."""
+        if len(self._waiting) >= _MAX_QUEUED:
+            self._waiting.popleft().done(0, TIMED_OUT)
+            self.dropped += 1
+            if not self._overflowing:
+                _log.warning("%s reads too slowly; the oldest give way", self._target)
+                self._overflowing = True
+        self._waiting.append(delivery)
+        self._pump()
+
+    def close(self) -> None:
+        """Close the connection; what was not sent is lost."""
+        self._closed = True
+        self._stop_timer()
+        if self._connecting is not None:
+            self._connecting.cancel()
+        self._waiting.clear()
+        self._flying.clear()
+        if self._wire is not None:
+            self._wire.abort()
+
+    def _pump(self) -> None:
+        if self._closed or not self._waiting:
+            return
+        if self._wire is None:
+            if self._connecting is None:
+                self._connecting = asyncio.get_running_loop().create_task(
+                    self._connect(), name="embedded-notifier-connect"
+                )
+            return
+        room = (_AHEAD if self._proven else 1) - len(self._flying)
+        while room > 0 and self._waiting:
+            delivery = self._waiting.popleft()
+            self._flying.append(delivery)
+            self._wire.write(delivery.request)
+            room -= 1
+        if self._timer is None:
+            self._start_timer()
+        if not self._waiting:
+            self._overflowing = False
+
+    async def _connect(self) -> None:
+        target = self._target
+        try:
+            async with asyncio.timeout(self._waiting[0].timeout_s):
+                _, self._wire = await asyncio.get_running_loop().create_connection(
+                    lambda: _Wire(self),
+                    target.host,
+                    target.port,
+                    ssl=ssl.create_default_context() if target.tls else None,
+                )
+            self._proven = False
+        except TimeoutError:
+            self._fail_first(TIMED_OUT)
+        except OSError:
+            self._fail_first(REFUSED)
+        finally:
+            self._connecting = None
+        if self._closed and self._wire is not None:
+            self._wire.abort()
+        self._pump()
+
+    def _fail_first(self, reason: str) -> None:
+        if self._waiting:
+            self._waiting.popleft().done(0, reason)
+
+    def answered(self, wire: "_Wire", status: int, body: bytes, *, keep: bool) -> None:
+        """The oldest delivery on the way has its answer."""
+        if wire is not self._wire or not self._flying:
+            return
+        self._stop_timer()
+        self._flying.popleft().done(status, body)
+        if keep:
+            self._proven = True
+            self._start_timer()
+            self._pump()
+        else:
+            self.lost(wire)
+            wire.close()
+
+    def lost(self, wire: "_Wire") -> None:
+        """The connection is gone; what was never answered may go out once more."""
+        if wire is not self._wire or self._closed:
+            return
+        self._wire = None
+        self._stop_timer()
+        again = []
+        for delivery in self._flying:
+            if self._proven and not delivery.tried:
+                delivery.tried = True
+                again.append(delivery)
+            else:
+                delivery.done(0, CLOSED)
+        self._flying.clear()
+        self._waiting.extendleft(reversed(again))
+        self._pump()
+
+    def _start_timer(self) -> None:
+        if self._flying:
+            self._timer = asyncio.get_running_loop().call_later(
+                self._flying[0].timeout_s, self._time_out
+            )
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _time_out(self) -> None:
+        self._timer = None
+        if self._flying:
+            self._flying.popleft().done(0, TIMED_OUT)
+        if self._wire is not None:
+            self._wire.abort()
+
+
+class _Wire(asyncio.Protocol):
+    """One connection of a lane: writes requests, reads answers."""
+
+    def __init__(self, lane: Lane) -> None:
+        self._lane = lane
+        self._parser = httptools.HttpResponseParser(self)
+        self._body: list[bytes] = []
+        self._transport: asyncio.Transport | None = None
+
+    def write(self, request: bytes) -> None:
+        """Send bytes."""
+        if self._transport is not None:
+            self._transport.write(request)
+
+    def close(self) -> None:
+        """Hang up politely."""
+        if self._transport is not None:
+            self._transport.close()
+
+    def abort(self) -> None:
+        """Hang up at once."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Connected."""
+        self._transport = transport  # type: ignore[assignment]
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
+        """The receiver went, or we hung up on it."""
+        self._transport = None
+        self._lane.lost(self)
+
+    def data_received(self, data: bytes) -> None:
+        """A part of an answer."""
+        try:
+            self._parser.feed_data(data)
+        except httptools.HttpParserError:
+            self.abort()
+
+    def on_message_begin(self) -> None:
+        """An answer starts."""
+        self._body = []
+
+    def on_body(self, body: bytes) -> None:
+        """A part of its body."""
+        self._body.append(body)
+
+    def on_message_complete(self) -> None:
+        """The whole answer is here."""
+        status = self._parser.get_status_code()
+        if status >= 200:
+            keep = self._parser.should_keep_alive()
+            self._lane.answered(self, status, b"".join(self._body), keep=keep)
+
+
+async def exchange(
+    target: Target, request: bytes, timeout_s: float
+) -> tuple[int, bytes | str]:
+    """Send one request on a connection of its own and wait for the answer.
+
+    Returns:
+        Status and body, or 0 and what failed.
+    """
+    answer: asyncio.Future[tuple[int, bytes | str]] = (
+        asyncio.get_running_loop().create_future()
+    )
+
+    def done(status: int, body: bytes | str) -> None:
+        if not answer.done():
+            answer.set_result((status, body))
+
+    lane = Lane(target)
+    lane.send(Delivery(request, timeout_s, done))
+    try:
+        return await answer
+    finally:
+        lane.close()

@@ -1,0 +1,166 @@
+"""From a change to the notifications that tell of it."""
+
+import itertools
+import re
+import secrets
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+import orjson
+
+from iveg.embedded.entities import Entity, Touched
+from iveg.embedded.notifier import Delivery, Lane, Target
+from iveg.embedded.orion_text import quoted
+from iveg.embedded.subscriptions import Subscription
+from iveg.embedded.views import View, write_entity
+
+AGENT = "orion/4.7.0-next libcurl/7.88.1"
+_MACRO = re.compile(r"\$\{([^}]*)\}")
+_WHOLE_MACRO = re.compile(r'"\$\{([^}"]*)\}"')
+
+
+class Outbox:
+    """Writes notifications and hands them to one lane for each subscription.
+
+    Args:
+        now: Reads Unix time, for what is known only when a receiver has answered.
+    """
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self._lanes: dict[str, tuple[Target, Lane]] = {}
+        self._heads: dict[str, tuple[dict[str, object], bytes]] = {}
+        self._correlators = itertools.count(1)
+        self._prefix = f"{secrets.token_hex(4)}-e4ec-11f1-9a0b-"
+
+    def correlator(self) -> str:
+        """A name for one chain of requests."""
+        return f"{self._prefix}{next(self._correlators):012x}"
+
+    def post(
+        self,
+        subscription: Subscription,
+        entity: Entity,
+        touched: Touched,
+        alteration: str,
+        correlator: str,
+        now: float,
+    ) -> None:
+        """Send one entity to one subscriber."""
+        view = subscription.shown(touched)
+        body = self._body(subscription, entity, view, alteration)
+        request = self._request(subscription, entity, body, correlator)
+        subscription.sent(now)
+
+        def done(status: int, answer: bytes | str) -> None:
+            if status:
+                subscription.told(self._now(), status)
+            else:
+                subscription.failed(self._now(), str(answer))
+
+        self._lane(subscription).send(Delivery(request, subscription.timeout_s, done))
+
+    def _body(
+        self, subscription: Subscription, entity: Entity, view: View, alteration: str
+    ) -> bytes:
+        endpoint = subscription.endpoint
+        if "payload" in endpoint:
+            return _filled(endpoint["payload"], entity).encode()
+        if "json" in endpoint:
+            return _filled_json(endpoint["json"], entity)
+        text = write_entity(entity, view, alteration=alteration)
+        if view.form.startswith("simplified"):
+            return text
+        return b'{"subscriptionId":%b,"data":[%b]}' % (quoted(subscription.id), text)
+
+    def _request(
+        self, subscription: Subscription, entity: Entity, body: bytes, correlator: str
+    ) -> bytes:
+        head = self._head(subscription)
+        if b"${" in head:
+            head = _filled(head.decode(), entity).encode()
+        return b"%bContent-Length: %d\r\nFiware-Correlator: %b; cbnotif=1\r\n\r\n%b" % (
+            head,
+            len(body),
+            correlator.encode(),
+            body,
+        )
+
+    def _head(self, subscription: Subscription) -> bytes:
+        """The head's fixed part, written again only when the subscription changed."""
+        known = self._heads.get(subscription.id)
+        if known is None or known[0] is not subscription.document:
+            known = (subscription.document, _write_head(subscription))
+            self._heads[subscription.id] = known
+        return known[1]
+
+    def _lane(self, subscription: Subscription) -> Lane:
+        target = Target.from_url(subscription.endpoint["url"])
+        known = self._lanes.get(subscription.id)
+        if known is None or known[0] != target:
+            self.forget(subscription.id)
+            known = (target, Lane(target))
+            self._lanes[subscription.id] = known
+        return known[1]
+
+    def forget(self, subscription_id: str) -> None:
+        """A subscription is gone, or goes elsewhere; so is its connection."""
+        self._heads.pop(subscription_id, None)
+        known = self._lanes.pop(subscription_id, None)
+        if known is not None:
+            known[1].close()
+
+    def close(self) -> None:
+        """Close every connection."""
+        for subscription_id in list(self._lanes):
+            self.forget(subscription_id)
+
+
+def _write_head(subscription: Subscription) -> bytes:
+    endpoint, view = subscription.endpoint, subscription.view
+    custom = "httpCustom" in subscription.notification
+    parts = urlsplit(endpoint["url"])
+    query = "&".join(
+        f"{name}={value}" for name, value in endpoint.get("qs", {}).items()
+    )
+    query = "&".join(part for part in (parts.query, query) if part)
+    target = (parts.path or "/") + (f"?{query}" if query else "")
+    kind = "text/plain" if "payload" in endpoint else "application/json; charset=utf-8"
+    headers = {
+        "Host": parts.netloc,
+        "User-Agent": AGENT,
+        "Fiware-Service": subscription.service,
+        "Fiware-Servicepath": subscription.path,
+        "Accept": "application/json",
+        "Content-Type": kind,
+        "Ngsiv2-AttrsFormat": (
+            "custom" if "payload" in endpoint or "json" in endpoint else view.form
+        ),
+    }
+    if custom:
+        for name, value in endpoint.get("headers", {}).items():
+            headers = {k: v for k, v in headers.items() if k.lower() != name.lower()}
+            headers[name.lower()] = str(value)
+    lines = [
+        f"{endpoint.get('method', 'POST') if custom else 'POST'} {target} HTTP/1.1"
+    ]
+    lines += [f"{name}: {value}" for name, value in headers.items() if value]
+    return "\r\n".join((*lines, "")).encode()
+
+
+def _filled(text: str, entity: Entity) -> str:
+    return _MACRO.sub(lambda found: _macro(found[1], entity).strip('"'), text)
+
+
+def _filled_json(template: object, entity: Entity) -> bytes:
+    text = orjson.dumps(template).decode()
+    text = _WHOLE_MACRO.sub(lambda found: _macro(found[1], entity), text)
+    return _filled(text, entity).encode()
+
+
+def _macro(name: str, entity: Entity) -> str:
+    """What ``${name}`` stands for, as JSON text."""
+    if name in ("id", "type"):
+        return quoted(getattr(entity, name)).decode()
+    attribute = entity.attributes.get(name)
+    return "null" if attribute is None else attribute.json.decode()

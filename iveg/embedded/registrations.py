@@ -1,0 +1,198 @@
+"""Attributes that live elsewhere: registrations, and asking their providers.
+
+A command is such an attribute.  An update of it goes to the provider as ``op/update``,
+a read as ``op/query``; a provider that is silent, slow or says no is to the client an
+entity that does not exist.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlsplit
+
+import orjson
+
+from iveg.embedded.entities import Attribute, Change, default_type, metadata_json
+from iveg.embedded.notifier import Target, exchange
+from iveg.embedded.orion_errors import bad_request
+from iveg.embedded.orion_text import print_value
+from iveg.embedded.outbox import AGENT
+from iveg.embedded.subscriptions import new_id
+
+PATIENCE_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Registration:
+    """One context provider and what it has."""
+
+    id: str
+    document: dict[str, Any]
+    path: str
+
+    @property
+    def url(self) -> str:
+        """Address of the provider."""
+        url: str = self.document["provider"]["http"]["url"]
+        return url
+
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Names of the attributes that it has; none named means all."""
+        return tuple(self.document["dataProvided"].get("attrs", ()))
+
+    @property
+    def entities(self) -> list[dict[str, str]]:
+        """The entities that it has attributes of."""
+        found: list[dict[str, str]] = self.document["dataProvided"]["entities"]
+        return found
+
+    def concerns(self, entity_id: str, entity_type: str) -> bool:
+        """Whether it has something of an entity; an unknown type fits none."""
+        return any(
+            _fits(one, "id", entity_id) and _fits(one, "type", entity_type)
+            for one in self.entities
+        )
+
+    def show(self) -> dict[str, Any]:
+        """The registration as a client sees it."""
+        shown = {
+            key: self.document[key] for key in ("description",) if key in self.document
+        }
+        provided = {"entities": self.entities, "attrs": list(self.attributes)}
+        provider = {
+            "http": {"url": self.url},
+            "supportedForwardingMode": "all",
+            "legacyForwarding": False,
+        }
+        return {
+            "id": self.id,
+            **shown,
+            "dataProvided": provided,
+            "provider": provider,
+            "status": "active",
+        }
+
+
+def _fits(one: Mapping[str, str], name: str, text: str) -> bool:
+    if name in one:
+        return one[name] == text
+    pattern = one.get(f"{name}Pattern")
+    return pattern is None or re.search(pattern, text) is not None
+
+
+def read_registration(raw: Any, path: str) -> Registration:
+    """Make a registration from a ``POST``.
+
+    Raises:
+        NgsiError: 400.
+    """
+    document = raw if isinstance(raw, dict) else {}
+    provided, provider = document.get("dataProvided"), document.get("provider")
+    if not isinstance(provided, dict) or not isinstance(provided.get("entities"), list):
+        raise bad_request("/dataProvided/ field missing in registration")
+    if not isinstance(provider, dict) or not isinstance(provider.get("http"), dict):
+        raise bad_request("/provider/ field missing in registration")
+    if not urlsplit(str(provider["http"].get("url", ""))).hostname:
+        raise bad_request("/url/ field missing in registration")
+    return Registration(new_id(), document, path)
+
+
+@dataclass(frozen=True, slots=True)
+class Asking:
+    """In whose name a provider is asked."""
+
+    service: str
+    path: str
+    correlator: str
+
+
+async def forward_update(
+    registration: Registration,
+    entity_id: str,
+    entity_type: str,
+    changes: Mapping[str, Change],
+    asking: Asking,
+) -> bool:
+    """Send attributes to their provider; whether it took them."""
+    written = {
+        name: {
+            "type": change.type or default_type(change.value),
+            "value": change.value,
+            "metadata": {},
+        }
+        for name, change in changes.items()
+    }
+    entity = {"id": entity_id, "type": entity_type, **written}
+    body = orjson.dumps({"entities": [entity], "actionType": "update"})
+    status, _ = await _ask(registration.url, "/op/update", body, asking)
+    return 200 <= status < 300
+
+
+async def forward_query(
+    registration: Registration,
+    entities: Iterable[Mapping[str, str]],
+    names: Iterable[str],
+    asking: Asking,
+    now: float,
+) -> dict[tuple[str, str], dict[str, Attribute]]:
+    """Ask a provider for attributes; nothing from one that does not answer.
+
+    Returns:
+        Id and type of each entity that it told of, with its attributes.
+    """
+    body = orjson.dumps({"entities": list(entities), "attrs": list(names)})
+    resource = "/op/query?limit=20&offset=0&options=count"
+    status, answer = await _ask(registration.url, resource, body, asking)
+    if status != 200:
+        return {}
+    try:
+        told = orjson.loads(answer)
+    except orjson.JSONDecodeError:
+        return {}
+    return {
+        (one["id"], one["type"]): _read_told(one, now)
+        for one in (told if isinstance(told, list) else ())
+        if isinstance(one, dict) and {"id", "type"} <= one.keys()
+    }
+
+
+def _read_told(one: Mapping[str, Any], now: float) -> dict[str, Attribute]:
+    return {
+        name: Attribute(
+            raw.get("type") or default_type(raw.get("value")),
+            print_value(raw.get("value")),
+            {
+                each: metadata_json(part.get("type", "Text"), part.get("value"))
+                for each, part in raw.get("metadata", {}).items()
+            },
+            now,
+            now,
+        )
+        for name, raw in one.items()
+        if name not in ("id", "type") and isinstance(raw, dict)
+    }
+
+
+async def _ask(
+    url: str, resource: str, body: bytes, asking: Asking
+) -> tuple[int, bytes | str]:
+    parts = urlsplit(url)
+    head = "\r\n".join(
+        (
+            # Orion puts a slash between the two, whatever the address ends in.
+            f"POST {parts.path or '/'}{resource} HTTP/1.1",
+            f"Host: {parts.netloc}",
+            f"User-Agent: {AGENT}",
+            f"Fiware-Service: {asking.service}",
+            f"Fiware-ServicePath: {asking.path}",
+            "Accept: application/json",
+            "Content-Type: application/json; charset=utf-8",
+            f"Content-Length: {len(body)}",
+            f"Fiware-Correlator: {asking.correlator}; cbfwd=1",
+            "",
+            "",
+        )
+    )
+    return await exchange(Target.from_url(url), head.encode() + body, PATIENCE_S)

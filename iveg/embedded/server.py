@@ -1,0 +1,120 @@
+"""All three embedded parts in one process: MQTT broker, context broker, IoT Agent."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass
+
+from iveg.adapters import clock
+from iveg.embedded.context_broker import ContextBroker
+from iveg.embedded.http_server import http_server
+from iveg.embedded.iot_agent import IotAgent
+from iveg.embedded.iota_api import IotaApi
+from iveg.embedded.loopback import require_loopback
+from iveg.embedded.mqtt_broker import mqtt_broker
+from iveg.embedded.ngsi_api import NgsiApi
+
+Address = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """An embedded FIWARE that is up.
+
+    Attributes:
+        mqtt_port: Where devices connect.
+        orion_port: NGSI-v2.
+        iota_port: North port of the agent.
+        broker: For looking inside.
+        agent: For looking inside.
+    """
+
+    mqtt_port: int
+    orion_port: int
+    iota_port: int
+    broker: ContextBroker
+    agent: IotAgent
+
+    @property
+    def mqtt_url(self) -> str:
+        """Address of the MQTT broker."""
+        return f"mqtt://127.0.0.1:{self.mqtt_port}"
+
+    @property
+    def orion_url(self) -> str:
+        """Address of the context broker."""
+        return f"http://127.0.0.1:{self.orion_port}"
+
+    @property
+    def iota_url(self) -> str:
+        """Address of the agent's north port."""
+        return f"http://127.0.0.1:{self.iota_port}"
+
+
+@asynccontextmanager
+async def embedded_fiware(
+    mqtt: Address = ("127.0.0.1", 0),
+    orion: Address = ("127.0.0.1", 0),
+    iota: Address = ("127.0.0.1", 0),
+) -> AsyncIterator[Running]:
+    """Run all three while the block lasts; port 0 takes a free one.
+
+    Raises:
+        SettingsError: an address that is not loopback.
+        OSError: a port that is taken.
+    """
+    orion_host = require_loopback("IVEG_ORION_URL", orion[0])
+    iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
+    async with AsyncExitStack() as stack:
+        mqtt_port = await stack.enter_async_context(mqtt_broker(*mqtt))
+        broker = ContextBroker()
+        stack.callback(broker.close)
+        agent = IotAgent(broker, (mqtt[0], mqtt_port))
+        api = NgsiApi(broker, clock.now().wall)
+        orion_port = await stack.enter_async_context(
+            http_server(api.handle, orion_host, orion[1])
+        )
+        iota_port = await stack.enter_async_context(
+            http_server(IotaApi(agent).handle, iota_host, iota[1])
+        )
+        agent.url = f"http://{iota_host}:{iota_port}"
+        await stack.enter_async_context(_running(agent))
+        yield Running(mqtt_port, orion_port, iota_port, broker, agent)
+
+
+@asynccontextmanager
+async def _running(agent: IotAgent) -> AsyncIterator[None]:
+    task = asyncio.create_task(agent.run(), name="embedded-iot-agent")
+    try:
+        await agent.ready()
+        yield
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+
+
+async def serve_fiware(
+    mqtt: Address,
+    orion: Address,
+    iota: Address,
+    *,
+    notify_ready: Callable[[], None] | None = None,
+) -> None:
+    """Run the embedded FIWARE until cancelled.
+
+    Args:
+        mqtt: Host and port of the MQTT broker.
+        orion: Host and port of the context broker.
+        iota: Host and port of the agent's north side.
+        notify_ready: Called once when all three take requests.
+
+    Raises:
+        SettingsError: an address that is not loopback.
+        OSError: a port that is taken.
+    """
+    async with embedded_fiware(mqtt, orion, iota):
+        if notify_ready is not None:
+            notify_ready()
+        await asyncio.Event().wait()

@@ -1,0 +1,346 @@
+"""Who wants to hear of which change, and what became of telling them."""
+
+import re
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+from urllib.parse import urlsplit
+
+from iveg.embedded.entities import Touched, date_iso, date_text
+from iveg.embedded.orion_errors import NgsiError, bad_request
+from iveg.embedded.orion_text import FORBIDDEN
+from iveg.embedded.views import View
+
+FORMATS = (
+    "normalized",
+    "simplifiedNormalized",
+    "keyValues",
+    "simplifiedKeyValues",
+    "values",
+)
+_FIELDS = {
+    "description", "subject", "notification", "expires", "status", "throttling",
+}  # fmt: skip
+_ENDPOINTS = ("http", "httpCustom")
+_UNSUPPORTED = ("mqtt", "mqttCustom", "kafka", "kafkaCustom")
+_ALTERATIONS = {"entityChange", "entityUpdate", "entityCreate", "entityDelete"}
+_DEFAULT_TIMEOUT_S = 5.0
+
+
+@dataclass(slots=True)
+class Subscription:
+    """One subscription and its history.
+
+    Attributes:
+        document: What the client asked for, merged with its later changes.
+        path: Service path that its entities live under.
+        service: Tenant, as the notification's header says it.
+        status: ``active``, ``inactive`` or ``oneshot``; expiry is by the clock.
+    """
+
+    id: str
+    document: dict[str, Any]
+    path: str
+    service: str
+    status: str = "active"
+    times_sent: int = 0
+    last_notification: float | None = None
+    last_success: float | None = None
+    last_success_code: int = 0
+    last_failure: float | None = None
+    last_failure_reason: str = ""
+    fails: int = 0
+    view: View = field(default_factory=View)
+    _entities: list[tuple[re.Pattern[str] | str, re.Pattern[str] | str]] = field(
+        default_factory=list
+    )
+
+    def __post_init__(self) -> None:
+        """Make what is asked at every change quick to answer."""
+        self.prepare()
+
+    def prepare(self) -> None:
+        """Read the document again after it has changed."""
+        notification = self.notification
+        self.view = View(
+            notification.get("attrsFormat", "normalized"),
+            tuple(notification.get("attrs", ())),
+            tuple(notification.get("metadata", ())),
+        )
+        self._entities = [_matcher(one) for one in self.document["subject"]["entities"]]
+
+    @property
+    def notification(self) -> dict[str, Any]:
+        """The ``notification`` part of the document."""
+        part: dict[str, Any] = self.document["notification"]
+        return part
+
+    @property
+    def condition(self) -> dict[str, Any]:
+        """The ``condition`` part of the document."""
+        part: dict[str, Any] = self.document["subject"].get("condition", {})
+        return part
+
+    @property
+    def endpoint(self) -> dict[str, Any]:
+        """The ``http`` or ``httpCustom`` part of the document."""
+        notification = self.notification
+        part: dict[str, Any] = notification.get("http") or notification["httpCustom"]
+        return part
+
+    @property
+    def timeout_s(self) -> float:
+        """How long a receiver may take."""
+        return self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
+
+    def concerns(self, entity_id: str, entity_type: str) -> bool:
+        """Whether an entity is one of those subscribed to."""
+        return any(
+            _matches(kind, entity_type) and _matches(name, entity_id)
+            for name, kind in self._entities
+        )
+
+    def expired(self, now: float) -> bool:
+        """Whether its end has come."""
+        expires: str = self.document.get("expires") or ""
+        return bool(expires) and expires <= date_iso(now)
+
+    def wants(self, touched: Touched, alteration: str, now: float) -> bool:
+        """Whether a change is one to tell of, now.
+
+        Throttling drops what comes too early; it is not sent later.
+        """
+        if self.status == "inactive" or self.expired(now):
+            return False
+        throttling = self.document.get("throttling", 0)
+        last = self.last_notification
+        if throttling and last is not None and now - last < throttling:
+            return False
+        return self._alteration_wanted(alteration) and self._attributes_wanted(
+            touched, alteration
+        )
+
+    def _alteration_wanted(self, alteration: str) -> bool:
+        wanted = self.condition.get("alterationTypes")
+        if wanted is None:
+            return alteration != "entityDelete"
+        return alteration in wanted or (
+            alteration == "entityChange" and "entityUpdate" in wanted
+        )
+
+    def _attributes_wanted(self, touched: Touched, alteration: str) -> bool:
+        condition = self.condition
+        any_update = "entityUpdate" in condition.get("alterationTypes", ())
+        if alteration == "entityDelete" or (any_update and touched.named):
+            return True
+        metadata_too = condition.get("notifyOnMetadataChange", True)
+        changed = touched.changed if metadata_too else touched.values
+        watched = condition.get("attrs")
+        if not watched:
+            return bool(changed) or alteration == "entityCreate"
+        return not changed.isdisjoint(watched)
+
+    def shown(self, touched: Touched) -> View:
+        """What the notification shows of the entity."""
+        if not self.notification.get("onlyChangedAttrs"):
+            return self.view
+        names = self.view.names or touched.named
+        chosen = tuple(name for name in names if name in touched.changed)
+        return View(self.view.form, chosen or ("",), self.view.metadata)
+
+    def sent(self, now: float) -> None:
+        """A notification goes out."""
+        self.times_sent += 1
+        self.last_notification = now
+        if self.status == "oneshot":
+            self.status = "inactive"
+
+    def told(self, now: float, status: int) -> None:
+        """The receiver answered; whatever it answered counts as success."""
+        self.last_success, self.last_success_code, self.fails = now, status, 0
+
+    def failed(self, now: float, reason: str) -> None:
+        """The receiver did not answer."""
+        self.last_failure, self.last_failure_reason = now, reason
+        self.fails += 1
+        limit = self.notification.get("maxFailsLimit")
+        if limit is not None and self.fails > limit:
+            self.status = "inactive"
+
+    def show(self, now: float) -> dict[str, Any]:
+        """The subscription as a client sees it."""
+        document, condition = self.document, self.condition
+        shown: dict[str, Any] = {"id": self.id}
+        for name in ("description", "expires"):
+            if document.get(name):
+                shown[name] = document[name]
+        shown["status"] = "expired" if self.expired(now) else self.status
+        shown["subject"] = {
+            "entities": document["subject"]["entities"],
+            "condition": {
+                "attrs": [],
+                **condition,
+                "notifyOnMetadataChange": condition.get("notifyOnMetadataChange", True),
+            },
+        }
+        shown["notification"] = self._show_notification()
+        if document.get("throttling"):
+            shown["throttling"] = document["throttling"]
+        return shown
+
+    def _show_notification(self) -> dict[str, Any]:
+        asked = self.notification
+        shown: dict[str, Any] = {}
+        if self.last_notification is not None:
+            shown["timesSent"] = self.times_sent
+            shown["lastNotification"] = _whole_seconds(self.last_notification)
+        shown["attrs"] = asked.get("attrs", [])
+        shown["onlyChangedAttrs"] = asked.get("onlyChangedAttrs", False)
+        shown["attrsFormat"] = self.view.form
+        for name in ("http", "httpCustom", "metadata", "maxFailsLimit"):
+            if name in asked:
+                shown[name] = asked[name]
+        if self.last_failure is not None:
+            shown["lastFailure"] = _whole_seconds(self.last_failure)
+            shown["lastFailureReason"] = self.last_failure_reason
+        if self.fails:
+            shown["failsCounter"] = self.fails
+        if self.last_success is not None:
+            shown["lastSuccess"] = _whole_seconds(self.last_success)
+            shown["lastSuccessCode"] = self.last_success_code
+        shown["covered"] = asked.get("covered", False)
+        return shown
+
+
+def _whole_seconds(at: float) -> str:
+    return date_iso(int(at))
+
+
+@lru_cache(maxsize=256)
+def _pattern(text: str) -> re.Pattern[str]:
+    return re.compile(text)
+
+
+def _matcher(
+    one: Mapping[str, str],
+) -> tuple[re.Pattern[str] | str, re.Pattern[str] | str]:
+    name = one.get("id") or _pattern(one.get("idPattern", ".*"))
+    kind = one.get("type") or _pattern(one.get("typePattern", ".*"))
+    return name, kind
+
+
+def _matches(matcher: re.Pattern[str] | str, text: str) -> bool:
+    if isinstance(matcher, str):
+        return matcher == text
+    return matcher.search(text) is not None
+
+
+# --- reading what clients send ------------------------------------------------------
+
+
+def new_id() -> str:
+    """24 hexadecimal digits, as MongoDB names its documents."""
+    return secrets.token_hex(12)
+
+
+def read_subscription(raw: Any, service: str, path: str) -> Subscription:
+    """Make a subscription from a ``POST``.
+
+    Raises:
+        NgsiError: 400, with Orion's sentence.
+    """
+    document = _read_document(raw)
+    if not document:
+        raise bad_request("empty payload")
+    for part in ("subject", "notification"):
+        if part not in document:
+            raise bad_request(f"no {part} for subscription specified")
+    status = document.pop("status", "active")
+    return Subscription(new_id(), document, path, service, status)
+
+
+def update_subscription(subscription: Subscription, raw: Any) -> None:
+    """Carry out a ``PATCH``; each part that is named replaces the old one whole.
+
+    Raises:
+        NgsiError: 400, with Orion's sentence.
+    """
+    changes = _read_document(raw)
+    status = changes.pop("status", None)
+    subscription.document = {**subscription.document, **changes}
+    if status is not None:
+        subscription.status = status
+        subscription.fails = 0
+    subscription.prepare()
+
+
+def _read_document(raw: Any) -> dict[str, Any]:
+    if not isinstance(raw, dict):
+        raise NgsiError(400, "ParseError", "Errors found in incoming JSON buffer")
+    document = dict(raw)
+    if unknown := document.keys() - _FIELDS:
+        raise bad_request(f"invalid field: {sorted(unknown)[0]}")
+    if not FORBIDDEN.isdisjoint(str(document.get("description", ""))):
+        raise bad_request("forbidden characters in description")
+    if "subject" in document:
+        _check_subject(document["subject"])
+    if "notification" in document:
+        document["notification"] = _read_notification(document["notification"])
+    if document.get("expires"):
+        document["expires"] = date_text(document["expires"]).decode().strip('"')
+    if document.get("status", "active") not in ("active", "inactive", "oneshot"):
+        raise bad_request(f"invalid status: {document['status']}")
+    throttling = document.get("throttling", 0)
+    if not isinstance(throttling, int) or throttling < 0:
+        raise bad_request("throttling must be a non-negative integer")
+    return document
+
+
+def _check_subject(subject: Any) -> None:
+    entities = subject.get("entities") if isinstance(subject, dict) else None
+    if not isinstance(entities, list) or not entities:
+        raise bad_request("no subject entities specified")
+    for one in entities:
+        if not isinstance(one, dict) or not ("id" in one or "idPattern" in one):
+            raise bad_request("subject entities element has neither id nor idPattern")
+        for name in ("id", "type"):
+            if name in one and f"{name}Pattern" in one:
+                raise bad_request(
+                    f"/entities/ vector item has both /{name}/ and /{name}Pattern/"
+                )
+        for name in ("idPattern", "typePattern"):
+            _check_pattern(one.get(name, ".*"), name)
+    for one in subject.get("condition", {}).get("alterationTypes", []):
+        if one not in _ALTERATIONS:
+            raise bad_request(f"unknown alteration type: {one}")
+
+
+def _check_pattern(text: Any, name: str) -> None:
+    try:
+        re.compile(text)
+    except (re.error, TypeError):
+        raise bad_request(f"Invalid regex for entity {name}") from None
+
+
+def _read_notification(raw: Any) -> dict[str, Any]:
+    if not isinstance(raw, dict):
+        raise bad_request("notification must be a JSON object")
+    chosen = [name for name in (*_ENDPOINTS, *_UNSUPPORTED) if name in raw]
+    if not chosen:
+        raise bad_request(
+            "http, httpCustom, mqtt, mqttCustom, kafka or kafkaCustom is missing"
+        )
+    if chosen[0] in _UNSUPPORTED:
+        raise bad_request(f"{chosen[0]} is not supported by the embedded broker")
+    parts = urlsplit(str(raw[chosen[0]].get("url", "")))
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise bad_request("Invalid URL parsing notification url")
+    form = raw.get("attrsFormat", "normalized")
+    if form not in FORMATS:
+        raise bad_request(
+            "invalid attrsFormat, accepted values: normalized, simplifiedNormalized, "
+            "keyValues, simplifiedkeyValues, values"
+        )
+    return dict(raw)

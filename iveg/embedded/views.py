@@ -1,0 +1,106 @@
+"""Entities as text, in each of the representations that NGSI-v2 has."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import orjson
+
+from iveg.embedded.entities import Attribute, Entity, date_json
+from iveg.embedded.orion_text import quoted
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a client wants to see.
+
+    Attributes:
+        form: ``normalized``, ``keyValues``, ``values`` or ``unique``.
+        names: Attributes in the order wanted; none for all, by name.
+        metadata: Metadata in the order wanted; none for all stored ones.
+    """
+
+    form: str = "normalized"
+    names: tuple[str, ...] = ()
+    metadata: tuple[str, ...] = ()
+
+    @property
+    def bare(self) -> bool:
+        """Whether attributes are shown as their values alone."""
+        return self.form in ("keyValues", "simplifiedKeyValues")
+
+
+def write_entity(
+    entity: Entity,
+    view: View,
+    foreign: Mapping[str, Attribute] | None = None,
+    alteration: str = "",
+) -> bytes:
+    """One entity.
+
+    Args:
+        entity: What to show.
+        view: How to show it.
+        foreign: Attributes that a context provider added; shown after our own.
+        alteration: What happened to it, for those who ask.
+    """
+    chosen = _chosen(entity, view, foreign or {}, alteration)
+    if view.form in ("values", "unique"):
+        return _values([attribute.json for _, attribute in chosen], view.form)
+    parts = [b'"id":%b,"type":%b' % (quoted(entity.id), quoted(entity.type))]
+    parts += _named(chosen, view)
+    return b"{%b}" % b",".join(parts)
+
+
+def write_attributes(
+    entity: Entity, view: View, foreign: Mapping[str, Attribute] | None = None
+) -> bytes:
+    """The attributes of one entity, without its id and type."""
+    chosen = _chosen(entity, view, foreign or {}, "")
+    if view.form in ("values", "unique"):
+        return _values([attribute.json for _, attribute in chosen], view.form)
+    return b"{%b}" % b",".join(_named(chosen, view))
+
+
+def _named(chosen: Sequence[tuple[str, Attribute]], view: View) -> list[bytes]:
+    if view.bare:
+        return [quoted(name) + b":" + one.json for name, one in chosen]
+    return [quoted(name) + b":" + one.normalized(view.metadata) for name, one in chosen]
+
+
+def _values(values: list[bytes], form: str) -> bytes:
+    if form == "unique":
+        values = list(dict.fromkeys(values))
+    return b"[%b]" % b",".join(values)
+
+
+def _chosen(
+    entity: Entity, view: View, foreign: Mapping[str, Attribute], alteration: str
+) -> list[tuple[str, Attribute]]:
+    own = entity.attributes
+    if not view.names:
+        return [(name, own[name]) for name in sorted(own)] + [
+            (name, one) for name, one in foreign.items() if name not in own
+        ]
+    chosen: dict[str, Attribute] = {}
+    for name in view.names:
+        if name == "*":
+            chosen.update((each, own[each]) for each in sorted(own))
+        elif name in own:
+            chosen[name] = own[name]
+        elif name in foreign:
+            chosen[name] = foreign[name]
+    for name in ("dateCreated", "dateModified"):
+        if name in view.names and name not in own:
+            chosen[name] = _builtin_date(entity, name)
+    if alteration and "alterationType" in view.names:
+        chosen["alterationType"] = Attribute(
+            "Text", orjson.dumps(alteration), {}, entity.created, entity.modified
+        )
+    if "*" in view.names:
+        return list(chosen.items())
+    return [(name, chosen[name]) for name in view.names if name in chosen]
+
+
+def _builtin_date(entity: Entity, name: str) -> Attribute:
+    at = entity.created if name == "dateCreated" else entity.modified
+    return Attribute("DateTime", date_json(at), {}, entity.created, entity.modified)
