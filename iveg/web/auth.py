@@ -218,7 +218,7 @@ class Door:
         if scheme.lower() == "bearer":
             known = bool(self._api_token) and _same(token.strip(), self._api_token)
             return Principal("program", "program") if known else None
-        secure = connection.url.scheme in ("https", "wss")
+        secure = connection.scope["scheme"] in ("https", "wss")
         cookie = connection.cookies.get(_cookie_name(secure=secure))
         return None if cookie is None else self.sessions.find(cookie)
 
