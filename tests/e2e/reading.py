@@ -36,15 +36,13 @@ def evaluate(page: Page, script: str, *arguments: object) -> Any:
 COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
   .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
   .filter((stop) => {
+    if (!stop.closest('#stops')) stop.scrollIntoView({block: 'center'});
     const box = stop.getBoundingClientRect();
     const x = box.x + box.width / 2, y = box.y + box.height / 2;
-    const inside = x >= 0 && y >= 0 && x < innerWidth && y < innerHeight;
-    if (!inside) return Boolean(stop.closest('#stops'));
-    const top = document.elementFromPoint(x, y);
-    return !stop.contains(top);
+    return !stop.contains(document.elementFromPoint(x, y));
   }).map((stop) => stop.dataset.stop)"""
-"""Which visible STOPs a finger at their centre would miss.  Cards may be scrolled out
-of sight; the strip never."""
+"""Which visible STOPs a finger at their centre would miss.  Those of cards may have to be
+scrolled to; those of the strip are always in sight."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""
