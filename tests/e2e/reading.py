@@ -41,8 +41,8 @@ COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
     const x = box.x + box.width / 2, y = box.y + box.height / 2;
     return !stop.contains(document.elementFromPoint(x, y));
   }).map((stop) => stop.dataset.stop)"""
-"""Which visible STOPs a finger at their centre would miss.  Those of cards may have to be
-scrolled to; those of the strip are always in sight."""
+"""Which visible STOPs a finger at their centre would miss.  Those of cards may have to
+be scrolled to; those of the strip are always in sight."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""
