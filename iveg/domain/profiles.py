@@ -2,10 +2,13 @@
 
 Sources: the seed paper (AGI is a Husky with an RGB-D camera at (0.4, 0, 0.6) m; AGII
 is Ackermann with a 2 m turning radius and a stereo camera at (0.35, 0, 0.6) m) and
-Clearpath's Husky sheet (0.99 × 0.57 m, 1.0 m/s).  Braking is not measured for these
-machines, so the margin uses the cautious 0.5 m/s² (safety.md §6.2).
+Clearpath's Husky sheet (0.99 × 0.57 m, 1.0 m/s); Intel's D435 sheet (RGB 69° across)
+and Point Grey's Bumblebee2 sheet (66°); the ranges of useful depth are assumed.
+Braking is not measured for these machines, so the margin uses the cautious 0.5 m/s²
+(safety.md §6.2).
 """
 
+import math
 from dataclasses import dataclass
 
 from iveg.domain.geometry import Pose2D
@@ -23,6 +26,7 @@ class RobotProfile:
         acceleration: (m/s²); ``braking`` (m/s²) what the drive does when asked to halt.
         assumed_braking: What margins may count on (m/s²).
         camera: Pose of the camera in ``base_link``; ``camera_height`` (m).
+        camera_fov: What the camera sees across (rad); ``camera_range`` (m).
         laser: Pose of the laser in ``base_link``.
     """
 
@@ -37,6 +41,8 @@ class RobotProfile:
     assumed_braking: float = 0.5
     camera: Pose2D = Pose2D(0.4, 0.0, 0.0)
     camera_height: float = 0.6
+    camera_fov: float = math.radians(69.0)
+    camera_range: float = 8.0
     laser: Pose2D = Pose2D(0.0, 0.0, 0.0)
 
 
@@ -48,6 +54,8 @@ AGII = RobotProfile(
     max_turn=0.5,
     turning_radius=2.0,
     camera=Pose2D(0.35, 0.0, 0.0),
+    camera_fov=math.radians(66.0),
+    camera_range=10.0,
 )
 
 _KNOWN = {"AGI": AGI, "AGII": AGII}

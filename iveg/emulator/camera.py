@@ -1,0 +1,287 @@
+"""Camera and detector: who is in view, and what a detector of the paper's makes of it.
+
+Nothing is rendered.  A target in the field of view, in range and not hidden by crop or
+crates opens an *encounter* of 0.5 to 2 s; whether it is missed, how sure the detector
+is and whether a false box comes with it is drawn once for the encounter, so that
+mistakes last as long as real ones and do not flicker away between two frames.
+
+Source of the rates: the seed paper's field table (true positives, false positives,
+false negatives per class).  Assumed: the spread of confidence, the length of an
+encounter, that false boxes are less sure than true ones.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from iveg.domain.geometry import Box3D, Pose2D, wrap_angle
+from iveg.domain.observations import Detection
+from iveg.domain.profiles import RobotProfile
+from iveg.emulator.greenhouse import Body, Disc, Scenery
+
+PERSON = "farmer"
+PERSON_HEIGHT_M = 1.75
+ROBOT_HEIGHT_M = 1.2
+_NEAREST_M = 0.3
+_LONGEST_S, _SHORTEST_S = 2.0, 0.5
+_GHOST_NEAR_M, _GHOST_FAR_M = 2.0, 6.0
+_HIDDEN_LOSS = 0.15
+"""Confidence that a target loses when nearly all of it is hidden."""
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """What the paper counted for one class."""
+
+    true_positives: int
+    false_positives: int
+    false_negatives: int
+
+    @property
+    def encounters(self) -> int:
+        """How often there was something to see."""
+        return self.true_positives + self.false_negatives
+
+    @property
+    def miss_rate(self) -> float:
+        """Chance that an encounter is missed."""
+        return self.false_negatives / self.encounters
+
+    @property
+    def ghost_rate(self) -> float:
+        """Chance that an encounter brings a false box of the class."""
+        return self.false_positives / self.encounters
+
+
+FIELD_COUNTS: Mapping[str, Counts] = {
+    PERSON: Counts(36, 6, 3),
+    "AGI": Counts(34, 8, 5),
+    "AGII": Counts(28, 12, 8),
+}
+_FAULTLESS = Counts(1, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorModel:
+    """How good a detector is.
+
+    Attributes:
+        confidence: Mean over encounters (0 to 1); ``spread`` its deviation.
+        flicker: Deviation from frame to frame.
+        ghost_confidence: How much less sure false boxes are.
+        position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
+        counts: By class; one that is not named is seen like ``AGI``.
+    """
+
+    confidence: float
+    spread: float = 0.05
+    flicker: float = 0.01
+    ghost_confidence: float = 0.10
+    position: float = 0.05
+    jitter: float = 0.01
+    counts: Mapping[str, Counts] = field(default_factory=lambda: FIELD_COUNTS)
+
+    def counts_of(self, class_id: str) -> Counts:
+        """The rates for a class."""
+        return self.counts.get(class_id, self.counts.get("AGI", _FAULTLESS))
+
+
+DETECTORS: Mapping[str, DetectorModel] = {
+    "field": DetectorModel(0.72),
+    "simulation": DetectorModel(0.85, spread=0.03),
+    "noisy": DetectorModel(0.80, spread=0.06, flicker=0.06, position=0.10, jitter=0.05),
+    "perfect": DetectorModel(0.95, 0.0, 0.0, 0.0, 0.0, 0.0, {}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Something that a detector may see.
+
+    Attributes:
+        key: Tells it apart from others.
+        class_id: As the paper's detector names it.
+        body: Its outline; a person's is a square.
+    """
+
+    key: str
+    class_id: str
+    body: Body
+    height: float
+
+
+def person_target(number: int, person: Disc) -> Target:
+    """A person as a detector sees one."""
+    pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
+    body = Body(f"person-{number}", pose, size, size)
+    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
+
+
+def robot_target(body: Body) -> Target:
+    """A robot as a detector sees one: the class is its name, as in the paper."""
+    return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ghost:
+    """A false box at a place in ``map``."""
+
+    class_id: str
+    x: float
+    y: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Encounter:
+    """What was drawn for one target."""
+
+    until: float
+    missed: bool
+    confidence: float
+    offset: tuple[float, float]
+    ghost: _Ghost | None
+
+
+class Detector:
+    """One robot's camera and the network behind it.
+
+    Args:
+        profile: Where the camera sits and what it sees.
+        model: How good the network is.
+        rng: Where its mistakes come from.
+    """
+
+    def __init__(
+        self, profile: RobotProfile, model: DetectorModel, rng: np.random.Generator
+    ) -> None:
+        self._profile = profile
+        self._model = model
+        self._rng = rng
+        self._encounters: dict[str, _Encounter] = {}
+
+    def look(
+        self, now: float, pose: Pose2D, targets: Sequence[Target], scenery: Scenery
+    ) -> tuple[Detection, ...]:
+        """One frame.
+
+        Args:
+            now: Seconds into the run.
+            pose: The robot's true pose in ``map``.
+            targets: People and the other robots.
+            scenery: What hides them.
+
+        Returns:
+            Boxes in ``base_link``.
+        """
+        camera = pose.compose(self._profile.camera)
+        found: list[Detection] = []
+        for target in targets:
+            seen = self._part_seen(camera, target.body, scenery)
+            encounter = self._encounter(now, camera, target, seen > 0.0)
+            if encounter is None:
+                continue
+            if seen > 0.0 and not encounter.missed:
+                found.append(self._box(pose, target, encounter, seen))
+            if encounter.ghost is not None:
+                found.append(self._ghost_box(pose, encounter.ghost))
+        return tuple(found)
+
+    # --- what is in view ----------------------------------------------------------
+
+    def _part_seen(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
+        """How much of a target is in view: 0, 1/3, 2/3 or 1."""
+        x, y = body.pose.x, body.pose.y
+        distance = camera.distance_to(x, y)
+        if not _NEAREST_M < distance <= self._profile.camera_range:
+            return 0.0
+        bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
+        if abs(bearing) > self._profile.camera_fov / 2:
+            return 0.0
+        half = body.width / 2 / distance
+        side_x, side_y = -(y - camera.y) * half, (x - camera.x) * half
+        places = ((x + k * side_x, y + k * side_y) for k in (-0.9, 0.0, 0.9))
+        return sum(not scenery.hides(camera.x, camera.y, *p) for p in places) / 3
+
+    # --- what the network makes of it ---------------------------------------------
+
+    def _encounter(
+        self, now: float, camera: Pose2D, target: Target, visible: bool
+    ) -> _Encounter | None:
+        """The running encounter; a new one when it is over and the target in view."""
+        running = self._encounters.get(target.key)
+        if running is not None and now < running.until:
+            return running
+        self._encounters.pop(target.key, None)
+        if not visible:
+            return None
+        fresh = self._draw(now, camera, target)
+        self._encounters[target.key] = fresh
+        return fresh
+
+    def _draw(self, now: float, camera: Pose2D, target: Target) -> _Encounter:
+        counts, rng, model = (
+            self._model.counts_of(target.class_id),
+            self._rng,
+            self._model,
+        )
+        until = now + rng.uniform(_SHORTEST_S, _LONGEST_S)
+        missed = rng.random() < counts.miss_rate
+        confidence = rng.normal(model.confidence, model.spread)
+        x, y = rng.normal(0.0, model.position, 2)
+        ghost = None
+        if rng.random() < counts.ghost_rate:
+            ghost = self._draw_ghost(camera, target.class_id)
+        return _Encounter(until, missed, confidence, (float(x), float(y)), ghost)
+
+    def _draw_ghost(self, camera: Pose2D, class_id: str) -> _Ghost:
+        half = self._profile.camera_fov / 2
+        bearing = self._rng.uniform(-half, half)
+        distance = self._rng.uniform(_GHOST_NEAR_M, _GHOST_FAR_M)
+        x, y = camera.transform(
+            distance * math.cos(bearing), distance * math.sin(bearing)
+        )
+        mean = self._model.confidence - self._model.ghost_confidence
+        return _Ghost(class_id, x, y, self._rng.normal(mean, self._model.spread))
+
+    # --- boxes --------------------------------------------------------------------
+
+    def _box(
+        self, pose: Pose2D, target: Target, encounter: _Encounter, seen: float
+    ) -> Detection:
+        jitter = self._rng.normal(0.0, self._model.jitter, 2)
+        moved = target.body.corners() + encounter.offset + jitter
+        corners = [_into(pose, float(x), float(y)) for x, y in moved]
+        xs, ys = [x for x, _ in corners], [y for _, y in corners]
+        box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
+        confidence = encounter.confidence - _HIDDEN_LOSS * (1.0 - seen)
+        return Detection(target.class_id, self._probability(confidence), box)
+
+    def _ghost_box(self, pose: Pose2D, ghost: _Ghost) -> Detection:
+        probability = self._probability(ghost.confidence)
+        return upright_box(pose, ghost.class_id, ghost.x, ghost.y, probability)
+
+    def _probability(self, confidence: float) -> float:
+        flickering = confidence + self._rng.normal(0.0, self._model.flicker)
+        return float(min(max(flickering, 0.05), 0.99))
+
+
+def upright_box(
+    pose: Pose2D, class_id: str, x: float, y: float, probability: float
+) -> Detection:
+    """A box of a person's size at a place in ``map``, told in ``base_link``."""
+    ahead, left = _into(pose, x, y)
+    half = 0.25
+    box = Box3D(
+        ahead - half, ahead + half, left - half, left + half, 0.0, PERSON_HEIGHT_M
+    )
+    return Detection(class_id, probability, box)
+
+
+def _into(pose: Pose2D, x: float, y: float) -> tuple[float, float]:
+    """A point of ``map`` in ``base_link``."""
+    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
+    dx, dy = x - pose.x, y - pose.y
+    return c * dx + s * dy, c * dy - s * dx

@@ -1,0 +1,142 @@
+"""The greenhouse as arrays: what blocks a ray, and what a robot must not touch.
+
+The domain's ``Greenhouse`` names things; this module only knows rectangles and discs,
+in ``map`` (m), laid out for NumPy.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.greenhouse import Greenhouse
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """A person seen from above (m)."""
+
+    x: float
+    y: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A robot seen from above: a rectangle centred on its ``base_link`` (m)."""
+
+    robot_id: str
+    pose: Pose2D
+    length: float
+    width: float
+
+    def corners(self) -> Floats:
+        """Shape (4, 2), counter-clockwise from the front left."""
+        x, y = self.length / 2, self.width / 2
+        around = ((x, y), (-x, y), (-x, -y), (x, -y))
+        return np.array([self.pose.transform(*corner) for corner in around])
+
+    def discs(self) -> tuple[Disc, ...]:
+        """Three discs along the body that cover it but for its corners."""
+        reach = self.length / 2 - self.width / 2
+        places = (self.pose.transform(along, 0.0) for along in (-reach, 0.0, reach))
+        return tuple(Disc(x, y, self.width / 2) for x, y in places)
+
+    def gap_to(self, x: float, y: float) -> tuple[float, float, float]:
+        """Distance from a point to the rectangle, and the direction away from it.
+
+        Returns:
+            Distance (m, 0 inside) and the unit vector from the body to the point.
+        """
+        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        dx, dy = x - self.pose.x, y - self.pose.y
+        ahead, left = c * dx + s * dy, c * dy - s * dx
+        out_x = ahead - min(max(ahead, -self.length / 2), self.length / 2)
+        out_y = left - min(max(left, -self.width / 2), self.width / 2)
+        gap = math.hypot(out_x, out_y)
+        if gap == 0.0:
+            out_x, out_y = 0.0, math.copysign(1.0, left)
+        size = math.hypot(out_x, out_y)
+        out_x, out_y = out_x / size, out_y / size
+        return gap, c * out_x - s * out_y, s * out_x + c * out_y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scenery:
+    """Everything that stands still.
+
+    Attributes:
+        bounds: The outer wall.
+        rectangles: Shape (n, 4): xmin, ymin, xmax, ymax of crop, crates, trolleys.
+        posts: Shape (m, 3): x, y, radius.
+        screens: What hides people and robots from a camera: crop, crates, trolleys.
+    """
+
+    bounds: Rectangle
+    rectangles: Floats
+    posts: Floats
+    screens: tuple[Rectangle, ...]
+
+    @classmethod
+    def of(cls, house: Greenhouse) -> "Scenery":
+        """Lay a greenhouse out."""
+        screens = house.rows + tuple(thing.area for thing in house.obstacles)
+        sides = [(area.xmin, area.ymin, area.xmax, area.ymax) for area in screens]
+        posts = [(post.x, post.y, post.radius) for post in house.posts]
+        return cls(
+            house.bounds,
+            np.array(sides, float).reshape(-1, 4),
+            np.array(posts, float).reshape(-1, 3),
+            screens,
+        )
+
+    def hides(self, ax: float, ay: float, bx: float, by: float) -> bool:
+        """Whether something stands between two points."""
+        return any(area.crosses(ax, ay, bx, by) for area in self.screens)
+
+    def touches(self, body: Body) -> bool:
+        """Whether a robot overlaps anything, or the wall."""
+        corners = body.corners()
+        if not all(self.bounds.contains(x, y) for x, y in corners):
+            return True
+        boxes = [_box_corners(*sides) for sides in self.rectangles]
+        posts = any(body.gap_to(x, y)[0] < radius for x, y, radius in self.posts)
+        return posts or any(overlap(corners, box) for box in boxes)
+
+    def free(self, x: float, y: float, radius: float) -> bool:
+        """Whether a disc fits at a place."""
+        inside = self.bounds.contains(x, y, -radius)
+        return inside and not any(s.contains(x, y, radius) for s in self.screens)
+
+
+def _box_corners(xmin: float, ymin: float, xmax: float, ymax: float) -> Floats:
+    return np.array(((xmax, ymax), (xmin, ymax), (xmin, ymin), (xmax, ymin)))
+
+
+def overlap(first: Floats, second: Floats) -> bool:
+    """Whether two convex quadrilaterals overlap (separating axis theorem)."""
+    return not any(
+        _separates(edge, first, second)
+        for shape in (first, second)
+        for edge in np.roll(shape, -1, axis=0) - shape
+    )
+
+
+def _separates(edge: Floats, first: Floats, second: Floats) -> bool:
+    normal = np.array((-edge[1], edge[0]))
+    one, other = first @ normal, second @ normal
+    return bool(one.max() < other.min() or other.max() < one.min())
+
+
+def bodies_touch(bodies: Sequence[Body]) -> bool:
+    """Whether any two robots overlap."""
+    return any(
+        overlap(one.corners(), other.corners())
+        for index, one in enumerate(bodies)
+        for other in bodies[:index]
+    )

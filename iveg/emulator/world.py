@@ -1,0 +1,206 @@
+"""The greenhouse with everybody in it: who is where, and what each robot senses there.
+
+Pure but for its seeds: time is an argument, so an hour is a loop of steps.
+``fleet.py`` runs the same world in real time and speaks MQTT for its robots.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from iveg.domain.geometry import Twist2D
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+)
+from iveg.domain.profiles import RobotProfile, profile_of
+from iveg.emulator.camera import (
+    PERSON,
+    Detector,
+    DetectorModel,
+    Target,
+    person_target,
+    robot_target,
+    upright_box,
+)
+from iveg.emulator.following import Follower
+from iveg.emulator.greenhouse import Body, Disc, Scenery
+from iveg.emulator.kinematics import Odometer, Vehicle
+from iveg.emulator.lidar import LaserModel, sweep
+from iveg.emulator.people import Person
+from iveg.emulator.scenarios import Layout, RobotScript
+
+REST = Twist2D(0.0, 0.0)
+_LASER = LaserModel()
+_FALSE_PERSON_CONFIDENCE = 0.95
+
+
+class Rig:
+    """The hardware of one robot and its navigation; the safety node sits between.
+
+    Attributes:
+        command: What the drive was told last.
+        false_person: Fault: a place in ``map`` where the camera sees a person.
+        hides_people: Fault: the camera sees no person.
+    """
+
+    def __init__(
+        self,
+        robot_id: str,
+        script: RobotScript,
+        detector: DetectorModel,
+        rng: np.random.Generator,
+    ) -> None:
+        self.robot_id = robot_id
+        self.profile: RobotProfile = profile_of(robot_id)
+        self.command = REST
+        self.false_person: tuple[float, float] | None = None
+        self.hides_people = False
+        self._script = script
+        self._rng = rng
+        self._odometer = Odometer(rng)
+        self._detector = Detector(self.profile, detector, rng)
+        self.vehicle = Vehicle(self.profile, script.start)
+        self._believed = script.start
+        self._follower = Follower(
+            self.profile, script.route(), script.start, script.cruise, script.stations
+        )
+
+    def drive(self, command: Twist2D) -> None:
+        """Take a command; it holds until the next."""
+        self.command = command
+
+    def move(self, dt: float) -> None:
+        """Let ``dt`` seconds pass on wheels."""
+        self.vehicle.step(self.command, dt)
+        truth, twist = self.vehicle.pose, self.vehicle.twist
+        self._believed = self._odometer.measure(truth, twist, dt)
+
+    def body(self) -> Body:
+        """Seen from above."""
+        return self.vehicle.body(self.robot_id)
+
+    def wish(self, now: float, around: "World") -> Twist2D:
+        """What navigation asks for; ``now`` in seconds into the run."""
+        discs = [person.disc for person in around.people]
+        for body in around.bodies_but(self.robot_id):
+            discs.extend(body.discs())
+        return self._follower.wish(self.vehicle.pose, now, discs)
+
+    # --- sensors ------------------------------------------------------------------
+
+    def odometry(self) -> Odometry:
+        """Pose as believed, speeds as measured."""
+        return Odometry(self.robot_id, Origin(), self._believed, self.vehicle.twist)
+
+    def scan(self, around: "World") -> LaserScan:
+        """One turn of the laser."""
+        sensor = self.vehicle.pose.compose(self.profile.laser)
+        people = [person.disc for person in around.people]
+        others = around.bodies_but(self.robot_id)
+        return LaserScan(
+            self.robot_id,
+            Origin(),
+            -math.pi,
+            _LASER.angle_increment,
+            _LASER.range_min,
+            _LASER.range_max,
+            self.profile.laser,
+            sweep(sensor, _LASER, around.scenery, people, others, self._rng),
+        )
+
+    def look(self, now: float, around: "World") -> DetectionFrame:
+        """One frame of camera and detector; empty when nothing is seen."""
+        pose = self.vehicle.pose
+        targets = around.targets_for(self.robot_id)
+        if self.hides_people:
+            targets = [target for target in targets if target.class_id != PERSON]
+        found = self._detector.look(now, pose, targets, around.scenery)
+        if self.false_person is not None:
+            x, y = self.false_person
+            ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
+            found = (*found, ghost)
+        return DetectionFrame(self.robot_id, Origin(), found)
+
+    def navigation(self) -> Navigation:
+        """The intent: task, goal and path."""
+        path = self._follower.path()
+        task = "waiting" if self._follower.at_station else self._script.task
+        return Navigation(self.robot_id, Origin(), task, path[-1], path)
+
+
+class World:
+    """Scenery, robots and people.
+
+    Args:
+        house: Where.
+        layout: Who, and on which ways.
+        detector: How good the robots' detectors are.
+        seed: The same seed gives the same people and the same noise.
+    """
+
+    def __init__(
+        self, house: Greenhouse, layout: Layout, detector: DetectorModel, seed: int
+    ) -> None:
+        streams = np.random.SeedSequence(seed).spawn(
+            len(layout.robots) + len(layout.people)
+        )
+        generators = [np.random.default_rng(stream) for stream in streams]
+        self.scenery = Scenery.of(house)
+        self.rigs: Mapping[str, Rig] = {
+            robot_id: Rig(robot_id, script, detector, rng)
+            for (robot_id, script), rng in zip(
+                layout.robots.items(), generators, strict=False
+            )
+        }
+        self.people = [
+            Person(round_, rng)
+            for round_, rng in zip(
+                layout.people, generators[len(layout.robots) :], strict=True
+            )
+        ]
+
+    def walk(self, dt: float) -> None:
+        """Let ``dt`` seconds pass for the people."""
+        bodies = self.bodies()
+        for person in self.people:
+            person.step(dt, bodies, self.scenery)
+
+    def bodies(self) -> list[Body]:
+        """All robots seen from above."""
+        return [rig.body() for rig in self.rigs.values()]
+
+    def bodies_but(self, robot_id: str) -> list[Body]:
+        """The other robots, as one of them meets them."""
+        return [body for body in self.bodies() if body.robot_id != robot_id]
+
+    def discs(self) -> list[Disc]:
+        """All people seen from above."""
+        return [person.disc for person in self.people]
+
+    def targets_for(self, robot_id: str) -> list[Target]:
+        """What a robot's camera may see."""
+        people = [person_target(n, disc) for n, disc in enumerate(self.discs())]
+        return people + [robot_target(body) for body in self.bodies_but(robot_id)]
+
+
+_DAY_S = 86_400.0
+
+
+def climate_at(wall: float) -> Climate:
+    """The air at a time of day (Unix s): warm and dry at 14 h UTC, damp at night.
+
+    Typical of a Mediterranean greenhouse in spring; CO₂ falls while the crop works.
+    """
+    warmth = math.cos((wall % _DAY_S - 14 * 3600.0) / _DAY_S * math.tau)
+    return Climate(
+        temperature=round(22.0 + 6.0 * warmth, 2),
+        relative_humidity=round(0.70 - 0.12 * warmth, 3),
+        co2=round(430.0 - 60.0 * warmth, 1),
+    )
