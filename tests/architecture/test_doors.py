@@ -1,0 +1,68 @@
+"""Every door of the finished application is declared, and every document knows it."""
+
+import re
+
+import pytest
+from fastapi import FastAPI
+from fastapi.routing import iter_route_contexts
+
+from iveg.app import Dss, create_app
+from iveg.settings import Settings
+from iveg.web.auth import Action, declared_action, undeclared
+from tests.processes import ROOT
+
+INTERFACES = (ROOT / "docs/interfaces.md").read_text()
+STATIC_FILES = "/static"
+OPEN_TO_STRANGERS = {"/healthz", "/signin", "/ngsi/notifications"}
+"""The last has a secret of its own."""
+
+
+@pytest.fixture(scope="module")
+def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
+    return create_app(Dss(Settings(), tmp_path_factory.mktemp("data")))
+
+
+def test_every_route_and_websocket_declares_a_role(app: FastAPI) -> None:
+    assert undeclared(app, {STATIC_FILES}) == []
+
+
+def test_only_these_are_open_to_strangers(app: FastAPI) -> None:
+    assert {path for path, action in _doors(app) if action == "open"} == (
+        OPEN_TO_STRANGERS
+    )
+
+
+def test_what_moves_a_robot_asks_for_more_than_what_stops_it(app: FastAPI) -> None:
+    asked = {
+        path.rsplit("/", 1)[1]: action
+        for path, action in _doors(app)
+        if path.startswith(("/api/v1/robots/", "/api/v1/fleet/"))
+    }
+
+    assert asked["stop"] == "stop"
+    assert asked["release"] == "release"
+    assert asked["resume"] == "release"
+
+
+def test_every_route_has_its_mention_in_the_contract(app: FastAPI) -> None:
+    pages = {"/", "/about", "/history", "/signin"}
+    unmentioned = [
+        path
+        for path, _ in _doors(app)
+        if path not in pages and _mention(path) not in INTERFACES
+    ]
+
+    assert unmentioned == []
+
+
+def _doors(app: FastAPI) -> list[tuple[str, Action | None]]:
+    return [
+        (str(route.path), declared_action(route))
+        for route in iter_route_contexts(app.routes)
+        if route.path != STATIC_FILES
+    ]
+
+
+def _mention(path: str) -> str:
+    """How the contract writes a path: below ``/api/v1``, every parameter ``{id}``."""
+    return re.sub(r"\{\w+(?::\w+)?\}", "{id}", path.removeprefix("/api/v1"))
