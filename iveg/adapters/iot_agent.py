@@ -1,0 +1,377 @@
+"""The door to the IoT Agent's north port, and provisioning a fleet through it.
+
+Provisioning looks first and changes only what is not as it should be, so it can run at
+every start.  It leaves commands a way to the robot: the traps are in fiware.md §4.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+from iveg.adapters.orion import FiwareHttp
+from iveg.domain.errors import HopError
+from iveg.ngsi import names
+
+RESOURCE = "/iot/json"
+_PAGE = 100
+
+Document = dict[str, Any]
+
+
+class IotAgentClient:
+    """What iVeg asks of the IoT Agent JSON.
+
+    Args:
+        url: Address of the north port, such as ``http://127.0.0.1:4041``.
+        service: ``Fiware-Service``.
+        path: ``Fiware-ServicePath``.
+    """
+
+    def __init__(self, url: str, service: str, path: str) -> None:
+        self.http = FiwareHttp("iot_agent", url, service, path)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the kept connections."""
+        await self.http.close()
+
+    async def version(self) -> str:
+        """The agent's version.
+
+        Raises:
+            HopError: the agent does not answer.
+        """
+        told = self.http.read(await self.http.ask("GET", "/iot/about"))
+        return str(told.get("version", "unknown") if isinstance(told, dict) else "")
+
+    async def read_groups(self) -> list[Document]:
+        """The groups of our tenant.
+
+        Raises:
+            HopError: the agent does not answer.
+        """
+        return await self._all("/iot/services", "services")
+
+    async def create_group(self, group: Document) -> bool:
+        """Make a group; False where there is one with this key already.
+
+        Raises:
+            HopError: the agent does not take it.
+        """
+        body = {"services": [group]}
+        response = await self.http.ask("POST", "/iot/services", body=body, also=(409,))
+        return response.status_code != 409
+
+    async def change_group(self, apikey: str, changes: Document) -> None:
+        """Change a group.
+
+        Raises:
+            HopError: the agent does not take it.
+        """
+        query = {"resource": RESOURCE, "apikey": apikey}
+        await self.http.ask("PUT", "/iot/services", query=query, body=changes)
+
+    async def read_devices(self) -> list[Document]:
+        """The devices of our tenant.
+
+        Raises:
+            HopError: the agent does not answer.
+        """
+        return await self._all("/iot/devices", "devices")
+
+    async def create_device(self, device: Document) -> bool:
+        """Make a device; False where there is one with this id already.
+
+        Raises:
+            HopError: the agent does not take it.
+        """
+        body = {"devices": [device]}
+        response = await self.http.ask("POST", "/iot/devices", body=body, also=(409,))
+        return response.status_code != 409
+
+    async def delete_device(self, device_id: str) -> bool:
+        """Delete a device; whether there was one.
+
+        Raises:
+            HopError: the agent does not answer.
+        """
+        path = f"/iot/devices/{device_id}"
+        response = await self.http.ask("DELETE", path, also=(404,))
+        return response.status_code != 404
+
+    async def _all(self, path: str, part: str) -> list[Document]:
+        found: list[Document] = []
+        while True:
+            query = {"limit": str(_PAGE), "offset": str(len(found))}
+            told = self.http.read(await self.http.ask("GET", path, query=query))
+            page = told.get(part, []) if isinstance(told, dict) else []
+            found += page
+            if not page or len(found) >= int(told.get("count", 0)):
+                return found
+
+
+class CommandRoads(Protocol):
+    """What provisioning looks at in Orion."""
+
+    async def read_registrations(self) -> list[Document]:
+        """All of our tenant, oldest first."""
+
+    async def delete_registration(self, registration_id: str) -> None:
+        """Remove one."""
+
+    async def has_attribute(self, robot_id: str, name: str) -> bool:
+        """Whether Orion itself keeps an attribute."""
+
+    async def delete_attribute(self, robot_id: str, name: str) -> bool:
+        """Remove an attribute."""
+
+
+@dataclass(frozen=True, slots=True)
+class Provisioned:
+    """What provisioning did, as sentences.
+
+    Attributes:
+        mended: What it made or corrected; empty when all was well.
+        problems: What it may not touch and a person should look at.
+    """
+
+    mended: tuple[str, ...] = ()
+    problems: tuple[str, ...] = ()
+
+
+async def provision(
+    agent: IotAgentClient,
+    orion: CommandRoads,
+    robots: Sequence[str],
+    apikey: str,
+    cbroker_url: str,
+) -> Provisioned:
+    """Make group, devices and command roads of a fleet what they should be.
+
+    Args:
+        agent: The IoT Agent.
+        orion: Where the registrations of commands are.
+        robots: The fleet.
+        apikey: First part of every topic.
+        cbroker_url: Orion as the agent reaches it.
+
+    Raises:
+        HopError: a neighbour does not answer or does not take something.
+    """
+    mended = await _ensure_group(agent, apikey, cbroker_url)
+    known = {one["device_id"]: one for one in await agent.read_devices()}
+    for device in (_climate_device(apikey), _canary_device(apikey)):
+        mended += await _ensure_device(agent, known, device)
+    problems = []
+    for robot_id in robots:
+        mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
+        problems += _thieves(known.values(), robot_id)
+    return Provisioned(tuple(mended), tuple(problems))
+
+
+async def remove_robot(agent: IotAgentClient, robot_id: str) -> tuple[str, ...]:
+    """Delete the devices of one robot and nothing else; says which.
+
+    Its entity and its past stay in Orion.
+
+    Raises:
+        HopError: the agent does not answer.
+    """
+    removed = []
+    for device in names.ROBOT_DEVICES:
+        device_id = robot_id + device.suffix
+        if await agent.delete_device(device_id):
+            removed.append(f"Removed device {device_id}.")
+    return tuple(removed)
+
+
+async def _ensure_group(
+    agent: IotAgentClient, apikey: str, cbroker_url: str
+) -> list[str]:
+    wanted: Document = {
+        "apikey": apikey,
+        "resource": RESOURCE,
+        "cbroker": cbroker_url,
+        "entity_type": names.ROBOT_TYPE,
+        "attributes": [],
+        "lazy": [],
+        "commands": [],
+        "static_attributes": [],
+    }
+    if await agent.create_group(wanted):
+        return [f"Made the group of API key {apikey}."]
+    known = next(
+        (one for one in await agent.read_groups() if one.get("apikey") == apikey), {}
+    )
+    # The agent never shows the address of its broker, so it is always told again.
+    await agent.change_group(
+        apikey, {"entity_type": names.ROBOT_TYPE, "cbroker": cbroker_url}
+    )
+    if known.get("entity_type") == names.ROBOT_TYPE:
+        return []
+    return [f"Corrected the entity type of the group of API key {apikey}."]
+
+
+async def _ensure_robot(
+    agent: IotAgentClient,
+    orion: CommandRoads,
+    known: dict[str, Document],
+    robot_id: str,
+    apikey: str,
+) -> list[str]:
+    """Sensors first, the command device last.
+
+    An agent with its registry in memory gives commands to the device of an entity that
+    was made last, one with MongoDB to the one that sorts first; ``AGI`` is both.
+    """
+    sensors = [one for one in names.ROBOT_DEVICES if not one.has_command]
+    mended = []
+    for sensor in sensors:
+        device = _robot_device(robot_id, sensor, apikey)
+        mended += await _ensure_device(agent, known, device)
+    commander = next(one for one in names.ROBOT_DEVICES if one.has_command)
+    device = _robot_device(robot_id, commander, apikey)
+    registered = _registered(await orion.read_registrations(), robot_id)
+    last = device["device_id"] in known and not mended
+    mended += await _ensure_device(
+        agent, known, device, anew=not last or not registered
+    )
+    return mended + await _clear_road(orion, robot_id)
+
+
+async def _ensure_device(
+    agent: IotAgentClient,
+    known: dict[str, Document],
+    wanted: Document,
+    *,
+    anew: bool = False,
+) -> list[str]:
+    device_id = wanted["device_id"]
+    there = known.get(device_id)
+    if there is not None and not anew and _shape(there) == _shape(wanted):
+        return []
+    if there is not None:
+        await agent.delete_device(device_id)
+    if not await agent.create_device(wanted):
+        # Somebody else made it in between, or it hid under another tenancy.
+        await agent.delete_device(device_id)
+        if not await agent.create_device(wanted):
+            raise HopError("iot_agent", f"does not take device {device_id}")
+    known[device_id] = wanted
+    verb = "Made" if there is None else "Made anew"
+    return [f"{verb} device {device_id}."]
+
+
+def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What of a device must be as wanted."""
+    return (
+        device.get("apikey"),
+        device.get("entity_name"),
+        device.get("entity_type"),
+        device.get("transport"),
+        sorted(
+            (one.get("object_id") or one["name"], one["name"], one.get("type"))
+            for one in device.get("attributes", [])
+        ),
+        sorted((one["name"], one.get("type")) for one in device.get("commands", [])),
+    )
+
+
+async def _clear_road(orion: CommandRoads, robot_id: str) -> list[str]:
+    """See that nothing at Orion stands between a command and the agent."""
+    mended = []
+    registered = _registered(await orion.read_registrations(), robot_id)
+    if not registered:
+        raise HopError("iot_agent", f"did not register the command of {robot_id}")
+    for old in registered[:-1]:
+        await orion.delete_registration(old["id"])
+        mended.append(f"Removed an old registration of the command of {robot_id}.")
+    if await orion.has_attribute(robot_id, names.COMMAND):
+        await orion.delete_attribute(robot_id, names.COMMAND)
+        mended.append(
+            f"Deleted attribute {names.COMMAND} of {robot_id} at Orion: "
+            "commands were stored there and went no further."
+        )
+    return mended
+
+
+def _registered(registrations: Sequence[Document], robot_id: str) -> list[Document]:
+    """The registrations of a robot's command, oldest first."""
+    return [
+        one
+        for one in registrations
+        if names.COMMAND in one.get("dataProvided", {}).get("attrs", [])
+        and any(
+            entity.get("id") == robot_id and entity.get("type") == names.ROBOT_TYPE
+            for entity in one.get("dataProvided", {}).get("entities", [])
+        )
+    ]
+
+
+def _thieves(devices: Iterable[Document], robot_id: str) -> list[str]:
+    """Devices of other people that commands for a robot may go to instead."""
+    ours = {robot_id + device.suffix for device in names.ROBOT_DEVICES}
+    return [
+        f"Device {one['device_id']} also feeds {robot_id}; commands may go to it and "
+        "be lost. Give it another entity or remove it."
+        for one in devices
+        if one.get("entity_name") == robot_id and one["device_id"] not in ours
+    ]
+
+
+def _robot_device(robot_id: str, device: names.Device, apikey: str) -> Document:
+    commands = [{"name": names.COMMAND, "type": "command"}]
+    return _device(
+        robot_id + device.suffix,
+        robot_id,
+        names.ROBOT_TYPE,
+        device.attributes,
+        apikey,
+        commands if device.has_command else [],
+    )
+
+
+def _climate_device(apikey: str) -> Document:
+    attributes = tuple(
+        (name, "Number") for name in ("temperature", "relativeHumidity", "co2")
+    )
+    return _device(
+        names.CLIMATE_DEVICE, names.CLIMATE_ID, names.CLIMATE_TYPE, attributes, apikey
+    )
+
+
+def _canary_device(apikey: str) -> Document:
+    return _device(
+        names.CANARY_ID,
+        names.CANARY_ID,
+        names.CANARY_TYPE,
+        (("probe", "object"),),
+        apikey,
+    )
+
+
+def _device(
+    device_id: str,
+    entity: str,
+    kind: str,
+    attributes: Sequence[tuple[str, str]],
+    apikey: str,
+    commands: Sequence[Mapping[str, str]] = (),
+) -> Document:
+    return {
+        "device_id": device_id,
+        "entity_name": entity,
+        "entity_type": kind,
+        "apikey": apikey,
+        "protocol": "JSON",
+        "transport": "MQTT",
+        "attributes": [
+            {"object_id": name, "name": name, "type": kind} for name, kind in attributes
+        ],
+        "commands": [dict(one) for one in commands],
+    }

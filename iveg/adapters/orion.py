@@ -1,0 +1,343 @@
+"""The door to Orion, for commands and for reading once after a gap.
+
+Orion's 204 to a command proves nothing: it also answers so when the command went
+nowhere (fiware.md §4).  Who wants to know waits for the robot's own answer.
+"""
+
+import socket
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any, Self
+
+import httpx
+
+from iveg.domain.errors import HopError
+from iveg.ngsi import names
+
+_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+_PAGE = 100
+_TIMEOUT_S = 6.0
+"""A little more than the five seconds that Orion waits for a hung agent."""
+ROBOT_ATTRIBUTES = (
+    names.ODOMETRY,
+    names.LIDAR,
+    names.LIDAR_HEADER,
+    names.BOXES,
+    names.BOXES_HEADER,
+    names.SAFETY,
+    names.NAVIGATION,
+    names.COMMAND_STATUS,
+    names.COMMAND_INFO,
+    *names.ALGORITHM_1,
+)
+"""What is read of a robot.  Never ``cmd``: Orion would go and ask the agent for it."""
+
+
+class FiwareHttp:
+    """HTTP to one FIWARE service: its headers, and failures as ``HopError``.
+
+    Args:
+        hop: Names the neighbour in errors.
+        url: Address without a path.
+        service: Tenant.
+        path: Service path.
+    """
+
+    def __init__(self, hop: str, url: str, service: str, path: str) -> None:
+        self._hop = hop
+        self._client = httpx.AsyncClient(
+            base_url=url,
+            headers={"Fiware-Service": service, "Fiware-ServicePath": path},
+            timeout=_TIMEOUT_S,
+            transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
+        )
+
+    async def close(self) -> None:
+        """Close the kept connections."""
+        await self._client.aclose()
+
+    async def ask(
+        self,
+        method: str,
+        path: str,
+        *,
+        query: Mapping[str, str] | None = None,
+        body: Any = None,
+        timeout_s: float = _TIMEOUT_S,
+        also: Sequence[int] = (),
+    ) -> httpx.Response:
+        """One request.
+
+        Args:
+            method: HTTP method.
+            path: With a leading slash.
+            query: Parameters.
+            body: Sent as JSON unless None.
+            timeout_s: For each step of the exchange (s).
+            also: Statuses beside 2xx that the caller understands.
+
+        Raises:
+            HopError: no connection, no answer in time, or another status.
+        """
+        try:
+            response = await self._client.request(
+                method,
+                path,
+                params=dict(query or {}),
+                json=body,
+                headers={"Accept": "application/json"},
+                timeout=timeout_s,
+            )
+        except httpx.TimeoutException as error:
+            raise HopError(
+                self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
+            ) from error
+        except httpx.HTTPError as error:
+            raise HopError(
+                self._hop, f"cannot be reached: {str(error) or type(error).__name__}"
+            ) from error
+        if response.is_success or response.status_code in also:
+            return response
+        raise HopError(self._hop, _complaint(method, path, response))
+
+    def read(self, response: httpx.Response) -> Any:
+        """The JSON of an answer.
+
+        Raises:
+            HopError: it is not JSON.
+        """
+        try:
+            return response.json()
+        except ValueError as error:
+            raise HopError(self._hop, "answered something that is not JSON") from error
+
+
+def _complaint(method: str, path: str, response: httpx.Response) -> str:
+    """What a refusal says, short; Orion and the agent use different words."""
+    said = ""
+    try:
+        told = response.json()
+    except ValueError:
+        told = None
+    if isinstance(told, dict):
+        said = str(told.get("description") or told.get("message") or "")[:160]
+    refused = f"{response.status_code} to {method} {path}"
+    return f"{refused}: {said}" if said else refused
+
+
+class OrionClient:
+    """What iVeg asks of Orion.
+
+    Args:
+        url: Address of Orion, such as ``http://127.0.0.1:1026``.
+        service: ``Fiware-Service``.
+        path: ``Fiware-ServicePath``.
+    """
+
+    def __init__(self, url: str, service: str, path: str) -> None:
+        self.http = FiwareHttp("orion", url, service, path)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the kept connections."""
+        await self.http.close()
+
+    async def version(self) -> str:
+        """Orion's version.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        told = self.http.read(await self.http.ask("GET", "/version"))
+        about = told.get("orion", {}) if isinstance(told, dict) else {}
+        return str(about.get("version", "unknown"))
+
+    async def update_command(
+        self, robot_id: str, value: Mapping[str, Any], timeout_s: float = 1.5
+    ) -> None:
+        """Ask Orion to pass a command on.
+
+        ``cmd`` goes alone, with ``?type=Robot`` and as an update: anything else makes
+        Orion store or lose it and still answer 204.  A return therefore proves
+        nothing; an error may still mean that the command arrives later.
+
+        Args:
+            robot_id: The robot.
+            value: The command (interfaces.md §3).
+            timeout_s: How long Orion may take (s).
+
+        Raises:
+            HopError: Orion did not take it; 404 also means that the agent is away.
+        """
+        await self.http.ask(
+            "PATCH",
+            f"/v2/entities/{robot_id}/attrs",
+            query={"type": names.ROBOT_TYPE},
+            body={names.COMMAND: {"type": "command", "value": dict(value)}},
+            timeout_s=timeout_s,
+        )
+
+    async def read_robots(self) -> list[dict[str, Any]]:
+        """Every robot that Orion knows, as ``ngsi.codec.read_entity`` takes them.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        return await self.read_entities(
+            names.ROBOT_TYPE, ROBOT_ATTRIBUTES, options="skipForwarding"
+        )
+
+    async def read_entities(
+        self, entity_type: str, attributes: Sequence[str], options: str = ""
+    ) -> list[dict[str, Any]]:
+        """Entities of a type, page by page.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        found: list[dict[str, Any]] = []
+        query = {"type": entity_type, "attrs": ",".join(attributes)}
+        query["options"] = ",".join(part for part in (options, "count") if part)
+        query["orderBy"] = "id"
+        while True:
+            page = {**query, "limit": str(_PAGE), "offset": str(len(found))}
+            response = await self.http.ask("GET", "/v2/entities", query=page)
+            entities = self.http.read(response)
+            found += [one for one in entities if isinstance(one, dict)]
+            total = int(response.headers.get("Fiware-Total-Count", 0))
+            if not entities or len(found) >= total:
+                return found
+
+    async def modified_at(self, robot_id: str) -> float | None:
+        """When Orion last changed a robot's odometry.
+
+        Returns:
+            Seconds, Unix time; None where there is none yet.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        response = await self.http.ask(
+            "GET",
+            f"/v2/entities/{robot_id}",
+            query={
+                "type": names.ROBOT_TYPE,
+                "attrs": names.ODOMETRY,
+                "metadata": "dateModified",
+                "options": "skipForwarding",
+            },
+            also=(404,),
+        )
+        if response.status_code == 404:
+            return None
+        return _date_modified(self.http.read(response))
+
+    async def delete_attribute(self, robot_id: str, name: str) -> bool:
+        """Delete an attribute of a robot; whether there was one.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        response = await self.http.ask(
+            "DELETE",
+            f"/v2/entities/{robot_id}/attrs/{name}",
+            query={"type": names.ROBOT_TYPE},
+            also=(404,),
+        )
+        return response.status_code != 404
+
+    async def has_attribute(self, robot_id: str, name: str) -> bool:
+        """Whether Orion itself keeps an attribute of a robot.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        response = await self.http.ask(
+            "GET",
+            f"/v2/entities/{robot_id}",
+            query={
+                "type": names.ROBOT_TYPE,
+                "attrs": name,
+                "options": "skipForwarding",
+            },
+            also=(404,),
+        )
+        return response.status_code != 404 and name in self.http.read(response)
+
+    async def read_registrations(self) -> list[dict[str, Any]]:
+        """Every registration of our tenant.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        return await self._all("/v2/registrations")
+
+    async def delete_registration(self, registration_id: str) -> None:
+        """Delete a registration; one that is gone already is no error.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        path = f"/v2/registrations/{registration_id}"
+        await self.http.ask("DELETE", path, also=(404,))
+
+    async def read_subscriptions(self) -> list[dict[str, Any]]:
+        """Every subscription of our tenant.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        return await self._all("/v2/subscriptions")
+
+    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+        """Subscribe; the id of the subscription.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        response = await self.http.ask("POST", "/v2/subscriptions", body=dict(document))
+        return str(response.headers.get("Location", "").rpartition("/")[2])
+
+    async def update_subscription(
+        self, subscription_id: str, changes: Mapping[str, Any]
+    ) -> None:
+        """Change a subscription; each part that is named replaces the old one whole.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        path = f"/v2/subscriptions/{subscription_id}"
+        await self.http.ask("PATCH", path, body=dict(changes))
+
+    async def delete_subscription(self, subscription_id: str) -> None:
+        """Delete a subscription; one that is gone already is no error.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        path = f"/v2/subscriptions/{subscription_id}"
+        await self.http.ask("DELETE", path, also=(404,))
+
+    async def _all(self, path: str) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = []
+        while True:
+            query = {"limit": str(_PAGE), "offset": str(len(found)), "options": "count"}
+            response = await self.http.ask("GET", path, query=query)
+            page = self.http.read(response)
+            found += page
+            total = int(response.headers.get("Fiware-Total-Count", 0))
+            if not page or len(found) >= total:
+                return found
+
+
+def _date_modified(entity: Any) -> float | None:
+    try:
+        text = entity[names.ODOMETRY]["metadata"]["dateModified"]["value"]
+        return datetime.fromisoformat(text).timestamp()
+    except (KeyError, TypeError, ValueError):
+        return None
