@@ -1,0 +1,62 @@
+/**
+ * Says that the browser's own line is down: old data must never look like new ones.
+ */
+
+import { need, setAttribute, setHidden, setText } from "./dom.js";
+
+const TICK_MS = 250;
+const BACK_SHOWN_MS = 3000;
+/** A first connection quicker than this needs no word (ms). */
+const PATIENCE_MS = 1500;
+
+/** @param {import("../main.js").App} app */
+export function createBanner({ store, words }) {
+  const banner = need("#banner");
+  const mark = need("#mark");
+  let wasLost = false;
+  let backAtMs = Number.NEGATIVE_INFINITY;
+
+  function draw() {
+    const { state, since } = store.connection;
+    const nowMs = performance.now();
+    if (state === "open" && wasLost) backAtMs = nowMs;
+    if (state === "open") wasLost = false;
+    if (state === "lost") wasLost = true;
+    const sentence = sentenceOf(state, nowMs - since, nowMs - backAtMs);
+    setHidden(banner, sentence === null);
+    setText(banner, sentence ?? "");
+    setAttribute(banner, "data-state", state);
+    setAttribute(document.body, "data-connection", state);
+    drawMark(state);
+  }
+
+  /**
+   * @param {import("../store.js").ConnectionState} state
+   * @param {number} forMs
+   * @param {number} backMs
+   */
+  function sentenceOf(state, forMs, backMs) {
+    if (state === "signed-out") return words.t("banner.signed_out");
+    if (state === "lost" || (state === "connecting" && wasLost)) {
+      return words.t("banner.lost", { seconds: Math.ceil(forMs / 1000) });
+    }
+    if (state === "connecting" && forMs > PATIENCE_MS) return words.t("banner.connecting");
+    return backMs < BACK_SHOWN_MS ? words.t("banner.back") : null;
+  }
+
+  /** @param {string} state */
+  function drawMark(state) {
+    const isReplay = [...store.robots().values()].some(({ replay }) => replay);
+    const live = isReplay ? "header.replay" : "header.live";
+    setAttribute(mark, "data-state", state === "open" && isReplay ? "replay" : state);
+    setText(
+      need("[data-i18n]", mark),
+      words.t(state === "lost" || state === "signed-out" ? "header.no_link" : live),
+    );
+  }
+
+  store.subscribe("connection", draw);
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+}

@@ -1,0 +1,293 @@
+/**
+ * The STOP controls: one a robot, one for the fleet, on every page.
+ *
+ * Each control exists once.  On a phone a robot's control stands in its card, elsewhere
+ * in the strip; it is moved, not copied, so there is one state to believe.  What it says
+ * comes from `stop_view.js`, what it sends goes through `press.js`.
+ */
+
+import { ageOf, linkOfRobot } from "../clock.js";
+import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { createPresser } from "./press.js";
+import { since, stateOfCommand, viewOfFleet, viewOfRobot } from "./stop_view.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("./stop_view.js").View} View */
+
+const PHONE = matchMedia("(max-width: 767px)");
+const TICK_MS = 100;
+/** How long after `pointerup` a click still belongs to the same gesture (ms). */
+const GESTURE_MS = 400;
+/** A robot's state may be a frame older than its command's own topic (ms). */
+const SETTLE_MS = 800;
+const ACCEPTED_LIMIT_MS = 3000;
+const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
+
+/**
+ * @param {App} app
+ */
+export function createStopPanel(app) {
+  const { store, words, line } = app;
+  const strip = need("#stops");
+  const presser = createPresser(line, drawAll);
+  /** @type {Map<string, {command: Command, heardMs: number}>} newest stop by robot */
+  const commands = new Map();
+  /** @type {Map<string, HTMLElement>} */
+  const controls = new Map();
+
+  /** @param {string} robotId */
+  function controlOf(robotId) {
+    const known = controls.get(robotId);
+    if (known) return known;
+    const control = makeControl(robotId);
+    strip.insertBefore(control, controls.get("fleet") ?? null);
+    adopt(control);
+    place();
+    return control;
+  }
+
+  /** @param {HTMLElement} control */
+  function adopt(control) {
+    const id = String(control.dataset.stop);
+    controls.set(id, control);
+    for (const part of all("[data-i18n]", control)) part.removeAttribute("data-i18n");
+    onPress(control, () => press(id === "fleet" ? null : id));
+  }
+
+  /** @param {string | null} robotId null = the whole fleet */
+  function press(robotId) {
+    presser.press(robotId);
+    navigator.vibrate?.(60);
+  }
+
+  /** @param {Command} command */
+  function take(command) {
+    if (command.kind !== "stop") return;
+    const known = commands.get(command.robot_id)?.command;
+    if (known && isOlder(command, known)) return;
+    commands.set(command.robot_id, { command, heardMs: performance.now() });
+    for (const robotId of [command.robot_id, null]) settle(robotId, command);
+    drawAll();
+  }
+
+  /** @param {string | null} robotId @param {Command} command */
+  function settle(robotId, command) {
+    const pending = presser.pending(robotId);
+    if (!pending) return;
+    const ageS = (performance.now() - pending.atMs) / 1000;
+    const isNewer = since(command.times.requested, line.serverNow()) <= ageS + 1.5;
+    if (pending.accepted || isNewer) presser.settle(robotId);
+  }
+
+  /** @param {import("../protocol.js").Robot} robot */
+  function takeRobot(robot) {
+    if (robot.stop) take(robot.stop);
+    else forget(robot.robot_id);
+    controlOf(robot.robot_id);
+  }
+
+  /** @param {string} robotId */
+  function forget(robotId) {
+    const known = commands.get(robotId);
+    if (known && performance.now() - known.heardMs > SETTLE_MS) commands.delete(robotId);
+  }
+
+  /** @param {import("../protocol.js").Snapshot} snapshot */
+  function restart(snapshot) {
+    commands.clear();
+    for (const command of snapshot.commands ?? []) take(command);
+    for (const robot of snapshot.robots ?? []) takeRobot(robot);
+    drawAll();
+  }
+
+  /** @param {string | null} robotId */
+  function pendingOf(robotId) {
+    const pending = presser.pending(robotId);
+    const isOld =
+      pending?.accepted && performance.now() - pending.atMs > ACCEPTED_LIMIT_MS;
+    if (isOld) presser.settle(robotId);
+    return isOld ? null : pending;
+  }
+
+  /** @param {string} robotId */
+  function factsOf(robotId) {
+    const robot = store.robots().get(robotId);
+    const nowMs = performance.now();
+    const fleetPress = pendingOf(null);
+    return {
+      robotId,
+      connection: store.connection.state,
+      link: linkOfRobot(robot, nowMs),
+      ageS: ageOf(robot, nowMs),
+      command: commands.get(robotId)?.command ?? null,
+      press: pendingOf(robotId) ?? fleetPress,
+      nowMs,
+      serverNowS: line.serverNow(),
+    };
+  }
+
+  function drawAll() {
+    const ids = [...controls.keys()].filter((id) => id !== "fleet");
+    const robots = ids.map((id) => {
+      const facts = factsOf(id);
+      return { id, view: viewOfRobot(facts), link: facts.link, ageS: facts.ageS };
+    });
+    for (const { id, view } of robots) draw(id, view);
+    const connection = store.connection.state;
+    const fleet = { connection, press: pendingOf(null), nowMs: performance.now() };
+    draw("fleet", viewOfFleet({ ...fleet, robots }));
+    drawLoud(ids);
+  }
+
+  /** @param {string} id @param {View} view */
+  function draw(id, view) {
+    const control = controlOf(id);
+    const name = id === "fleet" ? words.t("stop.fleet_name") : id;
+    setAttribute(control, "data-state", view.state);
+    setText(need(".stop__words", control), words.t(view.key, view.slots));
+    const who = need(".stop__who", control);
+    setText(who, name);
+    setHidden(who, view.state === "ready" || view.state === "late");
+  }
+
+  /** Full-width lines for what must not be overlooked. @param {string[]} ids */
+  function drawLoud(ids) {
+    const place = need("#p1");
+    const loud = ids
+      .map((id) => commands.get(id)?.command)
+      .filter((command) => LOUD.has(stateOfCommand(command ?? null) ?? ""));
+    while (place.children.length > loud.length) place.lastElementChild?.remove();
+    while (place.children.length < loud.length) place.append(make("p", "p1__line"));
+    loud.forEach((command, i) => {
+      setText(place.children[i], sentenceOf(/** @type {Command} */ (command)));
+    });
+  }
+
+  /** @param {Command} command */
+  function sentenceOf(command) {
+    const { robot, roads } = command;
+    const heard = robot && robot.report_age_s !== null;
+    const state = String(stateOfCommand(command));
+    /** @param {string} road */
+    const roadSaid = (road) => words.t(`stop.road.${roads?.[road] ?? "unknown"}`);
+    return words.t(`stop.p1.${state}`, {
+      robot: command.robot_id,
+      seconds: since(command.times.requested, line.serverNow()),
+      tries: command.tries,
+      report: heard
+        ? words.t("stop.p1.report", { age: robot.report_age_s, speed: robot.v ?? 0 })
+        : words.t("stop.p1.no_report"),
+      moved:
+        robot?.moved_m === null || robot?.moved_m === undefined
+          ? " "
+          : words.t("stop.p1.could", { distance: robot.moved_m }),
+      roads: words.t("stop.p1.roads", {
+        direct: roadSaid("direct"),
+        fiware: roadSaid("fiware"),
+      }),
+    });
+  }
+
+  /** Cards hold their robot's control on a phone, the strip elsewhere. */
+  function place() {
+    for (const [id, control] of controls) {
+      const slot = document.querySelector(
+        `[data-robot="${CSS.escape(id)}"] [data-part="stop"]`,
+      );
+      const home = PHONE.matches && slot ? slot : strip;
+      if (control.parentElement !== home) {
+        home.insertBefore(control, home === strip ? (controls.get("fleet") ?? null) : null);
+      }
+    }
+  }
+
+  for (const control of all("[data-stop]")) adopt(control);
+  place();
+  PHONE.addEventListener("change", place);
+  onFleetKeys(() => press(null));
+  store.subscribe("snapshot", restart);
+  store.subscribe("commands/", take);
+  store.subscribe("robots/", takeRobot);
+  store.subscribe("connection", drawAll);
+  words.onChange(drawAll);
+  setInterval(drawAll, TICK_MS);
+  drawAll();
+  return { place, commandOf: (/** @type {string} */ id) => commands.get(id)?.command };
+}
+
+/** @param {string} robotId */
+function makeControl(robotId) {
+  const control = make("button", "stop");
+  control.type = "button";
+  control.dataset.stop = robotId;
+  control.append(make("span", "stop__who", robotId), make("span", "stop__words"));
+  return control;
+}
+
+/**
+ * One press for one gesture, whatever it is made of: finger or mouse down (not up: that
+ * is a tenth of a second later), Enter, Space, or the bare click of an assistive tool.
+ *
+ * @param {HTMLElement} control
+ * @param {() => void} press
+ */
+export function onPress(control, press) {
+  let isGesture = false;
+  control.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    isGesture = true;
+    press();
+  });
+  for (const end of ["pointerup", "pointercancel"]) {
+    addEventListener(end, () => {
+      setTimeout(() => {
+        isGesture = false;
+      }, GESTURE_MS);
+    });
+  }
+  control.addEventListener("click", () => {
+    if (!isGesture) press();
+    isGesture = false;
+  });
+  control.addEventListener("keydown", (event) => {
+    if (!isPressKey(event)) return;
+    // The browser's own click would come late (Space) or again and again (Enter).
+    event.preventDefault();
+    if (!event.repeat) press();
+  });
+  control.addEventListener("keyup", (event) => {
+    if (isPressKey(event)) event.preventDefault();
+  });
+}
+
+/** @param {KeyboardEvent} event */
+const isPressKey = (event) =>
+  (event.key === "Enter" || event.key === " ") && !event.ctrlKey && !event.altKey;
+
+/**
+ * `Ctrl+.` anywhere on the page, a field with the focus included.
+ *
+ * @param {() => void} press
+ */
+function onFleetKeys(press) {
+  const listener = (/** @type {KeyboardEvent} */ event) => {
+    if (!event.ctrlKey || (event.key !== "." && event.code !== "Period")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!event.repeat) press();
+  };
+  addEventListener("keydown", listener, { capture: true });
+}
+
+/**
+ * ULIDs and times of one server sort as text; the newer episode wins.
+ *
+ * @param {Command} command
+ * @param {Command} known
+ */
+function isOlder(command, known) {
+  const a = command.times.requested ?? "";
+  const b = known.times.requested ?? "";
+  return a < b;
+}

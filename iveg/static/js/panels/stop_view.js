@@ -1,0 +1,195 @@
+/**
+ * What a STOP control says, as a pure function of what is known (product section 4).
+ *
+ * A wish is never shown as a result: *asked*, *acknowledged* and *standing* are three
+ * different words, and a control without a line does not look like one that works.
+ *
+ * @typedef {import("../protocol.js").Command} Command
+ * @typedef {import("../clock.js").Link} Link
+ * @typedef {import("../store.js").ConnectionState} ConnectionState
+ * @typedef {import("./press.js").Pending} Pending
+ * @typedef {{state: StopState, key: string, slots: Record<string, string | number>}} View
+ * @typedef {"ready" | "late" | "lost" | "asked" | "not_taken" | "acknowledged" |
+ *   "standing" | "unconfirmed" | "still_moving" | "stale" | "moved" | "releasing" |
+ *   "rearmed"} StopState
+ *
+ * @typedef {{
+ *   robotId: string,
+ *   connection: ConnectionState,
+ *   link: Link,
+ *   ageS: number,
+ *   command: Command | null,
+ *   press: Pending | null,
+ *   nowMs: number,
+ *   serverNowS: number,
+ * }} RobotFacts `nowMs` is `performance.now()`, `serverNowS` Unix time
+ */
+
+/** @type {Record<string, StopState>} */
+const BY_COMMAND = {
+  REQUESTED: "asked",
+  SENT: "asked",
+  DELIVERED: "acknowledged",
+  STANDING: "standing",
+  UNCONFIRMED: "unconfirmed",
+  STILL_MOVING: "still_moving",
+  STALE: "stale",
+  RELEASING: "releasing",
+  READY: "rearmed",
+};
+
+/** Reasons of a command that was made because a held robot moved. */
+const MOVED = new Set(["moved", "moved_while_held", "hold_lost"]);
+
+/** States in which a new press is news and has to be seen. */
+const GIVES_WAY = new Set(["standing", "stale", "releasing", "rearmed"]);
+
+/** From the loudest to the quietest; the fleet's control shows the loudest. */
+const LOUDEST_FIRST = /** @type {StopState[]} */ ([
+  "unconfirmed",
+  "still_moving",
+  "moved",
+  "not_taken",
+  "asked",
+  "acknowledged",
+  "releasing",
+  "stale",
+  "rearmed",
+]);
+
+/** Presses older than this without an answer are said to be so (ms). */
+export const TAKEN_LIMIT_MS = 500;
+
+/**
+ * One robot's control.
+ *
+ * @param {RobotFacts} facts
+ * @returns {View}
+ */
+export function viewOfRobot(facts) {
+  const robot = facts.robotId;
+  if (isCut(facts.connection)) return lost(facts.press, facts.nowMs);
+  const state = stateOfCommand(facts.command);
+  if (facts.press && (!state || GIVES_WAY.has(state))) {
+    return viewOfPress(facts.press, facts.nowMs);
+  }
+  if (state && facts.command) return viewOfCommand(state, facts.command, facts);
+  if (facts.connection === "connecting" || facts.link === "LATE") {
+    return { state: "late", key: "stop.late", slots: { robot, seconds: aged(facts) } };
+  }
+  if (facts.link !== "LIVE") return lost(null, facts.nowMs);
+  return { state: "ready", key: "stop.ready", slots: { robot } };
+}
+
+/**
+ * The control of the whole fleet.
+ *
+ * @param {{connection: ConnectionState, press: Pending | null, nowMs: number,
+ *   robots: {view: View, link: Link, ageS: number}[]}} facts
+ * @returns {View}
+ */
+export function viewOfFleet({ connection, press, nowMs, robots }) {
+  if (isCut(connection)) return lost(press, nowMs);
+  if (press) return viewOfPress(press, nowMs);
+  const total = robots.length;
+  const standing = robots.filter(({ view }) => view.state === "standing").length;
+  if (total && standing === total) {
+    return {
+      state: "standing",
+      key: "stop.standing_fleet",
+      slots: { count: standing, total },
+    };
+  }
+  const states = robots.map(({ view }) => view.state);
+  if (total && states.every((state) => LOUDEST_FIRST.includes(state))) {
+    const loudest = LOUDEST_FIRST.find((state) => states.includes(state));
+    const told = robots.find(({ view }) => view.state === loudest);
+    if (told) return told.view;
+  }
+  if (total && robots.every(({ link }) => link === "LOST" || link === "UNKNOWN")) {
+    return lost(null, nowMs);
+  }
+  return viewOfQuietFleet(connection, robots);
+}
+
+/**
+ * @param {ConnectionState} connection
+ * @param {{link: Link, ageS: number}[]} robots
+ * @returns {View}
+ */
+function viewOfQuietFleet(connection, robots) {
+  const late = robots.filter(({ link }) => link === "LATE");
+  if (connection === "connecting" || late.length) {
+    const seconds = Math.max(0, ...late.map(({ ageS }) => ageS));
+    return { state: "late", key: "stop.late_fleet", slots: { seconds } };
+  }
+  return { state: "ready", key: "stop.ready_fleet", slots: {} };
+}
+
+/** @param {Command | null} command @returns {StopState | null} */
+export function stateOfCommand(command) {
+  if (!command) return null;
+  const state = BY_COMMAND[command.state] ?? null;
+  const moved = state === "asked" && MOVED.has(command.reason ?? "");
+  return moved ? "moved" : state;
+}
+
+/**
+ * @param {StopState} state
+ * @param {Command} command
+ * @param {RobotFacts} facts
+ * @returns {View}
+ */
+function viewOfCommand(state, command, facts) {
+  const key = `stop.${state}`;
+  if (state === "asked") {
+    const ms = facts.press
+      ? facts.nowMs - facts.press.atMs
+      : since(command.times.requested, facts.serverNowS) * 1000;
+    return { state, key, slots: { ms } };
+  }
+  if (state === "standing") {
+    if (command.standstill_ms === null) {
+      return { state, key: "stop.standing_untimed", slots: {} };
+    }
+    return { state, key, slots: { ms: command.standstill_ms } };
+  }
+  if (state === "stale") return { state, key, slots: { seconds: aged(facts) } };
+  return { state, key, slots: {} };
+}
+
+/**
+ * @param {Pending} press
+ * @param {number} nowMs
+ * @returns {View}
+ */
+function viewOfPress(press, nowMs) {
+  const ms = nowMs - press.atMs;
+  if (!press.accepted && ms > TAKEN_LIMIT_MS) {
+    return { state: "not_taken", key: "stop.not_taken", slots: { tries: press.tries } };
+  }
+  return { state: "asked", key: "stop.asked", slots: { ms } };
+}
+
+/**
+ * @param {Pending | null} press
+ * @param {number} nowMs
+ * @returns {View}
+ */
+function lost(press, nowMs) {
+  // A fresh press must be seen to have happened, even on a dead line.
+  if (press && nowMs - press.atMs < TAKEN_LIMIT_MS) return viewOfPress(press, nowMs);
+  return { state: "lost", key: "stop.lost", slots: {} };
+}
+
+/** @param {ConnectionState} connection */
+const isCut = (connection) => connection === "lost" || connection === "signed-out";
+
+/** @param {RobotFacts} facts age that can be written (s) */
+const aged = ({ ageS }) => (Number.isFinite(ageS) ? ageS : 0);
+
+/** @param {string | null | undefined} iso @param {number} nowS */
+export function since(iso, nowS) {
+  const at = iso ? Date.parse(iso) / 1000 : Number.NaN;
+  return Number.isFinite(at) ? Math.max(0, nowS - at) : 0;
+}

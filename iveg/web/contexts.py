@@ -1,0 +1,124 @@
+"""What each template may say: one frozen dataclass a template, and nothing beside it.
+
+A template sees its own dataclass as ``page`` and the functions ``t`` (a sentence),
+``say`` (a sentence that follows the language switch) and ``label`` (the same, as an
+attribute).  Live values never come this way; they arrive on ``/live``.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from iveg.web.openapi import ApiDoc
+
+Theme = Literal["auto", "light", "dark", "sunlight"]
+THEMES: tuple[Theme, ...] = ("auto", "light", "dark", "sunlight")
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What is the same on every page while this server runs.
+
+    Attributes:
+        greenhouse: Name as people say it.
+        robots: Ids in fleet order; the order decides each robot's colour.
+        demo: The robots are emulated.
+        confidence_threshold: From here on a detection counts (0 to 1).
+        radius_m: Of the ring around a person (m).
+    """
+
+    greenhouse: str
+    robots: tuple[str, ...]
+    version: str
+    demo: bool
+    confidence_threshold: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How this browser wants the page; remembered in its cookies."""
+
+    language: str = "es"
+    theme: Theme = "auto"
+    paper_colours: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What ``base.html`` draws around every page.
+
+    Attributes:
+        route: Which entry of the navigation is current.
+        name: Who is signed in; None shows neither navigation nor STOP.
+        role: ``viewer``, ``operator``, ``admin`` or ``program``.
+    """
+
+    site: Site
+    look: Look
+    route: str
+    name: str | None = None
+    role: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LivePage:
+    """``live.html``: the five widgets, empty until ``/live`` speaks."""
+
+    template: ClassVar[str] = "live.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryPage:
+    """``history.html``: the shell that the history scripts fill."""
+
+    template: ClassVar[str] = "history.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class DocsPage:
+    """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
+
+    template: ClassVar[str] = "docs.html"
+    frame: Frame
+    document: ApiDoc
+
+
+@dataclass(frozen=True, slots=True)
+class AboutPage:
+    """``about.html``: what iVeg is, and what STOP is not."""
+
+    template: ClassVar[str] = "about.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class SignInPage:
+    """``signin.html``: how to get in.
+
+    Attributes:
+        wrong: A link was tried and does not sign in.
+    """
+
+    template: ClassVar[str] = "signin.html"
+    frame: Frame
+    wrong: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorPage:
+    """``error.html``: what went wrong, for a person.
+
+    Attributes:
+        status: HTTP status.
+        sentence: Key of the sentence that explains it.
+    """
+
+    template: ClassVar[str] = "error.html"
+    frame: Frame
+    status: int
+    sentence: str
+
+
+Page = LivePage | HistoryPage | DocsPage | AboutPage | SignInPage | ErrorPage

@@ -1,0 +1,193 @@
+"""HTML: each page is one context drawn by its template, in the reader's language.
+
+``Pages`` draws; ``router`` says which page stands where.  Who may read is decided by
+the dependencies that are handed in.
+"""
+
+import json
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Annotated, Any, Protocol, TypeVar
+
+from fastapi import APIRouter, Depends
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+
+from iveg.web.contexts import (
+    THEMES,
+    AboutPage,
+    DocsPage,
+    ErrorPage,
+    Frame,
+    HistoryPage,
+    LivePage,
+    Look,
+    Page,
+    SignInPage,
+    Site,
+)
+from iveg.web.openapi import ApiDoc
+from iveg.web.problems import Problem
+from iveg.web.security import PLOTLY_CONTENT_SECURITY_POLICY
+from iveg.web.words import LANGUAGES, Slot, Words, preferred_language, read_words
+
+LANGUAGE_COOKIE = "iveg_language"
+THEME_COOKIE = "iveg_theme"
+PALETTE_COOKIE = "iveg_palette"
+
+_EXPLAINED = (400, 401, 403, 404, 405, 500, 503)
+
+
+class Visitor(Protocol):
+    """Whom a page is for; ``auth.Principal`` is one."""
+
+    @property
+    def name(self) -> str:
+        """As shown to other people."""
+
+    @property
+    def role(self) -> str:
+        """``viewer``, ``operator``, ``admin`` or ``program``."""
+
+
+class Pages:
+    """Draws pages; one for the life of the server.
+
+    Args:
+        site: What every page of this server has in common.
+    """
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        self._environments = {
+            language: _environment(read_words(language)) for language in LANGUAGES
+        }
+
+    def frame(
+        self, request: Request, route: str, visitor: Visitor | None = None
+    ) -> Frame:
+        """What surrounds a page for this reader."""
+        look = _look(request)
+        if visitor is None:
+            return Frame(self._site, look, route)
+        return Frame(self._site, look, route, visitor.name, visitor.role)
+
+    def draw(
+        self, page: Page, status: int = 200, policy: str | None = None
+    ) -> HTMLResponse:
+        """A page as a response.
+
+        Args:
+            policy: A Content-Security-Policy other than everybody's.
+        """
+        environment = self._environments[page.frame.look.language]
+        html = environment.get_template(page.template).render(page=page)
+        headers = {"Vary": "Cookie, Accept-Language"}
+        if policy is not None:
+            headers["Content-Security-Policy"] = policy
+        return HTMLResponse(html, status, headers)
+
+    def problem(self, request: Request, problem: Problem) -> Response:
+        """A problem as a page: the way in for a stranger, an explanation else."""
+        if problem.status == 401:
+            return self.sign_in(request, 401)
+        known = problem.status if problem.status in _EXPLAINED else "other"
+        frame = self.frame(request, "error")
+        page = ErrorPage(frame, problem.status, f"error.{known}")
+        return self._with_headers(self.draw(page, problem.status), problem)
+
+    def refused_link(self, request: Request, _: Problem) -> Response:
+        """The page for a sign-in link that is wrong."""
+        return self.sign_in(request, 401, wrong=True)
+
+    def sign_in(
+        self, request: Request, status: int = 200, *, wrong: bool = False
+    ) -> Response:
+        """How to get in."""
+        return self.draw(SignInPage(self.frame(request, "signin"), wrong), status)
+
+    @staticmethod
+    def _with_headers(response: Response, problem: Problem) -> Response:
+        response.headers.update(problem.headers)
+        return response
+
+
+Whoever = TypeVar("Whoever", bound=Visitor)
+
+
+def router(
+    pages: Pages,
+    *,
+    reader: Callable[..., Any],
+    anyone: Callable[..., Any],
+    document: Callable[[], ApiDoc],
+) -> APIRouter:
+    """The routes of all pages.
+
+    Args:
+        reader: Dependency that gives the visitor, or refuses a stranger.
+        anyone: Dependency of the page that is open to strangers.
+        document: The HTTP interface as it stands.
+    """
+    routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
+    who = Depends(reader)
+
+    @routes.get("/", response_model=None)
+    async def live(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(LivePage(pages.frame(request, "live", visitor)))
+
+    @routes.get("/history", response_model=None)
+    async def history(request: Request, visitor: Annotated[Any, who]) -> Response:
+        page = HistoryPage(pages.frame(request, "history", visitor))
+        return pages.draw(page, policy=PLOTLY_CONTENT_SECURITY_POLICY)
+
+    @routes.get("/docs", response_model=None)
+    async def docs(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(DocsPage(pages.frame(request, "docs", visitor), document()))
+
+    @routes.get("/about", response_model=None)
+    async def about(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(AboutPage(pages.frame(request, "about", visitor)))
+
+    @routes.get("/signin", response_model=None, dependencies=[Depends(anyone)])
+    async def signin(request: Request) -> Response:
+        return pages.sign_in(request)
+
+    return routes
+
+
+def _look(request: Request) -> Look:
+    cookies = request.cookies
+    language = cookies.get(LANGUAGE_COOKIE, "")
+    if language not in LANGUAGES:
+        language = preferred_language(request.headers.get("accept-language", ""))
+    theme = next((t for t in THEMES if t == cookies.get(THEME_COOKIE)), "auto")
+    return Look(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
+
+
+def _environment(words: Words) -> Environment:
+    """Templates that speak one language."""
+    environment = Environment(
+        loader=FileSystemLoader(str(files("iveg") / "templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+    def say(key: str, **slots: Slot) -> Markup:
+        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
+        return Markup('<span data-i18n="{}"{}>{}</span>').format(
+            key, data, words.say(key, **slots)
+        )
+
+    def label(attribute: str, key: str, **slots: Slot) -> Markup:
+        data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""
+        return Markup('{}="{}" data-i18n-{}="{}"{}').format(
+            attribute, words.say(key, **slots), attribute, key, data
+        )
+
+    environment.globals.update(t=words.say, say=say, label=label)
+    return environment
