@@ -10,11 +10,11 @@ from pathlib import Path
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError
-from sqlalchemy.pool import ConnectionPoolEntry, NullPool
+from sqlalchemy.pool import ConnectionPoolEntry, NullPool, Pool, QueuePool
 
 from iveg.domain.errors import HopError, SettingsError
 
-BUSY_TIMEOUT_MS = 5000
+_BUSY_TIMEOUT_S = 5.0
 _POSTGRESQL = {
     "connect_timeout": 5,
     "keepalives_idle": 5,
@@ -56,19 +56,20 @@ def writing_engine(database_url: str) -> Engine:
     ``BEGIN IMMEDIATE`` waits its turn at the start; a transaction that finds out
     half-way that it must write cannot wait at all.
     """
-    return _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s")
+    # The connection stays open: whenever the last one closes, SQLite tidies up.
+    return _engine(database_url, "BEGIN IMMEDIATE", "-c lock_timeout=5s", QueuePool)
 
 
 def reading_engine(database_url: str) -> Engine:
     """For readers: short transactions, given up when they take too long."""
-    return _engine(database_url, "BEGIN", "-c statement_timeout=20s")
+    # None idles: a file that was moved aside must not live on in one.
+    return _engine(database_url, "BEGIN", "-c statement_timeout=20s", NullPool)
 
 
-def _engine(database_url: str, begin: str, options: str) -> Engine:
+def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> Engine:
     url = _parse(database_url)
     if url.get_backend_name() == "sqlite":
-        # No pool: a file that was moved aside must not live on in an idle connection.
-        engine = create_engine(url, poolclass=NullPool)
+        engine = create_engine(_with_timeout(url), poolclass=pool)
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _beginner(begin))
         return engine
@@ -85,10 +86,16 @@ def _engine(database_url: str, begin: str, options: str) -> Engine:
         raise HopError("database", "PostgreSQL needs iveg[postgresql]") from error
 
 
+def _with_timeout(url: URL) -> URL:
+    """How long to wait for a lock; an address may say otherwise: ``?timeout=0.5``."""
+    if "timeout" in url.query:
+        return url
+    return url.update_query_dict({"timeout": str(_BUSY_TIMEOUT_S)})
+
+
 def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     connection.isolation_level = None
     for pragma in (
-        f"busy_timeout={BUSY_TIMEOUT_MS}",
         "journal_mode=WAL",
         "synchronous=NORMAL",
         "foreign_keys=ON",

@@ -8,7 +8,7 @@ import errno
 import logging
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,14 +27,24 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 class Journal:
     """An append-only file; safe to use from several threads.
 
+    Args:
+        reserve_bytes: Given back to the disk when it is full.
+        write: As ``os.write``; a test's disk may be full.
+
     Attributes:
         unreadable: Lines that could not be read back, such as one torn by a power cut.
     """
 
-    def __init__(self, file: Path, reserve_bytes: int = _RESERVE_BYTES) -> None:
+    def __init__(
+        self,
+        file: Path,
+        reserve_bytes: int = _RESERVE_BYTES,
+        write: Callable[[int, memoryview], int] = os.write,
+    ) -> None:
         self._file = file
         self._reserve = file.with_name(file.name + "-reserve")
         self._reserve_bytes = reserve_bytes
+        self._write = write
         self._lock = threading.Lock()
         self.unreadable = 0
 
@@ -108,7 +118,7 @@ class Journal:
         try:
             rest = memoryview(lines)
             while rest:
-                rest = rest[os.write(descriptor, rest) :]
+                rest = rest[self._write(descriptor, rest) :]
             os.fsync(descriptor)
         finally:
             os.close(descriptor)

@@ -34,7 +34,7 @@ from iveg.domain.records import (
     Record,
 )
 
-MOST_ROWS = 1000
+USUAL_ROWS, MOST_ROWS = 100, 1000
 
 R = TypeVar("R", bound=Record)
 
@@ -63,7 +63,7 @@ class Filter:
     robot: str | None = None
     class_: str | None = None
     min_probability: float | None = None
-    limit: int = 100
+    limit: int = USUAL_ROWS
     cursor: Cursor | None = None
 
 
@@ -184,7 +184,13 @@ def read_cursor(text: str, of: ListOf[R]) -> Cursor:
         at, key = orjson.loads(base64.urlsafe_b64decode(padded))
     except (ValueError, TypeError, binascii.Error) as error:
         raise UnreadableError("bad_cursor") from error
-    key_type = of.key.type.python_type
-    if not isinstance(at, float) or type(key) is not key_type:
+    if not isinstance(at, float) or not _is_key(key, of):
         raise UnreadableError("bad_cursor")
     return Cursor(at, key)
+
+
+def _is_key(key: object, of: ListOf[R]) -> bool:
+    # Only what a column can hold: the rest would fail inside the database.
+    if of.key.type.python_type is int:
+        return type(key) is int and 0 <= key < 2**63
+    return isinstance(key, str) and key.isascii() and key.isprintable()

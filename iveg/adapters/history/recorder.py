@@ -39,7 +39,7 @@ class RecorderHealth:
         state: ``ok``, ``late`` (something waits longer than 2 s) or ``down``.
         age_s: How long the oldest record has waited to be stored (s).
         detail: Why the database is away; empty when it is not.
-        counters: written, dropped, journalled, rejected, waiting.
+        counters: written, dropped, journalled, replayed, rejected, waiting.
     """
 
     state: Literal["ok", "late", "down"]
@@ -74,7 +74,7 @@ class Recorder:
         self._writing: asyncio.Task[None] | None = None
         self._closing = False
         self._revision = 0
-        self._written = self._journalled = self._lost_at_close = 0
+        self._written = self._journalled = self._replayed = self._lost_at_close = 0
         self._lost_since: float | None = None
         self._detail = ""
         self._pause_s = _FIRST_PAUSE_S
@@ -116,6 +116,7 @@ class Recorder:
             "history_written": self._written,
             "history_dropped": self._queue.dropped + self._lost_at_close,
             "history_journalled": self._journalled,
+            "history_replayed": self._replayed,
             "history_rejected": self._store.rejected + self._journal.unreadable,
             "history_waiting": len(self._queue),
         }
@@ -199,6 +200,7 @@ class Recorder:
         while position < (end := self._journal.size):
             rows, position = self._journal.read(position, _BATCH)
             self._store.write(rows)
+            self._replayed += len(rows)
             if position >= end and self._journal.clear(position):
                 break
         if batch:

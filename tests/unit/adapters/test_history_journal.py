@@ -1,0 +1,161 @@
+import errno
+import os
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.history.journal import Journal
+from iveg.domain.errors import HopError
+from iveg.domain.records import Record
+from iveg.pipeline.record import Waiting
+from tests.fakes.records import (
+    alert_record,
+    command_event_record,
+    command_record,
+    decision_record,
+    log_record,
+)
+
+EVERYTHING = (
+    alert_record(note="¿quién?"),
+    command_event_record(),
+    command_record(),
+    decision_record(),
+    log_record(),
+)
+
+
+def rows(*records: Record) -> list[Waiting]:
+    return [Waiting(record, number, 5.0) for number, record in enumerate(records, 1)]
+
+
+@contextmanager
+def files_no_longer_than(size: int) -> Iterator[None]:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+class FullDisk:
+    """Has room for half a line only, until a file is gone."""
+
+    def __init__(self, until_gone: Path) -> None:
+        self._until_gone = until_gone
+        self._half_written = False
+
+    def write(self, descriptor: int, data: memoryview) -> int:
+        if not self._until_gone.exists():
+            return os.write(descriptor, data)
+        if self._half_written:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        self._half_written = True
+        return os.write(descriptor, data[: len(data) // 2])
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Journal:
+    return Journal(tmp_path / "journal", reserve_bytes=4096)
+
+
+def test_what_was_written_down_is_read_back(journal: Journal) -> None:
+    journal.append(rows(*EVERYTHING))
+
+    found, end = journal.read(0, 100)
+
+    assert [row.record for row in found] == list(EVERYTHING)
+    assert [row.revision for row in found] == [1, 2, 3, 4, 5]
+    assert end == journal.size
+
+
+def test_a_journal_is_read_in_pieces(journal: Journal) -> None:
+    journal.append(rows(*EVERYTHING))
+
+    first, middle = journal.read(0, 3)
+    second, end = journal.read(middle, 3)
+
+    assert [row.record for row in first + second] == list(EVERYTHING)
+    assert end == journal.size
+
+
+def test_a_journal_that_never_was_is_empty(journal: Journal) -> None:
+    assert journal.size == 0
+    assert journal.read(0, 10) == ([], 0)
+
+
+def test_a_line_torn_by_a_power_cut_is_counted_and_the_others_count(
+    journal: Journal, tmp_path: Path
+) -> None:
+    journal.append(rows(command_record(), log_record()))
+    os.truncate(tmp_path / "journal", journal.size - 10)
+
+    found, end = journal.read(0, 10)
+
+    assert [row.record for row in found] == [command_record()]
+    assert journal.unreadable == 1
+    assert end == journal.size
+
+
+def test_what_was_appended_meanwhile_is_not_cleared(journal: Journal) -> None:
+    journal.append(rows(command_record()))
+    _, end = journal.read(0, 10)
+    journal.append(rows(log_record()))
+
+    assert not journal.clear(end)
+    assert journal.clear(journal.size)
+    assert journal.size == 0
+
+
+def test_a_record_that_is_no_text_is_left_out_and_its_neighbours_kept(
+    journal: Journal,
+) -> None:
+    journal.append(rows(log_record(slots="\ud800"), command_record()))
+
+    found, _ = journal.read(0, 10)
+
+    assert [row.record for row in found] == [command_record()]
+
+
+def test_a_full_disk_is_told_and_leaves_no_half_line(journal: Journal) -> None:
+    journal.append(rows(command_record()))
+    size = journal.size
+
+    with files_no_longer_than(size + 20), pytest.raises(HopError, match="journal"):
+        journal.append(rows(log_record()))
+
+    assert journal.size == size
+    journal.append(rows(log_record()))
+    assert len(journal.read(0, 10)[0]) == 2
+
+
+def test_the_reserve_is_really_taken_from_the_disk(
+    journal: Journal, tmp_path: Path
+) -> None:
+    journal.keep_reserve()
+
+    assert (tmp_path / "journal-reserve").stat().st_blocks * 512 >= 4096
+
+
+def test_a_full_disk_gets_the_reserve_back(tmp_path: Path) -> None:
+    reserve = tmp_path / "journal-reserve"
+    journal = Journal(tmp_path / "journal", 4096, FullDisk(reserve).write)
+    journal.keep_reserve()
+
+    journal.append(rows(command_record()))
+
+    assert not reserve.exists()
+    assert [row.record for row in journal.read(0, 10)[0]] == [command_record()]
+    assert journal.clear(journal.size)
+    assert reserve.exists()
+
+
+def test_no_room_for_the_reserve_is_no_error(journal: Journal, tmp_path: Path) -> None:
+    with files_no_longer_than(100):
+        journal.keep_reserve()
+
+    assert not (tmp_path / "journal-reserve").exists()

@@ -1,0 +1,154 @@
+import sqlite3
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.runtime.migration import MigrationContext
+from sqlalchemy import Connection, text
+
+from iveg.adapters.history.engine import describe, writing_engine
+from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.tables import metadata
+from iveg.domain.errors import DataFileError, HopError, SettingsError
+
+
+def execute(database_url: str, statement: str) -> None:
+    engine = writing_engine(database_url)
+    with engine.begin() as connection:
+        connection.execute(text(statement))
+    engine.dispose()
+
+
+def differences(connection: Connection) -> list[object]:
+    migrated = MigrationContext.configure(connection, opts={"compare_type": True})
+    return list(compare_metadata(migrated, metadata))
+
+
+def test_migrations_make_the_tables_that_the_code_describes(database_url: str) -> None:
+    upgrade(database_url)
+
+    engine = writing_engine(database_url)
+    with engine.connect() as connection:
+        assert differences(connection) == []
+    engine.dispose()
+
+
+def test_a_missing_column_would_be_noticed(database_url: str) -> None:
+    upgrade(database_url)
+    execute(database_url, "ALTER TABLE log DROP COLUMN decision_id")
+
+    engine = writing_engine(database_url)
+    with engine.connect() as connection:
+        assert len(differences(connection)) == 1
+    engine.dispose()
+
+
+def test_upgrading_twice_keeps_what_is_there(database_url: str) -> None:
+    upgrade(database_url)
+    execute(
+        database_url,
+        "INSERT INTO command_events (command_id, robot_id, at, state, why) "
+        "VALUES ('C1', 'AGI', 1.0, 'SENT', '')",
+    )
+
+    upgrade(database_url)
+
+    engine = writing_engine(database_url)
+    with engine.connect() as connection:
+        count = connection.scalar(text("SELECT count(*) FROM command_events"))
+    engine.dispose()
+    assert count == 1
+
+
+def test_a_newer_database_is_refused_with_one_sentence(database_url: str) -> None:
+    upgrade(database_url)
+    execute(database_url, "UPDATE alembic_version SET version_num = 'from_the_future'")
+
+    with pytest.raises(DataFileError, match=r"newer iVeg .*from_the_future") as caught:
+        upgrade(database_url)
+
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unfinished_migration_is_refused_and_left_as_it_was(
+    database_url: str,
+) -> None:
+    execute(database_url, "CREATE TABLE log (id INTEGER)")
+
+    with pytest.raises(DataFileError, match=r"cannot be finished .*log"):
+        upgrade(database_url)
+
+    engine = writing_engine(database_url)
+    with engine.connect() as connection:
+        found = MigrationContext.configure(connection).get_current_revision()
+    engine.dispose()
+    assert found is None
+
+
+def test_a_corrupt_file_is_moved_aside_and_a_fresh_one_begun(
+    tmp_path: Path, sqlite_url: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "history.db").write_bytes(b"this was never a database " * 100)
+
+    upgrade(sqlite_url)
+
+    [aside] = tmp_path.glob("history.db.corrupt-*")
+    assert aside.read_bytes().startswith(b"this was never")
+    assert [record.levelname for record in caplog.records] == ["ERROR"]
+    assert aside.name in caplog.text
+    upgrade(sqlite_url)
+    assert list(tmp_path.glob("history.db.corrupt-*")) == [aside]
+
+
+def test_damage_inside_a_file_is_found(tmp_path: Path, sqlite_url: str) -> None:
+    upgrade(sqlite_url)
+    file = tmp_path / "history.db"
+    whole = bytearray(file.read_bytes())
+    whole[8192 : 8192 + 4096] = bytes([0xA5]) * 4096
+    file.write_bytes(whole)
+
+    upgrade(sqlite_url)
+
+    assert len(list(tmp_path.glob("history.db.corrupt-*"))) == 1
+
+
+def test_an_empty_file_becomes_a_history(tmp_path: Path, sqlite_url: str) -> None:
+    (tmp_path / "history.db").touch()
+
+    upgrade(sqlite_url)
+
+    assert list(tmp_path.glob("*.corrupt-*")) == []
+
+
+def test_a_missing_directory_is_made(tmp_path: Path) -> None:
+    upgrade(f"sqlite:///{tmp_path / 'a' / 'b' / 'history.db'}")
+
+    assert (tmp_path / "a" / "b" / "history.db").exists()
+
+
+def test_a_locked_file_is_a_hop_that_does_not_answer_and_not_damage(
+    tmp_path: Path, sqlite_url: str
+) -> None:
+    upgrade(sqlite_url)
+    other = sqlite3.connect(tmp_path / "history.db", isolation_level=None)
+    other.execute("BEGIN EXCLUSIVE")
+
+    with pytest.raises(HopError, match="locked"):
+        upgrade(f"{sqlite_url}?timeout=0.05")
+
+    other.close()
+    assert list(tmp_path.glob("*.corrupt-*")) == []
+
+
+def test_a_server_that_is_not_there_is_a_hop_that_does_not_answer() -> None:
+    with pytest.raises(HopError, match="database"):
+        upgrade("postgresql://somebody:secret@127.0.0.1:1/history")
+
+
+def test_sqlite_in_memory_is_refused_because_it_forgets() -> None:
+    with pytest.raises(SettingsError, match="a file"):
+        upgrade("sqlite://")
+
+
+def test_a_password_is_not_shown() -> None:
+    assert "secret" not in describe("postgresql://somebody:secret@server/history")

@@ -1,0 +1,393 @@
+import asyncio
+import contextlib
+import logging
+import os
+import sqlite3
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from iveg.adapters import clock
+from iveg.adapters.history.engine import reading_engine
+from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.domain.observations import Instant
+from tests.fakes.postgresql import PostgreSQL
+from tests.fakes.records import (
+    NOON,
+    alert_record,
+    command_event_record,
+    command_record,
+    decision_record,
+    detection_record,
+    log_record,
+    odometry_record,
+)
+
+EVERYTHING = (
+    alert_record(),
+    command_event_record(),
+    command_record(),
+    decision_record(),
+    detection_record(),
+    log_record(),
+    odometry_record(),
+)
+KEPT = 5
+_PATIENCE_S = 20.0
+
+
+@asynccontextmanager
+async def recording(
+    database_url: str, directory: Path, capacity: int = 20_000
+) -> AsyncIterator[Recorder]:
+    journal = journal_file(database_url, directory)
+    recorder = Recorder(database_url, journal, capacity=capacity)
+    task = asyncio.create_task(recorder.run())
+    try:
+        yield recorder
+    finally:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
+        await recorder.close()
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + _PATIENCE_S
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come true"
+        await asyncio.sleep(0.02)
+
+
+def state(recorder: Recorder) -> str:
+    return recorder.health(clock.now()).state
+
+
+def scalar(database_url: str, query: str) -> object:
+    engine = reading_engine(database_url)
+    with engine.connect() as connection:
+        found = connection.scalar(text(query))
+    engine.dispose()
+    return found
+
+
+def counts(database_url: str) -> dict[str, object]:
+    tables = (
+        "alerts",
+        "command_events",
+        "commands",
+        "decisions",
+        "detections",
+        "log",
+        "odometry",
+    )
+    return {
+        table: scalar(database_url, f"SELECT count(*) FROM {table}")  # noqa: S608
+        for table in tables
+    }
+
+
+def lock(database_url: str) -> sqlite3.Connection:
+    """Somebody else's program that holds the database."""
+    file = database_url.removeprefix("sqlite:///").partition("?")[0]
+    connection = sqlite3.connect(file, isolation_level=None)
+    connection.execute("BEGIN EXCLUSIVE")
+    return connection
+
+
+async def test_everything_that_is_offered_is_stored(
+    database_url: str, tmp_path: Path
+) -> None:
+    async with recording(database_url, tmp_path) as recorder:
+        for record in EVERYTHING:
+            recorder.offer(record)
+        await until(lambda: recorder.counters["history_written"] == len(EVERYTHING))
+        assert state(recorder) == "ok"
+
+    assert set(counts(database_url).values()) == {1}
+
+
+async def test_closing_stores_what_still_waits(
+    database_url: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(database_url, tmp_path / "journal")
+    for number in range(1200):
+        recorder.offer(odometry_record(at=NOON + number))
+
+    await recorder.close()
+
+    assert scalar(database_url, "SELECT count(*) FROM odometry") == 1200
+    assert recorder.counters["history_dropped"] == 0
+
+
+async def test_a_command_is_one_row_that_changes_and_a_trail_that_grows(
+    database_url: str, tmp_path: Path
+) -> None:
+    async with recording(database_url, tmp_path) as recorder:
+        for number, step in enumerate(("REQUESTED", "SENT", "STANDING")):
+            recorder.offer(command_record(state=step))
+            recorder.offer(command_event_record(state=step, at=NOON + number))
+            await until(lambda: recorder.counters["history_waiting"] == 0)
+
+    assert scalar(database_url, "SELECT count(*) FROM commands") == 1
+    assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
+    assert scalar(database_url, "SELECT count(*) FROM command_events") == 3
+
+
+async def test_two_states_in_one_batch_leave_the_later_one(
+    database_url: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(database_url, tmp_path / "journal")
+    recorder.offer(alert_record(count=1))
+    recorder.offer(alert_record(count=2))
+
+    await recorder.close()
+
+    assert scalar(database_url, "SELECT count FROM alerts") == 2
+
+
+async def test_offering_never_waits_for_a_locked_database(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    upgrade(sqlite_url)
+    other = lock(sqlite_url)
+    async with recording(f"{sqlite_url}?timeout=0.2", tmp_path) as recorder:
+        started = time.perf_counter()
+        for number in range(5000):
+            recorder.offer(odometry_record(at=NOON + number))
+        took = time.perf_counter() - started
+        await until(lambda: state(recorder) == "down")
+        other.close()
+        await until(lambda: recorder.counters["history_written"] == 5000)
+
+    assert took < 1.0
+
+
+async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
+    sqlite_url: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, "iveg.adapters.history.recorder")
+    upgrade(sqlite_url)
+    other = lock(sqlite_url)
+    journal = tmp_path / "history.db.journal"
+    url = f"{sqlite_url}?timeout=0.2"
+    async with recording(url, tmp_path, 10) as recorder:
+        for record in EVERYTHING:
+            recorder.offer(record)
+        for number in range(100):
+            recorder.offer(odometry_record(at=NOON + number))
+        await until(lambda: recorder.counters["history_journalled"] == KEPT)
+        assert state(recorder) == "down"
+        assert len(journal.read_bytes().splitlines()) == KEPT
+        assert recorder.counters["history_waiting"] <= 10
+
+        other.close()
+        await until(lambda: state(recorder) == "ok")
+        await until(lambda: recorder.counters["history_waiting"] == 0)
+        await until(lambda: journal.stat().st_size == 0)
+
+    stored = counts(sqlite_url)
+    assert stored.pop("odometry") == 5
+    assert stored.pop("detections") == 0
+    assert set(stored.values()) == {1}
+    assert recorder.counters["history_dropped"] == 97
+    assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
+
+
+async def test_a_server_that_dies_is_missed_and_welcomed_back(
+    postgresql: PostgreSQL, postgresql_url: str, tmp_path: Path
+) -> None:
+    journal = tmp_path / "history.journal"
+    async with recording(postgresql_url, tmp_path) as recorder:
+        recorder.offer(command_record(state="REQUESTED"))
+        await until(lambda: recorder.counters["history_written"] == 1)
+        postgresql.stop()
+        recorder.offer(command_record(state="STANDING"))
+        recorder.offer(odometry_record())
+        await until(lambda: recorder.counters["history_journalled"] == 1)
+        assert state(recorder) == "down"
+
+        postgresql.start()
+        await until(lambda: state(recorder) == "ok")
+        await until(lambda: journal.stat().st_size == 0)
+        await until(lambda: recorder.counters["history_waiting"] == 0)
+
+    assert scalar(postgresql_url, "SELECT state FROM commands") == "STANDING"
+    assert scalar(postgresql_url, "SELECT count(*) FROM odometry") == 1
+
+
+async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_start(
+    database_url: str, tmp_path: Path
+) -> None:
+    crashed = Recorder(database_url, tmp_path / "journal")
+    assert await crashed.secure(command_record(state="REQUESTED"))
+
+    upgrade(database_url)
+    assert scalar(database_url, "SELECT count(*) FROM commands") == 0
+    recorder = Recorder(database_url, tmp_path / "journal")
+    task = asyncio.create_task(recorder.run())
+    await until(lambda: (tmp_path / "journal").stat().st_size == 0)
+    task.cancel()
+    await asyncio.wait({task})
+    await recorder.close()
+
+    assert scalar(database_url, "SELECT state FROM commands") == "REQUESTED"
+
+
+async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
+    database_url: str, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal"
+    first = Recorder(database_url, journal)
+    await first.secure(command_record(state="REQUESTED"))
+    old = journal.read_bytes()
+    first.offer(command_record(state="STANDING"))
+    await first.close()
+    journal.write_bytes(old)
+
+    second = Recorder(database_url, journal)
+    task = asyncio.create_task(second.run())
+    await until(lambda: journal.stat().st_size == 0)
+    task.cancel()
+    await asyncio.wait({task})
+    await second.close()
+
+    assert scalar(database_url, "SELECT state FROM commands") == "STANDING"
+
+
+async def test_replaying_the_audit_trail_twice_writes_it_once(
+    database_url: str, tmp_path: Path
+) -> None:
+    journal = tmp_path / "journal"
+    for _ in range(2):
+        recorder = Recorder(database_url, journal)
+        await recorder.secure(command_event_record())
+        await recorder.secure(log_record())
+        await recorder.close()
+
+    assert scalar(database_url, "SELECT count(*) FROM command_events") == 1
+    assert scalar(database_url, "SELECT count(*) FROM log") == 1
+
+
+async def test_closing_while_the_database_is_away_leaves_it_to_the_journal(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    upgrade(sqlite_url)
+    other = lock(sqlite_url)
+    recorder = Recorder(f"{sqlite_url}?timeout=0.1", tmp_path / "journal")
+    for record in EVERYTHING:
+        recorder.offer(record)
+
+    await recorder.close()
+    other.close()
+
+    assert len((tmp_path / "journal").read_bytes().splitlines()) == KEPT
+    assert recorder.counters["history_dropped"] == len(EVERYTHING) - KEPT
+
+
+async def test_one_bad_row_does_not_hold_up_its_neighbours(
+    database_url: str, tmp_path: Path
+) -> None:
+    async with recording(database_url, tmp_path) as recorder:
+        recorder.offer(odometry_record(x=None))
+        recorder.offer(log_record(id=2**70))
+        recorder.offer(log_record(id=2))
+        recorder.offer(odometry_record())
+        await until(lambda: recorder.counters["history_waiting"] == 0)
+        await until(lambda: state(recorder) == "ok")
+        await until(lambda: recorder.counters["history_written"] == 4)
+
+    assert recorder.counters["history_rejected"] == 2
+    assert scalar(database_url, "SELECT count(*) FROM odometry") == 1
+    assert scalar(database_url, "SELECT id FROM log") == 2
+
+
+async def test_text_that_postgresql_cannot_hold_is_left_out(
+    postgresql_url: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(postgresql_url, tmp_path / "journal")
+    recorder.offer(alert_record(note="nul \0"))
+    recorder.offer(alert_record(alert_id="A2"))
+
+    await recorder.close()
+
+    assert scalar(postgresql_url, "SELECT alert_id FROM alerts") == "A2"
+    assert recorder.counters["history_rejected"] == 1
+
+
+async def test_a_file_that_rots_while_in_use_is_moved_aside(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "history.db"
+    recorder = Recorder(sqlite_url, tmp_path / "journal")
+    task = asyncio.create_task(recorder.run())
+    recorder.offer(command_record())
+    await until(lambda: recorder.counters["history_written"] == 1)
+    with sqlite3.connect(file, isolation_level=None) as other:
+        other.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    other.close()
+    with file.open("r+b") as raw:
+        raw.write(os.urandom(100))
+
+    recorder.offer(command_record(command_id="C2"))
+    await until(lambda: recorder.counters["history_replayed"] == 1)
+    task.cancel()
+    await asyncio.wait({task})
+    await recorder.close()
+
+    assert sum(".corrupt-" in name for name in os.listdir(tmp_path)) == 1
+    assert scalar(sqlite_url, "SELECT command_id FROM commands") == "C2"
+
+
+async def test_what_waits_too_long_is_late(sqlite_url: str, tmp_path: Path) -> None:
+    recorder = Recorder(
+        sqlite_url, tmp_path / "journal", read_clock=lambda: Instant(100.0, NOON)
+    )
+    recorder.offer(odometry_record())
+
+    fresh = recorder.health(Instant(101.0, NOON))
+    late = recorder.health(Instant(103.0, NOON))
+    await recorder.close()
+
+    assert (fresh.state, fresh.age_s) == ("ok", 1.0)
+    assert (late.state, late.age_s) == ("late", 3.0)
+    assert recorder.health(Instant(103.0, NOON)).age_s == 0.0
+
+
+async def test_securing_a_stop_returns_when_the_journal_holds_it(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(sqlite_url, tmp_path / "journal")
+
+    assert await recorder.secure(command_record())
+
+    assert b'"C1"' in (tmp_path / "journal").read_bytes()
+    await recorder.close()
+
+
+async def test_securing_says_when_the_disk_did_not_take_it(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    (tmp_path / "journal").mkdir()
+    recorder = Recorder(sqlite_url, tmp_path / "journal")
+
+    assert not await recorder.secure(command_record())
+
+    (tmp_path / "journal").rmdir()
+    await recorder.close()
+    assert scalar(sqlite_url, "SELECT count(*) FROM commands") == 1
+
+
+def test_the_journal_lies_beside_the_file_or_in_the_data_directory() -> None:
+    directory = Path("/data")
+
+    beside = journal_file("sqlite:////var/lib/history.db", directory)
+    apart = journal_file("postgresql://server/history", directory)
+
+    assert beside == Path("/var/lib/history.db.journal")
+    assert apart == Path("/data/history.journal")

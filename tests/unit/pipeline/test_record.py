@@ -1,0 +1,171 @@
+import dataclasses
+
+from iveg.domain.records import RECORD_TYPES, Record, is_telemetry
+from iveg.pipeline.record import OdometryThinner, RecordQueue, Waiting
+from tests.fakes.records import (
+    NOON,
+    alert_record,
+    command_event_record,
+    command_record,
+    decision_record,
+    detection_record,
+    log_record,
+    odometry_record,
+)
+
+KEPT = (
+    alert_record(),
+    command_event_record(),
+    command_record(),
+    decision_record(),
+    log_record(),
+)
+
+
+def waiting(record: Record, since: float = 0.0) -> Waiting:
+    return Waiting(record, 1, since)
+
+
+def queue_of(capacity: int, *records: Record) -> RecordQueue:
+    queue = RecordQueue(capacity)
+    for since, record in enumerate(records):
+        queue.offer(waiting(record, float(since)))
+    return queue
+
+
+def records(batch: list[Waiting]) -> list[Record]:
+    return [one.record for one in batch]
+
+
+def test_only_odometry_and_detections_may_be_dropped() -> None:
+    assert is_telemetry(odometry_record())
+    assert is_telemetry(detection_record())
+    assert not any(is_telemetry(record) for record in KEPT)
+    assert len(RECORD_TYPES) == len(KEPT) + 2
+
+
+def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:
+    queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
+
+    queue.offer(waiting(odometry_record(x=3.0)))
+
+    assert queue.dropped == 1
+    assert records(queue.take(10)) == [odometry_record(x=2.0), odometry_record(x=3.0)]
+
+
+def test_telemetry_makes_room_for_what_may_not_be_lost() -> None:
+    queue = queue_of(2, odometry_record(), detection_record(), *KEPT)
+
+    assert records(queue.take(10)) == list(KEPT)
+    assert queue.dropped == 2
+
+
+def test_what_may_not_be_lost_stays_even_when_there_is_no_room() -> None:
+    queue = queue_of(1, *KEPT)
+
+    assert len(queue) == len(KEPT)
+    assert queue.dropped == 0
+
+
+def test_telemetry_offered_to_a_queue_full_of_better_things_is_dropped() -> None:
+    queue = queue_of(1, command_record(), odometry_record())
+
+    assert records(queue.take(10)) == [command_record()]
+    assert queue.dropped == 1
+
+
+def test_what_may_not_be_lost_is_taken_first() -> None:
+    queue = queue_of(10, odometry_record(), command_record())
+
+    assert records(queue.take(1)) == [command_record()]
+    assert records(queue.take(1)) == [odometry_record()]
+    assert queue.take(1) == []
+
+
+def test_only_what_may_not_be_lost_can_be_taken_alone() -> None:
+    queue = queue_of(10, odometry_record(), command_record(), log_record())
+
+    assert records(queue.take_kept(10)) == [command_record(), log_record()]
+    assert len(queue) == 1
+
+
+def test_what_is_put_back_stands_where_it_stood() -> None:
+    queue = queue_of(
+        10, odometry_record(x=1.0), odometry_record(x=2.0), odometry_record(x=3.0)
+    )
+
+    queue.put_back(queue.take(2))
+
+    xs = [getattr(record, "x", None) for record in records(queue.take(10))]
+    assert xs == [1.0, 2.0, 3.0]
+
+
+def test_putting_back_into_a_full_queue_drops_the_oldest() -> None:
+    queue = queue_of(2, odometry_record(x=1.0), odometry_record(x=2.0))
+    batch = queue.take(1)
+    queue.offer(waiting(odometry_record(x=3.0)))
+
+    queue.put_back(batch)
+
+    assert queue.dropped == 1
+    assert records(queue.take(1)) == [odometry_record(x=2.0)]
+
+
+def test_the_queue_knows_how_long_its_oldest_record_waits() -> None:
+    queue = queue_of(10, odometry_record(), command_record())
+
+    assert queue.oldest_since() == 0.0
+    queue.take(2)
+    assert queue.oldest_since() is None
+
+
+def test_odometry_is_thinned_to_two_a_second_for_each_robot() -> None:
+    thinner = OdometryThinner()
+    ticks = [
+        odometry_record(robot_id=robot, at=NOON + tick / 20)
+        for tick in range(201)
+        for robot in ("AGI", "AGII")
+    ]
+
+    kept = [one for one in ticks if thinner.take(one) is not None]
+
+    assert sum(one.robot_id == "AGI" for one in kept) == 21
+    assert sum(one.robot_id == "AGII" for one in kept) == 21
+
+
+def test_a_pose_that_comes_half_a_tick_early_is_kept() -> None:
+    thinner = OdometryThinner()
+    thinner.take(odometry_record(at=NOON))
+
+    early = odometry_record(at=NOON + 0.48)
+
+    assert thinner.take(early) is early
+
+
+def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
+    thinner = OdometryThinner()
+    first = odometry_record(at=NOON)
+    changes = [
+        dataclasses.replace(first, at=NOON + 0.01, mandated_factor=0.5),
+        dataclasses.replace(
+            first, at=NOON + 0.02, mandated_factor=0.5, applied_factor=0.5
+        ),
+        dataclasses.replace(
+            first,
+            at=NOON + 0.03,
+            mandated_factor=0.5,
+            applied_factor=0.5,
+            link="LATE",
+        ),
+    ]
+
+    kept = [thinner.take(one) for one in [first, *changes, changes[-1]]]
+
+    assert kept == [first, *changes, None]
+
+
+def test_a_clock_that_was_set_back_does_not_silence_a_robot() -> None:
+    thinner = OdometryThinner()
+    thinner.take(odometry_record(at=NOON))
+
+    assert thinner.take(odometry_record(at=NOON - 3600.0)) is not None
