@@ -1,0 +1,168 @@
+"""Rows → Plotly figures: plotly's one door.
+
+The package checks every figure as it is made; the browser draws it with the library
+that lies in the same package, so the two always fit.  ``meta`` names what a trace or an
+axis shows, and the page puts the words in the reader's language.
+"""
+
+import gzip
+import hashlib
+import importlib.resources
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+from iveg.adapters.history.series import (
+    CONFIDENCE_BINS,
+    CommandLatency,
+    ConfidenceCount,
+    SpeedSeries,
+)
+from iveg.domain.profiles import profile_of
+
+_Trace = Mapping[str, object]
+
+_SILENCE_S = 5.0
+_BIN = 1.0 / CONFIDENCE_BINS
+
+
+def speed_figure(series: Sequence[SpeedSeries]) -> bytes:
+    """Speed (m/s) of each robot with its mandated limit as a step line, as JSON.
+
+    The limit is the mandated factor of the robot's greatest speed.  Lines break where
+    nothing was heard for 5 s: a line through silence would be invented.
+    """
+    traces = [trace for one in series for trace in _speed_traces(one)]
+    return _figure(traces, ("time", "speed"), {"yaxis": {"rangemode": "tozero"}})
+
+
+def confidence_figure(
+    counts: Sequence[ConfidenceCount], threshold: float | None
+) -> bytes:
+    """Detections stacked by class over their confidence, the threshold marked."""
+    traces = [
+        {
+            "type": "bar",
+            "name": class_id,
+            "meta": {"kind": "class", "class_id": class_id},
+            "x": [c.least + _BIN / 2 for c in counts if c.class_id == class_id],
+            "y": [c.count for c in counts if c.class_id == class_id],
+            "width": 0.9 * _BIN,
+        }
+        for class_id in sorted({c.class_id for c in counts})
+    ]
+    layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
+    if threshold is not None:
+        layout["shapes"] = [_line_at(threshold)]
+    return _figure(traces, ("confidence", "count"), layout)
+
+
+def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
+    """How long each STOP took (ms): to both answers, and to standing still."""
+    kinds = ("direct_ms", "fiware_ms", "standstill_ms")
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": kind.removesuffix("_ms"),
+            "meta": {"kind": kind.removesuffix("_ms")},
+            "x": [_ms(one.requested_at) for one in latencies],
+            "y": [getattr(one, kind) for one in latencies],
+            "text": [one.robot_id for one in latencies],
+        }
+        for kind in kinds
+        if any(getattr(one, kind) is not None for one in latencies)
+    ]
+    return _figure(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """Plotly for the browser.
+
+    Attributes:
+        name: Changes with the content, so that a browser may keep it for good.
+        packed: The script, gzipped.
+    """
+
+    name: str
+    packed: bytes
+
+
+@cache
+def library() -> Library:
+    """The script that lies in the installed package; the first call takes a while."""
+    data = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    script = data.read_bytes()
+    digest = hashlib.sha256(script).hexdigest()[:16]
+    return Library(f"plotly-{digest}.min.js", gzip.compress(script, 6, mtime=0))
+
+
+def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
+    robot, fastest = series.robot_id, profile_of(series.robot_id).max_speed
+    at = [_ms(moment) for moment in series.at]
+    lines: tuple[tuple[str, Sequence[float | None], _Trace], ...] = (
+        ("speed", series.linear, {}),
+        ("mandated", [fastest * f for f in series.mandated], {"shape": "hv"}),
+    )
+    gaps = _gaps(series)
+    for kind, values, line in lines:
+        yield {
+            "type": "scatter",
+            "mode": "lines",
+            "name": f"{robot} {kind}",
+            "meta": {"kind": kind, "robot": robot, "slice_s": series.slice_s},
+            "x": _broken(at, gaps, at),
+            "y": _broken(values, gaps, [None] * len(at)),
+            "line": line,
+            "connectgaps": False,
+        }
+
+
+def _gaps(series: SpeedSeries) -> list[int]:
+    """Places after which nothing was heard for too long."""
+    longest = max(_SILENCE_S, 3 * series.slice_s)
+    pairs = enumerate(pairwise(series.at))
+    return [place for place, (one, other) in pairs if other - one > longest]
+
+
+def _broken(
+    values: Sequence[float | None], gaps: Sequence[int], fill: Sequence[float | None]
+) -> list[float | None]:
+    out: list[float | None] = []
+    start = 0
+    for gap in gaps:
+        out += [*values[start : gap + 1], fill[gap]]
+        start = gap + 1
+    return out + list(values[start:])
+
+
+def _line_at(x: float) -> _Trace:
+    return {
+        "type": "line",
+        "name": "threshold",
+        "x0": x,
+        "x1": x,
+        "yref": "paper",
+        "y0": 0,
+        "y1": 1,
+    }
+
+
+def _figure(
+    traces: Sequence[_Trace], axes: tuple[str, str], layout: Mapping[str, object]
+) -> bytes:
+    """Checked by the package: a wrong name or value raises here, not in a browser."""
+    # Half of its users never open a chart, and the package is slow to load.
+    from plotly.graph_objects import Figure
+
+    figure = Figure(data=list(traces), layout=dict(layout))
+    figure.update_layout(template="none", meta={"x": axes[0], "y": axes[1]})
+    if axes[0] == "time":
+        figure.update_xaxes(type="date")
+    return str(figure.to_json()).encode()
+
+
+def _ms(moment: float) -> float:
+    return round(1000.0 * moment, 1)

@@ -1,0 +1,227 @@
+"""What is remembered, over HTTP: lists to filter and export, and figures to draw.
+
+Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Generic, TypeVar
+
+from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+
+from iveg.adapters import clock
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Filter, ListOf, Page
+from iveg.adapters.history.queries import Queries
+from iveg.domain.observations import Instant
+from iveg.domain.records import Record
+from iveg.web import charts, exports
+from iveg.web.exports import MEDIA_TYPES, Form
+from iveg.web.history_filters import Filters, Range, filter_of, range_of
+from iveg.web.history_views import (
+    AlertView,
+    CommandView,
+    DecisionView,
+    DetectionView,
+    EntryView,
+    Listing,
+    View,
+    view_alert,
+    view_command,
+    view_decision,
+    view_detection,
+    view_entry,
+)
+
+R = TypeVar("R", bound=Record)
+_FOR_GOOD = "public, max-age=31536000, immutable"
+_CSV_AND_NDJSON: dict[str, dict[str, str]] = {
+    MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _List(Generic[R]):
+    """One list: where it comes from and how it looks."""
+
+    path: str
+    of: ListOf[R]
+    ask: Callable[[Filter], Awaitable[Page[R]]]
+    view: Callable[[R], View]
+    model: type[View]
+    says: str
+
+
+def router(
+    queries: Queries,
+    *,
+    reader: Callable[..., Any],
+    threshold: float | None = None,
+    read_clock: Callable[[], Instant] = clock.now,
+) -> APIRouter:
+    """The routes of the history.
+
+    Args:
+        queries: Where the past is asked for.
+        reader: Dependency that refuses whoever may not read.
+        threshold: Least confidence of the rule, marked in the chart.
+        read_clock: What "the last 15 minutes" end at.
+    """
+    routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
+    for one in _lists(queries):
+        _add_list(routes, one)
+
+    @routes.get("/api/v1/decisions/{decision_id}", summary="One decision")
+    async def decision(
+        decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+    ) -> DecisionView:
+        found = await queries.decision(decision_id)
+        if found is None:
+            raise HTTPException(404, "There is no such decision.")
+        return view_decision(found)
+
+    @routes.get(
+        "/api/v1/history/charts",
+        summary="Plotly figures of a range",
+        description="Speed with the mandated limit, detections by class and "
+        "confidence, how long each STOP took; the last 15 minutes unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def draw(asked: Annotated[Range, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall)
+        return await _charts(queries, since, until, asked.robot, threshold)
+
+    @routes.get("/vendor/{name}", include_in_schema=False)
+    async def vendor(name: str) -> Response:
+        script = await asyncio.to_thread(charts.library)
+        if name != script.name:
+            raise HTTPException(404, "There is no such file.")
+        headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
+        return Response(script.packed, 200, headers, "text/javascript")
+
+    return routes
+
+
+def _lists(queries: Queries) -> tuple[_List[Any], ...]:
+    return (
+        _List(
+            "decisions",
+            lists.DECISIONS,
+            queries.decisions,
+            view_decision,
+            DecisionView,
+            "Why robots were slowed, by when it began",
+        ),
+        _List(
+            "detections",
+            lists.DETECTIONS,
+            queries.detections,
+            view_detection,
+            DetectionView,
+            "What robots saw, by when it reached iVeg",
+        ),
+        _List(
+            "commands",
+            lists.COMMANDS,
+            queries.commands,
+            view_command,
+            CommandView,
+            "Every STOP, release and resume, by when it was asked",
+        ),
+        _List(
+            "alerts",
+            lists.ALERTS,
+            queries.alerts,
+            view_alert,
+            AlertView,
+            "Every alert, by when it was raised",
+        ),
+        _List(
+            "log",
+            lists.LOG,
+            queries.log,
+            view_entry,
+            EntryView,
+            "The action and inference log",
+        ),
+    )
+
+
+def _add_list(routes: APIRouter, one: _List[R]) -> None:
+    @routes.get(
+        f"/api/v1/{one.path}",
+        name=one.path,
+        summary=one.says,
+        response_model=Listing[one.model],  # type: ignore[name-defined]
+        responses={200: {"content": _CSV_AND_NDJSON}},
+    )
+    async def listing(
+        request: Request, filters: Annotated[Filters, Query()]
+    ) -> Response:
+        form = filters.format or exports.form_of(request.headers)
+        asked = filter_of(filters, one.of)
+        if form == "json":
+            return _listing(await one.ask(asked), one.view)
+        return await _file(one, filters, asked, form)
+
+
+def _listing(page: Page[R], view: Callable[[R], View]) -> Response:
+    after = None if page.next is None else lists.write_cursor(page.next)
+    listing = Listing[View](items=[view(record) for record in page.items], next=after)
+    text = listing.model_dump_json(by_alias=True, serialize_as_any=True)
+    return Response(text, media_type=MEDIA_TYPES["json"])
+
+
+async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> Response:
+    """A whole list as a file; with a limit, that many rows of it."""
+    if filters.limit is None:
+        asked = replace(asked, limit=lists.MOST_ROWS)
+    # The first page is read before the answer begins, so that a refusal can be told.
+    first = await one.ask(asked)
+    pages = _pages(one, first, asked, whole=filters.limit is None)
+    if form == "csv":
+        body = exports.write_csv(one.of.kind, pages)
+    else:
+        body = exports.write_ndjson(one.view, pages)
+    name = f"{one.path}.{form}"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
+
+
+async def _pages(
+    one: _List[R], page: Page[R], asked: Filter, *, whole: bool
+) -> AsyncIterator[Sequence[R]]:
+    yield page.items
+    while whole and page.next is not None:
+        page = await one.ask(replace(asked, cursor=page.next))
+        yield page.items
+
+
+async def _charts(
+    queries: Queries,
+    since: float,
+    until: float,
+    robot: str | None,
+    threshold: float | None,
+) -> Response:
+    speeds, counts, stops = await asyncio.gather(
+        queries.speed_series(since, until, robot),
+        queries.confidence_counts(since, until, robot),
+        queries.command_latencies(since, until, robot),
+    )
+
+    def draw() -> bytes:
+        parts = (
+            b'{"library":"/vendor/%s"' % charts.library().name.encode(),
+            b'"speed":' + charts.speed_figure(speeds),
+            b'"detections":' + charts.confidence_figure(counts, threshold),
+            b'"stops":' + charts.stop_figure(stops) + b"}",
+        )
+        return b",".join(parts)
+
+    body = await asyncio.to_thread(draw)
+    return Response(body, media_type=MEDIA_TYPES["json"])

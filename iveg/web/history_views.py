@@ -1,0 +1,322 @@
+"""Remembered records as integrators read them: the names of the live topics."""
+
+from typing import Generic, TypeVar
+
+import orjson
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+
+from iveg.domain.records import (
+    AlertRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+)
+from iveg.ngsi.codec import format_stamp
+
+
+class View(BaseModel):
+    """Base of what history answers."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+V = TypeVar("V", bound=View)
+
+
+class Listing(View, Generic[V]):
+    """One page, newest first; ``next`` is the cursor of the page after it."""
+
+    items: list[V]
+    next: str | None
+
+
+class PointView(View):
+    """A place in ``map`` (m)."""
+
+    x: float
+    y: float
+    z: float
+
+
+class DetectionView(View):
+    """One detection; ``received_at`` is when it reached iVeg."""
+
+    robot_id: str
+    stamp: str | None
+    received_at: str
+    class_: str | None = Field(serialization_alias="class")
+    class_id: str
+    probability: float
+    position: PointView
+    box: JsonValue
+    confident: bool
+    person_id: str | None
+    road: str
+
+
+class CommandTimes(View):
+    """When each step of a command came to be known; null where it has not yet."""
+
+    requested: str
+    sent_fiware: str | None
+    sent_direct: str | None
+    answer_fiware: str | None
+    answer_direct: str | None
+    standing: str | None
+
+
+class CommandView(View):
+    """One STOP, release or resume."""
+
+    command_id: str
+    robot_id: str
+    kind: str
+    state: str
+    requested_by: str
+    times: CommandTimes
+    standstill_ms: float | None
+    tries: int
+    reason: str | None
+
+
+class AlertView(View):
+    """One notice, through its life."""
+
+    alert_id: str
+    priority: str
+    key: str
+    slots: JsonValue
+    robot_id: str | None
+    raised_at: str
+    cleared_at: str | None
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str | None
+    count: int
+
+
+class EntryView(View):
+    """One line of the log."""
+
+    id: int
+    at: str
+    kind: str
+    robot_id: str | None
+    key: str
+    slots: JsonValue
+    class_: str | None = Field(serialization_alias="class")
+    decision_id: str | None
+
+
+class RuleView(View):
+    """The rule that fired, as it was at that moment."""
+
+    id: str | None
+    version: str | None
+    parameters: JsonValue
+
+
+class LinkView(View):
+    """One link of the chain of evidence."""
+
+    link: str
+    at: str | None
+    value: JsonValue
+    verdict: str
+
+
+class SentenceView(View):
+    """A template's name and what fills its holes."""
+
+    key: str
+    slots: dict[str, str | float | bool | None]
+
+
+class DecisionView(View):
+    """Who was seen by whom, which rule fired, and when the robot obeyed."""
+
+    decision_id: str
+    kind: str
+    robot_id: str
+    person_id: str | None
+    observer: str | None
+    class_: str | None = Field(serialization_alias="class")
+    class_id: str | None
+    confidence: float | None
+    position: PointView | None
+    distance_m: float | None
+    speed_factor: float | None
+    reason: str | None
+    rule: RuleView
+    in_sight: bool | None
+    started_at: str
+    feedback_at: str | None
+    applied_at: str | None
+    observed_at: str | None
+    ended_at: str | None
+    speed_before: float | None
+    speed_after: float | None
+    links: list[LinkView]
+    sentence: SentenceView
+
+
+def view_detection(record: DetectionRecord) -> DetectionView:
+    """As ``GET /detections`` lists it."""
+    return DetectionView(
+        robot_id=record.robot_id,
+        stamp=record.stamp,
+        received_at=format_stamp(record.at),
+        class_=record.class_,
+        class_id=record.class_id,
+        probability=record.probability,
+        position=PointView(x=record.x, y=record.y, z=record.z),
+        box=_json(record.box),
+        confident=record.confident,
+        person_id=record.person_id,
+        road=record.road,
+    )
+
+
+def view_command(record: CommandRecord) -> CommandView:
+    """As ``GET /commands`` lists it."""
+    return CommandView(
+        command_id=record.command_id,
+        robot_id=record.robot_id,
+        kind=record.kind,
+        state=record.state,
+        requested_by=record.requested_by,
+        times=CommandTimes(
+            requested=format_stamp(record.requested_at),
+            sent_fiware=_time(record.sent_fiware_at),
+            sent_direct=_time(record.sent_direct_at),
+            answer_fiware=_time(record.answer_fiware_at),
+            answer_direct=_time(record.answer_direct_at),
+            standing=_time(record.standing_at),
+        ),
+        standstill_ms=record.standstill_ms,
+        tries=record.tries,
+        reason=record.reason,
+    )
+
+
+def view_alert(record: AlertRecord) -> AlertView:
+    """As ``GET /alerts`` lists it."""
+    return AlertView(
+        alert_id=record.alert_id,
+        priority=record.priority,
+        key=record.key,
+        slots=_json(record.slots),
+        robot_id=record.robot_id,
+        raised_at=format_stamp(record.raised_at),
+        cleared_at=_time(record.cleared_at),
+        acknowledged_at=_time(record.acknowledged_at),
+        acknowledged_by=record.acknowledged_by,
+        note=record.note,
+        count=record.count,
+    )
+
+
+def view_entry(record: LogRecord) -> EntryView:
+    """As ``GET /log`` lists it."""
+    return EntryView(
+        id=record.id,
+        at=format_stamp(record.at),
+        kind=record.kind,
+        robot_id=record.robot_id,
+        key=record.key,
+        slots=_json(record.slots),
+        class_=record.class_,
+        decision_id=record.decision_id,
+    )
+
+
+def view_decision(record: DecisionRecord) -> DecisionView:
+    """As ``GET /decisions`` lists it."""
+    return DecisionView(
+        decision_id=record.decision_id,
+        kind=record.kind,
+        robot_id=record.robot_id,
+        person_id=record.person_id,
+        observer=record.observer,
+        class_=record.class_,
+        class_id=record.class_id,
+        confidence=record.confidence,
+        position=_position(record),
+        distance_m=record.distance_m,
+        speed_factor=record.speed_factor,
+        reason=record.reason,
+        rule=RuleView(
+            id=record.rule_id,
+            version=record.rule_version,
+            parameters=_json(record.rule_parameters),
+        ),
+        in_sight=record.in_sight,
+        started_at=format_stamp(record.started_at),
+        feedback_at=_time(record.feedback_at),
+        applied_at=_time(record.applied_at),
+        observed_at=_time(record.observed_at),
+        ended_at=_time(record.ended_at),
+        speed_before=record.speed_before,
+        speed_after=record.speed_after,
+        links=_links(record.links),
+        sentence=_sentence(record),
+    )
+
+
+def _position(record: DecisionRecord) -> PointView | None:
+    if record.x is None or record.y is None:
+        return None
+    return PointView(x=record.x, y=record.y, z=record.z or 0.0)
+
+
+def _sentence(record: DecisionRecord) -> SentenceView:
+    """The same words that the log used when it happened."""
+    if record.kind == "alert":
+        key = "log.person_seen"
+    elif record.in_sight is False:
+        key = f"log.speed_down.{record.reason}_nlos"
+    else:
+        key = f"log.speed_down.{record.reason or 'default'}"
+    slots: dict[str, str | float | bool | None] = {
+        "robot": record.robot_id,
+        "person": record.person_id,
+        "observer": record.observer,
+        "class": record.class_,
+        "class_id": record.class_id,
+        "confidence": record.confidence,
+        "factor": record.speed_factor,
+        "reason": record.reason,
+        "distance": record.distance_m,
+        "in_sight": record.in_sight,
+    }
+    return SentenceView(key=key, slots=slots)
+
+
+def _links(text: str) -> list[LinkView]:
+    links = _json(text)
+    found = links if isinstance(links, list) else []
+    return [_link(link) for link in found if isinstance(link, dict)]
+
+
+def _link(link: dict[str, JsonValue]) -> LinkView:
+    at = link.get("at")
+    return LinkView(
+        link=str(link.get("link")),
+        at=format_stamp(at) if isinstance(at, int | float) else None,
+        value=link.get("value"),
+        verdict=str(link.get("verdict")),
+    )
+
+
+def _json(text: str | None) -> JsonValue:
+    """Our own JSON text back as a value; null where a row holds none that is whole."""
+    try:
+        value: JsonValue = orjson.loads(text or "null")
+    except orjson.JSONDecodeError:
+        return None
+    return value
+
+
+def _time(at: float | None) -> str | None:
+    return None if at is None else format_stamp(at)
