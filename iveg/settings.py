@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import field as _field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import urlsplit
 
 from iveg.domain.errors import SettingsError
@@ -227,7 +227,7 @@ class Settings:
         3.0,
         "Age of feedback at which a robot stands (s).",
     )
-    uplink: str = setting(
+    uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",
         _choice("per-topic", "single"),
         "per-topic",

@@ -4,7 +4,7 @@ The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; 
 are Unix seconds unless said otherwise.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -229,8 +229,13 @@ Observation = (
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """An observation with the moment and the road that brought it."""
+    """An observation with the moment and the road that brought it.
+
+    Attributes:
+        asked: It is Orion's answer to a question, so nobody knows how old it is.
+    """
 
     observation: Observation
     at: Instant
-    road: Road = field(default="orion")
+    road: Road = "orion"
+    asked: bool = False

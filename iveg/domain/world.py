@@ -171,10 +171,13 @@ class World:
         origin = getattr(observation, "origin", Origin())
         verdict = robot.judge(observation, origin)
         self.counters[f"{type(observation).__name__}.{verdict}"] += 1
-        if verdict == "duplicate":
-            return verdict
-        robot.heard_at = at.mono
-        delay = robot.clock.observe(origin, at)
+        if verdict == "duplicate" or (received.asked and origin.seq is None):
+            return "duplicate"
+        if received.asked:
+            delay = _age_when_asked(origin, at)
+        else:
+            robot.heard_at = at.mono
+            delay = robot.clock.observe(origin, at)
         if verdict == "new":
             _update(robot, received, delay)
         return verdict
@@ -182,6 +185,12 @@ class World:
     def live_robots(self) -> Iterable[RobotState]:
         """Robots that are not recordings."""
         return (robot for robot in self.robots.values() if not robot.is_replay)
+
+
+def _age_when_asked(origin: Origin, at: Instant) -> float:
+    """How old Orion's answer is at least (s): nothing that was asked for looks live."""
+    told = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
+    return max(told, LATE_S + 0.1)
 
 
 def _update(robot: RobotState, received: Received, delay: float) -> None:

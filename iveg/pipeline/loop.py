@@ -55,6 +55,8 @@ class RuleLoop:
         """Take everything that arrived, then let time pass if it is due."""
         for received in arrived:
             fresh = self._assessor.take(received)
+            if received.asked:
+                continue
             # The second road's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
                 self._commander.take(received)

@@ -1,11 +1,11 @@
 """REST twins of what is live: robots, people, map, climate (docs/interfaces.md §5)."""
 
 from collections.abc import Callable
-from typing import TypedDict
 
 import orjson
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
+from typing_extensions import TypedDict
 
 from iveg.domain.observations import Instant
 from iveg.web import schemas

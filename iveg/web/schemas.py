@@ -4,7 +4,10 @@ Lengths in metres, angles in radians, times ISO-8601 UTC, ages in seconds
 (docs/interfaces.md §5 and §8).
 """
 
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal
+
+# pydantic takes the standard library's TypedDict from Python 3.12 on only.
+from typing_extensions import TypedDict
 
 
 class Point(TypedDict):

@@ -1,0 +1,362 @@
+"""Composition root of the DSS: settings → parts → FastAPI.  Wires, decides nothing."""
+
+import asyncio
+import logging
+import secrets
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from fastapi import Depends, FastAPI
+from starlette.staticfiles import StaticFiles
+from ulid import ULID
+
+from iveg import __version__
+from iveg.adapters import clock
+from iveg.adapters.direct import DirectReader
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.history.engine import sqlite_file, sqlite_url
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.journal import FileJournal
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.roads import MqttRoad, OrionRoad
+from iveg.adapters.upkeep import Upkeep
+from iveg.domain.alerts import Rule
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import Instant
+from iveg.domain.world import World
+from iveg.ngsi.codec import format_stamp
+from iveg.pipeline.assess import Assessor
+from iveg.pipeline.chain import Chain
+from iveg.pipeline.command import Commander
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.publish import Hub
+from iveg.settings import Settings
+from iveg.web import (
+    alerts,
+    commands,
+    health,
+    history,
+    live,
+    notifications,
+    openapi,
+    pages,
+    problems,
+    robots,
+    security,
+)
+from iveg.web.auth import Door, NotifySecret, Principal, SignInLink, require
+from iveg.web.contexts import Site
+from iveg.web.views import Views
+
+_log = logging.getLogger(__name__)
+
+
+def new_id() -> str:
+    """A ULID: random, sortable by time, never reused."""
+    return str(ULID())
+
+
+class Dss:
+    """The decision-support system with all its parts, not yet running.
+
+    Args:
+        settings: What an operator chose.
+        data_directory: Where the database (unless set) and the journals live.
+        demo: Whether the robots are emulated; shown on the page.
+        on_failure: Called when a part that must live has died.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        data_directory: Path,
+        *,
+        demo: bool = False,
+        on_failure: Callable[[], None] | None = None,
+    ) -> None:
+        start = clock.now()
+        self.settings = settings
+        self.on_failure = on_failure
+        self._boot = secrets.token_hex(8)
+        self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
+        self.notify_secret = NotifySecret(
+            settings.notify_token or secrets.token_hex(32)
+        )
+        self._demo = demo
+        url = settings.database_url or sqlite_url(data_directory / "iveg.sqlite")
+        beside = sqlite_file(url)
+        directory = data_directory if beside is None else beside.parent
+        directory.mkdir(parents=True, exist_ok=True)
+
+        self.hub = Hub()
+        self.recorder = Recorder(url, journal_file(url, directory))
+        self.queries = Queries(url)
+        self.minutes = Minutes(self.hub, self.recorder, start)
+        world = World(settings.robots)
+        self.chain = Chain(start)
+        self.ingest = Ingest(world.robots.__contains__, self._rejected)
+        self.journal = FileJournal(directory / "commands.jsonl")
+        self._direct = DirectReader(
+            settings.apikey,
+            settings.robots,
+            clock.now,
+            self.ingest.offer,
+            self.ingest.reject,
+        )
+        self.link = MqttLink(
+            broker_of(settings),
+            "iveg",
+            self._direct.subscriptions() if settings.direct_read else None,
+            self._direct.read,
+            self._broker_back,
+            self._broker_lost,
+        )
+        self.orion = OrionClient(
+            settings.orion_url, settings.fiware_service, settings.fiware_servicepath
+        )
+        self.agent = IotAgentClient(
+            settings.iota_url, settings.fiware_service, settings.fiware_servicepath
+        )
+        road = MqttRoad(self.link, settings.apikey)
+        self.assessor = Assessor(
+            world,
+            load_greenhouse(settings.greenhouse),
+            Rule(
+                threshold=settings.confidence_threshold,
+                radius_m=settings.safety_radius_m,
+            ),
+            road,
+            self.minutes,
+            self.hub,
+            new_id,
+            format_stamp,
+            self._boot,
+        )
+        self.commander = Commander(
+            settings.robots,
+            road,
+            OrionRoad(self.orion),
+            self.journal,
+            self.minutes,
+            self.hub,
+            new_id,
+            clock.now,
+            direct=settings.stop_direct,
+        )
+        self.loop = RuleLoop(
+            self.ingest,
+            self.assessor,
+            self.commander,
+            self.chain,
+            self.minutes,
+            self.hub,
+            clock.now,
+            lambda: self.recorder.health(clock.now()).state,
+        )
+        self.upkeep = Upkeep(
+            self.orion,
+            self.agent,
+            self.link,
+            self.chain,
+            self.ingest,
+            robots=settings.robots,
+            apikey=settings.apikey,
+            context_broker_url=settings.iota_cb_url or settings.orion_url,
+            notify_url=settings.notify_url or notify_url_of(settings),
+            notify_token=self.notify_secret.current,
+            boot=self._boot,
+            read_clock=clock.now,
+        )
+        self.views = Views(self.assessor, self.commander)
+        self.door = Door(
+            sign_in_token=self.sign_in_token,
+            api_token=settings.api_token,
+            now=lambda: clock.now().mono,
+        )
+
+    # --- life ---------------------------------------------------------------------
+
+    @asynccontextmanager
+    async def running(self, _: FastAPI | None = None) -> AsyncIterator[None]:
+        """Everything that lives beside the requests."""
+        living = asyncio.create_task(self._live(), name="dss")
+        living.add_done_callback(self._ended)
+        try:
+            yield
+        finally:
+            living.remove_done_callback(self._ended)
+            living.cancel()
+            await asyncio.gather(living, return_exceptions=True)
+            await self.commander.close()
+            await self.recorder.close()
+            await self.orion.close()
+            await self.agent.close()
+            self.queries.close()
+            self.journal.close()
+
+    async def _live(self) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.link.run(), name="mqtt")
+            tasks.create_task(self.loop.run(), name="rule-loop")
+            tasks.create_task(self.upkeep.run(), name="upkeep")
+            tasks.create_task(self.recorder.run(), name="recorder")
+            self.commander.restore(self.journal.read(), clock.now())
+
+    def _ended(self, task: asyncio.Task[None]) -> None:
+        """A part that must live has died: say so and stop; the robots slow down."""
+        if not task.cancelled():
+            _log.critical("iVeg stops", exc_info=task.exception())
+        if self.on_failure is not None:
+            self.on_failure()
+
+    def _broker_back(self) -> None:
+        self.chain.mqtt_connected = True
+        self.commander.broker_back()
+
+    def _broker_lost(self) -> None:
+        self.chain.mqtt_connected = False
+
+    def _rejected(self, source: str, reason: str) -> None:
+        event = LogEvent("system", "log.rejected", {"source": source, "reason": reason})
+        self.minutes.log(event, clock.now())
+
+    # --- what the web asks --------------------------------------------------------
+
+    def counters(self) -> Counter[str]:
+        """Everything that is counted."""
+        total = Counter(self.ingest.counters)
+        total.update(self.assessor.world.counters)
+        total.update(self.recorder.counters)
+        total["live.browsers"] = self.hub.watchers
+        total["nlos.protected"] = self.assessor.protected_unseen
+        return total
+
+    def health(self, now: Instant) -> Any:
+        """The chain from robot to screen."""
+        return health.health_of(self.chain, self.counters, now)
+
+    def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
+        """Everything that is known, for a browser that has just come."""
+        views, ids = self.views, self.settings.robots
+        frames = {robot_id: views.frame(robot_id) for robot_id in ids}
+        return {
+            "t": format_stamp(now.wall),
+            "server": {
+                "boot": self._boot,
+                "version": __version__,
+                "demo": self._demo,
+                "wall": now.wall,
+            },
+            "user": {"name": principal.name, "role": principal.role},
+            "rule": views.rule(),
+            "map": views.map(),
+            "robots": views.robots(now),
+            "people": views.people(now),
+            "detections": {name: frame for name, frame in frames.items() if frame},
+            "commands": views.open_commands(now),
+            "alerts": views.alerts(),
+            "log": views.log(list(self.minutes.lines)[-200:]),
+            "health": self.health(now),
+            "climate": views.climate(now),
+        }
+
+    async def stop(self, robot_id: str | None, by: str) -> None:
+        """STOP one robot, or all."""
+        targets = self.commander.machines if robot_id is None else [robot_id]
+        await self.commander.stop(targets, by, clock.now())
+
+    def is_ours(self, subscription_id: str) -> bool:
+        """Whether a subscription is one that this DSS keeps."""
+        return subscription_id in self.upkeep.subscription_ids
+
+    def notified(self, at: Instant) -> None:
+        """A notification of Orion's came in."""
+        self.chain.notified_at = at.mono
+
+    def site(self) -> Site:
+        """What every page says of this server."""
+        rule = self.assessor.rule
+        return Site(
+            self.assessor.greenhouse.name,
+            self.settings.robots,
+            __version__,
+            self._demo,
+            rule.threshold,
+            rule.radius_m,
+        )
+
+
+def create_app(dss: Dss) -> FastAPI:
+    """The web face of a DSS; its lifespan runs the rest."""
+    app = FastAPI(
+        title="iVeg",
+        version=__version__,
+        description="Supervise mixed robot fleets in greenhouses.",
+        lifespan=dss.running,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+    )
+    app.state.door = dss.door
+    drawn = pages.Pages(dss.site())
+    encoder = live.Encoder(dss.views, dss.hub, clock.now, dss.health)
+    settings = dss.settings
+    tenant = settings.fiware_service, settings.fiware_servicepath
+    app.include_router(
+        notifications.router(
+            dss.ingest, dss.notify_secret, clock.now, dss.is_ours, tenant, dss.notified
+        )
+    )
+    app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))
+    app.include_router(robots.router(dss.views, clock.now, dss.health))
+    app.include_router(commands.router(dss.commander, clock.now))
+    app.include_router(alerts.router(dss.assessor, clock.now))
+    app.include_router(
+        history.router(
+            dss.queries,
+            reader=require("read"),
+            threshold=dss.assessor.rule.threshold,
+        )
+    )
+    app.include_router(health.router(clock.now, dss.health))
+    app.include_router(
+        pages.router(
+            drawn,
+            reader=require("read"),
+            anyone=require("open"),
+            document=lambda: openapi.describe_api(app),
+        )
+    )
+
+    @app.get("/openapi.json", dependencies=[Depends(require("read"))])
+    async def document() -> Any:
+        """This interface in OpenAPI."""
+        return app.openapi()
+
+    app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
+    problems.install(app, drawn.problem)
+    app.add_middleware(security.SecurityHeaders)
+    app.add_middleware(security.BodyLimit)
+    app.add_middleware(SignInLink, door=dss.door, refusal=drawn.refused_link)
+    return app
+
+
+def broker_of(settings: Settings) -> BrokerAddress:
+    """Where the MQTT broker is and who we are there."""
+    return BrokerAddress.from_url(
+        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+    )
+
+
+def notify_url_of(settings: Settings) -> str:
+    """Where Orion reaches us when nobody said otherwise."""
+    return f"http://{settings.host}:{settings.port}/ngsi/notifications"

@@ -1,0 +1,121 @@
+"""The command line: words and settings to parts (docs/interfaces.md §6)."""
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from iveg import __version__
+from iveg.domain.errors import DataFileError, IvegError, SettingsError
+from iveg.settings import Settings, default_data_directory, describe
+
+UNUSABLE = 2
+"""Exit code for a setting or a file that cannot be used."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run one command; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(
+        level=logging.INFO if options.verbose else logging.WARNING,
+        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
+    )
+    # Their INFO lines are one a message; what matters they say as warnings.
+    for noisy in ("amqtt", "transitions", "httpx", "alembic"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+    try:
+        settings = Settings.from_environment(os.environ)
+        return _run(options, settings)
+    except (SettingsError, DataFileError) as error:
+        print(f"iveg: {error}", file=sys.stderr)
+        return UNUSABLE
+    except IvegError as error:
+        print(f"iveg: {error}", file=sys.stderr)
+        return 1
+
+
+def _run(options: argparse.Namespace, settings: Settings) -> int:
+    data = default_data_directory(os.environ, Path.home())
+    match options.command:
+        case "settings":
+            print(describe(), end="")
+            return 0
+        case "db":
+            from iveg.cli.parts import upgrade_database
+
+            return upgrade_database(settings, data)
+        case "provision":
+            from iveg.cli.parts import provision_fleet
+
+            return provision_fleet(settings)
+        case "demo":
+            from iveg.cli.demo import demo
+
+            return demo(settings, os.environ, data)
+        case _:
+            from iveg.cli import parts
+
+            return parts.run_part(options, settings, data)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="iveg", description="Supervise mixed robot fleets in greenhouses."
+    )
+    parser.add_argument("--version", action="version", version=f"iveg {__version__}")
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="log what goes well, too"
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("demo", help="everything on this machine, nothing else needed")
+    serve = commands.add_parser("serve", help="the DSS and its page")
+    serve.add_argument("--demo", action="store_true", help=argparse.SUPPRESS)
+    fiware = commands.add_parser("fiware", help="MQTT broker, Orion and IoT Agent")
+    emulator = commands.add_parser("emulator", help="robots that are not there")
+    emulator.add_argument("--scenario", default="demo", metavar="NAME")
+    emulator.add_argument(
+        "--robots", type=_positive, metavar="N", help="how many (default: the fleet)"
+    )
+    emulator.add_argument("--seed", type=int, default=1, metavar="S")
+    emulator.add_argument(
+        "--profile", default="simulation", choices=("simulation", "field", "perfect")
+    )
+    emulator.add_argument(
+        "--held", action="store_true", help="robots stay held after they boot"
+    )
+    emulator.add_argument("--fault-port", type=int, metavar="PORT")
+    replay = commands.add_parser("replay", help="recorded logs as robots")
+    replay.add_argument("files", nargs="+", type=Path, metavar="FILE")
+    replay.add_argument(
+        "--robot", nargs="+", required=True, metavar="NAME", help="one for each file"
+    )
+    replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
+    replay.add_argument("--loop", action="store_true", help="start over at the end")
+    replay.add_argument(
+        "--force", action="store_true", help="also where a live robot may be listening"
+    )
+    for part in (serve, fiware, emulator, replay):
+        part.add_argument(
+            "--until-eof", action="store_true", help="end when the input closes"
+        )
+    commands.add_parser("provision", help="make devices and subscriptions")
+    commands.add_parser("settings", help="print docs/settings.md")
+    database = commands.add_parser("db", help="the history's database")
+    database.add_argument("action", choices=("upgrade",))
+    return parser
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= 100:
+        raise argparse.ArgumentTypeError("a number from 1 to 100")
+    return number
+
+
+def _speed(text: str) -> float:
+    factor = float(text)
+    if not 0.01 <= factor <= 100.0:
+        raise argparse.ArgumentTypeError("a factor from 0.01 to 100")
+    return factor

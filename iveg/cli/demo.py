@@ -1,0 +1,174 @@
+"""Everything on one machine: three processes, one address, one Ctrl-C.
+
+The parts talk only through MQTT and HTTP, so each can be killed and started again by
+itself.  They watch their standard input: when this process is gone, so are they.
+"""
+
+import asyncio
+import contextlib
+import logging
+import secrets
+import signal
+import socket
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from iveg.cli.running import run_until_told, sign_in_link
+from iveg.domain.errors import SettingsError
+from iveg.settings import Settings
+
+_log = logging.getLogger(__name__)
+_PATIENCE_S = 30.0
+_GRACE_S = 5.0
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True, slots=True)
+class _Listener:
+    """One address that the demo opens, and the setting that moves it."""
+
+    field: str
+    variable: str
+    host: str
+    port: int
+
+
+def demo(settings: Settings, environment: Mapping[str, str], data: Path) -> int:
+    """Run the demo; returns the exit code."""
+    placed = replace(
+        _on_free_ports(settings, environment),
+        sign_in_token=settings.sign_in_token or secrets.token_hex(32),
+        notify_token=settings.notify_token or secrets.token_hex(32),
+    )
+    directory = data / "demo"
+    # Each demo is a new greenhouse: nothing of the last one's robots is still held.
+    with contextlib.suppress(FileNotFoundError):
+        (directory / "commands.jsonl").unlink()
+    child_environment = {
+        **environment,
+        **placed.to_environment(),
+        "XDG_DATA_HOME": str(_data_home(data)),
+        "IVEG_DATA_DIRECTORY": str(directory),
+    }
+    return run_until_told(_supervise(placed, child_environment))
+
+
+def _data_home(data: Path) -> Path:
+    return data.parent
+
+
+def _on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
+    """Defaults that are taken move to a free port; what somebody chose does not."""
+    listeners = [_Listener("port", "IVEG_PORT", settings.host, settings.port)]
+    for field, variable in (
+        ("mqtt_url", "IVEG_MQTT_URL"),
+        ("orion_url", "IVEG_ORION_URL"),
+        ("iota_url", "IVEG_IOTA_URL"),
+    ):
+        parts = urlsplit(getattr(settings, field))
+        default = {"mqtt_url": 1883}.get(field, 80)
+        listeners.append(
+            _Listener(field, variable, parts.hostname or "", parts.port or default)
+        )
+    changes: dict[str, object] = {}
+    for one in listeners:
+        if one.host not in _LOOPBACK and one.field != "port":
+            raise SettingsError(one.variable, one.host, "an address on loopback")
+        if _is_free(one.host, one.port):
+            continue
+        if environment.get(one.variable):
+            raise SettingsError(one.variable, str(one.port), "a port that is free")
+        port = _free_port(one.host)
+        changes[one.field] = (
+            port
+            if one.field == "port"
+            else f"{urlsplit(getattr(settings, one.field)).scheme}://{one.host}:{port}"
+        )
+    return replace(settings, **changes)  # type: ignore[arg-type]
+
+
+def _is_free(host: str, port: int) -> bool:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError:
+            return False
+    return True
+
+
+def _free_port(host: str) -> int:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.bind((host, 0))
+        port: int = probe.getsockname()[1]
+    return port
+
+
+# --- processes --------------------------------------------------------------------
+
+
+async def _supervise(settings: Settings, environment: Mapping[str, str]) -> None:
+    parts: list[tuple[str, asyncio.subprocess.Process]] = []
+    try:
+        for arguments in (["fiware"], ["serve", "--demo"], ["emulator"]):
+            process = await _start(arguments, environment)
+            parts.append((arguments[0], process))
+            await _ready(arguments[0], process)
+        print(f"iVeg: {sign_in_link(settings, settings.sign_in_token)}", flush=True)
+        await asyncio.gather(*(_watch(name, process) for name, process in parts))
+    finally:
+        await _stop([process for _, process in reversed(parts)])
+
+
+async def _start(
+    arguments: list[str], environment: Mapping[str, str]
+) -> asyncio.subprocess.Process:
+    # A session of its own: Ctrl-C reaches this process alone, which stops the parts
+    # in order, so that none complains about another that has already gone.
+    return await asyncio.create_subprocess_exec(
+        sys.executable,
+        "-m",
+        "iveg",
+        *arguments,
+        "--until-eof",
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+        env=dict(environment),
+        start_new_session=True,
+    )
+
+
+async def _ready(name: str, process: asyncio.subprocess.Process) -> None:
+    assert process.stdout is not None  # noqa: S101 - it was asked for
+    try:
+        async with asyncio.timeout(_PATIENCE_S):
+            line = await process.stdout.readline()
+    except TimeoutError:
+        line = b""
+    if line.strip() != b"ready":
+        raise SystemExit(f"iveg: {name} did not start.")
+
+
+async def _watch(name: str, process: asyncio.subprocess.Process) -> None:
+    """Stay until a part ends; the others go on, as they would on a real site."""
+    code = await process.wait()
+    print(f"iveg: {name} has ended (exit code {code}).", file=sys.stderr, flush=True)
+
+
+async def _stop(processes: list[asyncio.subprocess.Process]) -> None:
+    for process in processes:
+        if process.returncode is not None:
+            continue
+        process.send_signal(signal.SIGTERM)
+        try:
+            async with asyncio.timeout(_GRACE_S):
+                await process.wait()
+        except TimeoutError:
+            _log.warning("process %d did not end and is killed", process.pid)
+            process.kill()
+            await process.wait()

@@ -1,0 +1,232 @@
+"""The parts as processes: serve, fiware, emulator, replay."""
+
+import argparse
+import asyncio
+import contextlib
+import os
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
+
+import uvicorn
+
+from iveg.adapters import clock
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.history.engine import sqlite_url
+from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.orion import OrionClient
+from iveg.app import Dss, broker_of, create_app
+from iveg.cli.running import run_until_told, sign_in_link, tell_ready
+from iveg.domain.errors import DataFileError
+from iveg.settings import Settings
+
+_LIVE_ROBOT_S = 10.0
+_LOOPBACK = ("127.0.0.1", "localhost", "::1")
+_WS_MAX_BYTES = 65536
+
+
+def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int:
+    """Run one part until it is told to end; returns the exit code."""
+    data = Path(os.environ.get("IVEG_DATA_DIRECTORY") or data)
+    match options.command:
+        case "serve":
+            work = serve(settings, data, demo=options.demo)
+        case "fiware":
+            work = fiware(settings)
+        case "emulator":
+            work = emulator(options, settings)
+        case _:
+            work = replay(options, settings)
+    return run_until_told(work, until_eof=options.until_eof)
+
+
+# --- the DSS ----------------------------------------------------------------------
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to ``run_until_told``, which ends every part the same way."""
+
+    def __init__(self, config: uvicorn.Config, on_start: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_start = on_start
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            self._on_start()
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
+    """The DSS and its page."""
+    dss = Dss(settings, data, demo=demo)
+    server = _Server(
+        uvicorn.Config(
+            create_app(dss),
+            host=settings.host,
+            port=settings.port,
+            log_config=None,
+            access_log=False,
+            ws_max_size=_WS_MAX_BYTES,
+            ws_ping_interval=10.0,
+            ws_ping_timeout=10.0,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        ),
+        on_start=tell_ready if demo else lambda: _print_link(settings, dss),
+    )
+    dss.on_failure = lambda: setattr(server, "should_exit", True)
+    serving = asyncio.create_task(server.serve(), name="http")
+    try:
+        await asyncio.shield(serving)
+    except asyncio.CancelledError:
+        server.should_exit = True
+        await serving
+
+
+def _print_link(settings: Settings, dss: Dss) -> None:
+    print(f"iVeg: {sign_in_link(settings, dss.sign_in_token)}", flush=True)
+
+
+# --- FIWARE, robots, recordings ---------------------------------------------------
+
+
+async def fiware(settings: Settings) -> None:
+    """The embedded broker, Orion and IoT Agent."""
+    from iveg.embedded.server import serve_fiware
+
+    await serve_fiware(
+        _address(settings.mqtt_url, 1883),
+        _address(settings.orion_url, 1026),
+        _address(settings.iota_url, 4041),
+        notify_ready=tell_ready,
+    )
+
+
+async def emulator(options: argparse.Namespace, settings: Settings) -> None:
+    """Robots, people and air that are not there."""
+    from iveg.emulator.fleet import run_emulator
+
+    robots = list(settings.robots)
+    if options.robots is not None:
+        more = range(len(robots) + 1, options.robots + 1)
+        robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
+    with TemporaryDirectory(prefix="iveg-robots-") as directory:
+        running = asyncio.create_task(
+            run_emulator(
+                robots=robots,
+                address=broker_of(settings),
+                apikey=settings.apikey,
+                greenhouse=load_greenhouse(settings.greenhouse),
+                scenario=options.scenario,
+                seed=options.seed,
+                profile=options.profile,
+                uplink=settings.uplink,
+                slow_s=settings.feedback_slow_s,
+                stand_s=settings.feedback_stand_s,
+                state_directory=Path(directory),
+                held=options.held,
+                fault_port=options.fault_port,
+            ),
+            name="emulator",
+        )
+        tell_ready()
+        try:
+            await running
+        finally:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+
+async def replay(options: argparse.Namespace, settings: Settings) -> None:
+    """Recorded logs of real robots, played like any robot."""
+    from iveg.emulator.replay import run_replay
+
+    await _refuse_replay(options, settings)
+    with TemporaryDirectory(prefix="iveg-replay-") as directory:
+        await run_replay(
+            options.files,
+            options.robot,
+            address=broker_of(settings),
+            apikey=settings.apikey,
+            speed=options.speed,
+            loop=options.loop,
+            state_directory=Path(directory),
+        )
+
+
+async def _refuse_replay(options: argparse.Namespace, settings: Settings) -> None:
+    """A recording must never be taken for a robot that is really there."""
+    strangers = [name for name in options.robot if name not in settings.robots]
+    if strangers:
+        fleet = ", ".join(settings.robots)
+        raise DataFileError(
+            "--robot", strangers[0], f"is not in the fleet (IVEG_ROBOTS: {fleet})"
+        )
+    if options.force:
+        return
+    host = broker_of(settings).host
+    if host not in _LOOPBACK:
+        raise DataFileError(
+            "IVEG_MQTT_URL", host, "is not on loopback; --force if that is meant"
+        )
+    orion = OrionClient(
+        settings.orion_url, settings.fiware_service, settings.fiware_servicepath
+    )
+    try:
+        for robot_id in options.robot:
+            heard = await orion.modified_at(robot_id)
+            if heard is not None and clock.now().wall - heard < _LIVE_ROBOT_S:
+                raise DataFileError(
+                    "--robot", robot_id, "was live in the last 10 s; --force if meant"
+                )
+    finally:
+        await orion.close()
+
+
+# --- once -------------------------------------------------------------------------
+
+
+def upgrade_database(settings: Settings, data: Path) -> int:
+    """Bring the history's database to the newest shape."""
+    data.mkdir(parents=True, exist_ok=True)
+    upgrade(settings.database_url or sqlite_url(data / "iveg.sqlite"))
+    print("The database is up to date.")
+    return 0
+
+
+def provision_fleet(settings: Settings) -> int:
+    """Make or mend the devices of the fleet, and say what was mended."""
+
+    async def work() -> None:
+        service = settings.fiware_service, settings.fiware_servicepath
+        orion = OrionClient(settings.orion_url, *service)
+        agent = IotAgentClient(settings.iota_url, *service)
+        try:
+            done = await provision(
+                agent,
+                orion,
+                robots=settings.robots,
+                apikey=settings.apikey,
+                cbroker_url=settings.iota_cb_url or settings.orion_url,
+            )
+        finally:
+            await orion.close()
+            await agent.close()
+        said = [*done.mended, *done.problems]
+        print("\n".join(said) or "Everything was as it should be.")
+
+    asyncio.run(work())
+    return 0
+
+
+def _address(url: str, default_port: int) -> tuple[str, int]:
+    parts = urlsplit(url)
+    return parts.hostname or "127.0.0.1", parts.port or default_port

@@ -1,0 +1,52 @@
+"""Running one part in the foreground until it is told to end.
+
+Ctrl-C, SIGTERM and, where asked for, the end of the standard input all end a part the
+same way: it is cancelled, cleans up, and leaves with exit code 0.
+"""
+
+import asyncio
+import contextlib
+import os
+import signal
+import sys
+from collections.abc import Coroutine
+from typing import Any
+
+import uvloop
+
+from iveg.settings import Settings
+
+
+def run_until_told(work: Coroutine[Any, Any, None], *, until_eof: bool = False) -> int:
+    """Run to the end or to the first signal; returns the exit code."""
+    return uvloop.run(_guard(work, until_eof=until_eof))
+
+
+async def _guard(work: Coroutine[Any, Any, None], *, until_eof: bool) -> int:
+    loop = asyncio.get_running_loop()
+    task = asyncio.create_task(work, name="part")
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, task.cancel)
+    if until_eof:
+        loop.add_reader(sys.stdin.fileno(), _read, loop, task)
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+    return 0
+
+
+def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
+    """Nothing is ever written to us; the end means that whoever started us is gone."""
+    if not os.read(sys.stdin.fileno(), 1024):
+        loop.remove_reader(sys.stdin.fileno())
+        task.cancel()
+
+
+def sign_in_link(settings: Settings, token: str) -> str:
+    """The address that signs a browser in."""
+    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    return f"http://{host}:{settings.port}/?token={token}"
+
+
+def tell_ready() -> None:
+    """Say on the standard output that this part is up."""
+    print("ready", flush=True)
