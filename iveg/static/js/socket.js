@@ -285,7 +285,7 @@ async function probeHealth(url) {
   health.protocol = health.protocol.replace("ws", "http");
   const signal = AbortSignal.timeout(PROBE_LIMIT_MS);
   try {
-    await fetch(health, { cache: "no-store", signal });
+    await fetch(health, { cache: "no-store", mode: "no-cors", signal });
     return true;
   } catch {
     return false;

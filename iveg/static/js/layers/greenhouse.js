@@ -8,9 +8,12 @@ import { circle, isolated, label } from "./paint.js";
  * @typedef {import("../protocol.js").Box2D} Box2D
  */
 
-/** A plant every so many metres along a row; drawn only where it can be told apart. */
+/** A plant every so many metres, in lines so far apart; drawn where it can be told. */
 const PLANT_EVERY_M = 0.5;
+const PLANT_LINE_M = 0.8;
 const PLANT_FROM_SCALE = 14;
+/** No house is this long. */
+const OPEN_FIELD_M = 10_000;
 
 /** @param {Paint} paint */
 export function draw(paint) {
@@ -28,13 +31,15 @@ export function draw(paint) {
 }
 
 /**
- * Whether a map has walls; an open field has none.
+ * Whether a map has walls; an open field has none, or none that anybody could see.
  *
  * @param {Box2D | null | undefined} bounds
  * @returns {bounds is Box2D}
  */
 export function hasArea(bounds) {
-  return !!bounds && bounds.xmax > bounds.xmin && bounds.ymax > bounds.ymin;
+  if (!bounds) return false;
+  const [across, along] = [bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin];
+  return across > 0 && along > 0 && Math.max(across, along) < OPEN_FIELD_M;
 }
 
 /** @param {Paint} paint @param {Box2D} bounds */
@@ -71,25 +76,37 @@ function drawRow(paint, row) {
  * @param {Box2D} row
  */
 function drawPlants({ ctx, view, theme }, row) {
-  const isTall = row.ymax - row.ymin > row.xmax - row.xmin;
-  const length = isTall ? row.ymax - row.ymin : row.xmax - row.xmin;
-  const thickness = isTall ? row.xmax - row.xmin : row.ymax - row.ymin;
-  const radius = Math.min(0.38 * PLANT_EVERY_M, 0.38 * thickness) * view.scale;
-  const count = Math.max(1, Math.floor(length / PLANT_EVERY_M));
   ctx.save();
   ctx.globalAlpha = 0.28;
   ctx.fillStyle = theme.lane;
   ctx.beginPath();
-  for (let i = 0; i < count; i += 1) {
-    const along = ((i + 0.5) / count) * length;
-    const x = isTall ? (row.xmin + row.xmax) / 2 : row.xmin + along;
-    const y = isTall ? row.ymin + along : (row.ymin + row.ymax) / 2;
-    const [px, py] = [screenX(view, x), screenY(view, y)];
-    ctx.moveTo(px + radius, py);
-    ctx.arc(px, py, radius, 0, 2 * Math.PI);
+  for (const { x, y, radius } of plantsIn(row)) {
+    const [px, py, r] = [screenX(view, x), screenY(view, y), radius * view.scale];
+    ctx.moveTo(px + r, py);
+    ctx.arc(px, py, r, 0, 2 * Math.PI);
   }
   ctx.fill();
   ctx.restore();
+}
+
+/**
+ * Plants in lines along the longer side of a row (m).
+ *
+ * @param {Box2D} row
+ */
+function* plantsIn(row) {
+  const [width, height] = [row.xmax - row.xmin, row.ymax - row.ymin];
+  const lines = width < height ? PLANT_LINE_M : PLANT_EVERY_M;
+  const across = Math.max(1, Math.round(width / lines));
+  const along = width < height ? PLANT_EVERY_M : PLANT_LINE_M;
+  const up = Math.max(1, Math.round(height / along));
+  const radius = 0.38 * Math.min(PLANT_EVERY_M, width / across, height / up);
+  for (let i = 0; i < across; i += 1) {
+    for (let j = 0; j < up; j += 1) {
+      const x = row.xmin + ((i + 0.5) * width) / across;
+      yield { x, y: row.ymin + ((j + 0.5) * height) / up, radius };
+    }
+  }
 }
 
 /** @param {Paint} paint @param {{x: number, y: number, radius: number}} post */

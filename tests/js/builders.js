@@ -1,0 +1,159 @@
+/**
+ * Live messages with defaults; a test overrides what matters to it.
+ *
+ * @typedef {import("../../iveg/static/js/protocol.js").Robot} Robot
+ * @typedef {import("../../iveg/static/js/protocol.js").Person} Person
+ * @typedef {import("../../iveg/static/js/protocol.js").Detection} Detection
+ * @typedef {import("../../iveg/static/js/protocol.js").Command} Command
+ * @typedef {import("../../iveg/static/js/protocol.js").Entry} Entry
+ * @typedef {import("../../iveg/static/js/protocol.js").GreenhouseMap} GreenhouseMap
+ * @typedef {import("../../iveg/static/js/protocol.js").Snapshot} Snapshot
+ */
+
+export const STAMP = "2026-11-20T09:00:00.000Z";
+
+/** @param {Partial<Robot>} [changes] @returns {Robot} */
+export function robot(changes = {}) {
+  return {
+    robot_id: "AGI",
+    link: "LIVE",
+    mode: "RUNNING",
+    pose: { x: 1, y: 2, yaw: 0 },
+    twist: { linear: 0.5, angular: 0 },
+    stamp: STAMP,
+    received_at: STAMP,
+    age_s: 0.1,
+    speed_factor: 1,
+    applied: null,
+    mandate: null,
+    holds: [],
+    stop: null,
+    navigation: null,
+    replay: false,
+    clock_offset_s: 0,
+    road: "orion",
+    profile: {
+      drive: "differential",
+      length: 1,
+      width: 0.6,
+      max_speed: 1,
+      turning_radius: 0,
+    },
+    cmd_status: null,
+    ...changes,
+  };
+}
+
+/** @param {Partial<Person>} [changes] @returns {Person} */
+export function person(changes = {}) {
+  return {
+    person_id: "p1",
+    class: "person",
+    class_id: "farmer",
+    stage: "seen",
+    position: { x: 4, y: 2, z: 0.9 },
+    radius_m: 2,
+    confidence: 0.94,
+    first_seen: STAMP,
+    last_seen: STAMP,
+    age_s: 0.1,
+    observers: ["AGI"],
+    decision_id: "d1",
+    lane: null,
+    acting: [],
+    ...changes,
+  };
+}
+
+/** @param {Partial<Detection>} [changes] @returns {Detection} */
+export function detection(changes = {}) {
+  return {
+    robot_id: "AGI",
+    stamp: STAMP,
+    class: "person",
+    class_id: "farmer",
+    probability: 0.94,
+    position: { x: 4, y: 2, z: 0.9 },
+    box: { xmin: 3.8, xmax: 4.2, ymin: 1.7, ymax: 2.3, frame_id: "map" },
+    confident: true,
+    person_id: "p1",
+    ...changes,
+  };
+}
+
+/** @param {Partial<Command>} [changes] @returns {Command} */
+export function command(changes = {}) {
+  return {
+    command_id: "c1",
+    robot_id: "AGI",
+    kind: "stop",
+    state: "SENT",
+    requested_by: "ana",
+    requesters: ["ana"],
+    times: {},
+    standstill_ms: null,
+    tries: 1,
+    reason: null,
+    roads: {},
+    robot: null,
+    challenge_fresh: false,
+    ...changes,
+  };
+}
+
+/** @param {number} id @returns {Entry} */
+export function entry(id) {
+  const words = { kind: "system", key: "log.link.live", slots: {} };
+  return { id, at: STAMP, ...words, robot_id: null, class: null, decision_id: null };
+}
+
+/** @param {Partial<GreenhouseMap>} [changes] @returns {GreenhouseMap} */
+export function house(changes = {}) {
+  return {
+    name: "test",
+    bounds: { xmin: 0, ymin: 0, xmax: 20, ymax: 10 },
+    lanes: [{ label: "1", xmin: 0, ymin: 0, xmax: 20, ymax: 3 }],
+    rows: [{ xmin: 1, ymin: 4, xmax: 19, ymax: 5 }],
+    posts: [{ x: 10, y: 4, radius: 0.1 }],
+    obstacles: [{ kind: "crate", xmin: 15, ymin: 7, xmax: 16, ymax: 8 }],
+    ...changes,
+  };
+}
+
+/** @param {Partial<Snapshot>} [changes] @returns {Snapshot} */
+export function snapshot(changes = {}) {
+  return {
+    t: STAMP,
+    server: { boot: "b1", version: "0", demo: false },
+    user: { name: "ana", role: "operator" },
+    rule: null,
+    map: house(),
+    robots: [robot()],
+    people: [],
+    detections: {},
+    commands: [],
+    alerts: [],
+    log: [],
+    health: null,
+    climate: null,
+    ...changes,
+  };
+}
+
+/**
+ * A scan frame as the server writes it.
+ *
+ * @param {Record<string, unknown>} head
+ * @param {number[]} points x, y, x, y … (m)
+ * @returns {ArrayBuffer}
+ */
+export function scanFrame(head, points) {
+  const words = new TextEncoder().encode(JSON.stringify(head));
+  const length = Math.ceil(words.length / 4) * 4;
+  const bytes = new ArrayBuffer(4 + length + 4 * points.length);
+  new DataView(bytes).setUint32(0, length, true);
+  new Uint8Array(bytes, 4, length).fill(32);
+  new Uint8Array(bytes, 4, length).set(words);
+  new Float32Array(bytes, 4 + length).set(points);
+  return bytes;
+}

@@ -1,0 +1,33 @@
+import { ageOf, createServerClock, linkOf } from "../../iveg/static/js/clock.js";
+import { equal, near, test } from "./harness.js";
+
+test("an age is what the server said plus the wait since it arrived", () => {
+  near(ageOf({ age_s: 0.4, receivedAtMs: 1000 }, 2500), 1.9);
+});
+
+test("a value that was never heard is infinitely old and its link unknown", () => {
+  equal(linkOf(ageOf({ age_s: null, receivedAtMs: 0 }, 0)), "UNKNOWN");
+  equal(linkOf(ageOf(undefined, 0)), "UNKNOWN");
+});
+
+test("silence alone makes a robot late after one second and lost after three", () => {
+  const robot = { age_s: 0, receivedAtMs: 0 };
+  const links = [1000, 1001, 3000, 3001].map((ms) => linkOf(ageOf(robot, ms)));
+  equal(links, ["LIVE", "LATE", "LATE", "LOST"]);
+});
+
+test("the server's clock is read from the quickest of the last answers", () => {
+  const clock = createServerClock(0);
+  clock.note(0, 400, 1000.9);
+  clock.note(1000, 1020, 1001.01);
+  clock.note(2000, 2800, 1003);
+  near(clock.serverNow(3000), 1003, 1e-6);
+  equal(clock.roundTripMs(), 800);
+});
+
+test("a quick answer of long ago is forgotten", () => {
+  const clock = createServerClock(0);
+  clock.note(0, 2, 50.001);
+  for (let n = 1; n <= 8; n += 1) clock.note(1000 * n, 1000 * n + 20, 100 + n + 0.01);
+  near(clock.serverNow(9000), 109, 1e-6);
+});

@@ -1,0 +1,106 @@
+import { readPerson, readScene } from "../../iveg/static/js/scene.js";
+import { createStore } from "../../iveg/static/js/store.js";
+import { command, detection, person, robot, snapshot } from "./builders.js";
+import { equal, near, test } from "./harness.js";
+
+/** @param {Partial<import("./builders.js").Snapshot>} [changes] */
+function storeOf(changes) {
+  const store = createStore({ now: () => 0, schedule: () => {} });
+  store.apply("snapshot", snapshot(changes), 0);
+  store.setConnection("open", 0);
+  return store;
+}
+
+test("a robot without a word becomes a ghost at its last pose", () => {
+  const store = storeOf({ robots: [robot({ age_s: 0 })] });
+  const links = [500, 2000, 4000].map((ms) => readScene(store, ms).robots[0].link);
+  equal(links, ["LIVE", "LATE", "LOST"]);
+  equal(readScene(store, 4000).robots[0].pose, { x: 1, y: 2, yaw: 0 });
+});
+
+test("what the server calls live is not live once it is old", () => {
+  const store = storeOf({ robots: [robot({ link: "LIVE", age_s: 5 })] });
+  equal(readScene(store, 0).robots[0].link, "LOST");
+});
+
+test("a robot without a pose is not drawn", () => {
+  equal(readScene(storeOf({ robots: [robot({ pose: null })] }), 0).robots, []);
+});
+
+test("a person just seen has a still ring of the rule's radius", () => {
+  const scene = readPerson({ ...person(), receivedAtMs: 0 }, 800);
+  equal([scene.stage, scene.ringM], ["seen", 2]);
+});
+
+test("a remembered person's ring grows at walking speed up to six metres", () => {
+  const left = { ...person({ stage: "remembered", age_s: 1.32, radius_m: 3.6 }) };
+  near(readPerson({ ...left, receivedAtMs: 0 }, 0).ringM, 3.6);
+  near(readPerson({ ...left, receivedAtMs: 0 }, 1000).ringM, 5.2);
+  near(readPerson({ ...left, receivedAtMs: 0 }, 5000).ringM, 6);
+});
+
+test("without news a seen person becomes remembered, then last seen", () => {
+  const alone = { ...person({ age_s: 0 }), receivedAtMs: 0 };
+  const stages = [900, 1100, 10_100].map((ms) => readPerson(alone, ms).stage);
+  equal(stages, ["seen", "remembered", "last_seen"]);
+});
+
+test("a ring that the server drew wider than six metres is not made smaller", () => {
+  const wide = person({ stage: "remembered", age_s: 9, radius_m: 7 });
+  near(readPerson({ ...wide, receivedAtMs: 0 }, 500).ringM, 7);
+});
+
+test("a stop that nobody confirmed widens with the last known speed", () => {
+  const stop = command({
+    state: "UNCONFIRMED",
+    robot: { v: -0.5, report_age_s: 1, moved_m: 0.4 },
+  });
+  const store = storeOf({ robots: [robot({ stop })], commands: [stop] });
+  near(readScene(store, 2000).robots[0].unsureM, 1.4);
+});
+
+test("a confirmed stop has no such disc", () => {
+  const stop = command({
+    state: "STANDING",
+    robot: { v: 0, report_age_s: 0.1, moved_m: 0.4 },
+  });
+  const store = storeOf({ robots: [robot({ stop })], commands: [stop] });
+  near(readScene(store, 2000).robots[0].unsureM, 0);
+});
+
+test("a sweep fades while late and is gone when lost", () => {
+  const store = storeOf();
+  const sweep = { robot_id: "AGI", stamp: "s", age_s: 0 };
+  store.apply("robots/AGI/scan", { ...sweep, points: new Float32Array([1, 2]) }, 0);
+  equal(readScene(store, 500).scans[0].strength, 1);
+  equal(readScene(store, 2000).scans[0].strength < 1, true);
+  equal(readScene(store, 3500).scans, []);
+});
+
+test("a box in the robot's frame turns with the robot, one in the map does not", () => {
+  const store = storeOf({ robots: [robot({ pose: { x: 0, y: 0, yaw: 1.5 } })] });
+  const box = { xmin: 3, xmax: 3.4, ymin: -0.3, ymax: 0.3, frame_id: "base_link" };
+  const items = [detection({ box }), detection()];
+  store.apply(
+    "detections/AGI",
+    { robot_id: "AGI", stamp: "s", road: "mqtt", items },
+    0,
+  );
+  const [turned, straight] = readScene(store, 100).detections;
+  equal([turned.yaw, straight.yaw], [1.5, 0]);
+  near(turned.length, 0.4);
+});
+
+test("a look older than a second shows nothing: nobody looks there now", () => {
+  const store = storeOf();
+  const look = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [detection()] };
+  store.apply("detections/AGI", look, 0);
+  equal(readScene(store, 1100).detections, []);
+});
+
+test("the veil falls a second after the line was lost", () => {
+  const store = storeOf();
+  store.setConnection("lost", 10_000);
+  equal(readScene(store, 10_900).isVeiled, false);
+  equal(readScene(store, 11_100).isVeiled, true);
+});

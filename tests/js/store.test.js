@@ -1,0 +1,126 @@
+import { ageOf } from "../../iveg/static/js/clock.js";
+import { createStore, LOG_SIZE, matches } from "../../iveg/static/js/store.js";
+import { command, entry, person, robot, snapshot } from "./builders.js";
+import { equal, near, test } from "./harness.js";
+
+/** A store whose frames come when the test says so. */
+function storeByHand() {
+  /** @type {(() => void)[]} */
+  const frames = [];
+  const store = createStore({ now: () => 0, schedule: (flush) => frames.push(flush) });
+  const frame = () => {
+    for (const flush of frames.splice(0)) flush();
+  };
+  /** @type {string[]} */
+  const heard = [];
+  /** @param {string} pattern */
+  const hear = (pattern) =>
+    store.subscribe(pattern, (_, topic) => void heard.push(topic));
+  return { store, frame, heard, hear };
+}
+
+test("a snapshot replaces everything that was known", () => {
+  const { store } = storeByHand();
+  store.apply("snapshot", snapshot({ people: [person()], log: [entry(1)] }), 0);
+  store.apply("robots/AGI/scan", { robot_id: "AGI", points: new Float32Array(2) }, 0);
+  store.apply("snapshot", snapshot({ robots: [robot({ robot_id: "AGII" })] }), 1);
+  equal([...store.robots().keys()], ["AGII"]);
+  equal([store.people().length, store.scans().size, store.log().length], [0, 0, 0]);
+  equal(store.get("robots/AGI"), undefined);
+});
+
+test("a robot's older state never replaces a newer one", () => {
+  const { store } = storeByHand();
+  const newer = robot({ received_at: "2026-11-20T09:00:02.000Z", mode: "SLOW" });
+  store.apply("robots/AGI", newer, 0);
+  store.apply("robots/AGI", robot({ received_at: "2026-11-20T09:00:01.000Z" }), 1);
+  equal(store.robots().get("AGI")?.mode, "SLOW");
+});
+
+test("ages count from the arrival, in lists too", () => {
+  const { store } = storeByHand();
+  store.apply("people", [person({ age_s: 0.5 })], 1000);
+  near(ageOf(store.people()[0], 3000), 2.5);
+});
+
+test("a look in a snapshot is as old as its stamp says", () => {
+  const { store } = storeByHand();
+  const look = { robot_id: "AGI", stamp: "2026-11-20T08:59:57.500Z", road: "mqtt" };
+  store.apply("snapshot", snapshot({ detections: { AGI: { ...look, items: [] } } }), 0);
+  near(ageOf(store.looks().get("AGI"), 0), 2.5);
+});
+
+test("a state is told once a frame, with its newest value", () => {
+  const { store, frame } = storeByHand();
+  /** @type {number[]} */
+  const told = [];
+  store.subscribe("robots/AGI", (data) => told.push(data.pose.x));
+  for (const x of [1, 2, 3])
+    store.apply("robots/AGI", robot({ pose: { x, y: 0, yaw: 0 } }));
+  equal(told, []);
+  frame();
+  equal(told, [3]);
+});
+
+test("log entries and command events are told one by one, at once", () => {
+  const { store, heard, hear } = storeByHand();
+  hear("log");
+  hear("commands/");
+  store.apply("log", entry(1));
+  store.apply("log", entry(2));
+  store.apply("commands/c1", command());
+  store.apply("commands/c1", command({ state: "STANDING" }));
+  equal(heard, ["log", "log", "commands/c1", "commands/c1"]);
+});
+
+test("a snapshot is told before what it brought", () => {
+  const { store, frame, heard, hear } = storeByHand();
+  hear("robots/");
+  hear("snapshot");
+  store.apply("snapshot", snapshot());
+  frame();
+  equal(heard, ["snapshot", "robots/AGI"]);
+});
+
+test("the log keeps its newest entries and no entry twice", () => {
+  const { store } = storeByHand();
+  for (let id = 1; id <= LOG_SIZE + 20; id += 1) store.apply("log", entry(id));
+  store.apply("log", entry(LOG_SIZE + 20));
+  equal(store.log().length, LOG_SIZE);
+  equal([store.log()[0].id, store.log()[LOG_SIZE - 1].id], [21, LOG_SIZE + 20]);
+});
+
+test("a prefix hears one level below itself: a robot, not its scan", () => {
+  equal(matches("robots/", "robots/AGI"), true);
+  equal(matches("robots/", "robots/AGI/scan"), false);
+  equal(matches("robots/+/scan", "robots/AGI/scan"), true);
+  equal(matches("robots/AGI", "robots/AGII"), false);
+  equal(matches("people", "people"), true);
+});
+
+test("who unsubscribed hears nothing any more", () => {
+  const { store, frame, heard, hear } = storeByHand();
+  const end = hear("people");
+  end();
+  store.apply("people", []);
+  frame();
+  equal(heard, []);
+});
+
+test("a robot keeps its hue when the fleet changes", () => {
+  const { store } = storeByHand();
+  const [agi, agii] = [robot(), robot({ robot_id: "AGII" })];
+  store.apply("snapshot", snapshot({ robots: [agi, agii] }), 0);
+  store.apply("snapshot", snapshot({ robots: [agii] }), 1);
+  equal([store.slotOf("AGI"), store.slotOf("AGII"), store.slotOf("X")], [1, 2, 3]);
+});
+
+test("a line's state is told when it changes and keeps since when", () => {
+  const { store, frame, heard, hear } = storeByHand();
+  hear("connection");
+  store.setConnection("lost", 5000);
+  store.setConnection("lost", 9000);
+  frame();
+  equal(heard, ["connection"]);
+  equal(store.connection, { state: "lost", since: 5000 });
+});
