@@ -17,6 +17,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.faults import FaultOrder, PersonOrder, serve_faults
+from iveg.emulator.pacing import every
 from iveg.emulator.scenarios import Incident, lay_out, scenario_named
 from iveg.emulator.world import REST, Rig, World, climate_at
 from iveg.ngsi import names
@@ -308,17 +309,3 @@ class EmulatedRobot:
         if self._node_task is not None:
             self._node_task.cancel()
             self._node_task = None
-
-
-async def every(period: float, work: Callable[[float], None]) -> None:
-    """Call ``work`` with the time since its last call, once a period, for ever.
-
-    A call that comes more than a period late moves the ones after it.
-    """
-    last = due = clock.now().mono
-    while True:
-        now = clock.now().mono
-        work(now - last)
-        last = now
-        due = max(due + period, now)
-        await asyncio.sleep(max(0.0, due - clock.now().mono))

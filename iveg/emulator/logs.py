@@ -1,0 +1,188 @@
+"""Recorded runs as files: JSON lines, plain or gzipped (interfaces.md §7).
+
+A file is read line by line and never held in memory.  A line that cannot be used is
+reported once with file and line number and skipped; a file that cannot be used at all
+stops the start with one sentence.
+"""
+
+import gzip
+import logging
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
+from iveg.ngsi.codec import load_json
+from iveg.ngsi.payloads import (
+    LidarPoints,
+    Metres,
+    Radians,
+    Speed,
+    Text,
+)
+
+_log = logging.getLogger(__name__)
+_FORBIDDEN = re.compile(r"[<>\"'=;()]")
+_LONGEST_LINE = 1 << 20
+_HALF_SIZE_M, _HEIGHT_M = 0.25, 1.75
+"""A log knows the place of a detection; it is sent as a box of a person's size."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line of a log.
+
+    Attributes:
+        at: Seconds from the start of the recording.
+    """
+
+    at: float
+    observation: Odometry | LaserScan | Detection
+
+
+class LogReader:
+    """Reads one recording, as often as asked; complains about each bad line once.
+
+    Args:
+        file: ``.jsonl`` or ``.jsonl.gz``.
+
+    Raises:
+        DataFileError: the file cannot be read or holds no odometry.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._reported: set[int] = set()
+        if not any(isinstance(entry.observation, Odometry) for entry in self.entries()):
+            raise DataFileError(str(file), "", "holds no line of odometry.")
+
+    def entries(self) -> Iterator[Entry]:
+        """All entries from the start, in the order of the file.
+
+        Raises:
+            DataFileError: the file ends within its compression, or went away.
+        """
+        try:
+            with self._open() as lines:
+                number = 0
+                while line := lines.readline(_LONGEST_LINE):
+                    number += 1
+                    entry = self._entry(number, line)
+                    if entry is not None:
+                        yield entry
+        except (OSError, EOFError, zlib.error) as error:
+            reason = f"cannot be read: {error}."
+            raise DataFileError(str(self._file), "", reason) from error
+
+    def _open(self) -> IO[bytes] | gzip.GzipFile:
+        if self._file.suffix == ".gz":
+            return gzip.open(self._file, "rb")
+        return self._file.open("rb")
+
+    def _entry(self, number: int, line: bytes) -> Entry | None:
+        if not line.strip():
+            return None
+        try:
+            return _read(line)
+        except UnreadableError as error:
+            why = str(error)
+        except ValidationError as error:
+            complaint = error.errors(include_input=False, include_url=False)[0]
+            place = ".".join(str(part) for part in complaint["loc"][1:])
+            why = f"{place}: {complaint['msg']}" if place else complaint["msg"]
+        if number not in self._reported:
+            self._reported.add(number)
+            _log.warning("%s, line %d skipped: %s", self._file, number, why)
+        return None
+
+
+# --- the shapes of a line ---------------------------------------------------------
+
+
+class _Line(BaseModel):
+    model_config = ConfigDict(
+        strict=True, extra="ignore", allow_inf_nan=False, frozen=True
+    )
+    t: Annotated[float, Field(ge=0, le=1e7)]
+
+
+class _OdometryLine(_Line):
+    kind: Literal["odom"]
+    x: Metres
+    y: Metres
+    yaw: Radians
+    v: Speed = 0.0
+    w: Speed = 0.0
+
+
+class _ScanLine(_Line):
+    kind: Literal["scan"]
+    angle_min: Radians
+    angle_increment: Radians
+    range_min: Annotated[float, Field(ge=0, le=1e4)] = 0.0
+    range_max: Annotated[float, Field(gt=0, le=1e4)]
+    ox: Metres = 0.0
+    oy: Metres = 0.0
+    ranges: LidarPoints
+
+
+class _DetectionLine(_Line):
+    kind: Literal["detection"]
+    class_: Annotated[Text, Field(alias="class", min_length=1)]
+    probability: Annotated[float, Field(ge=0, le=1)]
+    x: Metres
+    y: Metres
+
+
+_LINE: TypeAdapter[_OdometryLine | _ScanLine | _DetectionLine] = TypeAdapter(
+    Annotated[_OdometryLine | _ScanLine | _DetectionLine, Field(discriminator="kind")]
+)
+
+
+def _read(line: bytes) -> Entry:
+    if len(line) >= _LONGEST_LINE:
+        raise UnreadableError("too_long", f"more than {_LONGEST_LINE} bytes")
+    value = _LINE.validate_python(load_json(line))
+    match value:
+        case _OdometryLine():
+            pose = Pose2D(value.x, value.y, value.yaw)
+            twist = Twist2D(value.v, value.w)
+            return Entry(value.t, Odometry("", Origin(), pose, twist))
+        case _ScanLine():
+            return Entry(value.t, _scan(value))
+        case _DetectionLine():
+            return Entry(value.t, _detection(value))
+
+
+def _scan(line: _ScanLine) -> LaserScan:
+    ranges = np.array(line.ranges, np.float32)
+    ranges[np.isnan(ranges)] = np.inf
+    return LaserScan(
+        "",
+        Origin(),
+        line.angle_min,
+        line.angle_increment,
+        line.range_min,
+        line.range_max,
+        Pose2D(line.ox, line.oy, 0.0),
+        ranges,
+    )
+
+
+def _detection(line: _DetectionLine) -> Detection:
+    # Orion refuses a whole update for one of these characters.
+    if _FORBIDDEN.search(line.class_):
+        raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
+    half = _HALF_SIZE_M
+    box = Box3D(
+        line.x - half, line.x + half, line.y - half, line.y + half, 0.0, _HEIGHT_M
+    )
+    return Detection(line.class_, line.probability, box, "map")

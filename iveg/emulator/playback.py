@@ -1,0 +1,105 @@
+"""A recording at a moment of its own time: pure, and played at any pace."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Detection, LaserScan, Odometry
+from iveg.emulator.logs import Entry
+
+_READ_AHEAD = 256
+"""Lines looked ahead for the next pose; beyond, the robot is shown where it was."""
+
+_SEEN_FOR_S = 0.4
+"""How long (s of the recording) a recorded detection counts as seen."""
+
+
+class Playback:
+    """Where a recording stands.
+
+    Args:
+        open_: Gives the entries from the start; at least one is odometry.
+        loop: Starts over at the end.
+
+    Attributes:
+        ended: Whether the last entry was played; never with ``loop``.
+        has_detector: Whether a detection was met: then no detection means nobody.
+    """
+
+    def __init__(self, open_: Callable[[], Iterator[Entry]], *, loop: bool) -> None:
+        self._open = open_
+        self._loop = loop
+        self.ended = False
+        self.has_detector = False
+        self._start_over()
+
+    def _start_over(self) -> None:
+        self._source = self._open()
+        self._ahead: deque[Entry] = deque()
+        self._poses_ahead: deque[tuple[float, Odometry]] = deque()
+        self._seen: list[tuple[float, Detection]] = []
+        self._scan: LaserScan | None = None
+        self._read_ahead()
+        self._at = self._ahead[0].at if self._ahead else 0.0
+        while not self._poses_ahead and self._ahead:
+            self._take(self._ahead.popleft())
+            self._read_ahead()
+        self._last = self._poses_ahead[0]
+
+    def advance(self, seconds: float) -> None:
+        """Let ``seconds`` of the recording pass."""
+        self._at += seconds
+        while self._ahead and self._ahead[0].at <= self._at:
+            self._take(self._ahead.popleft())
+            self._read_ahead()
+        self._seen = [seen for seen in self._seen if seen[0] > self._at - _SEEN_FOR_S]
+        if not self._ahead and self._loop:
+            self._start_over()
+        self.ended = not self._ahead and not self._loop
+
+    def _read_ahead(self) -> None:
+        while not self._poses_ahead and len(self._ahead) < _READ_AHEAD:
+            entry = next(self._source, None)
+            if entry is None:
+                return
+            self._ahead.append(entry)
+            if isinstance(entry.observation, Odometry):
+                self._poses_ahead.append((entry.at, entry.observation))
+
+    def _take(self, entry: Entry) -> None:
+        match entry.observation:
+            case Odometry():
+                self._last = self._poses_ahead.popleft()
+            case LaserScan() as scan:
+                self._scan = scan
+            case Detection() as detection:
+                self.has_detector = True
+                self._seen.append((entry.at, detection))
+
+    # --- what the robot senses at this moment -------------------------------------
+
+    @property
+    def motion(self) -> tuple[Pose2D, Twist2D]:
+        """Pose and speeds, interpolated between two recorded ones."""
+        at, last = self._last
+        if not self._poses_ahead or self._poses_ahead[0][0] <= at:
+            return last.pose, last.twist
+        then, following = self._poses_ahead[0]
+        part = min(max((self._at - at) / (then - at), 0.0), 1.0)
+        twist = Twist2D(
+            last.twist.linear_x
+            + part * (following.twist.linear_x - last.twist.linear_x),
+            last.twist.angular_z
+            + part * (following.twist.angular_z - last.twist.angular_z),
+        )
+        return last.pose.interpolate(following.pose, part), twist
+
+    @property
+    def scan(self) -> LaserScan | None:
+        """The newest sweep; the same object until there is another."""
+        return self._scan
+
+    @property
+    def detections(self) -> tuple[Detection, ...]:
+        """What was detected just now."""
+        return tuple(detection for _, detection in self._seen)

@@ -1,0 +1,259 @@
+"""Plays recorded runs as robots: the log moves, the safety node decides how fast.
+
+The node's drive output is the pace of the log: full speed plays it as recorded, a
+mandate of 0.5 at half the pace, a hold not at all, and the replayed robot then reports
+that it stands.  Poses between two recorded ones are interpolated, because a safety node
+wants odometry more often than logs have it.  While the log pauses, the newest scan and
+detections are told again, as a robot that stands goes on seeing what it saw.
+"""
+
+import asyncio
+import ipaddress
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.errors import CommandRefusedError, DataFileError, SettingsError
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+)
+from iveg.domain.profiles import profile_of
+from iveg.emulator.logs import LogReader
+from iveg.emulator.pacing import every
+from iveg.emulator.playback import Playback
+from iveg.ngsi import names
+from iveg.robot.node import RobotNode
+from iveg.robot.uplink import Form
+
+TASK = "replay"
+"""The navigation task by which iVeg knows a replayed robot."""
+
+_REST = Twist2D(0.0, 0.0)
+_PERIOD_S = 0.05
+_SCAN_AGAIN_S = 0.5
+_LOOK_EVERY_S = 0.2
+_NAVIGATION_EVERY_S = 1.0
+_LONGEST_STEP_S = 0.2
+_STANDS_AT_END_S = 2.0
+_FASTEST = 100.0
+_LISTEN_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """What all replayed robots of a run share; see ``run_replay``."""
+
+    address: BrokerAddress
+    apikey: str
+    speed: float
+    loop: bool
+    uplink: Form
+    slow_s: float
+    stand_s: float
+    state_directory: Path
+
+
+async def run_replay(
+    files: Sequence[Path],
+    robots: Sequence[str],
+    *,
+    address: BrokerAddress,
+    apikey: str,
+    speed: float = 1.0,
+    loop: bool = False,
+    uplink: Form = "per-topic",
+    slow_s: float = 1.0,
+    stand_s: float = 3.0,
+    state_directory: Path,
+    allow_remote: bool = False,
+    allow_live: bool = False,
+) -> None:
+    """Play recordings; returns when all have ended, never with ``loop``.
+
+    Args:
+        files: One recording a robot.
+        robots: Their ids, in the order of the files.
+        address: The broker.
+        apikey: First part of the measure topics.
+        speed: 2 plays twice as fast as recorded.
+        loop: Starts over at the end.
+        uplink: One message a topic, or Algorithm 1's single payload.
+        slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
+        stand_s: See above.
+        state_directory: Where the robots keep their hold files; made if missing.
+        allow_remote: The broker may be on another machine.
+        allow_live: Do not look whether one of the robots is live.
+
+    Raises:
+        DataFileError: files and robots do not match, or a file cannot be used.
+        SettingsError: the broker is on another machine.
+        CommandRefusedError: a robot of that name is live.
+    """
+    _check(files, robots, speed)
+    if not allow_remote:
+        _check_loopback(address)
+    playbacks = [Playback(LogReader(file).entries, loop=loop) for file in files]
+    if not allow_live:
+        await _check_not_live(robots, address, apikey)
+    settings = ReplaySettings(
+        address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory
+    )
+    replayed = [
+        ReplayedRobot(robot_id, playback, settings)
+        for robot_id, playback in zip(robots, playbacks, strict=True)
+    ]
+    async with asyncio.TaskGroup() as tasks:
+        playing = [
+            tasks.create_task(robot.run(), name=f"replay-{robot.robot_id}")
+            for robot in replayed
+        ]
+        await asyncio.gather(*(robot.ended.wait() for robot in replayed))
+        for task in playing:
+            task.cancel()
+
+
+# --- what is refused --------------------------------------------------------------
+
+
+def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
+    if len(files) != len(robots) or not files:
+        reason = f"{len(files)} files for {len(robots)} robots: each robot needs one."
+        raise DataFileError("replay", "", reason)
+    if len(set(robots)) != len(robots):
+        raise DataFileError("replay", "", "a robot is named twice.")
+    if not 0.0 < speed <= _FASTEST:
+        reason = f"speed must be more than 0 and at most {_FASTEST:g}, not {speed:g}."
+        raise DataFileError("replay", "", reason)
+
+
+def _check_loopback(address: BrokerAddress) -> None:
+    try:
+        is_here = ipaddress.ip_address(address.host).is_loopback
+    except ValueError:
+        is_here = address.host == "localhost"
+    if not is_here:
+        allowed = "on loopback for a replay, unless it is told otherwise"
+        raise SettingsError("IVEG_MQTT_URL", address.host, allowed)
+
+
+async def _check_not_live(
+    robots: Sequence[str], address: BrokerAddress, apikey: str
+) -> None:
+    """Listen for the robots: a live one reports twice a second whatever it does.
+
+    Raises:
+        CommandRefusedError: one of them was heard.
+    """
+    heard: set[str] = set()
+    topics = {
+        names.measure_topic(apikey, robot_id + device.suffix): robot_id
+        for robot_id in robots
+        for device in names.ROBOT_DEVICES
+    }
+    link = MqttLink(
+        address,
+        "replay",
+        dict.fromkeys(topics, 0),
+        lambda topic, _: heard.add(topics[topic]),
+    )
+    listening = asyncio.create_task(link.run(), name="replay-listens")
+    await asyncio.sleep(_LISTEN_S)
+    listening.cancel()
+    await asyncio.gather(listening, return_exceptions=True)
+    for robot_id in robots:
+        if robot_id in heard:
+            raise CommandRefusedError(
+                robot_id, "replay", "a robot of this name is live"
+            )
+
+
+# --- one replayed robot -----------------------------------------------------------
+
+
+class ReplayedRobot:
+    """One recording under its own safety node."""
+
+    def __init__(
+        self, robot_id: str, playback: Playback, settings: ReplaySettings
+    ) -> None:
+        self.robot_id = robot_id
+        self.ended = asyncio.Event()
+        self._playback = playback
+        self._speed = settings.speed
+        self._profile = profile_of(robot_id)
+        self._told = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
+        self._told_scan: LaserScan | None = None
+        self._command = _REST
+        self._pace = 0.0
+        self._stood_s = 0.0
+        settings.state_directory.mkdir(parents=True, exist_ok=True)
+        self._node = RobotNode(
+            robot_id,
+            address=settings.address,
+            apikey=settings.apikey,
+            profile=self._profile,
+            hold_file=settings.state_directory / f"{robot_id}.holds.json",
+            drive=self._drive,
+            slow_s=settings.slow_s,
+            stand_s=settings.stand_s,
+            uplink=settings.uplink,
+        )
+
+    async def run(self) -> None:
+        """Play until cancelled; ``ended`` says when the recording is over."""
+        self._node.release_locally()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._node.run(), name=f"node-{self.robot_id}")
+            await every(_PERIOD_S, self._step)
+
+    def _drive(self, command: Twist2D) -> None:
+        self._command = command
+
+    def _step(self, dt: float) -> None:
+        node, step = self._node, min(dt, _LONGEST_STEP_S)
+        full = Twist2D(self._profile.max_speed, 0.0)
+        node.wish(full if node.may_drive and not self._playback.ended else _REST)
+        self._pace = self._slowed(self._command.linear_x, step)
+        self._playback.advance(self._pace * self._speed * step)
+        if self._playback.ended:
+            self._pace = 0.0
+            self._stood_s += step
+        if self._stood_s >= _STANDS_AT_END_S:
+            self.ended.set()
+        self._tell(clock.now().mono)
+
+    def _slowed(self, command: float, dt: float) -> float:
+        """The pace, 0 to 1: it falls no faster than the robot's brake allows."""
+        wanted = max(0.0, command / self._profile.max_speed)
+        braking = self._profile.braking / self._profile.max_speed
+        return max(wanted, self._pace - braking * dt)
+
+    def _tell(self, now: float) -> None:
+        pose, twist = self._playback.motion
+        rate = self._pace * self._speed
+        moving = Twist2D(twist.linear_x * rate, twist.angular_z * rate)
+        self._node.sense(Odometry(self.robot_id, Origin(), pose, moving))
+        if self._is_due(Navigation, _NAVIGATION_EVERY_S, now):
+            self._node.sense(Navigation(self.robot_id, Origin(), TASK))
+        scan = self._playback.scan
+        is_new = scan is not self._told_scan
+        if scan and (is_new or self._is_due(LaserScan, _SCAN_AGAIN_S, now)):
+            self._told_scan, self._told[LaserScan] = scan, now
+            self._node.sense(scan)
+        looks = self._playback.has_detector
+        if looks and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
+            seen = self._playback.detections
+            self._node.sense(DetectionFrame(self.robot_id, Origin(), seen))
+
+    def _is_due(self, kind: type, period: float, now: float) -> bool:
+        if now - self._told[kind] < period:
+            return False
+        self._told[kind] = now
+        return True
