@@ -9,7 +9,14 @@ and an alert about the robot itself is ignored, or it would slow for ever.
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from iveg.domain.feedback import CLEAR, HALF_SPEED, Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import (
+    CLEAR,
+    FULL_SPEED,
+    HALF_SPEED,
+    Feedback,
+    FeedbackAlert,
+    Mandate,
+)
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Origin
 from iveg.robot.caps import FREE, RELEASE_BEYOND_M, Cap, known_reason, quantised
@@ -232,7 +239,9 @@ def _growth(age: float) -> float:
 
 def _mandated(mandate: Mandate) -> Cap:
     factor = quantised(mandate.speed_factor)
-    reason = "clear" if factor == 1.0 else known_reason(mandate.reason)
+    if factor == FULL_SPEED:
+        return FREE
+    reason = known_reason(mandate.reason)
     return Cap(factor, reason, mandate.cause, mandate.decision_id)
 
 
@@ -240,7 +249,7 @@ def _mandated_free(mandate: Mandate, alert: FeedbackAlert) -> bool:
     return (
         alert.decision_id != ""
         and mandate.decision_id == alert.decision_id
-        and mandate.speed_factor >= 1.0
+        and mandate.speed_factor >= FULL_SPEED
     )
 
 

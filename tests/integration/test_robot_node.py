@@ -1,0 +1,331 @@
+"""A robot node on a real broker, on a free port of loopback.
+
+Mosquitto where it is installed, the embedded broker elsewhere.
+"""
+
+import asyncio
+import contextlib
+import os
+import shutil
+import socket
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import (
+    CommandAnswer,
+    DetectionFrame,
+    Odometry,
+    Origin,
+    SafetyReport,
+)
+from iveg.domain.profiles import RobotProfile
+from iveg.embedded.mqtt_broker import mqtt_broker
+from iveg.ngsi import codec
+from iveg.robot.node import RobotNode
+
+MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
+CONF = """listener {port} 127.0.0.1
+allow_anonymous true
+set_tcp_nodelay true
+log_type none
+"""
+
+
+@contextlib.asynccontextmanager
+async def broker_on(port: int, folder: Path) -> AsyncIterator[BrokerAddress]:
+    address = BrokerAddress("127.0.0.1", port)
+    if MOSQUITTO is None:
+        async with mqtt_broker("127.0.0.1", port):
+            yield address
+        return
+    conf = folder / "mosquitto.conf"
+    conf.write_text(CONF.format(port=port))
+    process = await asyncio.create_subprocess_exec(MOSQUITTO, "-c", str(conf))
+    try:
+        await listening(port)
+        yield address
+    finally:
+        process.kill()
+        await process.wait()
+
+
+async def listening(port: int) -> None:
+    deadline = time.monotonic() + 10
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError):
+            _, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.close()
+            return
+        await asyncio.sleep(0.02)
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+@pytest.fixture
+async def broker(port: int, tmp_path: Path) -> AsyncIterator[BrokerAddress]:
+    async with broker_on(port, tmp_path) as address:
+        yield address
+
+
+async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
+    deadline = time.monotonic() + within_s
+    while not true():
+        assert time.monotonic() < deadline, "did not come true in time"
+        await asyncio.sleep(0.005)
+
+
+@dataclass
+class Cloud:
+    """A small iVeg: hears everything, sends feedback at 10 Hz while ``speaks``."""
+
+    address: BrokerAddress
+    answers: list[CommandAnswer] = field(default_factory=list)
+    reports: list[SafetyReport] = field(default_factory=list)
+    topics: set[str] = field(default_factory=set)
+    speaks: bool = True
+    mandate: Mandate | None = None
+    seq: int = 0
+    boot: str = "cloud"
+
+    def __post_init__(self) -> None:
+        self.link = MqttLink(self.address, "cloud", {"/iveg/#": 1}, self.take)
+
+    def take(self, topic: str, payload: bytes) -> None:
+        self.topics.add(topic)
+        device = topic.split("/")[2]
+        if topic.endswith("/cmdexe"):
+            for one in codec.read_answer(device, payload).observations:
+                assert isinstance(one, CommandAnswer)
+                self.answers.append(one)
+        elif device.endswith("_safety"):
+            for said in codec.read_measure(device, payload).observations:
+                assert isinstance(said, SafetyReport)
+                self.reports.append(said)
+
+    async def speak(self) -> None:
+        while True:
+            await asyncio.sleep(0.1)
+            if self.speaks and self.link.connected and self.reports:
+                self.seq += 1
+                newest = self.reports[-1].origin.seq or 0
+                mandates = {} if self.mandate is None else {"AGI": self.mandate}
+                feedback = Feedback(
+                    "AGII",
+                    Origin(self.boot, self.seq),
+                    mandates=mandates,
+                    seen={"AGI": newest},
+                )
+                self.link.offer(
+                    "/AGII/mqtt_feedback", codec.write_feedback(feedback), qos=1
+                )
+
+    async def command(self, payload: bytes) -> None:
+        await self.link.publish("/iveg/AGI/cmd", payload)
+
+
+@dataclass
+class Robot:
+    """A node on a drive that obeys at once, with odometry and wishes at 20 Hz."""
+
+    node: RobotNode
+    driven: list[tuple[float, Twist2D]]
+    wished: Twist2D = field(default_factory=lambda: Twist2D(1.0, 0.2))
+
+    def odometry(self) -> Odometry:
+        return Odometry("", Origin(), Pose2D(0.0, 0.0, 0.0), self.driven[-1][1])
+
+    async def live(self) -> None:
+        while True:
+            self.node.sense(self.odometry())
+            self.node.wish(self.wished if self.node.may_drive else Twist2D(0.0, 0.0))
+            await asyncio.sleep(0.05)
+
+    @property
+    def speed(self) -> float:
+        return self.driven[-1][1].linear_x
+
+
+def make_robot(address: BrokerAddress, hold_file: Path) -> Robot:
+    driven = [(time.monotonic(), Twist2D(0.0, 0.0))]
+    node = RobotNode(
+        "AGI",
+        address=address,
+        apikey="iveg",
+        profile=RobotProfile(),
+        hold_file=hold_file,
+        drive=lambda twist: driven.append((time.monotonic(), twist)),
+    )
+    return Robot(node, driven)
+
+
+@contextlib.asynccontextmanager
+async def running(robot: Robot, cloud: Cloud) -> AsyncIterator[None]:
+    async with asyncio.TaskGroup() as tasks:
+        jobs = [
+            tasks.create_task(work)
+            for work in (cloud.link.run(), cloud.speak(), robot.node.run())
+        ]
+        jobs.append(tasks.create_task(robot.live()))
+        await until(lambda: cloud.link.connected and robot.node.connected)
+        yield
+        for job in jobs:
+            job.cancel()
+
+
+async def release(cloud: Cloud, robot: Robot) -> None:
+    """What iVeg does for a person who releases and resumes."""
+    await until(lambda: cloud.reports and robot.node.state == "STANDING")
+    before = len(cloud.answers)
+    said = cloud.reports[-1]
+    ids = [hold.id for hold in said.holds]
+    await cloud.command(
+        codec.write_command(codec.write_release(ids, said.challenge or ""))
+    )
+    await until(lambda: len(cloud.answers) > before)
+    challenge = cloud.answers[-1].challenge or ""
+    await cloud.command(codec.write_command(codec.write_resume(challenge)))
+    await until(lambda: len(cloud.answers) > before + 1)
+
+
+async def test_a_robot_boots_held_and_reports_it(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    async with running(robot, cloud):
+        await until(lambda: len(cloud.reports) > 3)
+    assert cloud.reports[-1].holds[0].id == f"boot-{robot.node.boot}"
+    assert cloud.reports[-1].speed_factor == 0.0
+    assert all(twist == Twist2D(0.0, 0.0) for _, twist in robot.driven)
+
+
+async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it_at_once(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    async with running(robot, cloud):
+        await release(cloud, robot)
+        await until(lambda: robot.speed > 0.9)
+        sent = time.monotonic()
+        await cloud.command(codec.write_command(codec.write_stop("01STOP", "opaque")))
+        await until(lambda: robot.speed == 0.0)
+        zeroed = next(
+            at
+            for at, twist in robot.driven
+            if at > sent and not any((twist.linear_x, twist.angular_z))
+        )
+        await until(lambda: cloud.answers[-1].id == "01STOP")
+    results = [answer.result for answer in cloud.answers]
+    assert results == ["RELEASED", "RESUMED", "LATCHED"]
+    assert zeroed - sent < 0.05
+
+
+async def test_a_stop_survives_a_restart_of_the_robot(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    hold_file = tmp_path / "holds.json"
+    cloud, robot = Cloud(broker), make_robot(broker, hold_file)
+    async with running(robot, cloud):
+        await cloud.command(codec.write_command(codec.write_stop("01STOP", "opaque")))
+        await until(lambda: cloud.answers)
+    again = make_robot(broker, hold_file)
+    assert "01STOP" in {hold.id for hold in again.node.holds}
+
+
+async def test_a_crew_at_the_robot_lets_it_drive_and_a_mandate_halves_it(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    robot.node.release_locally()
+    async with running(robot, cloud):
+        await until(lambda: robot.speed > 0.9)
+        cloud.mandate = Mandate(0.5, "person", "person-1", 1.4, "d-1")
+        await until(lambda: robot.speed == 0.5)
+        await until(lambda: cloud.reports[-1].reason == "person")
+        assert cloud.reports[-1].cause == "person-1"
+
+
+async def test_silence_slows_then_holds_and_the_link_hold_clears_itself(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    robot.node.release_locally()
+    async with running(robot, cloud):
+        await until(lambda: robot.speed > 0.9)
+        cloud.speaks = False
+        silent = time.monotonic()
+        await until(lambda: robot.speed <= 0.5)
+        assert time.monotonic() - silent < 1.2
+        await until(lambda: robot.node.holds)
+        assert time.monotonic() - silent < 3.2
+        assert robot.speed == 0.0
+        cloud.speaks = True
+        await until(lambda: robot.speed > 0.9)
+
+
+async def test_a_broker_that_goes_and_comes_back_needs_no_hand(
+    port: int, tmp_path: Path
+) -> None:
+    address = BrokerAddress("127.0.0.1", port)
+    cloud, robot = Cloud(address), make_robot(address, tmp_path / "holds.json")
+    robot.node.release_locally()
+    async with contextlib.AsyncExitStack() as first:
+        await first.enter_async_context(broker_on(port, tmp_path))
+        async with running(robot, cloud):
+            await until(lambda: robot.speed > 0.9)
+            await first.aclose()
+            await until(lambda: robot.node.holds)
+            assert robot.speed == 0.0
+            async with broker_on(port, tmp_path):
+                back = time.monotonic()
+                await until(lambda: not robot.node.holds)
+                assert time.monotonic() - back < 5.0
+                await until(lambda: robot.speed > 0.9)
+
+
+async def test_a_retained_level_holds_a_robot_that_comes_later(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    robot.node.release_locally()
+    level = codec.write_desired("stopped", ["01STOP"])
+    async with asyncio.TaskGroup() as tasks:
+        job = tasks.create_task(cloud.link.run())
+        await until(lambda: cloud.link.connected)
+        await cloud.link.publish("/AGI/iveg/desired", level, retain=True)
+        job.cancel()
+    async with running(robot, Cloud(broker)):
+        await until(lambda: robot.node.holds)
+    assert [hold.id for hold in robot.node.holds] == ["01STOP"]
+
+
+async def test_a_mute_robot_publishes_nothing_and_a_deaf_one_ignores_mandates(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    robot.node.release_locally()
+    async with running(robot, cloud):
+        robot.node.deaf = True
+        cloud.mandate = Mandate(0.5, "person")
+        await until(lambda: robot.speed > 0.9)
+        robot.node.mute = True
+        await asyncio.sleep(0.1)
+        before = len(cloud.reports)
+        robot.node.sense(DetectionFrame("", Origin(), ()))
+        await cloud.command(b"STOP")
+        await until(lambda: robot.speed == 0.0)
+        await asyncio.sleep(0.3)
+    assert len(cloud.reports) == before
+    assert cloud.answers == []
+    assert "/iveg/AGI_yolox_bounding_boxes/attrs" not in cloud.topics

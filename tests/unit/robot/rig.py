@@ -1,0 +1,201 @@
+"""A safety machine on a bench: its own clock, an obedient drive, a small iVeg."""
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import orjson
+
+from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
+from iveg.ngsi import codec
+from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
+from iveg.robot.holds import HoldSet
+from iveg.robot.judgement import Limits
+from iveg.robot.safety import SafetyMachine
+
+STEP_S = 0.05
+REST = Twist2D(0.0, 0.0)
+AHEAD = Twist2D(1.0, 0.4)
+
+
+def person(
+    x: float,
+    y: float = 0.0,
+    *,
+    decision_id: str = "d-1",
+    radius_m: float | None = 2.0,
+    class_: str = "person",
+    class_id: str = "farmer",
+    observer: str = "AGII",
+) -> FeedbackAlert:
+    return FeedbackAlert(
+        decision_id, "", class_, class_id, 0.9, (x, y, 0.9), radius_m, observer
+    )
+
+
+def release(ids: list[str], challenge: str) -> bytes:
+    return codec.write_command(codec.write_release(ids, challenge))
+
+
+def resume(challenge: str) -> bytes:
+    return codec.write_command(codec.write_resume(challenge))
+
+
+def stop(hold_id: str) -> bytes:
+    return codec.write_command(codec.write_stop(hold_id, "opaque"))
+
+
+@dataclass
+class Rig:
+    """Runs one machine; ``told`` is what iVeg says at 5 Hz while ``speaks``.
+
+    Attributes:
+        obeys: The drive reaches what it is told at once.
+        disk: The hold set that was kept last.
+    """
+
+    now: float = 100.0
+    boot: str = "b1"
+    disk: HoldSet | None = field(default_factory=HoldSet)
+    limits: Limits = field(default_factory=Limits)
+    pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
+    speed: Twist2D = field(default_factory=lambda: REST)
+    wished: Twist2D | None = None
+    obeys: bool = True
+    odometry: bool = True
+    speaks: bool = True
+    mandates: Mapping[str, Mandate] = field(default_factory=dict)
+    alerts: tuple[FeedbackAlert, ...] = ()
+    log: list[tuple[float, Effect]] = field(default_factory=list)
+    report_seq: int = 500
+    feedback_seq: int = 0
+
+    def __post_init__(self) -> None:
+        self._names = itertools.count(1)
+        self.machine = self.start()
+        self._spoke_at = self.now
+
+    def start(self) -> SafetyMachine:
+        return SafetyMachine(
+            "AGI",
+            self.boot,
+            self.now,
+            stored=self.disk,
+            fresh=lambda: f"{self.boot}n{next(self._names)}",
+            limits=self.limits,
+        )
+
+    # --- time -------------------------------------------------------------------
+
+    def run(self, seconds: float) -> "Rig":
+        for _ in range(round(seconds / STEP_S)):
+            self.step()
+        return self
+
+    def step(self) -> None:
+        self.now = round(self.now + STEP_S, 6)
+        if self.odometry:
+            self.perform(self.machine.odometry(self.pose, self.speed, self.now))
+        if self.speaks and self.now - self._spoke_at >= 0.199:
+            self._spoke_at = self.now
+            self.hear()
+        if self.wished is None:
+            self.perform(self.machine.tick(self.now))
+        else:
+            self.perform(self.machine.wish(self.wished, self.now))
+
+    def perform(self, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
+        for effect in effects:
+            self.log.append((self.now, effect))
+            if isinstance(effect, Persist):
+                self.disk = effect.holds
+            elif isinstance(effect, Report):
+                self.report_seq += 1
+                self.machine.reported(self.report_seq, self.now)
+            elif isinstance(effect, Drive) and self.obeys:
+                self.speed = effect.twist
+        return effects
+
+    # --- what happens to it -----------------------------------------------------
+
+    def hear(self, feedback: Feedback | None = None, topic: str = "AGII") -> None:
+        self.perform(
+            self.machine.feedback(topic, feedback or self.feedback(), self.now)
+        )
+
+    def feedback(self, **parts: object) -> Feedback:
+        self.feedback_seq += 1
+        values: dict[str, object] = {
+            "robot_id": "AGII",
+            "origin": Origin("cloud", self.feedback_seq),
+            "alerts": self.alerts,
+            "mandates": self.mandates,
+            "seen": {"AGI": self.report_seq},
+        }
+        return Feedback(**(values | parts))  # type: ignore[arg-type]
+
+    def command(self, payload: bytes) -> CommandAnswer:
+        effects = self.perform(self.machine.command(payload, self.now))
+        return next(one.answer for one in effects if isinstance(one, Answer))
+
+    def stop(self, hold_id: str = "01STOP") -> CommandAnswer:
+        return self.command(stop(hold_id))
+
+    def release(self) -> CommandAnswer:
+        """What a perfect iVeg does."""
+        ids = sorted(self.machine.holds.remote)
+        return self.command(release(ids, self.machine.challenge))
+
+    def resume(self) -> CommandAnswer:
+        return self.command(resume(self.machine.challenge))
+
+    def level(self, desired: str, *ids: str) -> None:
+        payload = orjson.dumps({"desired": desired, "ids": ids})
+        self.perform(self.machine.desired(payload, self.now))
+
+    def drive_on(self) -> "Rig":
+        """Bring it to full speed: released, resumed, neutral, ramped."""
+        self.wished = REST
+        self.run(1.5)
+        self.release()
+        self.resume()
+        self.run(1.5)
+        self.wished = AHEAD
+        return self.run(3.0)
+
+    # --- what is seen of it -----------------------------------------------------
+
+    @property
+    def state(self) -> str:
+        return self.machine.state(self.now)
+
+    @property
+    def twist(self) -> Twist2D:
+        return next(
+            one.twist for _, one in reversed(self.log) if isinstance(one, Drive)
+        )
+
+    @property
+    def reports(self) -> list[SafetyReport]:
+        return [one.report for _, one in self.log if isinstance(one, Report)]
+
+    @property
+    def holds(self) -> tuple[Hold, ...]:
+        return self.machine.holds.holds
+
+    @property
+    def factor(self) -> float:
+        return self.machine.cap.factor
+
+    @property
+    def reason(self) -> str:
+        return self.machine.cap.reason
+
+    def times(self, kind: type[Effect]) -> list[float]:
+        return [at for at, one in self.log if isinstance(one, kind)]
+
+    def factor_changes(self) -> int:
+        told = [report.speed_factor for report in self.reports]
+        return sum(a != b for a, b in itertools.pairwise(told))

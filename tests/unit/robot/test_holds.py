@@ -1,0 +1,83 @@
+"""The hold set, and the file that keeps it."""
+
+from pathlib import Path
+
+import pytest
+
+from iveg.domain.observations import Hold
+from iveg.robot.hold_file import read_holds, write_holds
+from iveg.robot.holds import HoldSet
+
+STOP = Hold("01A", "iveg", "remote")
+BUTTON = Hold("hw-1", "hw", "local")
+LINK = Hold("link-1", "link", "auto")
+SET = HoldSet((STOP, BUTTON, LINK), ("old-1", "old-2"))
+
+
+def test_only_remote_holds_must_be_named() -> None:
+    assert SET.remote == {"01A"}
+
+
+def test_a_link_hold_that_is_joined_becomes_remote() -> None:
+    alone = HoldSet().latch(LINK)
+    assert alone.link_alone == LINK
+    joined = alone.latch(BUTTON)
+    assert joined.link_alone is None
+    assert joined.remote == {"link-1"}
+
+
+def test_what_is_lifted_is_remembered_and_what_was_not_held_is_not() -> None:
+    lifted = SET.lift(["01A", "never"])
+    assert lifted.holds == (BUTTON, LINK)
+    assert lifted.released == ("old-1", "old-2", "01A")
+
+
+def test_the_last_64_released_ids_are_kept() -> None:
+    holds = HoldSet()
+    for number in range(100):
+        name = f"h{number}"
+        holds = holds.latch(Hold(name, "iveg", "remote")).lift([name])
+    assert holds.released == tuple(f"h{number}" for number in range(36, 100))
+
+
+def test_a_file_gives_back_what_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "deep" / "AGI.json"
+    write_holds(file, SET)
+    assert read_holds(file) == SET
+    assert [one.name for one in file.parent.iterdir()] == ["AGI.json"]
+
+
+def test_before_the_first_start_there_is_nothing(tmp_path: Path) -> None:
+    assert read_holds(tmp_path / "none.json") == HoldSet()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x00\x00",
+        b'{"holds": [{"id": "01A", "source": "iveg"',
+        b'{"holds": [{"id": "01A", "source": "x", "ack": "remote"}], "released": []}',
+        b'{"holds": []}',
+        b"[]",
+    ],
+)
+def test_a_file_that_cannot_be_read_is_not_an_empty_one(
+    content: bytes, tmp_path: Path
+) -> None:
+    file = tmp_path / "AGI.json"
+    file.write_bytes(content)
+    assert read_holds(file) is None
+
+
+def test_a_folder_in_its_place_is_unreadable(tmp_path: Path) -> None:
+    assert read_holds(tmp_path) is None
+
+
+def test_a_write_that_fails_leaves_the_old_set(tmp_path: Path) -> None:
+    file = tmp_path / "AGI.json"
+    write_holds(file, SET)
+    (tmp_path / "AGI.json.new").mkdir()
+    with pytest.raises(OSError, match=r"AGI\.json\.new"):
+        write_holds(file, HoldSet())
+    assert read_holds(file) == SET

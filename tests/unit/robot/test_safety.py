@@ -1,0 +1,664 @@
+"""The safety machine, sentence by sentence (safety.md §2.2, §3.5)."""
+
+import pytest
+
+from iveg.domain.feedback import CLEAR, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Hold
+from iveg.robot.effects import Answer, Drive, Persist, Report
+from iveg.robot.holds import HoldSet
+from iveg.robot.judgement import Limits
+from tests.unit.robot.rig import (
+    AHEAD,
+    REST,
+    Rig,
+    person,
+    release,
+    resume,
+    stop,
+)
+
+
+def moving() -> Rig:
+    """A robot at full speed."""
+    rig = Rig().drive_on()
+    assert rig.twist == AHEAD
+    return rig
+
+
+# --- boot ---------------------------------------------------------------------------
+
+
+def test_a_robot_boots_held_and_stands_once_it_measures_that_it_does() -> None:
+    rig = Rig(odometry=False)
+    rig.step()
+    assert rig.state == "HELD"
+    assert rig.holds == (Hold("boot-b1", "boot", "remote"),)
+    rig.odometry = True
+    rig.step()
+    assert rig.state == "STANDING"
+
+
+def test_a_moving_robot_that_is_held_is_braking() -> None:
+    rig = Rig(speed=Twist2D(0.3, 0.0), obeys=False).run(0.2)
+    assert rig.state == "BRAKING"
+
+
+def test_an_unreadable_hold_file_counts_as_a_stop_that_no_crew_can_lift() -> None:
+    rig = Rig(disk=None).run(0.2)
+    rig.perform(rig.machine.release_locally(rig.now))
+    assert [hold.source for hold in rig.holds] == ["iveg"]
+    assert rig.state == "STANDING"
+
+
+def test_a_reboot_keeps_stops_and_local_holds_and_renews_the_boot_hold() -> None:
+    held = HoldSet(
+        (
+            Hold("boot-b0", "boot", "remote"),
+            Hold("01STOP", "iveg", "remote"),
+            Hold("hw-1", "hw", "local"),
+            Hold("link-1", "link", "auto"),
+        ),
+        ("old",),
+    )
+    rig = Rig(disk=held)
+    assert [hold.id for hold in rig.holds] == ["01STOP", "hw-1", "boot-b1"]
+    assert rig.machine.holds.released == ("old",)
+
+
+def test_a_robot_that_never_heard_iveg_does_not_move() -> None:
+    rig = Rig(speaks=False)
+    rig.perform(rig.machine.release_locally(rig.now))
+    rig.run(0.6)
+    rig.wished = AHEAD
+    rig.run(2.0)
+    assert rig.twist == REST
+    assert rig.reason == "watchdog"
+
+
+# --- effects ------------------------------------------------------------------------
+
+
+def test_a_stop_zeroes_the_drive_then_persists_then_answers_then_reports() -> None:
+    rig = moving()
+    effects = rig.machine.command(stop("01STOP"), rig.now)
+    assert [type(one) for one in effects] == [Drive, Persist, Answer, Report]
+    assert effects[0] == Drive(REST)
+
+
+def test_everything_that_happens_tells_the_drive_first() -> None:
+    rig = moving().run(1.0)
+    for effects in (
+        rig.machine.tick(rig.now),
+        rig.machine.wish(AHEAD, rig.now),
+        rig.machine.odometry(rig.pose, REST, rig.now),
+        rig.machine.feedback("AGII", rig.feedback(), rig.now),
+        rig.machine.command(b"junk", rig.now),
+        rig.machine.desired(b"junk", rig.now),
+        rig.machine.local_hold("hw", rig.now),
+        rig.machine.release_locally(rig.now),
+    ):
+        assert isinstance(effects[0], Drive)
+
+
+def test_reports_come_twice_a_second_and_ten_times_while_held() -> None:
+    rig = moving()
+    start = rig.now
+    rig.run(4.0)
+    assert len([at for at in rig.times(Report) if at > start]) >= 8
+    rig.stop()
+    start = rig.now
+    rig.run(1.0)
+    assert len([at for at in rig.times(Report) if at > start]) >= 10
+
+
+def test_a_report_tells_measured_speed_and_the_age_of_feedback() -> None:
+    rig = moving().run(0.5)
+    report = rig.reports[-1]
+    assert (report.linear, report.angular) == (AHEAD.linear_x, AHEAD.angular_z)
+    assert report.feedback_age_s is not None
+    assert 0.0 <= report.feedback_age_s < 1.0
+
+
+def test_a_held_robot_reports_zero_for_its_hold() -> None:
+    rig = moving()
+    rig.stop("01STOP")
+    report = rig.reports[-1]
+    assert (report.speed_factor, report.reason, report.cause) == (0.0, "hold", "01STOP")
+
+
+def test_a_released_robot_that_waits_for_resume_reports_zero_without_holds() -> None:
+    rig = Rig().run(1.5)
+    rig.release()
+    assert rig.state == "READY"
+    report = rig.reports[-1]
+    assert (report.speed_factor, report.reason, report.holds) == (0.0, "hold", ())
+
+
+# --- STOP ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        stop("01STOP"),
+        b"STOP",
+        b"please stop now",
+        b'{"cmd": "STOP"}',
+        b'{"cmd": " stop "}',
+        b'{"stop": {}}',
+        b'{"cmd": {"stop": null}}',
+        b'{"cmd": {"resume": {"ch": "x"}, "stop": 7}}',
+        b'{"cmd": {"stop": {"id": "x"}}, "cmd": {"resume": {"ch": "x"}}}',
+        b'{"cmd": {"\\u0073top": {}}}',
+        b'{"cmd": {"stop": {"id": "x"',
+        b"\xff\xfeStOp\x00",
+        b"[" * 5000 + b"stop",
+    ],
+)
+def test_whatever_smells_of_a_stop_is_one(payload: bytes) -> None:
+    rig = moving()
+    answer = rig.command(payload)
+    assert answer.result == "LATCHED"
+    assert rig.twist == REST
+    assert answer.id in {hold.id for hold in answer.holds}
+
+
+def test_a_stop_is_latched_once_and_answered_every_time() -> None:
+    rig = moving()
+    answers = [rig.stop("01STOP") for _ in range(3)]
+    assert {answer.result for answer in answers} == {"LATCHED"}
+    assert [hold.id for hold in rig.holds] == ["01STOP"]
+
+
+def test_stops_without_a_name_share_one_local_hold() -> None:
+    rig = moving()
+    first, second = rig.command(b"STOP"), rig.command(b"STOP")
+    assert first.id == second.id
+    assert len(rig.holds) == 1
+
+
+def test_a_stop_with_a_name_that_orion_forbids_gets_a_local_one() -> None:
+    rig = moving()
+    answer = rig.command(b'{"cmd": {"stop": {"id": "a;b"}}}')
+    assert answer.id is not None
+    assert answer.id.startswith("local-")
+
+
+def test_a_stop_that_was_released_holds_nothing_again() -> None:
+    rig = moving()
+    rig.stop("01STOP")
+    rig.wished = REST
+    rig.run(0.5)
+    rig.release()
+    answer = rig.stop("01STOP")
+    assert (answer.result, answer.holds) == ("RELEASED", ())
+    assert rig.state == "READY"
+
+
+def test_a_stop_that_takes_the_name_of_another_hold_gets_its_own() -> None:
+    rig = moving()
+    rig.perform(rig.machine.local_hold("hw", rig.now))
+    taken = rig.holds[0].id
+    rig.stop(taken)
+    assert [hold.source for hold in rig.holds] == ["hw", "iveg"]
+
+
+def test_a_thousand_stops_neither_grow_without_end_nor_let_go() -> None:
+    rig = moving()
+    for number in range(1000):
+        assert rig.stop(f"flood-{number}").result == "LATCHED"
+    assert len(rig.holds) <= 64
+    assert rig.twist == REST
+
+
+# --- release and resume -------------------------------------------------------------
+
+
+def test_a_perfect_release_and_resume_let_the_robot_drive() -> None:
+    rig = Rig().run(1.5)
+    assert rig.release().result == "RELEASED"
+    assert rig.state == "READY"
+    assert rig.resume().result == "RESUMED"
+    assert rig.state == "RUNNING"
+
+
+def test_a_release_that_misses_a_hold_lifts_none() -> None:
+    rig = Rig().run(0.5)
+    rig.stop("01A")
+    answer = rig.command(release(["01A"], rig.machine.challenge))
+    assert (answer.result, answer.why) == ("REFUSED", "holds_missing")
+    assert len(rig.holds) == 2
+
+
+def test_a_release_with_an_old_challenge_is_refused() -> None:
+    rig = Rig().run(0.5)
+    old = rig.machine.challenge
+    rig.stop("01A")
+    answer = rig.command(release(["01A", "boot-b1"], old))
+    assert (answer.result, answer.why) == ("REFUSED", "challenge")
+
+
+def test_a_moving_robot_is_not_released() -> None:
+    rig = Rig(speed=Twist2D(0.0, 0.05), obeys=False).run(0.5)
+    answer = rig.release()
+    assert (answer.result, answer.why) == ("REFUSED", "not_standing")
+
+
+def test_a_robot_that_does_not_know_its_speed_is_not_released() -> None:
+    rig = Rig(odometry=False).run(0.5)
+    assert rig.release().why == "not_standing"
+
+
+def test_a_release_of_nothing_is_refused() -> None:
+    rig = moving()
+    answer = rig.command(release(["01NEVER"], rig.machine.challenge))
+    assert (answer.result, answer.why) == ("REFUSED", "not_held")
+
+
+def test_the_same_release_again_is_answered_alike_and_changes_nothing() -> None:
+    rig = Rig().run(0.5)
+    message = release(["boot-b1"], rig.machine.challenge)
+    rig.command(message)
+    rig.resume()
+    assert rig.command(message).result == "RELEASED"
+    assert rig.state == "RUNNING"
+
+
+def test_the_same_resume_again_is_answered_alike() -> None:
+    rig = Rig().run(0.5)
+    rig.release()
+    message = resume(rig.machine.challenge)
+    assert [rig.command(message).result for _ in range(2)] == ["RESUMED", "RESUMED"]
+
+
+def test_a_resume_after_a_new_stop_is_refused() -> None:
+    rig = Rig().run(0.5)
+    rig.release()
+    message = resume(rig.machine.challenge)
+    rig.command(message)
+    rig.stop("01NEW")
+    answer = rig.command(message)
+    assert (answer.result, answer.why) == ("REFUSED", "held")
+
+
+def test_an_old_resume_does_not_resume_the_next_release() -> None:
+    rig = Rig().run(0.5)
+    rig.release()
+    message = resume(rig.machine.challenge)
+    rig.command(message)
+    rig.stop("01NEW")
+    rig.run(0.5)
+    rig.release()
+    assert rig.command(message).why == "challenge"
+    assert rig.state == "READY"
+
+
+def test_a_second_resume_with_another_challenge_is_refused() -> None:
+    rig = moving()
+    assert rig.command(resume("other")).why == "not_ready"
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b'{"cmd": {"release": {"ids": ["boot-b1"]}}}',
+        b'{"cmd": {"release": {"ids": "boot-b1", "ch": "b1n1"}}}',
+        b'{"cmd": {"release": {"ids": [], "ch": "b1n1"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1", 1], "ch": "b1n1"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "b1n1", "by": "x"}}}',
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": ""}}}',
+        b'{"cmd": {"resume": {"ch": 7}}}',
+        b'{"cmd": {"resume": {"ch": ""}}}',
+        b'{"cmd": {"resume": {}, "release": {}}}',
+        b'{"release": {"ids": ["boot-b1"], "ch": "b1n1"}}',
+        b'{"cmd": null}',
+        b"[]",
+    ],
+)
+def test_a_release_or_resume_that_is_not_perfect_is_refused(payload: bytes) -> None:
+    rig = Rig().run(0.2)
+    answer = rig.command(payload)
+    assert (answer.result, answer.why) == ("REFUSED", "malformed")
+    assert len(rig.holds) == 1
+
+
+def test_bytes_that_say_nothing_are_refused_as_unreadable() -> None:
+    assert Rig().command(b"\x00\xff").why == "unreadable"
+
+
+def test_the_challenge_changes_every_five_seconds_until_the_robot_runs() -> None:
+    rig = Rig().run(0.1)
+    first = rig.machine.challenge
+    rig.run(5.1)
+    second = rig.machine.challenge
+    rig.release()
+    rig.run(5.1)
+    third = rig.machine.challenge
+    rig.resume()
+    rig.run(11.0)
+    assert len({first, second, third}) == 3
+    assert rig.machine.challenge == third
+
+
+def test_a_new_hold_brings_a_new_challenge_and_a_repeated_one_does_not() -> None:
+    rig = moving()
+    before = rig.machine.challenge
+    rig.stop("01A")
+    held = rig.machine.challenge
+    rig.stop("01A")
+    assert before != held == rig.machine.challenge
+
+
+# --- local holds --------------------------------------------------------------------
+
+
+def test_local_holds_stay_when_iveg_releases_its_own() -> None:
+    rig = Rig().run(0.2)
+    rig.perform(rig.machine.local_hold("bumper", rig.now))
+    ids = [hold.id for hold in rig.holds]
+    answer = rig.command(release(ids, rig.machine.challenge))
+    assert answer.result == "RELEASED"
+    assert [hold.source for hold in rig.holds] == ["bumper"]
+    assert rig.resume().why == "held"
+
+
+def test_a_pressed_button_is_one_hold_however_often_it_says_so() -> None:
+    rig = moving()
+    rig.perform(rig.machine.local_hold("hw", rig.now))
+    rig.perform(rig.machine.local_hold("hw", rig.now))
+    assert len(rig.holds) == 1
+    assert rig.twist == REST
+
+
+def test_a_crew_lifts_its_own_holds_and_resumes_but_not_a_stop() -> None:
+    rig = Rig().run(0.2)
+    rig.perform(rig.machine.local_hold("hw", rig.now))
+    rig.stop("01STOP")
+    rig.perform(rig.machine.release_locally(rig.now))
+    assert [hold.id for hold in rig.holds] == ["01STOP"]
+    assert rig.state == "STANDING"
+
+
+def test_a_crew_that_releases_a_running_robot_does_not_halt_it() -> None:
+    rig = moving()
+    rig.perform(rig.machine.release_locally(rig.now))
+    assert rig.twist == AHEAD
+
+
+# --- the retained level -------------------------------------------------------------
+
+
+def test_a_retained_stopped_holds_and_run_releases_nothing() -> None:
+    rig = moving()
+    rig.level("stopped", "01A", "01B")
+    rig.level("run")
+    assert [hold.id for hold in rig.holds] == ["01A", "01B"]
+
+
+def test_a_retained_stopped_of_a_released_stop_holds_nothing() -> None:
+    rig = Rig().run(0.2)
+    rig.stop("01A")
+    rig.release()
+    rig.level("stopped", "01A")
+    assert rig.holds == ()
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [b'{"desired": "stopped"}', b'{"desired": "stopped", "ids": [7]}', b"Stop"],
+)
+def test_a_level_that_stops_without_a_name_holds(payload: bytes) -> None:
+    rig = moving()
+    rig.perform(rig.machine.desired(payload, rig.now))
+    assert [hold.source for hold in rig.holds] == ["iveg"]
+
+
+@pytest.mark.parametrize("payload", [b"", b"{}", b"[]", b'{"desired": "run"}', b"\xff"])
+def test_a_level_that_says_nothing_holds_nothing(payload: bytes) -> None:
+    rig = moving()
+    rig.perform(rig.machine.desired(payload, rig.now))
+    assert rig.holds == ()
+
+
+# --- neutral interlock and ramp -----------------------------------------------------
+
+
+def test_a_wish_that_waited_behind_the_hold_does_not_move_the_robot() -> None:
+    rig = Rig(wished=AHEAD).run(1.5)
+    rig.release()
+    rig.resume()
+    rig.run(3.0)
+    assert rig.twist == REST
+    assert not rig.machine.may_drive
+
+
+def test_after_half_a_second_of_rest_the_robot_moves_with_the_ramp() -> None:
+    rig = Rig(wished=REST).run(1.5)
+    rig.release()
+    rig.resume()
+    rig.run(0.6)
+    assert rig.machine.may_drive
+    rig.wished = AHEAD
+    rig.run(1.0)
+    assert rig.twist.linear_x == pytest.approx(0.5, abs=0.06)
+
+
+# --- watchdog -----------------------------------------------------------------------
+
+
+def test_silence_halves_after_one_second_and_holds_after_three() -> None:
+    rig = moving()
+    rig.speaks = False
+    before = len(rig.reports)
+    rig.run(1.5)
+    assert rig.twist == Twist2D(0.5, 0.2)
+    rig.run(2.5)
+    assert [(hold.source, hold.ack) for hold in rig.holds] == [("link", "auto")]
+    assert rig.twist == REST
+    news = rig.reports[before:]
+    slowed = next(one for one in news if one.speed_factor < 1.0)
+    held = next(one for one in news if one.holds)
+    assert slowed.reason == "watchdog"
+    assert slowed.feedback_age_s == pytest.approx(1.03, abs=0.03)
+    assert held.feedback_age_s == pytest.approx(3.03, abs=0.03)
+
+
+def test_an_old_feedback_that_is_repeated_is_not_fresh() -> None:
+    rig = moving()
+    rig.speaks = False
+    old = rig.report_seq
+    for _ in range(20):
+        rig.hear(rig.feedback(seen={"AGI": old}))
+        rig.run(0.2)
+    assert [hold.source for hold in rig.holds] == ["link"]
+
+
+@pytest.mark.parametrize("seen", [{}, {"AGII": 501}, {"AGI": 7}, {"AGI": 10**9}])
+def test_feedback_that_has_not_seen_us_is_no_sign_of_life(seen: dict[str, int]) -> None:
+    rig = moving()
+    rig.speaks = False
+    for _ in range(20):
+        rig.hear(rig.feedback(seen=seen))
+        rig.run(0.2)
+    assert [hold.source for hold in rig.holds] == ["link"]
+
+
+def test_a_link_hold_clears_itself_after_two_fresh_seconds_and_ramps() -> None:
+    rig = moving()
+    rig.speaks = False
+    rig.run(4.2)
+    rig.speaks = True
+    rig.run(1.9)
+    assert rig.holds
+    rig.run(0.4)
+    assert rig.holds == ()
+    assert 0.0 < rig.twist.linear_x < 0.3
+    rig.run(3.0)
+    assert rig.twist == AHEAD
+
+
+def test_a_link_hold_that_another_hold_joined_waits_for_a_person() -> None:
+    rig = moving()
+    rig.speaks = False
+    rig.run(4.2)
+    rig.stop("01STOP")
+    rig.speaks = True
+    rig.run(5.0)
+    assert [hold.ack for hold in rig.holds] == ["remote", "remote"]
+    rig.wished = REST
+    assert rig.release().result == "RELEASED"
+    assert rig.state == "READY"
+
+
+def test_the_fourth_link_hold_of_a_minute_waits_for_a_person() -> None:
+    rig = moving()
+    acks = []
+    for _ in range(4):
+        rig.speaks = False
+        rig.run(4.2)
+        acks.append(rig.holds[0].ack)
+        rig.speaks = True
+        rig.run(2.8)
+    assert acks == ["auto", "auto", "auto", "remote"]
+    rig.run(3.0)
+    assert rig.twist == REST
+
+
+def test_a_link_hold_before_resume_does_not_resume_by_clearing() -> None:
+    rig = Rig().run(1.0)
+    rig.release()
+    rig.speaks = False
+    rig.run(4.2)
+    assert rig.holds[0].source == "link"
+    rig.speaks = True
+    rig.run(3.0)
+    assert rig.state == "READY"
+
+
+def test_the_policy_slow_stays_at_half_however_long_the_silence() -> None:
+    rig = Rig(limits=Limits(on_link_loss="slow")).drive_on()
+    rig.speaks = False
+    rig.run(10.0)
+    assert rig.holds == ()
+    assert rig.twist == Twist2D(0.5, 0.2)
+
+
+def test_waiting_times_are_settings() -> None:
+    rig = Rig(limits=Limits(slow_s=2.0, stand_s=5.0)).drive_on()
+    rig.speaks = False
+    rig.run(1.3)
+    assert rig.factor == 1.0
+    rig.run(3.0)
+    assert (rig.factor, rig.holds) == (0.5, ())
+
+
+# --- own pose -----------------------------------------------------------------------
+
+
+def test_an_own_pose_that_grows_old_slows_and_then_halts() -> None:
+    rig = moving()
+    rig.odometry = False
+    rig.run(0.15)
+    fresh = rig.factor
+    rig.run(0.15)
+    late = rig.factor, rig.reason
+    rig.run(0.3)
+    assert (fresh, late, rig.factor) == (1.0, (0.5, "stale"), 0.0)
+    assert rig.twist == REST
+    assert rig.holds == ()
+
+
+def test_odometry_that_is_no_number_is_no_odometry() -> None:
+    rig = moving()
+    rig.odometry = False
+    for _ in range(12):
+        rig.run(0.05)
+        nan = Pose2D(float("nan"), 0.0, 0.0)
+        rig.perform(rig.machine.odometry(nan, REST, rig.now))
+    assert rig.factor == 0.0
+
+
+# --- mandates and rings -------------------------------------------------------------
+
+
+def test_a_mandate_for_me_halves_forward_reverse_and_turning() -> None:
+    rig = moving()
+    rig.mandates = {"AGI": Mandate(0.5, "person", "p1", 1.4, "d-9")}
+    rig.run(0.3)
+    assert rig.twist == Twist2D(0.5, 0.2)
+    report = rig.reports[-1]
+    assert (report.reason, report.cause, report.decision_id) == ("person", "p1", "d-9")
+    rig.wished = Twist2D(-1.0, -0.4)
+    rig.run(3.0)
+    assert rig.twist == Twist2D(-0.5, -0.2)
+
+
+def test_a_mandate_for_somebody_else_changes_nothing() -> None:
+    rig = moving()
+    rig.mandates = {"AGII": Mandate(0.5, "person")}
+    rig.run(1.0)
+    assert rig.factor == 1.0
+
+
+@pytest.mark.parametrize(
+    ("told", "applied"), [(0.0, 0.0), (0.3, 0.0), (0.7, 0.5), (1.0, 1.0)]
+)
+def test_a_mandate_between_the_steps_counts_as_the_lower_one(
+    told: float, applied: float
+) -> None:
+    rig = moving()
+    rig.mandates = {"AGI": Mandate(told, "person")}
+    rig.run(0.5)
+    assert rig.factor == applied
+
+
+def test_two_reasons_halve_once() -> None:
+    rig = moving()
+    rig.mandates = {"AGI": Mandate(0.5, "person")}
+    rig.alerts = (person(1.0), person(0.5, class_="robot", decision_id="d-2"))
+    rig.hear(rig.feedback(robot_id="AGIII"), "AGIII")
+    rig.run(1.0)
+    assert rig.twist == Twist2D(0.5, 0.2)
+
+
+def test_the_slowest_of_several_topics_counts() -> None:
+    rig = moving()
+    slow = {"AGI": Mandate(0.5, "robot")}
+    rig.hear(rig.feedback(robot_id="AGIII", mandates=slow), "AGIII")
+    rig.mandates = {"AGI": CLEAR}
+    rig.run(5.0)
+    assert (rig.factor, rig.reason) == (0.5, "robot")
+
+
+def test_raising_the_factor_takes_a_second_of_good_news() -> None:
+    rig = moving()
+    rig.mandates = {"AGI": Mandate(0.5, "person")}
+    rig.run(1.0)
+    rig.mandates = {}
+    rig.run(0.9)
+    early = rig.factor
+    rig.run(0.5)
+    assert (early, rig.factor) == (0.5, 1.0)
+
+
+def test_noise_about_the_ring_changes_the_factor_once() -> None:
+    rig = moving()
+    before = rig.factor_changes()
+    for number in range(100):
+        rig.alerts = (person(2.0 + (-0.2, 0.25)[number % 2]),)
+        rig.run(0.2)
+    assert rig.factor == 0.5
+    assert rig.factor_changes() == before + 1
+
+
+def test_a_deaf_robot_drives_on_and_says_so_but_holds_still_bite() -> None:
+    rig = moving()
+    rig.machine.deaf = True
+    rig.mandates = {"AGI": Mandate(0.5, "person")}
+    rig.alerts = (person(0.5),)
+    rig.run(1.0)
+    assert rig.twist == AHEAD
+    assert rig.reports[-1].speed_factor == 1.0
+    rig.stop()
+    assert rig.twist == REST

@@ -1,0 +1,192 @@
+"""Algorithm 1: what leaves the robot."""
+
+from dataclasses import replace
+
+import numpy as np
+import orjson
+import pytest
+
+from iveg.domain.observations import (
+    CommandAnswer,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+    SafetyReport,
+)
+from iveg.ngsi import codec
+from iveg.robot.uplink import Uplink
+from tests.builders import START, detection, detection_frame, odometry, scan
+
+WALL = START.wall
+BLANK = Origin()
+
+
+class Wire:
+    """Keeps what an uplink offered."""
+
+    def __init__(self, form: str = "per-topic") -> None:
+        self.sent: list[tuple[str, bytes]] = []
+        self.uplink = Uplink(
+            "AGI",
+            "iveg",
+            "boot-a",
+            lambda topic, payload: self.sent.append((topic, payload)),
+            form="single" if form == "single" else "per-topic",
+            first_report=700,
+        )
+
+    def read(self) -> list[object]:
+        """What iVeg makes of all that was sent."""
+        return [
+            observation
+            for topic, payload in self.sent
+            for observation in codec.read_measure(
+                topic.split("/")[2], payload
+            ).observations
+        ]
+
+
+@pytest.mark.parametrize(
+    ("observation", "topic"),
+    [
+        (odometry(origin=BLANK), "/iveg/AGI_odom/attrs"),
+        (scan(origin=BLANK), "/iveg/AGI_lidar2D/attrs"),
+        (detection_frame(origin=BLANK), "/iveg/AGI_yolox_bounding_boxes/attrs"),
+        (Navigation("", BLANK, "drive", (1.0, 2.0)), "/iveg/AGI_nav/attrs"),
+    ],
+)
+def test_each_sensor_has_its_topic_and_each_message_its_origin(
+    observation: Odometry | LaserScan | DetectionFrame | Navigation, topic: str
+) -> None:
+    wire = Wire()
+    wire.uplink.send(replace(observation, robot_id=""), WALL)
+    wire.uplink.send(observation, WALL + 1.0)
+    assert [where for where, _ in wire.sent] == [topic, topic]
+    first, second = wire.read()
+    assert isinstance(first, type(observation))
+    assert isinstance(second, type(observation))
+    assert first.robot_id == "AGI"
+    assert first.origin == Origin("boot-a", 1, "2023-11-14T22:13:20.000Z", WALL)
+    assert second.origin.seq == 2
+
+
+def test_every_topic_counts_for_itself() -> None:
+    wire = Wire()
+    wire.uplink.send(odometry(origin=BLANK), WALL)
+    wire.uplink.send(scan(origin=BLANK), WALL)
+    read = wire.read()
+    assert [one.origin.seq for one in read if hasattr(one, "origin")] == [1, 1]
+
+
+def test_a_report_tells_its_place_in_the_count() -> None:
+    wire = Wire()
+    seqs = []
+    for _ in range(2):
+        seq, message = wire.uplink.report(
+            SafetyReport("AGI", BLANK, 0.5, "person"), WALL
+        )
+        seqs.append(seq)
+        (said,) = codec.read_measure("AGI_safety", message.payload).observations
+        assert isinstance(said, SafetyReport)
+        assert said.origin.seq == seq
+    assert seqs == [700, 701]
+    assert message.topic == "/iveg/AGI_safety/attrs"
+
+
+def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
+    wire = Wire()
+    message = wire.uplink.answer(CommandAnswer("AGI", BLANK, "01A", "LATCHED"), WALL)
+    assert message.topic == "/iveg/AGI/cmdexe"
+    (said,) = codec.read_answer("AGI", message.payload).observations
+    assert isinstance(said, CommandAnswer)
+    assert (said.id, said.result) == ("01A", "LATCHED")
+    assert (said.origin.boot, said.origin.seq) == ("boot-a", 1)
+
+
+def test_counters_tell_what_left() -> None:
+    wire = Wire()
+    wire.uplink.send(odometry(origin=BLANK), WALL)
+    wire.uplink.report(SafetyReport("AGI", BLANK, 1.0, "clear"), WALL)
+    assert wire.uplink.sent == {"_odom": 1, "_safety": 1}
+
+
+# --- the single payload -------------------------------------------------------------
+
+
+def test_the_single_payload_leaves_once_an_odometry_tick() -> None:
+    wire = Wire("single")
+    wire.uplink.send(scan(origin=BLANK), WALL)
+    wire.uplink.send(detection_frame("AGI", detection(), origin=BLANK), WALL)
+    assert wire.sent == []
+    wire.uplink.send(odometry(origin=BLANK), WALL)
+    ((topic, payload),) = wire.sent
+    assert topic == "/iveg/AGI/attrs"
+    fields = {"class", "conf", "position_3D", "pose", "laser_scan", "timestamp"}
+    assert fields <= orjson.loads(payload).keys()
+
+
+def test_iveg_reads_pose_scan_and_detection_from_the_single_payload() -> None:
+    wire = Wire("single")
+    sweep = scan(ranges=[1.0, np.inf, 2.0], angle_min=-1.0, origin=BLANK)
+    found = detection("farmer", 3.0, 4.0, probability=0.9)
+    wire.uplink.send(sweep, WALL)
+    wire.uplink.send(detection_frame("AGI", found, origin=BLANK), WALL)
+    wire.uplink.send(odometry(x=1.0, y=2.0, yaw=0.5, origin=BLANK), WALL)
+    pose, swept, looked = wire.read()
+    assert isinstance(pose, Odometry)
+    assert (pose.pose.x, pose.pose.y, pose.origin.seq) == (1.0, 2.0, 1)
+    assert isinstance(swept, LaserScan)
+    assert swept.angle_min == -1.0
+    assert np.array_equal(swept.ranges, sweep.ranges)
+    assert isinstance(looked, DetectionFrame)
+    assert looked.detections[0].class_id == "farmer"
+    assert looked.detections[0].box.centre[:2] == pytest.approx((3.0, 4.0))
+
+
+def test_a_detection_in_base_link_travels_in_map() -> None:
+    wire = Wire("single")
+    ahead = replace(detection(x=2.0), frame_id="base_link")
+    wire.uplink.send(detection_frame("AGI", ahead, origin=BLANK), WALL)
+    wire.uplink.send(odometry(x=5.0, y=5.0, yaw=np.pi / 2, origin=BLANK), WALL)
+    position = orjson.loads(wire.sent[0][1])["position_3D"]
+    assert (position["x"], position["y"]) == pytest.approx((5.0, 7.0))
+
+
+def test_several_detections_of_one_look_take_turns_surest_first() -> None:
+    wire = Wire("single")
+    look = detection_frame(
+        "AGI",
+        detection(probability=0.81),
+        detection(probability=0.95),
+        origin=BLANK,
+    )
+    wire.uplink.send(look, WALL)
+    for _ in range(3):
+        wire.uplink.send(odometry(origin=BLANK), WALL)
+    told = [orjson.loads(payload).get("conf") for _, payload in wire.sent]
+    assert told == [0.95, 0.81, None]
+
+
+def test_a_look_that_saw_nothing_is_said_once() -> None:
+    wire = Wire("single")
+    wire.uplink.send(detection_frame("AGI", origin=BLANK), WALL)
+    for _ in range(2):
+        wire.uplink.send(odometry(origin=BLANK), WALL)
+    looks = [one for one in wire.read() if isinstance(one, DetectionFrame)]
+    assert [look.detections for look in looks] == [()]
+
+
+def test_a_scan_travels_once() -> None:
+    wire = Wire("single")
+    wire.uplink.send(scan(origin=BLANK), WALL)
+    for _ in range(2):
+        wire.uplink.send(odometry(origin=BLANK), WALL)
+    assert sum(isinstance(one, LaserScan) for one in wire.read()) == 1
+
+
+def test_intent_keeps_its_own_topic_in_the_single_form() -> None:
+    wire = Wire("single")
+    wire.uplink.send(Navigation("", BLANK, "drive"), WALL)
+    assert wire.sent[0][0] == "/iveg/AGI_nav/attrs"
