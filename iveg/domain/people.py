@@ -197,6 +197,15 @@ class People:
         self.known[person.person_id] = person
         return replace(one, person=person, appeared=True)
 
+    def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
+        """Somebody has looked there in vain: this look protects nobody any more."""
+        person = self.known[person_id]
+        left = {
+            name: look for name, look in person.sightings.items() if look != sighting
+        }
+        self.known[person_id] = replace(person, sightings=left)
+        return self.known[person_id]
+
     def forget(self, now: Instant) -> list[Person]:
         """Drop who has not been seen for ten minutes; returns them."""
         gone = [one for one in self.known.values() if one.stage(now) == "gone"]

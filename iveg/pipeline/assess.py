@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.people import RING_S, People, Person, Placed
+from iveg.domain.sight import AllClear
 from iveg.domain.world import Link, RobotState, World
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
@@ -66,6 +67,7 @@ class Assessor:
         self.protected_unseen = 0
         """How often a robot slowed for somebody whom it could not see itself."""
         self._mandates = Mandates(greenhouse)
+        self._all_clear = AllClear()
         self._fleet = fleet
         self._minutes = minutes
         self._hub = hub
@@ -145,8 +147,6 @@ class Assessor:
         self.placed[frame.robot_id] = placed
         for one in placed:
             self._describe(one, frame, received)
-        if len(placed) < len(frame.detections):
-            robot.unreadable_at = received.at.mono
         self._hub.changed(f"detections/{frame.robot_id}")
         if any(one.person is not None for one in placed):
             self._hub.changed("people")
@@ -320,6 +320,10 @@ class Assessor:
     def _age_people(self, now: Instant) -> None:
         for person in self.people.known.values():
             self._log_stage(person, now)
+        for person in self._all_clear.sweep(
+            self.people, self.world, self.greenhouse, now
+        ):
+            self._log_clear(person, now)
         for person in self.people.forget(now):
             self._stages.pop(person.person_id, None)
             self._hub.changed("people")
@@ -347,6 +351,20 @@ class Assessor:
         }
         self._minutes.log(
             LogEvent("detection", key, slots, newest.observer, person.class_), now
+        )
+
+    def _log_clear(self, person: Person, now: Instant) -> None:
+        self._hub.changed("people")
+        newest = person.newest
+        if person.sightings or person.stage(now) != "remembered":
+            return
+        slots: dict[str, Slot] = {
+            "person": person.person_id,
+            "lane": self.greenhouse.lane_at(newest.x, newest.y) or "",
+        }
+        self._minutes.log(
+            LogEvent("detection", "log.person_cleared", slots, None, person.class_),
+            now,
         )
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
@@ -417,6 +435,9 @@ class Assessor:
         return "" if crossing.in_sight else "_nlos"
 
     def _log_alarm(self, alarm: Alarm, at: Instant) -> None:
+        """A slow-down has its own line; its alarm says nothing new."""
+        if alarm.condition.key == "alert.person_slowed":
+            return
         key = "log.alert.raised" if alarm.cleared is None else "log.alert.cleared"
         condition = alarm.condition
         slots: dict[str, Slot] = {

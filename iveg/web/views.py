@@ -20,8 +20,6 @@ from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.web import schemas
 
-_MAX_RING_SHOWN_S = 10.0
-
 
 def iso(wall: float | None) -> str | None:
     """Unix seconds as ISO-8601 UTC with milliseconds."""
@@ -163,7 +161,9 @@ class Views:
             "class_id": newest.class_id,
             "stage": person.stage(now),
             "position": {"x": newest.x, "y": newest.y, "z": newest.z},
-            "radius_m": rule.radius_at(age) if age <= _MAX_RING_SHOWN_S else None,
+            "radius_m": max(
+                (radius for _, radius in person.rings(rule, now)), default=None
+            ),
             "confidence": newest.confidence,
             "first_seen": _iso(person.first_seen.wall),
             "last_seen": _iso(newest.at.wall),

@@ -1,0 +1,81 @@
+"""Who can see what: cameras, crop, and the all-clear of an empty spot.
+
+A ring goes by time or because a robot has looked at its centre for a second and found
+nobody; never for one missing frame (safety.md §3.4).
+"""
+
+import math
+
+from iveg.domain.geometry import wrap_angle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.people import RING_S, SEEN_S, People, Person, Sighting
+from iveg.domain.profiles import profile_of
+from iveg.domain.world import LIVE_S, RobotState, World
+
+CLEAR_S = 1.0
+_EDGE_RAD = math.radians(5.0)
+"""So far inside the picture that a person there would be seen whole."""
+_NEAR_M, _RANGE_SHARE = 1.0, 0.75
+_FRESH_LOOK_S = 0.5
+
+_Look = tuple[str, str, str]
+
+
+class AllClear:
+    """Watches old sightings until somebody has looked there in vain."""
+
+    def __init__(self) -> None:
+        self._since: dict[_Look, float] = {}
+
+    def sweep(
+        self, people: People, world: World, greenhouse: Greenhouse, now: Instant
+    ) -> list[Person]:
+        """Take away rings whose centre is seen to be empty; returns whose."""
+        watched: dict[_Look, float] = {}
+        cleared: list[Person] = []
+        for person in list(people.known.values()):
+            for sighting in list(person.sightings.values()):
+                if not SEEN_S < sighting.age_s(now) <= RING_S:
+                    continue
+                if self._is_empty(person, sighting, world, greenhouse, now, watched):
+                    cleared.append(people.drop_sighting(person.person_id, sighting))
+        self._since = watched
+        return cleared
+
+    def _is_empty(
+        self,
+        person: Person,
+        sighting: Sighting,
+        world: World,
+        greenhouse: Greenhouse,
+        now: Instant,
+        watched: dict[_Look, float],
+    ) -> bool:
+        for robot in world.live_robots():
+            if not can_see(robot, sighting.x, sighting.y, greenhouse, now):
+                continue
+            look = person.person_id, sighting.observer, robot.robot_id
+            watched[look] = self._since.get(look, now.mono)
+            if now.mono - watched[look] >= CLEAR_S:
+                return True
+        return False
+
+
+def can_see(
+    robot: RobotState, x: float, y: float, greenhouse: Greenhouse, now: Instant
+) -> bool:
+    """Whether a robot's camera looks at a spot now, nothing in between."""
+    age, looked = robot.age_s(now), robot.detections_at
+    if robot.odometry is None or age is None or age > LIVE_S or looked is None:
+        return False
+    if now.mono - looked > _FRESH_LOOK_S:
+        return False
+    profile = profile_of(robot.robot_id)
+    camera = robot.odometry.pose.compose(profile.camera)
+    distance = camera.distance_to(x, y)
+    if not _NEAR_M <= distance <= _RANGE_SHARE * profile.camera_range:
+        return False
+    bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
+    in_picture = abs(bearing) <= profile.camera_fov / 2 - _EDGE_RAD
+    return in_picture and greenhouse.in_sight(camera.x, camera.y, x, y)
