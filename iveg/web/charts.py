@@ -46,7 +46,9 @@ def confidence_figure(
             "type": "bar",
             "name": class_id,
             "meta": {"kind": "class", "class_id": class_id},
-            "x": [c.least + _BIN / 2 for c in counts if c.class_id == class_id],
+            "x": [
+                round(c.least + _BIN / 2, 4) for c in counts if c.class_id == class_id
+            ],
             "y": [c.count for c in counts if c.class_id == class_id],
             "width": 0.9 * _BIN,
         }

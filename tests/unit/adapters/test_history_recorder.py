@@ -92,6 +92,10 @@ def counts(database_url: str) -> dict[str, object]:
     }
 
 
+def moved_aside(directory: Path) -> list[Path]:
+    return list(directory.glob("history.db.corrupt-*"))
+
+
 def lock(database_url: str) -> sqlite3.Connection:
     """Somebody else's program that holds the database."""
     file = database_url.removeprefix("sqlite:///").partition("?")[0]
@@ -340,7 +344,7 @@ async def test_a_file_that_rots_while_in_use_is_moved_aside(
     await asyncio.wait({task})
     await recorder.close()
 
-    assert sum(".corrupt-" in name for name in os.listdir(tmp_path)) == 1
+    assert len(moved_aside(tmp_path)) == 1
     assert scalar(sqlite_url, "SELECT command_id FROM commands") == "C2"
 
 

@@ -1,0 +1,321 @@
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Cursor, Filter, read_cursor, write_cursor
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.store import Store
+from iveg.domain.errors import HopError, UnreadableError
+from iveg.domain.records import DetectionRecord, Record
+from iveg.pipeline.record import Waiting
+from tests.fakes.records import (
+    NOON,
+    alert_record,
+    command_event_record,
+    command_record,
+    decision_record,
+    detection_record,
+    log_record,
+    odometry_record,
+)
+
+
+def remember(database_url: str, *records: Record) -> None:
+    store = Store(database_url)
+    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
+    store.close()
+
+
+@pytest.fixture
+def queries(database_url: str) -> Iterator[Queries]:
+    remember(database_url)
+    asked = Queries(database_url)
+    yield asked
+    asked.close()
+
+
+async def detections(queries: Queries, asked: Filter) -> list[DetectionRecord]:
+    """Every page, one after the other."""
+    page = await queries.detections(asked)
+    found = list(page.items)
+    while page.next is not None:
+        page = await queries.detections(replace(asked, cursor=page.next))
+        found += page.items
+    return found
+
+
+async def test_what_was_stored_comes_back_as_it_was(
+    queries: Queries, database_url: str
+) -> None:
+    remember(
+        database_url,
+        alert_record(),
+        command_record(),
+        decision_record(),
+        detection_record(),
+        log_record(),
+    )
+
+    assert (await queries.alerts(Filter())).items == (alert_record(),)
+    assert (await queries.commands(Filter())).items == (command_record(),)
+    assert (await queries.decisions(Filter())).items == (decision_record(),)
+    assert (await queries.detections(Filter())).items == (detection_record(),)
+    assert (await queries.log(Filter())).items == (log_record(),)
+
+
+async def test_pages_hold_every_row_once_though_times_are_equal_and_rows_arrive(
+    queries: Queries, database_url: str
+) -> None:
+    rows = [detection_record(at=NOON + n // 4, x=float(n)) for n in range(25)]
+    remember(database_url, *rows)
+
+    first = await queries.detections(Filter(limit=7))
+    remember(database_url, detection_record(at=NOON + 99.0, x=99.0))
+    rest = await detections(queries, Filter(limit=7, cursor=first.next))
+
+    assert [row.x for row in (*first.items, *rest)] == [float(n) for n in range(25)][
+        ::-1
+    ]
+
+
+async def test_pages_of_text_ids_stay_in_step_too(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, *(decision_record(decision_id=f"D{n}") for n in range(5)))
+
+    first = await queries.decisions(Filter(limit=3))
+    second = await queries.decisions(Filter(limit=3, cursor=first.next))
+
+    found = [row.decision_id for row in (*first.items, *second.items)]
+    assert found == ["D4", "D3", "D2", "D1", "D0"]
+    assert second.next is None
+
+
+async def test_a_full_last_page_is_the_end(queries: Queries, database_url: str) -> None:
+    remember(database_url, log_record(id=1), log_record(id=2))
+
+    assert (await queries.log(Filter(limit=2))).next is None
+
+
+async def test_since_is_inclusive_and_until_is_not(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, *(detection_record(at=NOON + n) for n in range(4)))
+
+    found = await detections(queries, Filter(since=NOON + 1, until=NOON + 3))
+
+    assert [row.at for row in found] == [NOON + 2, NOON + 1]
+
+
+@pytest.mark.parametrize(
+    ("asked", "xs"),
+    [
+        (Filter(robot="AGII"), [2.0]),
+        (Filter(class_="person"), [1.0]),
+        (Filter(class_="farmer"), [1.0]),
+        (Filter(class_="crate"), [2.0]),
+        (Filter(min_probability=0.8), [1.0]),
+        (Filter(min_probability=0.81), []),
+        (Filter(robot="AGI", class_="crate"), []),
+        (Filter(robot="AGI' OR 1=1 --"), []),
+    ],
+)
+async def test_filters_leave_what_was_asked_for(
+    queries: Queries, database_url: str, asked: Filter, xs: list[float]
+) -> None:
+    remember(
+        database_url,
+        detection_record(x=1.0, probability=0.8),
+        detection_record(
+            x=2.0, robot_id="AGII", class_=None, class_id="crate", probability=0.3
+        ),
+    )
+
+    assert [row.x for row in await detections(queries, asked)] == xs
+
+
+async def test_a_filter_that_a_row_has_no_field_for_asks_nothing(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, command_record())
+
+    page = await queries.commands(Filter(class_="person", min_probability=0.9))
+
+    assert len(page.items) == 1
+
+
+def test_a_cursor_survives_the_url() -> None:
+    number = Cursor(NOON + 0.1234567, 2**53)
+    text = Cursor(NOON, "01HF")
+
+    assert read_cursor(write_cursor(number), lists.DETECTIONS) == number
+    assert read_cursor(write_cursor(text), lists.DECISIONS) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "!",
+        "é",
+        "e30",
+        "WzEsMl0",
+        write_cursor(Cursor(NOON, "D1")),
+        write_cursor(Cursor(NOON, 2**63)),
+        write_cursor(Cursor(NOON, -1)),
+    ],
+)
+def test_a_cursor_of_nobody_or_of_another_list_is_refused(text: str) -> None:
+    with pytest.raises(UnreadableError):
+        read_cursor(text, lists.DETECTIONS)
+
+
+async def test_one_decision_is_found_by_its_id(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, decision_record())
+
+    assert await queries.decision("D1") == decision_record()
+    assert await queries.decision("D2") is None
+
+
+async def test_the_newest_stop_of_a_robot_is_found(
+    queries: Queries, database_url: str
+) -> None:
+    newest = command_record(command_id="C2", requested_at=NOON + 1)
+    remember(
+        database_url,
+        command_record(),
+        newest,
+        command_record(command_id="C3", requested_at=NOON + 2, kind="release"),
+        command_record(command_id="C4", requested_at=NOON + 3, robot_id="AGII"),
+    )
+
+    assert await queries.latest_stop("AGI") == newest
+    assert await queries.latest_stop("AGIII") is None
+
+
+async def test_the_trail_of_a_command_is_told_in_order(
+    queries: Queries, database_url: str
+) -> None:
+    first, second = (
+        command_event_record(state="REQUESTED"),
+        command_event_record(state="SENT", at=NOON + 1),
+    )
+    remember(database_url, second, first, command_event_record(command_id="C9"))
+
+    assert await queries.command_events("C1") == (first, second)
+
+
+async def test_the_log_counts_on_from_its_newest_number(
+    queries: Queries, database_url: str
+) -> None:
+    assert await queries.newest_log_id() == 0
+    remember(database_url, log_record(id=7), log_record(id=3))
+    assert await queries.newest_log_id() == 7
+
+
+async def test_a_short_series_is_answered_row_by_row(
+    queries: Queries, database_url: str
+) -> None:
+    remember(
+        database_url,
+        odometry_record(at=NOON + 1, linear=0.2, mandated_factor=0.5),
+        odometry_record(at=NOON, linear=0.4),
+        odometry_record(at=NOON, robot_id="AGII", applied_factor=None),
+        odometry_record(at=NOON + 60),
+    )
+
+    agi, agii = await queries.speed_series(NOON, NOON + 60)
+
+    assert (agi.robot_id, agi.at, agi.linear) == ("AGI", (NOON, NOON + 1), (0.4, 0.2))
+    assert (agi.mandated, agi.slice_s) == ((1.0, 0.5), 0.0)
+    assert agii.applied == (None,)
+    assert await queries.speed_series(NOON, NOON + 60, "AGII") == (agii,)
+    assert await queries.speed_series(NOON, NOON + 60, "AGIII") == ()
+
+
+async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
+    queries: Queries, database_url: str
+) -> None:
+    rows = [odometry_record(at=NOON + n / 2, linear=1.0) for n in range(5000)]
+    rows[2500] = replace(rows[2500], mandated_factor=0.5, applied_factor=0.0)
+    remember(database_url, *rows)
+
+    [series] = await queries.speed_series(NOON, NOON + 2500)
+
+    assert 1000 < len(series.at) <= 2000
+    assert list(series.at) == sorted(series.at)
+    assert series.mandated.count(0.5) == 1
+    assert series.applied.count(0.0) == 1
+    assert set(series.linear) == {1.0}
+    assert series.slice_s == pytest.approx(2499.5 / 1999)
+
+
+async def test_many_rows_of_one_moment_are_one_point(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, *(odometry_record() for _ in range(2001)))
+
+    [series] = await queries.speed_series(NOON, NOON + 1)
+
+    assert series.at == (NOON,)
+
+
+async def test_detections_are_counted_by_class_and_confidence(
+    queries: Queries, database_url: str
+) -> None:
+    chances = (0.0, 0.0499, 0.05, 0.8, 0.84, 0.95, 1.0)
+    remember(
+        database_url,
+        *(detection_record(probability=chance) for chance in chances),
+        detection_record(class_id="AGII", robot_id="AGII", probability=0.8),
+        detection_record(at=NOON + 99, probability=0.5),
+    )
+
+    found = await queries.confidence_counts(NOON, NOON + 1)
+    of_agii = await queries.confidence_counts(NOON, NOON + 1, "AGII")
+
+    assert [(c.class_id, c.least, c.count) for c in found] == [
+        ("AGII", 0.8, 1),
+        ("farmer", 0.0, 2),
+        ("farmer", 0.05, 1),
+        ("farmer", 0.8, 2),
+        ("farmer", 0.95, 2),
+    ]
+    assert [c.class_id for c in of_agii] == ["AGII"]
+
+
+async def test_how_long_stops_took_is_counted_from_the_press(
+    queries: Queries, database_url: str
+) -> None:
+    remember(
+        database_url,
+        command_record(command_id="C2", requested_at=NOON + 1),
+        command_record(
+            answer_direct_at=NOON + 0.25,
+            answer_fiware_at=NOON + 0.5,
+            standing_at=NOON + 1.5,
+            standstill_ms=1500.0,
+        ),
+        command_record(command_id="C3", kind="release"),
+    )
+
+    first, second = await queries.command_latencies(NOON, NOON + 2)
+
+    assert (first.command_id, first.direct_ms, first.fiware_ms) == ("C1", 250.0, 500.0)
+    assert first.standstill_ms == 1500.0
+    assert (second.command_id, second.direct_ms) == ("C2", None)
+    assert await queries.command_latencies(NOON, NOON + 2, "AGII") == ()
+
+
+async def test_a_database_that_does_not_answer_is_a_hop() -> None:
+    queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
+
+    with pytest.raises(HopError, match="database") as caught:
+        await queries.log(Filter())
+
+    queries.close()
+    assert "secret" not in str(caught.value)
