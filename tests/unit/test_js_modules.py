@@ -6,24 +6,36 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from shutil import which
 from threading import Thread
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 _ROOT = Path(__file__).parents[2]
 _MODULES = sorted(path.name for path in (_ROOT / "tests/js").glob("*.test.js"))
-_FLAGS = (
+BROWSER_FLAGS = (
     "--no-sandbox",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
 )
-_POLICY = "default-src 'self'; img-src data:; require-trusted-types-for 'script'"
+_POLICY = (
+    "default-src 'self'; img-src data:; connect-src 'self' {connect}; "
+    "require-trusted-types-for 'script'"
+)
 _PAGE = b"<!doctype html><html lang=en><link rel=icon href=data:,><body></body></html>"
 
 
-class _Files(SimpleHTTPRequestHandler):
-    """The repository's files, under the policy that the dashboard sends."""
+class Files(SimpleHTTPRequestHandler):
+    """The repository's files, under the policy that the dashboard sends.
+
+    Args:
+        connect: Where else than here a page may connect to.
+    """
+
+    def __init__(self, *args: Any, directory: str, connect: str = "") -> None:
+        self._policy = _POLICY.format(connect=connect)
+        super().__init__(*args, directory=directory)
 
     def do_GET(self) -> None:
         """An empty page at the root, files below it."""
@@ -36,7 +48,7 @@ class _Files(SimpleHTTPRequestHandler):
             super().do_GET()
 
     def end_headers(self) -> None:
-        self.send_header("Content-Security-Policy", _POLICY)
+        self.send_header("Content-Security-Policy", self._policy)
         super().end_headers()
 
     def log_message(self, format: str, *args: object) -> None:  # noqa: A002
@@ -45,7 +57,7 @@ class _Files(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def files() -> Iterator[str]:
-    handler = partial(_Files, directory=str(_ROOT))
+    handler = partial(Files, directory=str(_ROOT))
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     thread = Thread(target=server.serve_forever, name="files")
     thread.start()
@@ -59,7 +71,7 @@ def files() -> Iterator[str]:
 def browser() -> Iterator[Browser]:
     with sync_playwright() as playwright:
         found = playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(_FLAGS)
+            executable_path=which("chromium"), args=list(BROWSER_FLAGS)
         )
         yield found
         found.close()

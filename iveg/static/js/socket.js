@@ -229,6 +229,8 @@ export function connect({ url, store, onState, onCommandFallback, probe }) {
     serverNow: () => clock.serverNow(performance.now()),
     /** Newest round trip (ms); null before the first. */
     roundTripMs: () => clock.roundTripMs(),
+    /** STOP presses that the server has not provably read. */
+    pressesWaiting: () => presses.size(),
     /** Frames that could not be read. */
     malformed: () => malformed,
     close() {

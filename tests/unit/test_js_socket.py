@@ -1,0 +1,273 @@
+"""The browser's line to the server, against a server that goes away and comes back."""
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
+from http import HTTPStatus
+from http.server import ThreadingHTTPServer
+from pathlib import Path
+from shutil import which
+from socket import SHUT_RDWR
+from threading import Event, Thread
+from time import time
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.sync.server import Server, ServerConnection, serve
+
+from tests.unit.test_js_modules import BROWSER_FLAGS, Files
+
+_ROOT = Path(__file__).parents[2]
+_RECOVERY_MS = 3000
+_CONNECT = """async ([url]) => {
+    const {snapshot} = await import('/tests/js/builders.js');
+    const {connect} = await import('/iveg/static/js/socket.js');
+    const {createStore} = await import('/iveg/static/js/store.js');
+    const store = createStore();
+    const line = connect({url, store});
+    Object.assign(window, {store, line});
+}"""
+
+
+class LiveServer:
+    """Speaks ``/live`` well enough for one browser, and fails when told to.
+
+    Attributes:
+        heard: What browsers sent, pings left out.
+        answers: Whether pings are answered; without it the line falls silent.
+        refusal: The code that new connections are closed with; None takes them.
+    """
+
+    def __init__(self) -> None:
+        self.heard: list[dict[str, Any]] = []
+        self.answers = True
+        self.refusal: int | None = None
+        self.attempts = 0
+        self.clock_ahead_s = 0.0
+        self._port = 0
+        self._connections: list[ServerConnection] = []
+        self._closing = Event()
+
+    @property
+    def url(self) -> str:
+        """Where a browser connects to."""
+        return f"ws://127.0.0.1:{self._port}/live"
+
+    def start(self) -> None:
+        """Listens, at the same address as before."""
+        self._server: Server = serve(
+            self._talk, "127.0.0.1", self._port, process_request=_answer_health
+        )
+        self._port = self._server.socket.getsockname()[1]
+        self._thread = Thread(target=self._server.serve_forever, name="live")
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Goes away as a killed process does: every connection breaks at once."""
+        self._server.shutdown()
+        self._thread.join()
+        for connection in self._connections:
+            with suppress(OSError):
+                connection.socket.shutdown(SHUT_RDWR)
+        self._connections.clear()
+
+    def _talk(self, connection: ServerConnection) -> None:
+        self.attempts += 1
+        if self.refusal is not None:
+            connection.close(self.refusal)
+            return
+        self._connections.append(connection)
+        with suppress(ConnectionClosed):
+            _send(connection, "snapshot", _SNAPSHOT)
+            for text in connection:
+                self._take(connection, json.loads(text))
+
+    def _take(self, connection: ServerConnection, said: dict[str, Any]) -> None:
+        if said["type"] != "ping":
+            self.heard.append(said)
+        elif self.answers:
+            now = time() + self.clock_ahead_s
+            _send(connection, "pong", {"t": said["t"], "server": now})
+
+
+_SNAPSHOT: dict[str, Any] = {
+    "t": "2026-11-20T09:00:00.000Z",
+    "map": None,
+    "robots": [],
+    "people": [],
+    "detections": {},
+    "commands": [],
+    "alerts": [],
+    "log": [],
+}
+
+
+def _send(connection: ServerConnection, topic: str, data: dict[str, Any]) -> None:
+    connection.send(json.dumps({"topic": topic, "data": data}))
+
+
+def _answer_health(connection: ServerConnection, request: Request) -> Response | None:
+    if request.path != "/healthz":
+        return None
+    return connection.respond(HTTPStatus.OK, "ok\n")
+
+
+@pytest.fixture(scope="module")
+def files() -> Iterator[str]:
+    server = ThreadingHTTPServer(
+        ("127.0.0.1", 0), partial(Files, directory=str(_ROOT), connect="ws: http:")
+    )
+    thread = Thread(target=server.serve_forever, name="files")
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(
+            executable_path=which("chromium"), args=list(BROWSER_FLAGS)
+        )
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def live() -> Iterator[LiveServer]:
+    server = LiveServer()
+    server.start()
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def page(browser: Browser, files: str, live: LiveServer) -> Iterator[Page]:
+    """A page whose line is open."""
+    opened = browser.new_page()
+    opened.goto(files)
+    opened.evaluate(_CONNECT, [live.url])
+    _wait_for_state(opened, "open")
+    yield opened
+    opened.close()
+
+
+def _wait_for_state(page: Page, state: str, within_ms: float = 5000) -> None:
+    page.wait_for_function(
+        "state => window.line.state() === state", arg=state, timeout=within_ms
+    )
+
+
+def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
+    page: Page, live: LiveServer
+) -> None:
+    page.evaluate("() => { window.first = window.store.get('snapshot'); }")
+
+    live.stop()
+    _wait_for_state(page, "lost", _RECOVERY_MS)
+    page.wait_for_timeout(4000)  # long enough for the slowest pace of retries
+    live.start()
+
+    _wait_for_state(page, "open", _RECOVERY_MS)
+    assert page.evaluate("() => window.store.get('snapshot') !== window.first")
+
+
+def test_a_line_that_falls_silent_is_lost_within_three_seconds(
+    page: Page, live: LiveServer
+) -> None:
+    live.answers = False
+
+    _wait_for_state(page, "lost", 3000)
+
+
+def test_an_idle_line_that_answers_pings_stays_open(
+    page: Page, live: LiveServer
+) -> None:
+    page.evaluate(
+        """() => {
+            window.states = [];
+            window.store.subscribe('connection', (it) => window.states.push(it.state));
+        }"""
+    )
+
+    page.wait_for_timeout(3500)  # more than a lost line needs to be noticed
+
+    assert page.evaluate("() => window.states") == []
+    assert live.attempts == 1
+
+
+def test_an_ended_session_is_told_and_not_tried_again(
+    page: Page, live: LiveServer
+) -> None:
+    live.refusal = 4401
+    live.stop()
+    live.start()
+
+    _wait_for_state(page, "signed-out")
+
+    attempts = live.attempts
+    page.wait_for_timeout(1500)  # several retries long
+    assert live.attempts == attempts
+
+
+def test_a_stop_goes_out_at_once_and_only_once(page: Page, live: LiveServer) -> None:
+    sent = page.evaluate("() => window.line.sendStop('AGI', 'press-1', 12.5)")
+
+    page.wait_for_function("() => window.line.pressesWaiting() === 0")
+    assert sent is True
+    assert live.heard == [
+        {"type": "stop", "robot_id": "AGI", "press_id": "press-1", "pressed_at": 12.5}
+    ]
+
+
+def test_a_stop_without_a_line_goes_out_when_the_line_is_back(
+    page: Page, live: LiveServer
+) -> None:
+    live.stop()
+    _wait_for_state(page, "lost")
+
+    sent = page.evaluate("() => window.line.sendStop(null, 'press-2', 12.5)")
+    live.start()
+
+    page.wait_for_function("() => window.line.pressesWaiting() === 0")
+    assert sent is False
+    assert [(it["robot_id"], it["press_id"]) for it in live.heard] == [
+        (None, "press-2")
+    ]
+
+
+def test_a_stop_that_a_dead_line_swallowed_is_sent_again(
+    page: Page, live: LiveServer
+) -> None:
+    live.answers = False
+    page.evaluate("() => window.line.sendStop(null, 'press-3', 12.5)")
+    _wait_for_state(page, "lost")
+
+    live.answers = True
+
+    page.wait_for_function("() => window.line.pressesWaiting() === 0")
+    assert {it["press_id"] for it in live.heard} == {"press-3"}
+    assert len(live.heard) >= 2
+
+
+def test_the_servers_clock_is_known_to_a_few_milliseconds(
+    page: Page, live: LiveServer
+) -> None:
+    live.clock_ahead_s = 3600.0
+    live.stop()
+    _wait_for_state(page, "lost")
+    live.start()
+    _wait_for_state(page, "open")
+    page.wait_for_function(f"() => window.line.serverNow() > {time() + 3000}")
+
+    before = time()
+    told = page.evaluate("() => window.line.serverNow()")
+    after = time()
+
+    assert before - 0.1 <= told - 3600 <= after + 0.1
