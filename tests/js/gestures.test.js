@@ -8,6 +8,7 @@ function listened() {
   const touch = createTouch({
     pan: (dx, dy) => void meant.push(["pan", dx, dy]),
     zoom: (px, py, factor) => void meant.push(["zoom", px, py, factor]),
+    pinch: (...how) => void meant.push(["pinch", ...how]),
     tap: (px, py) => void meant.push(["tap", px, py]),
     doubleTap: (px, py) => void meant.push(["doubleTap", px, py]),
     hover: (px, py) => void meant.push(["hover", px, py]),
@@ -32,10 +33,7 @@ test("two fingers pinch about their middle", () => {
   touch.down(1, { x: 100, y: 100 });
   touch.down(2, { x: 200, y: 100 });
   touch.move(2, { x: 300, y: 100 });
-  equal(meant, [
-    ["pan", 50, 0],
-    ["zoom", 200, 100, 2],
-  ]);
+  equal(meant, [["pinch", 50, 0, 200, 100, 2]]);
 });
 
 test("two taps at one place are a double tap and no tap", () => {

@@ -25,10 +25,16 @@ function fingerprint(canvas) {
   return canvas.toDataURL();
 }
 
-/** @param {HTMLElement} target @param {string} type @param {number} x @param {number} y */
-function point(target, type, x, y) {
+/**
+ * @param {HTMLElement} target
+ * @param {string} type
+ * @param {number} x (px)
+ * @param {number} y (px)
+ * @param {number} [pointerId] 1 is the mouse
+ */
+function point(target, type, x, y, pointerId = 1) {
   const { left, top } = target.getBoundingClientRect();
-  const place = { clientX: left + x, clientY: top + y, pointerId: 1, bubbles: true };
+  const place = { clientX: left + x, clientY: top + y, pointerId, bubbles: true };
   target.dispatchEvent(new PointerEvent(type, place));
 }
 
@@ -84,6 +90,9 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   const faint = detection({ person_id: null, position: { x: 13, y: 2, z: 1 } });
   const look = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [faint] };
   const points = new Float32Array([17, 9, 17.5, 9]);
+  const origin = { x: 12, y: 8 };
+  const grid = { resolution: 0.5, width: 2, height: 1, origin, data: [100, 40] };
+  store.apply("costmap", grid);
   for (const x of [0, 0.5, 1]) {
     store.apply("robots/AGI", robot({ navigation, pose: { x, y: 2, yaw: 0 } }));
   }
@@ -141,6 +150,20 @@ test("a double tap follows a robot through a zoom, and a drag lets it go", async
   point(canvas, "pointerdown", 300, 200);
   point(canvas, "pointermove", 340, 200);
   equal(map.followed(), null);
+  map.destroy();
+});
+
+test("a pinch on a followed robot zooms without letting it go", async () => {
+  const { canvas, store, map } = mapOnPage();
+  store.apply("snapshot", snapshot());
+  await frame();
+  map.follow("AGI");
+  const { scale } = map.view();
+  point(canvas, "pointerdown", 250, 200, 7);
+  point(canvas, "pointerdown", 350, 200, 8);
+  point(canvas, "pointermove", 450, 200, 8);
+  near(map.view().scale, 2 * scale);
+  equal(map.followed(), "AGI");
   map.destroy();
 });
 

@@ -1,5 +1,10 @@
 import { ageOf } from "../../iveg/static/js/clock.js";
-import { createStore, LOG_SIZE, matches } from "../../iveg/static/js/store.js";
+import {
+  COMMANDS_SIZE,
+  createStore,
+  LOG_SIZE,
+  matches,
+} from "../../iveg/static/js/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
@@ -88,6 +93,17 @@ test("the log keeps its newest entries and no entry twice", () => {
   store.apply("log", entry(LOG_SIZE + 20));
   equal(store.log().length, LOG_SIZE);
   equal([store.log()[0].id, store.log()[LOG_SIZE - 1].id], [21, LOG_SIZE + 20]);
+});
+
+test("only the commands last heard of are kept", () => {
+  const { store } = storeByHand();
+  store.apply("commands/first", command());
+  store.apply("commands/second", command());
+  for (let n = 2; n < COMMANDS_SIZE; n += 1) store.apply(`commands/${n}`, command());
+  store.apply("commands/first", command({ state: "STANDING" }));
+  store.apply("commands/last", command());
+  equal(store.get("commands/first").state, "STANDING");
+  equal(store.get("commands/second"), undefined);
 });
 
 test("a prefix hears one level below itself: a robot, not its scan", () => {

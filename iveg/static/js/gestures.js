@@ -4,10 +4,11 @@
  * @typedef {{
  *   pan: (dx: number, dy: number) => void,
  *   zoom: (px: number, py: number, factor: number) => void,
+ *   pinch: (dx: number, dy: number, px: number, py: number, factor: number) => void,
  *   tap: (px: number, py: number) => void,
  *   doubleTap: (px: number, py: number) => void,
  *   hover: (px: number, py: number) => void,
- * }} Gestures all in CSS pixels of the element
+ * }} Gestures all in CSS pixels of the element; `pinch` moves and zooms in one
  * @typedef {{x: number, y: number}} Point
  */
 
@@ -38,7 +39,7 @@ export function listen(element, gestures) {
     "pointerdown",
     (event) => {
       if (event.button > 0) return;
-      element.setPointerCapture(event.pointerId);
+      capture(element, event.pointerId);
       touch.down(event.pointerId, place(event));
     },
     { signal },
@@ -66,6 +67,20 @@ export function listen(element, gestures) {
   );
   signal.addEventListener("abort", touch.end);
   return () => ending.abort();
+}
+
+/**
+ * Keeps a drag that leaves the element.
+ *
+ * @param {HTMLElement} element
+ * @param {number} pointerId
+ */
+function capture(element, pointerId) {
+  try {
+    element.setPointerCapture(pointerId);
+  } catch {
+    // The finger is up already; there is nothing left to keep.
+  }
 }
 
 /**
@@ -122,8 +137,8 @@ export function createTouch(gestures) {
     const [before, gapBefore] = spread(fingers);
     fingers.set(id, to);
     const [after, gapAfter] = spread(fingers);
-    gestures.pan(after.x - before.x, after.y - before.y);
-    if (gapBefore > 0) gestures.zoom(after.x, after.y, gapAfter / gapBefore);
+    const factor = gapBefore > 0 ? gapAfter / gapBefore : 1;
+    gestures.pinch(after.x - before.x, after.y - before.y, after.x, after.y, factor);
   }
 
   return {

@@ -17,6 +17,7 @@
  */
 
 import { listen } from "./gestures.js";
+import { createCostmapLayer } from "./layers/costmap.js";
 import * as detections from "./layers/detections.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
@@ -42,6 +43,7 @@ import * as viewport from "./viewport.js";
 export const LAYERS = [
   "grid",
   "greenhouse",
+  "costmap",
   "trail",
   "scan",
   "intent",
@@ -88,6 +90,7 @@ export function createMap(canvas, store, options = {}) {
   const broken = new Set();
   /** @type {Record<string, (paint: Paint) => void>} */
   const moving = {
+    costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, trailS),
     scan: scan.draw,
     intent: intent.draw,
@@ -250,6 +253,11 @@ export function createMap(canvas, store, options = {}) {
   const unlisten = listen(canvas, {
     pan,
     zoom,
+    pinch(dx, dy, px, py, factor) {
+      // A pinch on a followed robot means its size: fingers never move quite evenly.
+      if (!followed) pan(dx, dy);
+      zoom(px, py, factor);
+    },
     tap(px, py) {
       const picked = pickAt(px, py);
       if (picked) for (const fn of pickers) fn(picked);

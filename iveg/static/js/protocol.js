@@ -87,6 +87,10 @@
  *
  * @typedef {Aged & {robot_id: string, stamp: string, points: Float32Array}} Scan
  *
+ * @typedef {{resolution: number, width: number, height: number, origin: Point,
+ *   data: number[]}} Costmap `resolution` (m/cell); `data` row by row from the origin
+ *   (its south-western corner, m), 0 free … 100 taken, −1 unknown (GET /costmap)
+ *
  * @typedef {Aged & {
  *   t: string, server: {boot: string, version: string, demo: boolean},
  *   user: {name: string, role: string} | null,

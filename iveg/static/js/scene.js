@@ -39,7 +39,7 @@
  * @typedef {{
  *   nowMs: number, map: GreenhouseMap | null, isVeiled: boolean,
  *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
- *   scans: SceneScan[],
+ *   scans: SceneScan[], costmap: import("./protocol.js").Costmap | null,
  * }} Scene
  */
 
@@ -75,6 +75,7 @@ export function readScene(store, nowMs) {
     people: store.people().map((person) => readPerson(person, nowMs)),
     detections: readDetections(store, nowMs),
     scans: readScans(store, nowMs),
+    costmap: store.get("costmap") ?? null,
   };
 }
 

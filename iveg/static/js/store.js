@@ -26,6 +26,9 @@
 /** Entries of the log that a browser keeps. */
 export const LOG_SIZE = 500;
 
+/** Commands that a browser keeps, closed ones among them. */
+export const COMMANDS_SIZE = 200;
+
 /** Hues that the design has for robots (`--robot-1` … `--robot-8`). */
 const ROBOT_HUES = 8;
 
@@ -47,6 +50,8 @@ export function createStore(options = {}) {
   let scans = new Map();
   /** @type {Map<string, Look>} */
   let looks = new Map();
+  /** @type {Set<string>} topics, least recently heard first */
+  let commands = new Set();
   /** @type {Entry[]} */
   let log = [];
   /** @type {Map<string, number>} */
@@ -71,6 +76,16 @@ export function createStore(options = {}) {
     return true;
   }
 
+  /** Makes room, so that months of commands cost no more than the last ones. */
+  function keepCommand(/** @type {string} */ topic) {
+    commands.delete(topic);
+    commands.add(topic);
+    const [oldest] = commands;
+    if (commands.size <= COMMANDS_SIZE) return;
+    commands.delete(oldest);
+    values.delete(oldest);
+  }
+
   /**
    * Keeps one value; false when it is older than what is known.
    *
@@ -80,6 +95,7 @@ export function createStore(options = {}) {
   function keep(topic, data) {
     const [head, id, leaf] = topic.split("/");
     if (topic === "log") return keepEntry(data);
+    if (head === "commands") keepCommand(topic);
     if (head === "robots" && leaf === "scan") scans.set(id, data);
     else if (head === "robots" && !keepRobot(data)) return false;
     else if (head === "detections") looks.set(id, data);
@@ -96,6 +112,7 @@ export function createStore(options = {}) {
     robots = new Map();
     scans = new Map();
     looks = new Map();
+    commands = new Set();
     log = (snapshot.log ?? []).slice(-LOG_SIZE);
     values.set("snapshot", snapshot);
     hub.tell("snapshot", snapshot);
