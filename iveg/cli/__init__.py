@@ -53,7 +53,8 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
         case "demo":
             from iveg.cli.demo import demo
 
-            return demo(settings, os.environ, data)
+            emulator = not options.no_emulator
+            return demo(settings, os.environ, data, emulator=emulator)
         case _:
             from iveg.cli import parts
 
@@ -69,7 +70,10 @@ def _parser() -> argparse.ArgumentParser:
         "-v", "--verbose", action="store_true", help="log what goes well, too"
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("demo", help="everything on this machine, nothing else needed")
+    demo = commands.add_parser("demo", help="everything on one machine")
+    demo.add_argument(
+        "--no-emulator", action="store_true", help="no robots: for `iveg replay`"
+    )
     serve = commands.add_parser("serve", help="the DSS and its page")
     serve.add_argument("--demo", action="store_true", help=argparse.SUPPRESS)
     fiware = commands.add_parser("fiware", help="MQTT broker, Orion and IoT Agent")

@@ -11,7 +11,7 @@ import secrets
 import signal
 import socket
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -36,7 +36,13 @@ class _Listener:
     port: int
 
 
-def demo(settings: Settings, environment: Mapping[str, str], data: Path) -> int:
+def demo(
+    settings: Settings,
+    environment: Mapping[str, str],
+    data: Path,
+    *,
+    emulator: bool = True,
+) -> int:
     """Run the demo; returns the exit code."""
     placed = replace(
         _on_free_ports(settings, environment),
@@ -50,14 +56,10 @@ def demo(settings: Settings, environment: Mapping[str, str], data: Path) -> int:
     child_environment = {
         **environment,
         **placed.to_environment(),
-        "XDG_DATA_HOME": str(_data_home(data)),
         "IVEG_DATA_DIRECTORY": str(directory),
     }
-    return run_until_told(_supervise(placed, child_environment))
-
-
-def _data_home(data: Path) -> Path:
-    return data.parent
+    parts = [["fiware"], ["serve", "--demo"], *([["emulator"]] if emulator else [])]
+    return run_until_told(_supervise(parts, placed, child_environment))
 
 
 def _on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
@@ -112,21 +114,23 @@ def _free_port(host: str) -> int:
 # --- processes --------------------------------------------------------------------
 
 
-async def _supervise(settings: Settings, environment: Mapping[str, str]) -> None:
-    parts: list[tuple[str, asyncio.subprocess.Process]] = []
+async def _supervise(
+    parts: Sequence[Sequence[str]], settings: Settings, environment: Mapping[str, str]
+) -> None:
+    running: list[tuple[str, asyncio.subprocess.Process]] = []
     try:
-        for arguments in (["fiware"], ["serve", "--demo"], ["emulator"]):
+        for arguments in parts:
             process = await _start(arguments, environment)
-            parts.append((arguments[0], process))
+            running.append((arguments[0], process))
             await _ready(arguments[0], process)
         print(f"iVeg: {sign_in_link(settings, settings.sign_in_token)}", flush=True)
-        await asyncio.gather(*(_watch(name, process) for name, process in parts))
+        await asyncio.gather(*(_watch(name, process) for name, process in running))
     finally:
-        await _stop([process for _, process in reversed(parts)])
+        await _stop([process for _, process in reversed(running)])
 
 
 async def _start(
-    arguments: list[str], environment: Mapping[str, str]
+    arguments: Sequence[str], environment: Mapping[str, str]
 ) -> asyncio.subprocess.Process:
     # A session of its own: Ctrl-C reaches this process alone, which stops the parts
     # in order, so that none complains about another that has already gone.
