@@ -40,7 +40,8 @@ export function createBanner({ store, words }) {
     if (state === "lost" || (state === "connecting" && wasLost)) {
       return words.t("banner.lost", { seconds: Math.ceil(forMs / 1000) });
     }
-    if (state === "connecting" && forMs > PATIENCE_MS) return words.t("banner.connecting");
+    if (state === "connecting" && forMs > PATIENCE_MS)
+      return words.t("banner.connecting");
     return backMs < BACK_SHOWN_MS ? words.t("banner.back") : null;
   }
 
@@ -55,6 +56,12 @@ export function createBanner({ store, words }) {
     );
   }
 
+  const messages = need(".messages");
+  new ResizeObserver(() => {
+    // Panels and the drawer open below what must not be covered.
+    const height = `${messages.offsetHeight}px`;
+    document.documentElement.style.setProperty("--messages", height);
+  }).observe(messages);
   store.subscribe("connection", draw);
   words.onChange(draw);
   setInterval(draw, TICK_MS);

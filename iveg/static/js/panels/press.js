@@ -28,10 +28,7 @@ export function createPresser(line, onChange) {
 
   /** @param {Pending} press @param {number} pressedAt */
   async function carry(press, pressedAt) {
-    const fallback = setTimeout(
-      () => sendByLine(press, pressedAt),
-      TAKEN_LIMIT_MS,
-    );
+    const fallback = setTimeout(() => sendByLine(press, pressedAt), TAKEN_LIMIT_MS);
     while (isCurrent(press)) {
       press.tries += 1;
       const status = await post(press, pressedAt);
@@ -57,8 +54,7 @@ export function createPresser(line, onChange) {
   }
 
   /** @param {Pending} press */
-  const isCurrent = (press) =>
-    !press.accepted && pending.get(press.robotId) === press;
+  const isCurrent = (press) => !press.accepted && pending.get(press.robotId) === press;
 
   return {
     /** @param {string | null} robotId null = the whole fleet */

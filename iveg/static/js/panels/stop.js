@@ -90,7 +90,8 @@ export function createStopPanel(app) {
   /** @param {string} robotId */
   function forget(robotId) {
     const known = commands.get(robotId);
-    if (known && performance.now() - known.heardMs > SETTLE_MS) commands.delete(robotId);
+    if (known && performance.now() - known.heardMs > SETTLE_MS)
+      commands.delete(robotId);
   }
 
   /** @param {import("../protocol.js").Snapshot} snapshot */
@@ -197,7 +198,10 @@ export function createStopPanel(app) {
       );
       const home = PHONE.matches && slot ? slot : strip;
       if (control.parentElement !== home) {
-        home.insertBefore(control, home === strip ? (controls.get("fleet") ?? null) : null);
+        home.insertBefore(
+          control,
+          home === strip ? (controls.get("fleet") ?? null) : null,
+        );
       }
     }
   }

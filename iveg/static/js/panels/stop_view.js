@@ -154,7 +154,10 @@ function viewOfCommand(state, command, facts) {
     }
     return { state, key, slots: { ms: command.standstill_ms } };
   }
-  if (state === "stale") return { state, key, slots: { seconds: aged(facts) } };
+  if (state === "stale") {
+    const seconds = Math.max(aged(facts), reportAge(command, facts.nowMs));
+    return { state, key, slots: { seconds } };
+  }
   return { state, key, slots: {} };
 }
 
@@ -184,6 +187,12 @@ function lost(press, nowMs) {
 
 /** @param {ConnectionState} connection */
 const isCut = (connection) => connection === "lost" || connection === "signed-out";
+
+/** Age of the robot's last word about itself (s). @param {Command} command @param {number} nowMs */
+function reportAge(command, nowMs) {
+  const waitedS = (nowMs - (command.receivedAtMs ?? nowMs)) / 1000;
+  return (command.robot?.report_age_s ?? 0) + waitedS;
+}
 
 /** @param {RobotFacts} facts age that can be written (s) */
 const aged = ({ ageS }) => (Number.isFinite(ageS) ? ageS : 0);

@@ -1,0 +1,91 @@
+/**
+ * The chain from robot to screen: a chip with the worst hop, a list with a sentence each.
+ */
+
+import { ageOf } from "../clock.js";
+import { make, need, setAttribute, setText } from "./dom.js";
+
+const TICK_MS = 1000;
+const WORST_FIRST = ["down", "late", "unknown", "ok"];
+
+/** @typedef {import("../protocol.js").Health["hops"][number]} Hop */
+
+/** @param {import("../main.js").App} app */
+export function createHealthPanel({ store, words, line }) {
+  const chip = need("#health-chip");
+
+  function draw() {
+    /** @type {import("../protocol.js").Health | undefined} */
+    const health = store.get("health") ?? undefined;
+    drawChip(worstOf(health?.hops ?? []));
+    const ms = line.roundTripMs();
+    const isOpen = store.connection.state === "open";
+    setText(
+      need("#health-latency"),
+      isOpen && ms !== null ? words.t("health.latency", { ms }) : "",
+    );
+    const waitedS = health ? ageOf({ age_s: 0, receivedAtMs: health.receivedAtMs }) : 0;
+    drawHops(health?.hops ?? [], waitedS);
+    drawCounters(health?.counters ?? {});
+  }
+
+  /** @param {Hop | undefined} worst */
+  function drawChip(worst) {
+    const isOpen = store.connection.state === "open";
+    const state = isOpen ? (worst?.state ?? "unknown") : "down";
+    const hop = isOpen ? (worst?.hop ?? "") : "server";
+    setAttribute(chip, "data-state", state);
+    setText(need("#health-sentence"), words.t(`health.chip.${state}`, { hop }));
+    chip.title = isOpen && worst ? sentenceOf(worst) : "";
+  }
+
+  /** @param {Hop} hop */
+  function sentenceOf(hop) {
+    return words.t(`health.hop.${hop.hop}.${hop.state}`);
+  }
+
+  /** @param {Hop[]} hops @param {number} waitedS since the server wrote the ages */
+  function drawHops(hops, waitedS) {
+    const list = need("#hops");
+    while (list.children.length > hops.length) list.lastElementChild?.remove();
+    while (list.children.length < hops.length) list.append(makeItem());
+    hops.forEach((hop, i) => {
+      const item = list.children[i];
+      setAttribute(item, "data-state", hop.state);
+      setText(need("b", item), words.t(`hop.${hop.hop}`));
+      const age =
+        hop.age_s === null ? "" : words.t("health.age", { age: hop.age_s + waitedS });
+      setText(need("small", item), `${words.t(`health.state.${hop.state}`)} ${age}`);
+      const detail = hop.detail && hop.state !== "ok" ? ` (${hop.detail})` : "";
+      setText(need("p", item), `${sentenceOf(hop)}${detail}`);
+    });
+  }
+
+  /** @param {Record<string, number>} counters */
+  function drawCounters(counters) {
+    const rows = Object.entries(counters).map(([name, value]) => {
+      const row = make("div");
+      row.append(make("dt", "", name), make("dd", "", words.number(value, 0)));
+      return row;
+    });
+    need("#counters").replaceChildren(...rows);
+  }
+
+  store.subscribe("health", draw);
+  store.subscribe("connection", draw);
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+}
+
+function makeItem() {
+  const item = make("li");
+  item.append(make("span", "shape"), make("b"), make("small"), make("p"));
+  return item;
+}
+
+/** @param {Hop[]} hops */
+function worstOf(hops) {
+  const rank = (/** @type {Hop} */ hop) => WORST_FIRST.indexOf(hop.state);
+  return [...hops].sort((a, b) => rank(a) - rank(b))[0];
+}

@@ -1,0 +1,150 @@
+/**
+ * What stands around the map: its tools, its layers, and the counts over it.
+ *
+ * Picking a person opens the decision behind its ring; picking a robot goes to its card.
+ */
+
+import { TRAIL_SPANS_S } from "../layers/trail.js";
+import { createMap } from "../map.js";
+import { all, make, need, setHidden, setText } from "./dom.js";
+import { onThemeChange } from "./theme.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../protocol.js").Person} Person */
+/** @typedef {ReturnType<typeof createMap>} LiveMap */
+
+/**
+ * @param {App} app
+ * @param {{open: (decisionId: string, opener: HTMLElement | null) => void}} decision
+ */
+export function createMapbox(app, decision) {
+  const { store, words } = app;
+  const canvas = /** @type {HTMLCanvasElement} */ (need("#map"));
+  const map = createMap(canvas, store, { onFollow: showFollowed });
+
+  /** @param {string | null} robotId */
+  function showFollowed(robotId) {
+    const following = need("#following");
+    setHidden(following, robotId === null);
+    setText(following, robotId ? words.t("map.following", { robot: robotId }) : "");
+  }
+
+  /** @param {{kind: string, id: string}} picked */
+  function onPick({ kind, id }) {
+    if (kind === "robot") return goToCard(id);
+    const person = store.people().find(({ person_id }) => person_id === id);
+    if (person?.decision_id) decision.open(person.decision_id, canvas);
+  }
+
+  function drawFacts() {
+    const people = store.people().filter(isPresent);
+    setText(need("#people-count"), peopleSaid(people.length));
+    const unseen = people.flatMap(({ acting }) => acting).filter((it) => !it.in_sight);
+    const nlos = need("#nlos-count");
+    setHidden(nlos, unseen.length === 0);
+    setText(nlos, words.t("map.nlos_count", { count: unseen.length }));
+  }
+
+  /** @param {number} count */
+  function peopleSaid(count) {
+    if (count === 0) return words.t("map.people_none");
+    return count === 1
+      ? words.t("map.people_one")
+      : words.t("map.people_count", { count });
+  }
+
+  function drawClimate() {
+    /** @type {import("../protocol.js").Climate | null | undefined} */
+    const climate = store.get("climate");
+    const said = [
+      ["temperature", climate?.temperature],
+      ["humidity", climate?.relative_humidity],
+      ["co2", climate?.co2],
+    ]
+      .filter(([, value]) => typeof value === "number")
+      .map(([name, value]) => words.t(`climate.${name}`, { value }));
+    setHidden(need("#climate"), said.length === 0);
+    setText(need("#climate"), said.join(" · "));
+  }
+
+  function drawWords() {
+    map.setLanguage(words.t);
+    drawLayers(map, words);
+    drawFacts();
+    drawClimate();
+    showFollowed(map.followed());
+  }
+
+  need("#map-fit").addEventListener("click", () => map.fit());
+  need("#map-in").addEventListener("click", () => map.zoomBy(1));
+  need("#map-out").addEventListener("click", () => map.zoomBy(-1));
+  document.addEventListener("iveg:follow", (event) => {
+    map.follow(/** @type {CustomEvent<string>} */ (event).detail);
+  });
+  map.onPick(onPick);
+  onThemeChange(() => map.setTheme());
+  store.subscribe("people", drawFacts);
+  store.subscribe("climate", drawClimate);
+  words.onChange(drawWords);
+  drawWords();
+}
+
+/** @param {Person} person */
+const isPresent = (person) => person.class === "person" && person.stage !== "last_seen";
+
+/** @param {string} robotId */
+function goToCard(robotId) {
+  const card = all(".card").find(({ dataset }) => dataset.robot === robotId);
+  card?.scrollIntoView({ block: "nearest", inline: "nearest" });
+  const menu = /** @type {HTMLElement | null | undefined} */ (
+    card?.querySelector('[data-part="menu"]')
+  );
+  menu?.focus({ preventScroll: true });
+}
+
+/**
+ * @param {LiveMap} map
+ * @param {import("../i18n.js").Words} words
+ */
+function drawLayers(map, words) {
+  const switches = map.layers().map(({ name, on }) => {
+    const [choice, input] = makeChoice("checkbox", words.t(`map.layer.${name}`), on);
+    input.addEventListener("change", () => map.setLayer(name, input.checked));
+    return choice;
+  });
+  const spans = TRAIL_SPANS_S.map((seconds) => {
+    const said = words.t("map.trail_span", { seconds });
+    const [choice, input] = makeChoice("radio", said, map.trailSeconds() === seconds);
+    input.name = "trail";
+    input.addEventListener("change", () => map.setTrail(seconds));
+    return choice;
+  });
+  const [shortcuts, keys] = makeChoice(
+    "checkbox",
+    words.t("map.shortcuts"),
+    map.hasShortcuts(),
+  );
+  keys.addEventListener("change", () => map.setShortcuts(keys.checked));
+  need("#layers").replaceChildren(
+    ...switches,
+    make("h3", "choices__head", words.t("map.trail_length")),
+    ...spans,
+    make("h3", "choices__head", words.t("map.keyboard")),
+    shortcuts,
+  );
+}
+
+/**
+ * @param {"checkbox" | "radio"} type
+ * @param {string} text
+ * @param {boolean} isOn
+ * @returns {[HTMLLabelElement, HTMLInputElement]}
+ */
+function makeChoice(type, text, isOn) {
+  const choice = make("label", "choice");
+  const input = make("input");
+  input.type = type;
+  input.checked = isOn;
+  choice.append(input, text);
+  return [choice, input];
+}

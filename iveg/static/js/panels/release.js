@@ -1,0 +1,233 @@
+/**
+ * Releasing a robot and letting it drive again: two steps, never one, and never a STOP
+ * turned around.
+ *
+ * Release names every hold that the person saw, takes two seconds of holding, and only
+ * works on a robot that is proven to stand by a fresh report.  The server checks all of
+ * it again; here it is explained.
+ */
+
+import { ageOf } from "../clock.js";
+import { make, need, needPart, setText } from "./dom.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../protocol.js").Robot} Robot */
+/** @typedef {import("../protocol.js").Command} Command */
+
+const HOLD_MS = 2000;
+const FRESH_S = 1;
+const STANDING_M_S = 0.02;
+const RELEASERS = new Set(["operator", "admin"]);
+
+/**
+ * @param {App} app
+ * @param {HTMLElement} card
+ * @param {string} robotId
+ */
+export function createRelease(app, card, robotId) {
+  const { store, words, stops } = app;
+  const releaseButton = /** @type {HTMLButtonElement} */ (need("[data-release]", card));
+  const resumeButton = /** @type {HTMLButtonElement} */ (need("[data-resume]", card));
+  const result = needPart("result", card);
+  /** @type {Robot | undefined} */
+  let shown;
+  /** @type {string | null} key of the newest answer, and its slots */
+  let outcome = null;
+  let status = 0;
+  let isBusy = false;
+
+  /** @param {Robot | undefined} robot */
+  function draw(robot) {
+    shown = robot;
+    const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
+    if (!panel.open) return;
+    const facts = factsOf(robot);
+    const mayRelease = whyNotRelease(facts);
+    const mayResume = whyNotResume(facts);
+    releaseButton.disabled = isBusy || mayRelease !== "ok";
+    resumeButton.disabled = isBusy || mayResume !== "ok";
+    const why = mayResume === "ok" ? "ok" : mayRelease;
+    setText(
+      needPart("release-why", card),
+      words.t(`release.why.${isBusy ? "busy" : why}`),
+    );
+    setText(
+      needPart("release-words", card),
+      words.t("release.button", { robot: robotId }),
+    );
+    setText(
+      needPart("resume-words", card),
+      words.t("release.resume", { robot: robotId }),
+    );
+    setText(result, outcome ? words.t(outcome, { status }) : "");
+    drawFacts(robot);
+    drawHolds(robot);
+  }
+
+  /** @param {Robot | undefined} robot */
+  function factsOf(robot) {
+    return {
+      isConnected: store.connection.state === "open",
+      role: document.body.dataset.role ?? "",
+      robot,
+      ageS: ageOf(robot),
+      command: stops.commandOf(robotId),
+    };
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawFacts(robot) {
+    const profile = robot?.profile;
+    const facts = [
+      profile && words.t("robot.profile", profile),
+      robot?.cmd_status && words.t("robot.agent", { status: robot.cmd_status }),
+      robot?.clock_offset_s &&
+        words.t("robot.offset", { offset: robot.clock_offset_s }),
+    ];
+    setText(needPart("facts", card), facts.filter(Boolean).join(" · "));
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawHolds(robot) {
+    const list = needPart("holds", card);
+    const holds = robot?.holds ?? [];
+    const requesters = stops.commandOf(robotId)?.requesters ?? [];
+    while (list.children.length > Math.max(1, holds.length))
+      list.lastElementChild?.remove();
+    while (list.children.length < Math.max(1, holds.length)) {
+      const item = make("li");
+      item.append(make("b"), make("small"));
+      list.append(item);
+    }
+    holds.forEach((hold, i) => {
+      const by =
+        hold.source === "iveg" && requesters.length
+          ? ` · ${words.t("release.held_by", { who: requesters.join(", ") })}`
+          : "";
+      setText(
+        need("b", list.children[i]),
+        words.t(`release.hold_source.${hold.source}`),
+      );
+      const ack = words.t(`release.hold_ack.${hold.ack}`);
+      setText(need("small", list.children[i]), `${ack}${by} · ${hold.id}`);
+    });
+    if (!holds.length) {
+      setText(need("b", list.children[0]), words.t("release.no_holds"));
+      setText(need("small", list.children[0]), "");
+    }
+  }
+
+  /** @param {string} verb @param {object} body */
+  async function send(verb, body) {
+    isBusy = true;
+    draw(shown);
+    status = await post(`/api/v1/robots/${encodeURIComponent(robotId)}/${verb}`, body);
+    isBusy = false;
+    const isTaken = status === 202 || status === 200;
+    const known = `release.failed.${status}`;
+    const failed = words.has(known) ? known : "release.failed.other";
+    outcome = isTaken ? "release.sent" : failed;
+    draw(shown);
+  }
+
+  onHold(releaseButton, () => {
+    // Exactly what was on the screen: a hold that came since makes the server refuse.
+    send("release", { holds: (shown?.holds ?? []).map(({ id }) => id) });
+  });
+  resumeButton.addEventListener("click", () => send("resume", {}));
+  return { draw };
+}
+
+/**
+ * @typedef {{isConnected: boolean, role: string, robot: Robot | undefined, ageS: number,
+ *   command: Command | undefined}} Facts
+ */
+
+/** Key of the reason why a release cannot be asked for, or `ok`. @param {Facts} facts */
+export function whyNotRelease(facts) {
+  const { robot } = facts;
+  const common = whyNotAtAll(facts);
+  if (common) return common;
+  if (!robot?.holds.length) return "no_hold";
+  if (robot.holds.some(({ ack }) => ack === "local")) return "local_hold";
+  return isStanding(facts) ? "ok" : "not_standing";
+}
+
+/** @param {Facts} facts */
+export function whyNotResume(facts) {
+  const common = whyNotAtAll(facts);
+  if (common) return common;
+  const { robot, command } = facts;
+  if (!robot || robot.holds.length) return "not_ready";
+  if (command) return command.state === "READY" ? "ok" : "not_ready";
+  return robot.mode === "STOPPED" ? "ok" : "not_ready";
+}
+
+/** @param {Facts} facts */
+function whyNotAtAll({ isConnected, role, ageS }) {
+  if (!isConnected) return "no_link";
+  if (!RELEASERS.has(role)) return "role";
+  return ageS > FRESH_S ? "not_fresh" : null;
+}
+
+/** @param {Facts} facts */
+function isStanding({ robot, command }) {
+  if (command) return command.state === "STANDING";
+  const twist = robot?.twist;
+  return (
+    robot?.mode === "STOPPED" &&
+    Math.abs(twist?.linear ?? 1) < STANDING_M_S &&
+    Math.abs(twist?.angular ?? 1) < STANDING_M_S
+  );
+}
+
+/**
+ * Calls `fn` when a button was held down for two seconds, by finger, mouse or key.
+ *
+ * @param {HTMLButtonElement} button
+ * @param {() => void} fn
+ */
+export function onHold(button, fn) {
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let timer;
+  function begin() {
+    if (timer || button.disabled) return;
+    button.toggleAttribute("data-holding", true);
+    timer = setTimeout(() => {
+      end();
+      if (!button.disabled) fn();
+    }, HOLD_MS);
+  }
+  function end() {
+    clearTimeout(timer);
+    timer = undefined;
+    button.removeAttribute("data-holding");
+  }
+  button.addEventListener("pointerdown", (event) => {
+    if (event.button === 0) begin();
+  });
+  for (const name of ["pointerup", "pointerleave", "pointercancel", "blur", "keyup"]) {
+    button.addEventListener(name, end);
+  }
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" && event.key !== " ") return;
+    event.preventDefault();
+    begin();
+  });
+}
+
+/** @param {string} path @param {object} body @returns {Promise<number>} 0: no answer */
+async function post(path, body) {
+  try {
+    const headers = { "Content-Type": "application/json", "X-IVEG": "1" };
+    const answer = await fetch(path, {
+      method: "POST",
+      headers,
+      body: JSON.stringify(body),
+    });
+    return answer.status;
+  } catch {
+    return 0;
+  }
+}

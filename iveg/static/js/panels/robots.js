@@ -1,0 +1,213 @@
+/**
+ * One card a robot: where it is, how fast, how old that is, and why it drives so.
+ *
+ * Ages are counted here, by the browser's clock, so that silence shows by itself.
+ */
+
+import { ageOf, linkOfRobot } from "../clock.js";
+import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
+import { createGauge } from "./gauge.js";
+import { createRelease } from "./release.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../protocol.js").Robot} Robot */
+
+const TICK_MS = 200;
+const DEFAULT_MAX = 1;
+const DEGREES = 180 / Math.PI;
+
+/** @param {App} app */
+export function createRobotsPanel(app) {
+  const { store, words } = app;
+  const place = need("#robots");
+  /** @type {Map<string, ReturnType<typeof createCard>>} */
+  const cards = new Map();
+
+  /** @param {string} robotId */
+  function cardOf(robotId) {
+    const known = cards.get(robotId);
+    if (known) return known;
+    const card = createCard(app, findElement(robotId) ?? cloneElement(robotId));
+    cards.set(robotId, card);
+    app.stops.place();
+    return card;
+  }
+
+  /** @param {string} robotId */
+  function findElement(robotId) {
+    return all(".card", place).find((card) => card.dataset.robot === robotId);
+  }
+
+  /** @param {string} robotId */
+  function cloneElement(robotId) {
+    const template = /** @type {HTMLTemplateElement} */ (need("#robot-card"));
+    const copy = /** @type {DocumentFragment} */ (template.content.cloneNode(true));
+    const card = need(".card", copy);
+    card.dataset.robot = robotId;
+    setAttribute(card, "aria-label", robotId);
+    setText(needPart("name", card), robotId);
+    setText(needPart("panel-name", card), robotId);
+    need("[data-release]", card).dataset.release = robotId;
+    need("[data-resume]", card).dataset.resume = robotId;
+    place.append(card);
+    return card;
+  }
+
+  function drawAll() {
+    for (const robotId of store.robots().keys()) cardOf(robotId);
+    setHidden(need("#robots-empty"), cards.size > 0);
+    for (const [robotId, card] of cards) card.draw(store.robots().get(robotId));
+  }
+
+  for (const card of all(".card", place)) cardOf(String(card.dataset.robot));
+  store.subscribe("robots/", (robot) => cardOf(robot.robot_id).draw(robot));
+  store.subscribe("snapshot", drawAll);
+  words.onChange(drawAll);
+  setInterval(drawAll, TICK_MS);
+  drawAll();
+}
+
+/**
+ * @param {App} app
+ * @param {HTMLElement} card
+ */
+function createCard(app, card) {
+  const { store, words, dialogs } = app;
+  const robotId = String(card.dataset.robot);
+  const gauge = createGauge();
+  needPart("gauge", card).append(gauge.svg);
+  const release = createRelease(app, card, robotId);
+  const menu = needPart("menu", card);
+  const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
+  menu.addEventListener("click", (event) => {
+    event.stopPropagation();
+    if (dialogs.isOpen(panel)) dialogs.close();
+    else dialogs.open(panel, menu);
+  });
+  needPart("follow", card).addEventListener("click", () => {
+    dialogs.close();
+    document.dispatchEvent(new CustomEvent("iveg:follow", { detail: robotId }));
+  });
+  const fields = Object.fromEntries(
+    all("[data-field]", card).map((field) => [field.dataset.field, field]),
+  );
+  const ages = all("[data-age]", card);
+
+  /** @param {Robot | undefined} robot */
+  function draw(robot) {
+    const ageS = ageOf(robot);
+    const link = linkOfRobot(robot);
+    setAttribute(card, "data-link", link);
+    setAttribute(card, "data-mode", robot?.mode ?? "UNKNOWN");
+    setAttribute(menu, "aria-label", words.t("release.open", { robot: robotId }));
+    setText(fields.link, words.t(`robot.link.${link}`));
+    const shape = needPart("shape", card);
+    setAttribute(shape, "data-slot", String(store.slotOf(robotId)));
+    setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
+    setHidden(needPart("replay", card), !robot?.replay);
+    drawMode(robot);
+    drawReadouts(robot, ageS);
+    drawGauge(robot);
+    setText(needPart("certainty", card), certaintyOf(robotId));
+    drawTask(robot);
+    release.draw(robot);
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawMode(robot) {
+    const mode = robot?.mode ?? "UNKNOWN";
+    const said =
+      mode === "SLOW"
+        ? words.t("robot.mode_slow", { factor: robot?.speed_factor ?? 0.5 })
+        : words.t(`robot.mode.${mode}`);
+    setText(fields.mode, said);
+    setText(needPart("why", card), robot ? whyOf(robot) : "");
+  }
+
+  /** @param {Robot} robot */
+  function whyOf(robot) {
+    if (robot.holds.length) {
+      const names = robot.holds.map(({ source }) =>
+        words.t(`release.hold_source.${source}`),
+      );
+      return words.t("robot.why.held", { sources: [...new Set(names)].join(", ") });
+    }
+    const isMandated = (robot.mandate?.speed_factor ?? 1) < 1;
+    const reason = isMandated ? robot.mandate?.reason : robot.applied?.reason;
+    const distance = robot.mandate?.distance_m ?? null;
+    if (distance === null && (reason === "person" || reason === "robot")) {
+      return words.t(`why.${reason}`);
+    }
+    return words.t(`robot.why.${reason ?? "clear"}`, { distance });
+  }
+
+  /** @param {Robot | undefined} robot @param {number} ageS */
+  function drawReadouts(robot, ageS) {
+    const { pose, twist } = robot ?? {};
+    readout("x", pose?.x, 2, "m");
+    readout("y", pose?.y, 2, "m");
+    readout("yaw", pose && pose.yaw * DEGREES, 1, "deg");
+    readout("v", twist?.linear, 2, "ms");
+    readout("w", twist?.angular, 2, "rads");
+    const said = Number.isFinite(ageS) ? agoOf(ageS) : "";
+    for (const age of ages) setText(age, said);
+    setText(fields.age, said);
+  }
+
+  /**
+   * @param {string} field
+   * @param {number | null | undefined} value
+   * @param {number} decimals
+   * @param {string} unit
+   */
+  function readout(field, value, decimals, unit) {
+    const said =
+      value === null || value === undefined
+        ? "—"
+        : `${words.number(value, decimals)} ${words.t(`robot.unit.${unit}`)}`;
+    setText(fields[field], said);
+  }
+
+  /** @param {number} ageS */
+  function agoOf(ageS) {
+    const key = ageS < 10 ? "robot.ago" : "robot.ago_long";
+    return words.t(key, { age: ageS });
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawGauge(robot) {
+    const speed = robot?.twist?.linear ?? null;
+    const max = robot?.profile?.max_speed ?? DEFAULT_MAX;
+    const factor = robot?.mandate?.speed_factor ?? null;
+    const limit = (factor ?? 1) * max;
+    gauge.draw({
+      speed,
+      max,
+      factor,
+      name: words.t("robot.gauge", { robot: robotId }),
+      said: words.t("robot.gauge_value", { speed: speed ?? 0, max, limit }),
+      limitSaid: words.t("robot.limit", { limit }),
+      speedSaid: speed === null ? "—" : words.number(Math.abs(speed), 2),
+    });
+  }
+
+  /** How sure its detector is of the surest thing in its newest look. @param {string} id */
+  function certaintyOf(id) {
+    const look = store.looks().get(id);
+    if (!look || ageOf(look) > 3) return words.t("robot.certainty_old");
+    const [best] = [...look.items].sort((a, b) => b.probability - a.probability);
+    if (!best) return words.t("robot.certainty_none");
+    const key = best.confident ? "robot.certainty_value" : "robot.certainty_faint";
+    const slots = { class: best.class ?? best.class_id, confidence: best.probability };
+    return words.t(key, slots);
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawTask(robot) {
+    const task = robot?.navigation?.task;
+    setHidden(needPart("task-line", card), !task);
+    setText(needPart("task", card), task ?? "");
+  }
+
+  return { draw };
+}

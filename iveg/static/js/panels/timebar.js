@@ -1,0 +1,55 @@
+/**
+ * The bar under the map: the greenhouse's clock and what happened in the last minutes.
+ */
+
+import { makeSvg, need, setAttribute, setText } from "./dom.js";
+
+const TICK_MS = 1000;
+const MINUTES = 10;
+const WIDTH = 600;
+const MARK_WIDTH = 2;
+/** Detections come by the dozen; they draw low, what changed something draws high. */
+const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
+
+/** @param {import("../main.js").App} app */
+export function createTimebar({ store, words, line }) {
+  const strip = need("#time-strip");
+
+  function draw() {
+    const nowS = line.serverNow();
+    setText(need("#clock"), words.time(nowS));
+    setAttribute(strip, "aria-label", words.t("time.strip", { minutes: MINUTES }));
+    const marks = marksOf(nowS);
+    while (strip.childElementCount > marks.length) strip.lastElementChild?.remove();
+    while (strip.childElementCount < marks.length) strip.append(makeSvg("rect"));
+    for (const [i, { x, kind }] of marks.entries())
+      drawMark(strip.children[i], x, kind);
+  }
+
+  /** @param {number} nowS Unix time */
+  function marksOf(nowS) {
+    /** @type {Map<string, {x: number, kind: string}>} one a kind and place */
+    const marks = new Map();
+    for (const { at, kind } of store.log()) {
+      const share = 1 - (nowS - Date.parse(at) / 1000) / (MINUTES * 60);
+      if (share < 0 || share > 1.01) continue;
+      const x = Math.round((share * (WIDTH - MARK_WIDTH)) / MARK_WIDTH) * MARK_WIDTH;
+      marks.set(`${kind}:${x}`, { x, kind });
+    }
+    return [...marks.values()];
+  }
+
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+}
+
+/** @param {Element} mark @param {number} x @param {string} kind */
+function drawMark(mark, x, kind) {
+  const height = HEIGHTS[/** @type {keyof typeof HEIGHTS} */ (kind)] ?? 9;
+  setAttribute(mark, "data-kind", kind);
+  setAttribute(mark, "x", String(x));
+  setAttribute(mark, "y", String(20 - height));
+  setAttribute(mark, "width", String(MARK_WIDTH));
+  setAttribute(mark, "height", String(height));
+}
