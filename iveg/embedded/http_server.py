@@ -62,7 +62,7 @@ async def http_server(handler: Handler, host: str, port: int) -> AsyncIterator[i
     Yields:
         The port that is listened on.
     """
-    connections: set[_Connection] = set()
+    connections: set[_Connection] = set()  # from the first byte to the last answer
     server = await asyncio.get_running_loop().create_server(
         lambda: _Connection(handler, connections), host, port
     )
@@ -81,7 +81,7 @@ class _Connection(asyncio.Protocol):
     def __init__(self, handler: Handler, connections: "set[_Connection]") -> None:
         self._handler = handler
         self._connections = connections
-        self._requests: asyncio.Queue[tuple[Request, bool]] = asyncio.Queue()
+        self._requests: asyncio.Queue[tuple[Request, bool] | None] = asyncio.Queue()
         self._parser = httptools.HttpRequestParser(self)
         self._transport: asyncio.Transport | None = None
         self._task: asyncio.Task[None] | None = None
@@ -94,9 +94,9 @@ class _Connection(asyncio.Protocol):
         )
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        self._connections.discard(self)
-        if self._task is not None:
-            self._task.cancel()
+        """The client went; what it asked for is done all the same."""
+        self._transport = None
+        self._requests.put_nowait(None)
 
     async def close(self) -> None:
         """Drop the client and wait until its handler has gone."""
@@ -157,15 +157,22 @@ class _Connection(asyncio.Protocol):
     # --- answers ----------------------------------------------------------------
 
     async def _answer_all(self) -> None:
-        keep = True
-        while keep and self._transport is not None:
-            request, keep = await self._requests.get()
-            if self._requests.qsize() <= _MAX_WAITING:
-                self._transport.resume_reading()
-            response = await self._answer(request)
-            self._transport.write(_written(response, request.method, keep))
-        if self._transport is not None:
+        try:
+            while (asked := await self._requests.get()) is not None:
+                request, keep = asked
+                response = await self._answer(request)
+                self._write(_written(response, request.method, keep), keep=keep)
+        finally:
+            self._connections.discard(self)
+
+    def _write(self, data: bytes, *, keep: bool) -> None:
+        if self._transport is None:
+            return
+        self._transport.write(data)
+        if not keep:
             self._transport.close()
+        elif self._requests.qsize() <= _MAX_WAITING:
+            self._transport.resume_reading()
 
     async def _answer(self, request: Request) -> Response:
         try:

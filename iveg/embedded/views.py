@@ -8,6 +8,8 @@ import orjson
 from iveg.embedded.entities import Attribute, Entity, date_json
 from iveg.embedded.orion_text import quoted
 
+_BUILTIN = ("dateCreated", "dateModified", "alterationType")
+
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -64,7 +66,10 @@ def write_attributes(
 def _named(chosen: Sequence[tuple[str, Attribute]], view: View) -> list[bytes]:
     if view.bare:
         return [quoted(name) + b":" + one.json for name, one in chosen]
-    return [quoted(name) + b":" + one.normalized(view.metadata) for name, one in chosen]
+    return [
+        quoted(name) + b":" + one.normalized(() if name in _BUILTIN else view.metadata)
+        for name, one in chosen
+    ]
 
 
 def _values(values: list[bytes], form: str) -> bytes:
