@@ -39,7 +39,7 @@ import { readScene } from "./scene.js";
 import { followShortcuts } from "./shortcuts.js";
 import * as viewport from "./viewport.js";
 
-/** Layers from the ground up; the first two do not move. */
+/** Layers from the ground up; the first two do not move, nothing ever hides a person. */
 export const LAYERS = [
   "grid",
   "greenhouse",
@@ -49,8 +49,8 @@ export const LAYERS = [
   "intent",
   "links",
   "detections",
-  "people",
   "robot",
+  "people",
   "scalebar",
 ];
 

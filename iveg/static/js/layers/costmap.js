@@ -11,7 +11,7 @@ import { screenX, screenY } from "../viewport.js";
 import { isolated } from "./paint.js";
 
 /** Of a cell that costs 100; below that in proportion. */
-const DARKEST = 0.4;
+const DARKEST = 0.2;
 
 /** Draws grids, keeping the image of the newest. */
 export function createCostmapLayer() {
