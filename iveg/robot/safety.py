@@ -147,7 +147,7 @@ class SafetyMachine:
         elif isinstance(order, Release):
             answer = self._release(order, now)
         elif isinstance(order, Resume):
-            answer = self._resume(order)
+            answer = self._resume(order, now)
         else:
             answer = self._answer(None, "REFUSED", order.why)
         self._judge(now)
@@ -211,7 +211,7 @@ class SafetyMachine:
     def _release(self, order: Release, now: float) -> CommandAnswer:
         why = self._why_not_release(order, now)
         if why is not None:
-            return self._answer(order.ids[0], "REFUSED", why)
+            return self._refuse(order.ids[0], order.challenge, why, now)
         self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
         return self._answer(order.ids[0], "RELEASED")
 
@@ -228,19 +228,30 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: Resume) -> CommandAnswer:
-        if self._holds.holds:
-            return self._answer(None, "REFUSED", "held")
-        if self._resumed:
-            same = order.challenge == self._resumed_by
-            return self._answer(
-                None, "RESUMED" if same else "REFUSED", None if same else "not_ready"
-            )
-        if order.challenge != self._challenge:
-            return self._answer(None, "REFUSED", "challenge")
+    def _resume(self, order: Resume, now: float) -> CommandAnswer:
+        if self._resumed and order.challenge == self._resumed_by:
+            return self._answer(None, "RESUMED")
+        why = self._why_not_resume(order)
+        if why is not None:
+            return self._refuse(None, order.challenge, why, now)
         self._let_go()
         self._resumed_by = order.challenge
         return self._answer(None, "RESUMED")
+
+    def _why_not_resume(self, order: Resume) -> str | None:
+        if self._holds.holds:
+            return "held"
+        if self._resumed:
+            return "not_ready"
+        return None if order.challenge == self._challenge else "challenge"
+
+    def _refuse(
+        self, answered: str | None, challenge: str, why: str, now: float
+    ) -> CommandAnswer:
+        """Refuse; a copy that comes later, when all would be right, finds it spent."""
+        if challenge == self._challenge:
+            self._renew_challenge(now)
+        return self._answer(answered, "REFUSED", why)
 
     def _answer(
         self, answered: str | None, code: AnswerCode, why: str | None = None
@@ -264,7 +275,7 @@ class SafetyMachine:
         self._judge_link(now)
         waited = now - self._challenge_at
         if not self._free and waited >= CHALLENGE_LIVES_S:
-            self._challenge, self._challenge_at = self._fresh(), now
+            self._renew_challenge(now)
 
     def _judge_link(self, now: float) -> None:
         watchdog = self._judgement.watchdog
@@ -280,9 +291,12 @@ class SafetyMachine:
 
     def _latch(self, hold: Hold, now: float) -> None:
         self._holds = self._holds.latch(hold)
-        self._challenge, self._challenge_at = self._fresh(), now
+        self._renew_challenge(now)
         if hold.ack != "auto":
             self._resumed = False
+
+    def _renew_challenge(self, now: float) -> None:
+        self._challenge, self._challenge_at = self._fresh(), now
 
     def _let_go(self) -> None:
         self._resumed = True

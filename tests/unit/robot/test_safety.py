@@ -294,6 +294,25 @@ def test_an_old_resume_does_not_resume_the_next_release() -> None:
     assert rig.state == "READY"
 
 
+def test_a_copy_of_a_resume_that_came_too_early_does_not_count() -> None:
+    rig = Rig().run(0.5)
+    early = resume(rig.machine.challenge)
+    assert rig.command(early).why == "held"
+    rig.release()
+    assert rig.command(early).why == "challenge"
+    assert rig.resume().result == "RESUMED"
+
+
+def test_a_copy_of_a_release_that_came_too_early_does_not_count() -> None:
+    rig = Rig(speed=Twist2D(0.3, 0.0), obeys=False).run(0.5)
+    early = release(["boot-b1"], rig.machine.challenge)
+    assert rig.command(early).why == "not_standing"
+    rig.speed = REST
+    rig.run(0.5)
+    assert rig.command(early).why == "challenge"
+    assert rig.release().result == "RELEASED"
+
+
 def test_a_second_resume_with_another_challenge_is_refused() -> None:
     rig = moving()
     assert rig.command(resume("other")).why == "not_ready"

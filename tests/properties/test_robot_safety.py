@@ -1,0 +1,347 @@
+"""The robot's invariants R1-R10 (safety.md §2.6), under everything a network can do."""
+# ruff: noqa: N802 - each test bears the name of its invariant
+
+from dataclasses import replace
+
+import orjson
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iveg.domain.feedback import CLEAR, FeedbackAlert, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Origin
+from iveg.robot.caps import Cap, lowest
+from iveg.robot.effects import Drive
+from tests.unit.robot.hostile import (
+    EVENTS,
+    JUNK,
+    NAMES,
+    Event,
+    Transition,
+    played,
+    reports,
+)
+from tests.unit.robot.rig import AHEAD, REST, Rig, person, stop
+
+
+def released_by(transition: Transition) -> tuple[set[str], str]:
+    """The ids and challenge of a release; nothing for any other message."""
+    try:
+        message = orjson.loads(transition.payload or b"")
+        asked = message["cmd"]["release"]
+        return set(asked["ids"]), asked["ch"]
+    except (orjson.JSONDecodeError, KeyError, TypeError):
+        return set(), ""
+
+
+@given(EVENTS)
+def test_R1_driving_implies_an_empty_hold_set(events: list[Event]) -> None:
+    moving = [one for one in played(events).transitions if one.moves]
+    assert moving
+    assert all(one.after.holds == () for one in moving)
+    assert all(one.state == "RUNNING" for one in moving)
+
+
+@given(EVENTS)
+def test_R2_a_received_stop_stays_until_a_release_with_all_names_and_the_challenge(
+    events: list[Event],
+) -> None:
+    world = played(events)
+    for one in world.transitions:
+        named, challenge = released_by(one)
+        perfect = one.before.remote <= named and challenge == one.challenge
+        lost = [hold for hold in one.lost if hold.source == "iveg"]
+        assert perfect or not lost
+
+
+@given(EVENTS)
+def test_R2_every_stop_that_comes_is_held_or_was_released(events: list[Event]) -> None:
+    pressed = [one for one in played(events).transitions if one.did == "press"]
+    for one in pressed:
+        name = orjson.loads(one.payload or b"")["cmd"]["stop"]["id"]
+        released = name in one.before.released
+        assert (name in one.after.remote) != released
+        assert one.answers == ["RELEASED" if released else "LATCHED"]
+
+
+@given(EVENTS)
+def test_R3_a_release_lifts_no_hold_that_it_does_not_name(events: list[Event]) -> None:
+    commanded = [one for one in played(events).transitions if one.payload is not None]
+    for one in commanded:
+        named, _ = released_by(one)
+        assert {hold.id for hold in one.lost} <= named
+
+
+@given(EVENTS, st.lists(NAMES, min_size=1, max_size=3))
+def test_R4_a_boot_is_held_and_inherits_every_answered_stop(
+    events: list[Event], names: list[str]
+) -> None:
+    world = played(events)
+    for name in names:
+        world.press(name)
+    held = {hold for hold in world.machine.holds.holds if hold.source == "iveg"}
+    world.reboot()
+    assert held <= set(world.machine.holds.holds)
+    assert all(
+        one.after.holds[-1].id.startswith("boot-") and not one.moves
+        for one in world.boots
+    )
+
+
+@given(EVENTS, st.binary(max_size=8), st.binary(max_size=8))
+def test_R5_any_stop_gives_zero_in_the_same_call(
+    events: list[Event], left: bytes, right: bytes
+) -> None:
+    world = played(events)
+    for payload in (stop("01NEW"), left + b"StOp" + right):
+        effects = world.machine.command(payload, world.now)
+        assert effects[0] == Drive(REST)
+        world.perform(effects)
+
+
+CAPS = st.lists(
+    st.builds(
+        Cap,
+        st.sampled_from([0.0, 0.5, 1.0]),
+        st.sampled_from(["stale", "watchdog", "robot", "person"]),
+        st.sampled_from([None, "AGII"]),
+    )
+)
+
+
+@given(CAPS, CAPS)
+def test_R6_the_factor_is_the_least_cap_and_more_caps_never_raise_it(
+    some: list[Cap], more: list[Cap]
+) -> None:
+    assert lowest(some).factor == min([1.0, *(cap.factor for cap in some)])
+    assert lowest([*some, *more]).factor <= lowest(some).factor
+
+
+@given(EVENTS)
+def test_R6_every_reported_factor_is_0_or_half_or_1(events: list[Event]) -> None:
+    factors = {factor for _, factor in reports(played(events))}
+    assert factors <= {0.0, 0.5, 1.0}
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0.5, 1.0]), st.sampled_from([None, 0.5, 1.9, 2.2, 3.0])
+        ),
+        max_size=6,
+    ),
+    st.lists(
+        st.tuples(
+            st.sampled_from(["person", "robot"]), st.sampled_from([0.2, 1.5, 2.0, 2.2])
+        ),
+        max_size=3,
+    ),
+    st.sampled_from([0.0, 0.5, 1.0]),
+)
+def test_R6_another_topic_never_raises_the_factor(
+    told: list[tuple[float, float | None]],
+    others: list[tuple[str, float]],
+    factor: float,
+) -> None:
+    one, two = Rig().drive_on(), Rig().drive_on()
+    more: tuple[FeedbackAlert, ...] = tuple(
+        person(x, class_=class_, decision_id=f"o-{x}") for class_, x in others
+    )
+    for mandated, x in told:
+        for rig in (one, two):
+            rig.mandates = {"AGI": Mandate(mandated, "person")}
+            rig.alerts = () if x is None else (person(x),)
+        two.hear(
+            two.feedback(
+                robot_id="AGIII",
+                alerts=more,
+                mandates={"AGI": Mandate(factor, "robot")},
+                seen={},
+            ),
+            "AGIII",
+        )
+        one.run(0.7)
+        two.run(0.7)
+        assert two.factor <= one.factor
+
+
+@given(EVENTS)
+def test_R7_feedback_older_than_1_s_halves_and_older_than_3_s_stops(
+    events: list[Event],
+) -> None:
+    for one in played(events).transitions:
+        fastest = max(abs(twist.linear_x) for twist in one.twists)
+        age = float("inf") if one.heard is None else one.at - one.heard
+        assert age <= 1.0 or fastest <= 0.5
+        assert age <= 3.0 or fastest == 0.0
+
+
+@given(EVENTS)
+def test_R7_the_reported_factor_obeys_the_same_limits(events: list[Event]) -> None:
+    for one, factor in reports(played(events)):
+        age = float("inf") if one.heard is None else one.at - one.heard
+        assert age <= 1.0 or factor <= 0.5
+        assert age <= 3.0 or factor == 0.0
+
+
+@given(EVENTS)
+def test_R8_local_holds_are_lifted_by_a_crew_alone(events: list[Event]) -> None:
+    for one in played(events).transitions:
+        lost = [hold for hold in one.lost if hold.ack == "local"]
+        assert not lost or one.did in ("crew", "full_speed")
+        assert not lost or one.payload is None
+
+
+def without_stop(payload: bytes) -> bool:
+    return b"stop" not in payload.lower()
+
+
+@given(
+    EVENTS,
+    st.lists(
+        st.one_of(
+            st.builds(Event, st.just("say"), st.tuples(JUNK.filter(without_stop))),
+            st.builds(Event, st.just("hear_again"), st.tuples(st.integers(0, 400))),
+        ),
+        max_size=10,
+    ),
+)
+def test_R9_junk_and_old_feedback_change_no_hold_and_move_nothing(
+    events: list[Event], noise: list[Event]
+) -> None:
+    world = played(events)
+    before, state = world.machine.holds, world.state
+    twist = world.twist
+    world.play(noise)
+    assert world.machine.holds.holds == before.holds
+    assert world.state == state
+    assert abs(world.twist.linear_x) <= abs(twist.linear_x)
+
+
+@given(EVENTS, st.permutations(range(20)))
+def test_R9_commands_delivered_again_in_any_order_never_free_a_robot(
+    events: list[Event], order: list[int]
+) -> None:
+    world = played(events)
+    world.press("01HOLD")
+    for which in order:
+        world.again(which)
+    assert "01HOLD" in world.machine.holds.remote
+    assert world.twist == REST
+
+
+@given(EVENTS, st.permutations(range(20)))
+def test_R9_commands_delivered_again_never_make_a_waiting_robot_run(
+    events: list[Event], order: list[int]
+) -> None:
+    world = played(events)
+    world.press("01HOLD")
+    world.sensors(True)
+    world.push(0.0)
+    world.wait(0.6)
+    world.crew()
+    world.ask_release("perfect")
+    for which in order:
+        world.again(which)
+    assert world.state != "RUNNING"
+
+
+@given(EVENTS)
+def test_R10_after_a_release_motion_needs_resume_and_half_a_second_of_rest(
+    events: list[Event],
+) -> None:
+    interlock = Interlock()
+    for one in played(events).transitions:
+        interlock.watch(one)
+        assert interlock.passed or not one.moves
+
+
+class Interlock:
+    """R10 once more, from what went in alone."""
+
+    def __init__(self) -> None:
+        self.resumed_at: float | None = None
+        self.passed = False
+
+    def watch(self, one: Transition) -> None:
+        if any(hold.ack != "auto" for hold in one.after.holds):
+            self.resumed_at, self.passed = None, False
+        elif self.resumed_at is None and may_resume(one):
+            self.resumed_at = one.at
+        if self.resumed_at is not None and one.at_rest_since is not None:
+            rest = one.at - max(self.resumed_at, one.at_rest_since)
+            self.passed = self.passed or rest >= 0.5 - 1e-6
+
+
+def may_resume(one: Transition) -> bool:
+    """Whether this call may let a robot run: a resume with the challenge, a crew."""
+    if one.payload is None:
+        return one.did in ("crew", "full_speed")
+    return one.answers == ["RESUMED"] and one.challenge.encode() in one.payload
+
+
+@given(EVENTS)
+def test_the_order_of_effects_is_zero_disk_answer_report(events: list[Event]) -> None:
+    rank = {"Drive": 0, "Persist": 1, "Answer": 2, "Report": 3}
+    for one in played(events).transitions:
+        order = [rank[type(effect).__name__] for effect in one.effects]
+        assert order == sorted(order)
+        assert order[0] == 0
+
+
+@given(EVENTS)
+def test_nobody_is_locked_out_for_ever(events: list[Event]) -> None:
+    world = played(events)
+    world.alerts, world.mandates = (), {"AGI": CLEAR}
+    world.full_speed()
+    world.wait(3.4)
+    world.full_speed()
+    world.wait(3.4)
+    assert world.twist == AHEAD
+
+
+@given(
+    st.lists(st.floats(-0.14, 0.14), min_size=30, max_size=60),
+    st.floats(1.0, 3.0),
+)
+def test_noise_below_the_hysteresis_changes_the_factor_at_most_once_a_crossing(
+    noise: list[float], distance: float
+) -> None:
+    rig = Rig().drive_on()
+    before = rig.factor_changes()
+    for wobble in noise:
+        rig.pose = Pose2D(wobble, 0.0, 0.0)
+        rig.alerts = (replace(person(distance), stamp=str(wobble)),)
+        rig.run(0.2)
+    assert rig.factor_changes() - before <= 1
+
+
+@given(st.floats(-10, 10), st.floats(-10, 10), st.sampled_from([0.0, 0.5, 1.0]))
+def test_no_wish_exceeds_the_drive_times_the_factor(
+    linear: float, angular: float, factor: float
+) -> None:
+    rig = Rig().drive_on()
+    rig.mandates = {"AGI": Mandate(factor, "person")}
+    rig.wished = Twist2D(linear, angular)
+    rig.run(0.3)
+    for _ in range(40):
+        rig.step()
+        assert abs(rig.twist.linear_x) <= factor + 1e-9
+        assert abs(rig.twist.angular_z) <= factor + 1e-9
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 9)), max_size=30))
+def test_feedback_counts_forward_only_within_a_boot_and_boots_never_return(
+    order: list[tuple[str, int]],
+) -> None:
+    rig = Rig()
+    met: list[str] = []
+    last: dict[str, int] = {}
+    for boot, seq in order:
+        feedback = rig.feedback(origin=Origin(boot, seq))
+        counts = rig.machine._judgement._hearsay.take("T", feedback, None, rig.now)
+        newest = bool(met) and met[-1] == boot
+        assert counts == (boot not in met or (newest and seq > last[boot]))
+        if counts:
+            met += [] if boot in met else [boot]
+            last[boot] = seq
