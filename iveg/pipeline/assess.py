@@ -7,6 +7,7 @@ and nowhere else, so that a loop that hangs falls silent and slows the robots.
 
 from collections.abc import Callable, Iterable, Mapping
 
+from iveg.domain import conditions
 from iveg.domain.alarms import Alarm, AlarmBook, Condition
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Decisions
@@ -29,10 +30,9 @@ from iveg.domain.world import Link, RobotState, World
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.wording import alarm_line, evidence_of, speed_line
 
 HEARTBEAT_S = 0.1
-CLOCK_OFFSET_S = 0.25
-UNREADABLE_SHOWN_S = 10.0
 _LOOK_LOGGED_S = 2.0
 
 
@@ -282,8 +282,8 @@ class Assessor:
         self._judge(now)
         if now.mono - self._told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
-        conditions = [*self._conditions(now), *more]
-        for alarm in self.alarms.sync(conditions, now, self._new_id()):
+        wrong = [*self._conditions(now), *more]
+        for alarm in self.alarms.sync(wrong, now, self._new_id()):
             self._minutes.alarm(alarm)
             self._log_alarm(alarm, now)
 
@@ -369,36 +369,17 @@ class Assessor:
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():
-            yield from _decision_conditions(decision, now)
+            yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
-            yield from _robot_conditions(robot, now)
+            yield from conditions.of_robot(robot, now)
 
     # --- words --------------------------------------------------------------------
 
     def _log_speed(self, report: SafetyReport, at: Instant) -> None:
-        decision = self.decisions.get(report.decision_id or "")
-        slots: dict[str, Slot] = {
-            "robot": report.robot_id,
-            "factor": report.speed_factor,
-            "reason": report.reason,
-            "cause": report.cause,
-        }
-        if report.speed_factor >= 1.0:
-            key = "log.speed_up"
-        else:
-            key = f"log.speed_down.{report.reason}"
-            key += self._evidence(decision, slots)
-        self._minutes.log(
-            LogEvent(
-                "speed",
-                key,
-                slots,
-                report.robot_id,
-                None if decision is None else decision.crossing.hazard.reason,
-                report.decision_id,
-            ),
-            at,
+        evidence = evidence_of(
+            report, self.decisions, self.people, self.world, self.greenhouse
         )
+        self._minutes.log(speed_line(report, evidence), at)
 
     def _log_mandate(
         self, robot_id: str, before: Mandate, after: Mandate, at: Instant
@@ -416,36 +397,10 @@ class Assessor:
         )
         self._log_speed(report, at)
 
-    def _evidence(self, decision: Decision | None, slots: dict[str, Slot]) -> str:
-        """Fill in who saw whom; returns the ending of the sentence's key."""
-        if decision is None:
-            return ""
-        crossing = decision.crossing
-        sighting = crossing.hazard.sighting
-        slots.update(
-            {
-                "distance": round(crossing.entered_m, 2),
-                "observer": crossing.hazard.observer,
-                "person": crossing.hazard.cause,
-                "class": crossing.hazard.reason,
-                "confidence": None if sighting is None else sighting.confidence,
-                "in_sight": crossing.in_sight,
-            }
-        )
-        return "" if crossing.in_sight else "_nlos"
-
     def _log_alarm(self, alarm: Alarm, at: Instant) -> None:
-        """A slow-down has its own line; its alarm says nothing new."""
-        if alarm.condition.key == "alert.person_slowed":
-            return
-        key = "log.alert.raised" if alarm.cleared is None else "log.alert.cleared"
-        condition = alarm.condition
-        slots: dict[str, Slot] = {
-            **condition.slots,
-            "alert": condition.key,
-            "priority": condition.priority,
-        }
-        self._minutes.log(LogEvent("alert", key, slots, condition.robot_id), at)
+        line = alarm_line(alarm)
+        if line is not None:
+            self._minutes.log(line, at)
 
 
 _MAX_LOOKS = 1000
@@ -454,36 +409,3 @@ _STAGE_KEYS = {
     "remembered": "log.person_remembered",
     "last_seen": "log.person_expired",
 }
-
-
-def _decision_conditions(decision: Decision, now: Instant) -> Iterable[Condition]:
-    crossing = decision.crossing
-    slots: dict[str, Slot] = {
-        "robot": crossing.robot_id,
-        "person": crossing.hazard.cause,
-        "distance": round(crossing.distance_m, 2),
-        "decision": decision.decision_id,
-    }
-    subject = f"{crossing.robot_id}/{crossing.hazard.cause}"
-    person = crossing.hazard.reason == "person"
-    if decision.overdue(now):
-        key = "alert.person_not_slowing" if person else "alert.no_slow_down"
-        yield Condition("P1", key, subject, crossing.robot_id, slots)
-    elif person:
-        yield Condition("P2", "alert.person_slowed", subject, crossing.robot_id, slots)
-
-
-def _robot_conditions(robot: RobotState, now: Instant) -> Iterable[Condition]:
-    slots: dict[str, Slot] = {"robot": robot.robot_id}
-    name = robot.robot_id
-    if robot.link(now) == "LOST":
-        moving = not robot.stands
-        key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
-        yield Condition("P1" if moving else "P2", key, name, name, slots)
-    offset = robot.clock.offset_s
-    if offset is not None and abs(offset) > CLOCK_OFFSET_S:
-        slots = {**slots, "offset": round(offset, 2)}
-        yield Condition("P3", "alert.clock_offset", name, name, slots)
-    unreadable = robot.unreadable_at
-    if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
-        yield Condition("P3", "alert.unreadable_detection", name, name, slots)

@@ -1,0 +1,47 @@
+"""What is wrong now, found anew each time from decisions and robots (product.md §3)."""
+
+from collections.abc import Iterable
+
+from iveg.domain.alarms import Condition
+from iveg.domain.decisions import Decision
+from iveg.domain.events import Slot
+from iveg.domain.observations import Instant
+from iveg.domain.world import RobotState
+
+CLOCK_OFFSET_S = 0.25
+UNREADABLE_SHOWN_S = 10.0
+
+
+def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
+    """A slow-down is expected (P2); one that does not come is grave (P1)."""
+    crossing = decision.crossing
+    slots: dict[str, Slot] = {
+        "robot": crossing.robot_id,
+        "person": crossing.hazard.cause,
+        "distance": round(crossing.distance_m, 2),
+        "decision": decision.decision_id,
+    }
+    subject = f"{crossing.robot_id}/{crossing.hazard.cause}"
+    person = crossing.hazard.reason == "person"
+    if decision.overdue(now):
+        key = "alert.person_not_slowing" if person else "alert.no_slow_down"
+        yield Condition("P1", key, subject, crossing.robot_id, slots)
+    elif person:
+        yield Condition("P2", "alert.person_slowed", subject, crossing.robot_id, slots)
+
+
+def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """A robot that is lost, whose clock is off, or whose detections are unreadable."""
+    slots: dict[str, Slot] = {"robot": robot.robot_id}
+    name = robot.robot_id
+    if robot.link(now) == "LOST":
+        moving = not robot.stands
+        key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
+        yield Condition("P1" if moving else "P2", key, name, name, slots)
+    offset = robot.clock.offset_s
+    if offset is not None and abs(offset) > CLOCK_OFFSET_S:
+        slots = {**slots, "offset": round(offset, 2)}
+        yield Condition("P3", "alert.clock_offset", name, name, slots)
+    unreadable = robot.unreadable_at
+    if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
+        yield Condition("P3", "alert.unreadable_detection", name, name, slots)

@@ -1,0 +1,139 @@
+"""What the log says of speeds and alarms: which sentence, and what fills its holes."""
+
+from dataclasses import dataclass
+
+from iveg.domain.alarms import Alarm
+from iveg.domain.decisions import Decisions
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.feedback import FULL_SPEED
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.mandates import Crossing
+from iveg.domain.observations import SafetyReport
+from iveg.domain.people import People, Person
+from iveg.domain.world import RobotState, World
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Who was seen by whom, and how far from the robot that slowed down (m)."""
+
+    cause: str
+    class_: str
+    observer: str
+    distance_m: float
+    in_sight: bool
+    confidence: float | None = None
+
+
+def evidence_of(
+    report: SafetyReport,
+    decisions: Decisions,
+    people: People,
+    world: World,
+    greenhouse: Greenhouse,
+) -> Evidence | None:
+    """What iVeg knows of the reason that a robot gives; None when nothing.
+
+    A robot judges alerts by its own pose, too, and may be ahead of our decision; it
+    then names the alert, and what is known of that person is the evidence.
+    """
+    if report.reason not in ("person", "robot"):
+        return None
+    decision = decisions.get(report.decision_id or "")
+    if decision is not None:
+        return _of_crossing(decision.crossing)
+    robot = world.robots[report.robot_id]
+    for person in people.known.values():
+        if report.decision_id == person.decision_id:
+            return _of_person(person, robot, greenhouse)
+    peer = world.robots.get(report.cause or "")
+    return None if peer is None else _of_peer(peer, robot, greenhouse)
+
+
+def _of_crossing(crossing: Crossing) -> Evidence:
+    hazard = crossing.hazard
+    confidence = None if hazard.sighting is None else hazard.sighting.confidence
+    return Evidence(
+        hazard.cause,
+        hazard.reason,
+        hazard.observer,
+        crossing.entered_m,
+        crossing.in_sight,
+        confidence,
+    )
+
+
+def _of_person(
+    person: Person, robot: RobotState, greenhouse: Greenhouse
+) -> Evidence | None:
+    if robot.odometry is None:
+        return None
+    pose, look = robot.odometry.pose, person.newest
+    return Evidence(
+        person.person_id,
+        person.class_,
+        look.observer,
+        pose.distance_to(look.x, look.y),
+        greenhouse.in_sight(pose.x, pose.y, look.x, look.y),
+        look.confidence,
+    )
+
+
+def _of_peer(
+    peer: RobotState, robot: RobotState, greenhouse: Greenhouse
+) -> Evidence | None:
+    if robot.odometry is None or peer.odometry is None:
+        return None
+    pose, other = robot.odometry.pose, peer.odometry.pose
+    return Evidence(
+        peer.robot_id,
+        "robot",
+        peer.robot_id,
+        pose.distance_to(other.x, other.y),
+        greenhouse.in_sight(pose.x, pose.y, other.x, other.y),
+    )
+
+
+def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
+    """A robot applies another factor than before, and why."""
+    slots: dict[str, Slot] = {
+        "robot": report.robot_id,
+        "factor": report.speed_factor,
+        "reason": report.reason,
+        "cause": report.cause,
+    }
+    key = "log.speed_up"
+    if report.speed_factor < FULL_SPEED:
+        key = f"log.speed_down.{report.reason}"
+        if evidence is not None:
+            key += "" if evidence.in_sight else "_nlos"
+            slots |= {
+                "distance": round(evidence.distance_m, 2),
+                "observer": evidence.observer,
+                "person": evidence.cause,
+                "class": evidence.class_,
+                "confidence": evidence.confidence,
+                "in_sight": evidence.in_sight,
+            }
+    return LogEvent(
+        "speed",
+        key,
+        slots,
+        report.robot_id,
+        None if evidence is None else evidence.class_,
+        report.decision_id,
+    )
+
+
+def alarm_line(alarm: Alarm) -> LogEvent | None:
+    """An alarm came or went; None for a slow-down, which has a line of its own."""
+    condition = alarm.condition
+    if condition.key == "alert.person_slowed":
+        return None
+    key = "log.alert.raised" if alarm.cleared is None else "log.alert.cleared"
+    slots: dict[str, Slot] = {
+        **condition.slots,
+        "alert": condition.key,
+        "priority": condition.priority,
+    }
+    return LogEvent("alert", key, slots, condition.robot_id)
