@@ -12,7 +12,7 @@ from tests.processes import Site, until
 pytestmark = pytest.mark.e2e
 
 STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
-BOTH_STANDING = re.compile(r"TODO PARADO \(2/2\)")
+BOTH_STANDING = re.compile(r"PARADO \(2/2\)")
 WITHIN_MS = 8000
 """Braking, the window of 1.0 s in which standing is measured, and a busy machine."""
 
