@@ -1,0 +1,167 @@
+"""A broker and a small iVeg for tests of the emulator and the replay."""
+
+import asyncio
+import contextlib
+import os
+import shutil
+import socket
+import time
+from collections import defaultdict
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeVar
+
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.observations import (
+    CommandAnswer,
+    Observation,
+    Odometry,
+    Origin,
+    SafetyReport,
+)
+from iveg.embedded.mqtt_broker import mqtt_broker
+from iveg.ngsi import codec
+
+_MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
+_CONF = """listener {port} 127.0.0.1
+allow_anonymous true
+set_tcp_nodelay true
+log_type none
+"""
+T = TypeVar("T")
+
+
+@contextlib.asynccontextmanager
+async def broker(folder: Path) -> AsyncIterator[BrokerAddress]:
+    """Mosquitto where it is installed, the embedded broker elsewhere."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = int(free.getsockname()[1])
+    address = BrokerAddress("127.0.0.1", port)
+    if _MOSQUITTO is None:
+        async with mqtt_broker("127.0.0.1", port):
+            yield address
+        return
+    conf = folder / "mosquitto.conf"
+    conf.write_text(_CONF.format(port=port))
+    process = await asyncio.create_subprocess_exec(_MOSQUITTO, "-c", str(conf))
+    try:
+        await _listening(port)
+        yield address
+    finally:
+        process.kill()
+        await process.wait()
+
+
+async def _listening(port: int) -> None:
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        with contextlib.suppress(OSError):
+            _, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.close()
+            return
+        await asyncio.sleep(0.02)
+
+
+async def until(true: Callable[[], object], within_s: float = 15.0) -> None:
+    """Wait for a fact."""
+    deadline = time.monotonic() + within_s
+    while not true():
+        assert time.monotonic() < deadline, "did not come true in time"
+        await asyncio.sleep(0.02)
+
+
+@dataclass
+class Cloud:
+    """Hears everything, answers with feedback at 10 Hz while ``speaks``."""
+
+    address: BrokerAddress
+    speaks: bool = True
+    mandates: dict[str, Mandate] = field(default_factory=dict)
+    heard: dict[str, list[Observation]] = field(
+        default_factory=lambda: defaultdict(list)
+    )
+    answers: list[CommandAnswer] = field(default_factory=list)
+    devices: set[str] = field(default_factory=set)
+    problems: list[codec.Problem] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        topics = {"/iveg/+/attrs": 1, "/iveg/+/cmdexe": 1}
+        self.link = MqttLink(self.address, "cloud", topics, self._take)
+
+    async def run(self) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self.link.run())
+            tasks.create_task(self._speak())
+
+    def of(self, robot_id: str, kind: type[T]) -> list[T]:
+        """All that a robot said of one kind."""
+        return [o for o in self.heard[robot_id] if isinstance(o, kind)]
+
+    def newest(self, robot_id: str, kind: type[T]) -> T | None:
+        return next(
+            (o for o in reversed(self.heard[robot_id]) if isinstance(o, kind)), None
+        )
+
+    def speed(self, robot_id: str) -> float:
+        newest = self.newest(robot_id, Odometry)
+        return 0.0 if newest is None else abs(newest.twist.linear_x)
+
+    def report(self, robot_id: str) -> SafetyReport:
+        newest = self.newest(robot_id, SafetyReport)
+        return newest or SafetyReport(robot_id, Origin(), 0.0, "stale")
+
+    async def command(self, robot_id: str, value: dict[str, object]) -> None:
+        await self.link.publish(f"/iveg/{robot_id}/cmd", codec.write_command(value))
+
+    def _take(self, topic: str, payload: bytes) -> None:
+        device = topic.split("/")[2]
+        self.devices.add(device)
+        if topic.endswith("/cmdexe"):
+            reading = codec.read_answer(device, payload)
+        elif device == "climate":
+            return
+        else:
+            reading = codec.read_measure(device, payload)
+        self.problems.extend(reading.problems)
+        for observation in reading.observations:
+            self.heard[observation_robot(observation)].append(observation)
+
+    async def _speak(self) -> None:
+        seq = 0
+        while True:
+            await asyncio.sleep(0.1)
+            seq += 1
+            if not self.speaks or not self.link.connected:
+                continue
+            for robot_id in list(self.heard):
+                seen = {robot_id: self.report(robot_id).origin.seq or 0}
+                feedback = Feedback(
+                    robot_id,
+                    Origin("cloud", seq),
+                    mandates=dict(self.mandates),
+                    seen=seen,
+                )
+                self.link.offer(
+                    f"/{robot_id}/mqtt_feedback", codec.write_feedback(feedback), 1
+                )
+
+
+def observation_robot(observation: Observation) -> str:
+    """Whose it is; the climate and the probe are nobody's."""
+    return str(getattr(observation, "robot_id", ""))
+
+
+@contextlib.asynccontextmanager
+async def running(*work: asyncio.Future[None]) -> AsyncIterator[None]:
+    """Let tasks run beside a test; the first to fail fails it."""
+    try:
+        yield
+        for task in work:
+            assert not task.done() or task.exception() is None
+    finally:
+        for task in work:
+            task.cancel()
+        await asyncio.gather(*work, return_exceptions=True)

@@ -1,0 +1,284 @@
+"""The emulated fleet on a real broker, with a small iVeg that hears and answers."""
+
+import asyncio
+import json
+import logging
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.errors import DataFileError
+from iveg.domain.feedback import Mandate
+from iveg.domain.observations import (
+    CommandAnswer,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+)
+from iveg.emulator.fleet import run_emulator
+from tests.integration.emulator_cloud import Cloud, broker, running, until
+
+TESTBED = load_greenhouse("mvsim-20x20")
+FLEET = ("AGI", "AGII")
+
+
+@pytest.fixture
+async def address(tmp_path: Path) -> AsyncIterator[BrokerAddress]:
+    async with broker(tmp_path) as where:
+        yield where
+
+
+@pytest.fixture
+async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
+    small = Cloud(address)
+    async with running(asyncio.create_task(small.run())):
+        await until(lambda: small.link.connected)
+        yield small
+
+
+class Faults:
+    """Speaks to the fault port."""
+
+    def __init__(self) -> None:
+        self.port = 0
+
+    def opened(self, port: int) -> None:
+        self.port = port
+
+    async def post(self, order: object, *, method: str = "POST") -> httpx.Response:
+        async with httpx.AsyncClient() as client:
+            url = f"http://127.0.0.1:{self.port}/"
+            return await client.request(method, url, content=json.dumps(order))
+
+
+def emulator(
+    address: BrokerAddress,
+    folder: Path,
+    *,
+    scenario: str = "nlos",
+    robots: tuple[str, ...] = FLEET,
+    held: bool = False,
+    faults: Faults | None = None,
+) -> asyncio.Task[None]:
+    return asyncio.create_task(
+        run_emulator(
+            robots=robots,
+            address=address,
+            apikey="iveg",
+            greenhouse=TESTBED,
+            scenario=scenario,
+            profile="perfect",
+            state_directory=folder / "state",
+            held=held,
+            fault_port=None if faults is None else 0,
+            on_fault_port=None if faults is None else faults.opened,
+        )
+    )
+
+
+async def test_robots_publish_all_that_the_contract_names_in_order_and_cleanly(
+    address: BrokerAddress,
+    cloud: Cloud,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        async with running(emulator(address, tmp_path)):
+            await until(lambda: len(cloud.of("AGII", Odometry)) > 45)
+            await until(lambda: cloud.newest("AGII", Navigation))
+
+    suffixes = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety", "_nav")
+    wanted = {robot_id + suffix for robot_id in FLEET for suffix in suffixes}
+    counted = [o.origin.seq or 0 for o in cloud.of("AGII", Odometry)]
+    scans = len(cloud.of("AGII", LaserScan))
+    assert cloud.devices == wanted | {"climate"}
+    assert cloud.problems == []
+    assert counted == list(range(counted[0], counted[0] + len(counted)))
+    assert scans == pytest.approx(len(counted), abs=8)
+    assert len(cloud.of("AGII", DetectionFrame)) == pytest.approx(scans, abs=8)
+    assert caplog.records == []
+
+
+async def test_the_crew_releases_at_start_and_the_robot_obeys_a_mandate(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(emulator(address, tmp_path)):
+        await until(lambda: cloud.speed("AGII") > 0.7)
+
+        cloud.mandates["AGII"] = Mandate(0.5, "person", "someone", 1.2)
+        await until(lambda: 0.2 < cloud.speed("AGII") < 0.45)
+
+        assert cloud.report("AGII").speed_factor == 0.5
+
+
+async def test_robots_that_nobody_releases_stay_held(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(emulator(address, tmp_path, held=True)):
+        await until(lambda: len(cloud.of("AGII", Odometry)) > 60)
+
+        assert [hold.source for hold in cloud.report("AGII").holds] == ["boot"]
+        assert max(o.twist.linear_x for o in cloud.of("AGII", Odometry)) == 0.0
+
+
+async def test_a_stopped_robot_stands_and_drives_again_after_release_and_resume(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(emulator(address, tmp_path)):
+        await until(lambda: cloud.speed("AGII") > 0.5)
+
+        await cloud.command("AGII", {"stop": {"id": "01STOP", "by": "anna"}})
+        await until(lambda: cloud.newest("AGII", CommandAnswer))
+        await until(lambda: cloud.speed("AGII") < 0.001)
+        assert [hold.id for hold in cloud.report("AGII").holds] == ["01STOP"]
+
+        challenge = cloud.report("AGII").challenge
+        await cloud.command("AGII", {"release": {"ids": ["01STOP"], "ch": challenge}})
+        await until(lambda: not cloud.report("AGII").holds)
+        assert cloud.speed("AGII") < 0.001
+
+        challenge = cloud.report("AGII").challenge
+        await cloud.command("AGII", {"resume": {"ch": challenge}})
+        await until(lambda: cloud.speed("AGII") > 0.5)
+
+
+async def test_without_feedback_the_robots_come_to_a_stand(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(emulator(address, tmp_path)):
+        await until(lambda: cloud.speed("AGII") > 0.5)
+
+        cloud.speaks = False
+        await until(lambda: cloud.report("AGII").holds)
+        await until(lambda: cloud.speed("AGII") < 0.001)
+
+        assert [hold.source for hold in cloud.report("AGII").holds] == ["link"]
+
+
+async def test_faults_are_done_as_ordered(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    faults = Faults()
+    async with running(emulator(address, tmp_path, faults=faults)):
+        await until(lambda: cloud.speed("AGII") > 0.5)
+
+        done = await faults.post({"robot": "AGII", "local_hold": "hw"})
+        assert done.status_code == 204
+        await until(lambda: [h.source for h in cloud.report("AGII").holds] == ["hw"])
+        await faults.post({"robot": "AGII", "release_locally": True})
+        await until(lambda: cloud.speed("AGII") > 0.5)
+
+        await faults.post({"robot": "AGII", "kill": True})
+        before = cloud.report("AGII").origin.boot
+        await faults.post({"robot": "AGII", "revive": True})
+        await until(lambda: cloud.report("AGII").origin.boot != before)
+        assert [h.source for h in cloud.report("AGII").holds] == ["boot"]
+
+
+async def test_a_mute_robot_says_nothing_and_a_frozen_one_no_odometry(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    faults = Faults()
+    async with running(emulator(address, tmp_path, faults=faults)):
+        await until(lambda: cloud.newest("AGI", Odometry))
+        await until(lambda: cloud.newest("AGII", Odometry))
+
+        await faults.post({"robot": "AGI", "mute": True})
+        await faults.post({"robot": "AGII", "freeze_odometry": True})
+        reports, scans = (
+            len(cloud.of("AGI", LaserScan)),
+            len(cloud.of("AGII", LaserScan)),
+        )
+        frozen = len(cloud.of("AGII", Odometry))
+        await until(lambda: len(cloud.of("AGII", LaserScan)) > scans + 30)
+
+        assert len(cloud.of("AGI", LaserScan)) <= reports + 3
+        assert len(cloud.of("AGII", Odometry)) <= frozen + 3
+
+
+async def test_a_person_who_was_placed_is_seen_there_and_hidden_on_demand(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    faults = Faults()
+    boxes: list[float] = []
+
+    def seen_at(ahead: float) -> bool:
+        frame = cloud.newest("AGI", DetectionFrame)
+        boxes[:] = [d.box.centre[0] for d in frame.detections] if frame else []
+        return len(boxes) == 1 and abs(boxes[0] - ahead) < 0.3
+
+    def sees_nobody() -> bool:
+        frame = cloud.newest("AGI", DetectionFrame)
+        return frame is not None and not frame.detections
+
+    async with running(emulator(address, tmp_path, faults=faults)):
+        await until(lambda: cloud.newest("AGI", DetectionFrame))
+
+        await faults.post({"person": 0, "x": 10.0, "y": 8.8, "hold": True})
+        await until(lambda: seen_at(5.0))
+        await faults.post({"robot": "AGI", "hide_people": True})
+        await until(sees_nobody)
+        await faults.post({"robot": "AGI", "false_person": {"x": 10.0, "y": 6.8}})
+        await until(lambda: seen_at(3.0))
+        await faults.post({"robot": "AGI", "false_person": None})
+        await until(sees_nobody)
+
+
+@pytest.mark.parametrize(
+    ("order", "status"),
+    [
+        ({"robot": "AGI", "mute": "yes"}, 400),
+        ({"robot": "AGI", "explode": True}, 400),
+        ([], 400),
+        ({"robot": "AGV"}, 409),
+        ({"person": 99, "x": 0.0, "y": 0.0}, 409),
+    ],
+)
+async def test_an_order_that_cannot_be_done_is_refused(
+    address: BrokerAddress, tmp_path: Path, order: object, status: int
+) -> None:
+    faults = Faults()
+    async with running(emulator(address, tmp_path, faults=faults)):
+        await until(lambda: faults.port)
+
+        refused = await faults.post(order)
+        read = await faults.post(order, method="GET")
+
+    assert refused.status_code == status
+    assert read.status_code == 400
+
+
+async def test_the_clock_of_a_robot_can_be_wrong(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    faults = Faults()
+    async with running(emulator(address, tmp_path, faults=faults)):
+        await until(lambda: cloud.newest("AGI", Odometry))
+        right = cloud.of("AGI", Odometry)[-1].origin.stamp_s or 0.0
+
+        await faults.post({"robot": "AGI", "clock_offset_s": 3600.0})
+
+        await until(
+            lambda: (cloud.of("AGI", Odometry)[-1].origin.stamp_s or 0) > right + 3500
+        )
+
+
+async def test_an_unknown_profile_or_scenario_is_refused_before_anything_runs(
+    address: BrokerAddress, tmp_path: Path
+) -> None:
+    with pytest.raises(DataFileError, match="is not one of demo, nlos"):
+        await emulator(address, tmp_path, scenario="party")
+    with pytest.raises(DataFileError, match="is not one of field, simulation"):
+        await run_emulator(
+            robots=FLEET,
+            address=address,
+            apikey="iveg",
+            greenhouse=TESTBED,
+            profile="clairvoyant",
+            state_directory=tmp_path,
+        )

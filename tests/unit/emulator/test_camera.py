@@ -1,0 +1,142 @@
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Detection
+from iveg.domain.profiles import AGI
+from iveg.emulator.camera import (
+    DETECTORS,
+    FIELD_COUNTS,
+    Detector,
+    DetectorModel,
+    Target,
+    person_target,
+    robot_target,
+)
+from iveg.emulator.greenhouse import Body, Disc, Scenery
+
+BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)
+OPEN = Scenery.of(Greenhouse("yard", BOUNDS))
+HERE = Pose2D(0.0, 0.0, 0.0)
+EVERY_S = 2.5
+"""Longer than any encounter, so that each look is an encounter of its own."""
+
+
+def looks(
+    target: Target,
+    count: int = 1,
+    *,
+    model: DetectorModel = DETECTORS["perfect"],
+    scenery: Scenery = OPEN,
+    pose: Pose2D = HERE,
+    every_s: float = EVERY_S,
+) -> list[tuple[Detection, ...]]:
+    detector = Detector(AGI, model, np.random.default_rng(1))
+    return [detector.look(n * every_s, pose, [target], scenery) for n in range(count)]
+
+
+def person(x: float, y: float) -> Target:
+    return person_target(0, Disc(x, y, 0.25))
+
+
+def test_a_person_in_view_becomes_a_box_in_base_link() -> None:
+    pose = Pose2D(2.0, 3.0, math.pi / 2)
+
+    ((found,),) = looks(person(2.0, 8.0), pose=pose)
+
+    assert found.class_id == "farmer"
+    assert found.frame_id == "base_link"
+    assert found.box.centre == pytest.approx((5.0, 0.0, 0.875))
+    assert found.box.zmin == 0.0
+
+
+@pytest.mark.parametrize(("x", "y"), [(-4.0, 0.0), (4.0, 4.0), (8.5, 0.0), (0.5, 0.0)])
+def test_nobody_is_seen_behind_aside_too_far_or_too_near(x: float, y: float) -> None:
+    assert looks(person(x, y)) == [()]
+
+
+def test_the_view_is_as_wide_as_the_data_sheet_says() -> None:
+    edge = math.radians(69.0 / 2)
+    inside, outside = edge - 0.02, edge + 0.02
+
+    assert looks(person(0.4 + 4 * math.cos(inside), 4 * math.sin(inside))) != [()]
+    assert looks(person(0.4 + 4 * math.cos(outside), 4 * math.sin(outside))) == [()]
+
+
+def test_crop_hides_a_person() -> None:
+    row = Rectangle(2.0, -3.0, 2.5, 3.0)
+    garden = Scenery.of(Greenhouse("garden", BOUNDS, rows=(row,)))
+
+    assert looks(person(4.0, 0.0), scenery=garden) == [()]
+
+
+def test_a_half_hidden_person_is_seen_with_less_certainty() -> None:
+    row = Rectangle(2.0, 0.05, 2.5, 3.0)
+    garden = Scenery.of(Greenhouse("garden", BOUNDS, rows=(row,)))
+
+    ((whole,),) = looks(person(4.0, 0.0))
+    ((half,),) = looks(person(4.0, 0.0), scenery=garden)
+
+    assert half.probability < whole.probability
+
+
+def test_a_robot_is_named_as_the_papers_detector_names_it() -> None:
+    body = Body("AGII", Pose2D(5.0, 0.0, math.pi / 2), 1.4, 0.8)
+
+    ((found,),) = looks(robot_target(body))
+
+    assert found.class_id == "AGII"
+    assert found.box.ymax - found.box.ymin == pytest.approx(1.4)
+
+
+@pytest.mark.parametrize("class_id", ["farmer", "AGI", "AGII"])
+def test_misses_and_false_boxes_come_as_often_as_the_paper_counted(
+    class_id: str,
+) -> None:
+    target = replace(person(4.0, 0.0), class_id=class_id)
+    counts, count = FIELD_COUNTS[class_id], 4_000
+
+    frames = looks(target, count, model=DETECTORS["field"])
+    boxes = [box for frame in frames for box in frame]
+    near = [b for b in boxes if math.dist(b.box.centre[:2], (4.0, 0.0)) < 0.4]
+
+    recall = counts.true_positives / counts.encounters
+    false_share = counts.false_positives / counts.encounters
+    assert len(near) / count == pytest.approx(recall, abs=0.03)
+    assert (len(boxes) - len(near)) / count == pytest.approx(false_share, abs=0.03)
+
+
+@pytest.mark.parametrize(("profile", "mean"), [("field", 0.72), ("simulation", 0.85)])
+def test_the_mean_confidence_is_the_papers(profile: str, mean: float) -> None:
+    model = replace(DETECTORS[profile], counts={})
+    frames = looks(person(4.0, 0.0), 1_000, model=model)
+
+    assert np.mean([f.probability for (f,) in frames]) == pytest.approx(mean, abs=0.01)
+
+
+def test_a_perfect_detector_misses_nothing_and_invents_nothing() -> None:
+    frames = looks(person(4.0, 0.0), 200)
+
+    assert {len(frame) for frame in frames} == {1}
+
+
+def test_a_miss_lasts_as_long_as_an_encounter_and_no_longer() -> None:
+    always = DetectorModel(0.85, counts={"farmer": replace(FIELD_COUNTS["AGII"])})
+    seen = [
+        any(abs(b.box.centre[1]) < 0.4 and b.class_id == "farmer" for b in frame)
+        for frame in looks(person(4.0, 0.0), 6_000, model=always, every_s=1 / 30)
+    ]
+    runs = [len(list(run)) / 30 for run in _runs(seen) if not run[0]]
+
+    assert min(runs) >= 0.45
+    assert 1.0 < np.mean(runs) < 2.5
+
+
+def _runs(seen: list[bool]) -> list[list[bool]]:
+    edges = [0, *(np.flatnonzero(np.diff(seen)) + 1).tolist(), len(seen)]
+    return [seen[a:b] for a, b in itertools.pairwise(edges)]

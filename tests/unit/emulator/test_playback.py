@@ -1,0 +1,131 @@
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
+from iveg.emulator.logs import Entry, LogReader
+from iveg.emulator.playback import Playback
+from tests import data
+from tests.builders import scan
+
+DATA = Path(data.__file__).parent
+
+
+def moved(at: float, x: float, yaw: float = 0.0, v: float = 1.0) -> Entry:
+    pose, twist = Pose2D(x, 0.0, yaw), Twist2D(v, 0.0)
+    return Entry(at, Odometry("", Origin(), pose, twist))
+
+
+def swept(at: float) -> Entry:
+    return Entry(at, scan())
+
+
+def saw(at: float) -> Entry:
+    box = Box3D(0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
+    return Entry(at, Detection("farmer", 0.9, box, "map"))
+
+
+def log(*entries: Entry) -> Callable[[], Iterator[Entry]]:
+    return lambda: iter(entries)
+
+
+def test_poses_between_two_recorded_ones_are_interpolated() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0, v=3.0)), loop=False)
+
+    playback.advance(0.25)
+
+    pose, twist = playback.motion
+    assert pose.x == pytest.approx(0.5)
+    assert twist.linear_x == pytest.approx(1.5)
+
+
+def test_a_turn_across_the_seam_of_angles_is_the_short_one() -> None:
+    entries = moved(0.0, 0.0, yaw=3.1), moved(1.0, 0.0, yaw=-3.1)
+    playback = Playback(log(*entries), loop=False)
+
+    playback.advance(0.5)
+
+    assert abs(playback.motion[0].yaw) > 3.1
+
+
+def test_a_recording_begins_at_its_first_entry_whatever_its_time() -> None:
+    playback = Playback(log(moved(100.0, 0.0), moved(101.0, 1.0)), loop=False)
+
+    playback.advance(0.5)
+
+    assert playback.motion[0].x == pytest.approx(0.5)
+
+
+def test_the_newest_sweep_stays_until_the_next() -> None:
+    first, second = swept(0.1), swept(0.6)
+    playback = Playback(
+        log(moved(0.0, 0.0), first, second, moved(1.0, 1.0)), loop=False
+    )
+
+    shown = [playback.scan]
+    for _ in range(3):
+        playback.advance(0.25)
+        shown.append(playback.scan)
+
+    assert shown == [None, first.observation, first.observation, second.observation]
+
+
+def test_a_detection_is_seen_for_a_moment_of_the_recording() -> None:
+    playback = Playback(log(moved(0.0, 0.0), saw(0.5), moved(9.0, 1.0)), loop=False)
+    at_first = playback.has_detector
+
+    playback.advance(0.6)
+    seen, later = playback.detections, playback.has_detector
+    playback.advance(0.0)
+    paused = playback.detections
+    playback.advance(1.0)
+
+    assert len(seen) == 1
+    assert (at_first, later) == (False, True)
+    assert paused == seen
+    assert playback.detections == ()
+
+
+def test_a_recording_ends_after_its_last_entry() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0)), loop=False)
+
+    playback.advance(0.9)
+    before = playback.ended
+    playback.advance(0.2)
+
+    assert not before
+    assert playback.ended
+    assert playback.motion[0].x == 2.0
+
+
+def test_a_loop_starts_over_and_never_ends() -> None:
+    playback = Playback(log(moved(0.0, 0.0), moved(1.0, 2.0)), loop=True)
+
+    playback.advance(1.1)
+    playback.advance(0.5)
+
+    assert not playback.ended
+    assert playback.motion[0].x == pytest.approx(1.0)
+
+
+def test_many_sweeps_before_the_first_pose_are_no_hindrance() -> None:
+    entries = [swept(0.0)] * 1_000 + [moved(1.0, 7.0)]
+    playback = Playback(log(*entries), loop=False)
+
+    assert playback.motion[0].x == 7.0
+    assert isinstance(playback.scan, LaserScan)
+
+
+def test_the_synthetic_aisle_is_driven_there_and_back() -> None:
+    playback = Playback(LogReader(DATA / "aisle.jsonl").entries, loop=False)
+    xs = []
+
+    for _ in range(300):
+        playback.advance(0.05)
+        xs.append(playback.motion[0].x)
+
+    assert max(xs) == pytest.approx(4.0)
+    assert xs[-1] == pytest.approx(0.0)
+    assert playback.ended

@@ -1,0 +1,228 @@
+import math
+from collections.abc import Iterator
+
+import pytest
+
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.errors import DataFileError
+from iveg.domain.geometry import Twist2D
+from iveg.domain.greenhouse import Greenhouse
+from iveg.emulator.camera import DETECTORS, PERSON
+from iveg.emulator.greenhouse import bodies_touch
+from iveg.emulator.people import RADIUS_M
+from iveg.emulator.scenarios import SCENARIOS, lay_out, scenario_named
+from iveg.emulator.world import World, climate_at
+
+FLEET = ("AGI", "AGII")
+TEN = tuple(f"R{n}" for n in range(10))
+TESTBED = load_greenhouse("mvsim-20x20")
+
+
+def world_of(
+    scenario: str,
+    robots: tuple[str, ...] = FLEET,
+    house: Greenhouse = TESTBED,
+    *,
+    seed: int = 1,
+    detector: str = "perfect",
+) -> World:
+    layout = lay_out(scenario_named(scenario), robots, house)
+    return World(house, layout, DETECTORS[detector], seed)
+
+
+def run(world: World, seconds: float, dt: float = 0.1) -> Iterator[float]:
+    """Drive everybody as they wish; yields the time after every step."""
+    for step in range(round(seconds / dt)):
+        now = step * dt
+        for rig in world.rigs.values():
+            rig.drive(rig.wish(now, world))
+        for rig in world.rigs.values():
+            rig.move(dt)
+        world.walk(dt)
+        yield now
+
+
+def nearest_person(world: World, robot_id: str) -> float:
+    pose = world.rigs[robot_id].vehicle.pose
+    return min(pose.distance_to(person.x, person.y) for person in world.people)
+
+
+@pytest.mark.parametrize("scenario", sorted(SCENARIOS))
+def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
+    world = world_of(scenario)
+
+    for _ in run(world, 100.0):
+        bodies = world.bodies()
+        assert not any(world.scenery.touches(body) for body in bodies)
+        assert not bodies_touch(bodies)
+        for person in world.people:
+            gaps = [body.gap_to(person.x, person.y)[0] for body in bodies]
+            assert min(gaps) > RADIUS_M
+
+
+@pytest.mark.parametrize(
+    ("robots", "house"),
+    [
+        (TEN, "mvsim-20x20"),
+        (("AGI", "AGII", "R1"), "agroconnect"),
+        (("AGI", "AGII"), "none"),
+    ],
+)
+def test_every_robot_of_any_fleet_drives_in_any_house(
+    robots: tuple[str, ...], house: str
+) -> None:
+    world = world_of("demo", robots, load_greenhouse(house))
+    driven = dict.fromkeys(robots, 0.0)
+
+    for _ in run(world, 60.0):
+        assert not any(world.scenery.touches(body) for body in world.bodies())
+        assert not bodies_touch(world.bodies())
+        for robot_id, rig in world.rigs.items():
+            driven[robot_id] += abs(rig.vehicle.twist.linear_x) * 0.1
+
+    assert min(driven.values()) > 15.0
+
+
+def test_both_robots_of_the_demo_meet_people_in_the_first_minute_and_again() -> None:
+    world = world_of("demo")
+    met: dict[str, set[int]] = {robot_id: set() for robot_id in FLEET}
+
+    for now in run(world, 240.0):
+        for robot_id in FLEET:
+            if nearest_person(world, robot_id) <= 2.0:
+                met[robot_id].add(int(now // 80.0))
+
+    assert met == {"AGI": {0, 1, 2}, "AGII": {0, 1, 2}}
+
+
+@pytest.mark.parametrize("scenario", ["demo", "nlos"])
+def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
+    world = world_of(scenario)
+    unseen = 0
+
+    for now in run(world, 60.0):
+        pose = world.rigs["AGII"].vehicle.pose
+        close = [p for p in world.people if pose.distance_to(p.x, p.y) <= 2.0]
+        hidden = [p for p in close if not TESTBED.in_sight(pose.x, pose.y, p.x, p.y)]
+        seen_by_agi = [
+            detection
+            for detection in world.rigs["AGI"].look(now, world).detections
+            if detection.class_id == PERSON
+        ]
+        unseen += bool(hidden and seen_by_agi)
+
+    assert unseen > 5
+
+
+def test_agi_and_agii_of_peers_come_within_two_metres_and_see_each_other() -> None:
+    world = world_of("peers")
+    near, named = 0, set()
+
+    for now in run(world, 120.0):
+        agi, agii = (world.rigs[robot_id].vehicle.pose for robot_id in FLEET)
+        near += agi.distance_to(agii.x, agii.y) <= 2.0
+        found = world.rigs["AGI"].look(now, world).detections
+        named |= {detection.class_id for detection in found}
+
+    assert near > 5
+    assert named == {"AGII"}
+
+
+def test_a_person_and_agii_are_in_one_frame_of_together() -> None:
+    world = world_of("together")
+
+    frames = [
+        {d.class_id for d in world.rigs["AGI"].look(now, world).detections}
+        for now in run(world, 60.0)
+    ]
+
+    assert {PERSON, "AGII"} in frames
+
+
+def test_the_person_of_occluded_is_seen_in_part() -> None:
+    world = world_of("occluded")
+    sure = [
+        detection.probability
+        for now in run(world, 100.0)
+        for detection in world.rigs["AGI"].look(now, world).detections
+        if detection.class_id == PERSON
+    ]
+
+    assert min(sure) < 0.93
+    assert max(sure) == pytest.approx(0.95)
+
+
+def test_the_same_seed_gives_the_same_run() -> None:
+    one, other = world_of("demo", seed=5), world_of("demo", seed=5)
+
+    for _ in zip(run(one, 20.0), run(other, 20.0), strict=True):
+        pass
+
+    for robot_id in FLEET:
+        assert one.rigs[robot_id].odometry() == other.rigs[robot_id].odometry()
+    assert one.discs() == other.discs()
+
+
+def test_a_scan_shows_the_laser_of_the_profile_with_720_beams() -> None:
+    world = world_of("demo")
+
+    scan = world.rigs["AGI"].scan(world)
+
+    assert scan.ranges.size == 720
+    assert scan.angle_min == -math.pi
+    assert scan.angle_increment * 720 == pytest.approx(math.tau)
+    assert scan.range_max == 30.0
+
+
+def test_hidden_and_false_people_are_what_the_camera_is_told() -> None:
+    world = world_of("nlos")
+    rig = world.rigs["AGI"]
+
+    rig.hides_people = True
+    assert rig.look(0.0, world).detections == ()
+
+    rig.false_person = (12.0, 3.8)
+    (ghost,) = rig.look(10.0, world).detections
+    assert ghost.class_id == PERSON
+    assert ghost.box.centre[:2] == pytest.approx((0.0, -2.0), abs=1e-6)
+
+
+def test_the_intent_names_task_goal_and_path() -> None:
+    world = world_of("demo")
+    navigation = world.rigs["AGII"].navigation()
+
+    assert navigation.task == "hauling"
+    assert navigation.goal == navigation.path[-1]
+    assert len(navigation.path) == 12
+
+
+def test_a_robot_that_is_not_commanded_stands() -> None:
+    world = world_of("demo")
+    rig = world.rigs["AGI"]
+
+    rig.drive(Twist2D(0.0, 0.0))
+    rig.move(0.5)
+
+    assert rig.odometry().twist == Twist2D(0.0, 0.0)
+
+
+def test_an_unknown_scenario_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(DataFileError, match="demo, nlos, viewpoints"):
+        scenario_named("nothing")
+
+
+def test_a_house_without_room_for_the_fleet_is_refused() -> None:
+    crowd = tuple(f"R{n}" for n in range(30))
+
+    with pytest.raises(DataFileError, match="has room for 20 robots"):
+        world_of("many", crowd)
+    with pytest.raises(DataFileError, match="has 23 lanes, too few for 30"):
+        world_of("many", crowd, load_greenhouse("agroconnect"))
+
+
+def test_the_air_is_warm_at_two_in_the_afternoon_and_damp_at_night() -> None:
+    day, night = climate_at(14 * 3600.0), climate_at(2 * 3600.0)
+
+    assert (day.temperature, night.temperature) == (28.0, 16.0)
+    assert (day.relative_humidity, night.relative_humidity) == (0.58, 0.82)
+    assert (day.co2, night.co2) == (370.0, 490.0)
