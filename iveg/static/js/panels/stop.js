@@ -285,12 +285,14 @@ function onFleetKeys(press) {
 }
 
 /**
- * ULIDs and times of one server sort as text; the newer episode wins.
+ * Whether a command belongs to an episode before the known one.  Times of one server in
+ * one format compare as text; within an episode what arrives last is newest.
  *
  * @param {Command} command
  * @param {Command} known
  */
 function isOlder(command, known) {
+  if (command.command_id === known.command_id) return false;
   const a = command.times.requested ?? "";
   const b = known.times.requested ?? "";
   return a < b;
