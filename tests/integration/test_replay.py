@@ -1,0 +1,219 @@
+"""Recorded runs played as robots on a real broker."""
+
+import asyncio
+import itertools
+import logging
+import os
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.errors import CommandRefusedError, DataFileError, SettingsError
+from iveg.domain.feedback import Mandate
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+)
+from iveg.emulator.replay import run_replay
+from tests import data
+from tests.integration.emulator_cloud import Cloud, broker, running, until
+
+AISLE = Path(data.__file__).parent / "aisle.jsonl"
+REAL = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+@pytest.fixture
+async def address(tmp_path: Path) -> AsyncIterator[BrokerAddress]:
+    async with broker(tmp_path) as where:
+        yield where
+
+
+@pytest.fixture
+async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
+    small = Cloud(address)
+    async with running(asyncio.create_task(small.run())):
+        await until(lambda: small.link.connected)
+        yield small
+
+
+def replay(
+    address: BrokerAddress,
+    folder: Path,
+    *files: Path,
+    robots: tuple[str, ...] = ("AGI",),
+    speed: float = 1.0,
+    loop: bool = False,
+    allow_live: bool = True,
+) -> asyncio.Task[None]:
+    return asyncio.create_task(
+        run_replay(
+            files or (AISLE,),
+            robots,
+            address=address,
+            apikey="iveg",
+            speed=speed,
+            loop=loop,
+            state_directory=folder / "state",
+            allow_live=allow_live,
+        )
+    )
+
+
+def farthest(cloud: Cloud, robot_id: str = "AGI") -> float:
+    return max((o.pose.x for o in cloud.of(robot_id, Odometry)), default=-1.0)
+
+
+async def test_a_log_is_played_to_its_end_and_the_robot_then_stands(
+    address: BrokerAddress,
+    cloud: Cloud,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        await asyncio.wait_for(replay(address, tmp_path, speed=4.0), 30.0)
+
+    last = cloud.of("AGI", Odometry)[-20:]
+    people = [d for f in cloud.of("AGI", DetectionFrame) for d in f.detections]
+    assert farthest(cloud) == pytest.approx(4.0, abs=0.05)
+    assert {(o.pose.x, o.twist.linear_x) for o in last} == {(0.0, 0.0)}
+    assert {o.task for o in cloud.of("AGI", Navigation)} == {"replay"}
+    assert {(d.class_id, d.frame_id) for d in people} == {("farmer", "map")}
+    assert cloud.of("AGI", DetectionFrame)[-1].detections == ()
+    assert cloud.of("AGI", LaserScan)[0].mount.x == 0.1
+    assert cloud.problems == []
+    assert caplog.records == []
+
+
+async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(replay(address, tmp_path)):
+        await until(lambda: farthest(cloud) > 0.3)
+
+        await cloud.command("AGI", {"stop": {"id": "01STOP", "by": "anna"}})
+        await until(lambda: cloud.speed("AGI") == 0.0)
+        stood = cloud.of("AGI", Odometry)[-1].pose
+        count = len(cloud.of("AGI", Odometry))
+        await until(lambda: len(cloud.of("AGI", Odometry)) > count + 20)
+
+        assert cloud.of("AGI", Odometry)[-1].pose == stood
+        assert [hold.id for hold in cloud.report("AGI").holds] == ["01STOP"]
+
+        challenge = cloud.report("AGI").challenge
+        await cloud.command("AGI", {"release": {"ids": ["01STOP"], "ch": challenge}})
+        await until(lambda: not cloud.report("AGI").holds)
+        challenge = cloud.report("AGI").challenge
+        await cloud.command("AGI", {"resume": {"ch": challenge}})
+        await until(lambda: cloud.of("AGI", Odometry)[-1].pose.x > stood.x + 0.3)
+
+
+async def test_a_mandate_of_a_half_plays_at_half_the_pace(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    cloud.mandates["AGI"] = Mandate(0.5, "person", "someone", 1.0)
+    async with running(replay(address, tmp_path)):
+        await until(lambda: farthest(cloud) > 2.0)
+
+    driving = [o.twist.linear_x for o in cloud.of("AGI", Odometry)]
+    assert max(driving) == pytest.approx(0.4, abs=0.01)
+
+
+async def test_a_loop_starts_over(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    def rounds() -> int:
+        xs = [o.pose.x > 2.0 for o in cloud.of("AGI", Odometry)]
+        return sum(b and not a for a, b in itertools.pairwise(xs))
+
+    async with running(replay(address, tmp_path, speed=10.0, loop=True)):
+        await until(lambda: rounds() >= 3)
+
+
+async def test_robots_of_several_logs_play_side_by_side(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    both = ("AGI", "AGII")
+    async with running(replay(address, tmp_path, AISLE, AISLE, robots=both, speed=4.0)):
+        await until(lambda: farthest(cloud, "AGI") > 3.0)
+        await until(lambda: farthest(cloud, "AGII") > 3.0)
+
+
+async def test_a_live_robot_is_not_replayed_over(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(replay(address, tmp_path, loop=True)):
+        await until(lambda: cloud.newest("AGI", Odometry))
+
+        with pytest.raises(CommandRefusedError, match="replay of AGI refused"):
+            await replay(address, tmp_path / "second", allow_live=False)
+
+
+async def test_a_name_that_nobody_uses_is_played_after_listening(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    async with running(replay(address, tmp_path, allow_live=False)):
+        await until(lambda: cloud.newest("AGI", Odometry))
+
+
+@pytest.mark.parametrize(
+    ("files", "robots", "speed", "why"),
+    [
+        ((AISLE,), ("AGI", "AGII"), 1.0, "1 files for 2 robots"),
+        ((), (), 1.0, "0 files for 0 robots"),
+        ((AISLE, AISLE), ("AGI", "AGI"), 1.0, "named twice"),
+        ((AISLE,), ("AGI",), 0.0, "speed must be more than 0"),
+        ((Path("gone.jsonl"),), ("AGI",), 1.0, "cannot be read"),
+    ],
+)
+async def test_what_cannot_be_played_is_refused_with_one_sentence(
+    tmp_path: Path,
+    files: tuple[Path, ...],
+    robots: tuple[str, ...],
+    speed: float,
+    why: str,
+) -> None:
+    with pytest.raises(DataFileError, match=why):
+        await run_replay(
+            files,
+            robots,
+            address=BrokerAddress("127.0.0.1", 1),
+            apikey="iveg",
+            speed=speed,
+            state_directory=tmp_path,
+        )
+
+
+async def test_a_broker_on_another_machine_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match="on loopback for a replay"):
+        await run_replay(
+            (AISLE,),
+            ("AGI",),
+            address=BrokerAddress("broker.example", 1883),
+            apikey="iveg",
+            state_directory=tmp_path,
+        )
+
+
+async def test_the_logs_of_the_real_robot_play_together_and_cleanly(
+    address: BrokerAddress,
+    cloud: Cloud,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    files = tuple(REAL / f"orchard_d{n}.jsonl.gz" for n in (1, 2))
+    if not all(file.exists() for file in files) and "CI" not in os.environ:
+        pytest.skip("the recorded logs are not beside the repository")
+
+    both = ("AGI", "AGII")
+    with caplog.at_level(logging.WARNING):
+        async with running(replay(address, tmp_path, *files, robots=both, speed=5.0)):
+            await until(lambda: farthest(cloud, "AGI") > 5.0)
+            await until(lambda: farthest(cloud, "AGII") > 5.0)
+
+    assert cloud.of("AGI", LaserScan)[-1].ranges.size == 897
+    assert cloud.problems == []
+    assert caplog.records == []
