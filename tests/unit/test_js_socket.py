@@ -28,8 +28,9 @@ _CONNECT = """async ([url]) => {
     const {connect} = await import('/iveg/static/js/socket.js');
     const {createStore} = await import('/iveg/static/js/store.js');
     const store = createStore();
-    const line = connect({url, store});
-    Object.assign(window, {store, line});
+    const sight = Object.assign(new EventTarget(), {hidden: false});
+    const line = connect({url, store, page: sight});
+    Object.assign(window, {store, line, sight});
 }"""
 
 
@@ -200,6 +201,31 @@ def test_an_idle_line_that_answers_pings_stays_open(
 
     assert page.evaluate("() => window.states") == []
     assert live.attempts == 1
+
+
+def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alarm(
+    page: Page, live: LiveServer
+) -> None:
+    page.evaluate(
+        """() => {
+            window.states = [];
+            window.first = window.store.get('snapshot');
+            window.store.subscribe('connection', (it) => window.states.push(it.state));
+            window.show = (isShown) => {
+              window.sight.hidden = !isShown;
+              window.sight.dispatchEvent(new Event('visibilitychange'));
+            };
+        }"""
+    )
+
+    page.evaluate("() => window.show(false)")
+    page.wait_for_timeout(1200)  # hidden for longer than a glance elsewhere
+    page.evaluate("() => window.show(true)")
+
+    page.wait_for_function("() => window.store.get('snapshot') !== window.first")
+    assert page.evaluate("() => window.line.state()") == "open"
+    assert "lost" not in page.evaluate("() => window.states")
+    assert live.attempts == 2
 
 
 def test_an_ended_session_is_told_and_not_tried_again(

@@ -17,6 +17,7 @@ import { ProtocolError, readFrame, writePing, writeStop } from "./protocol.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./store.js").ConnectionState} ConnectionState */
+/** @typedef {EventTarget & {readonly hidden: boolean}} PageSight what `document` tells */
 /** @typedef {{robotId: string | null, pressId: string, pressedAt: number}} Press */
 
 const PING_EVERY_MS = 1000;
@@ -53,11 +54,13 @@ export function retryDelay(tries, luck) {
  *   onState?: (state: ConnectionState) => void,
  *   onCommandFallback?: (press: Press) => void,
  *   probe?: () => Promise<boolean>,
+ *   page?: PageSight,
  * }} options `onCommandFallback` is told of a STOP that could not be sent at once: the
  *   page tries its other transport, this one keeps the press and sends it when it can.
  */
-export function connect({ url, store, onState, onCommandFallback, probe }) {
-  const isServerThere = probe ?? (() => probeHealth(url));
+export function connect(options) {
+  const { url, store, onState, onCommandFallback, page = document } = options;
+  const isServerThere = options.probe ?? (() => probeHealth(url));
   const clock = createServerClock();
   const presses = createPresses();
   /** @type {WebSocket | null} */
@@ -189,7 +192,7 @@ export function connect({ url, store, onState, onCommandFallback, probe }) {
 
   function onVisibility() {
     const nowMs = performance.now();
-    if (document.hidden) hiddenAtMs = nowMs;
+    if (page.hidden) hiddenAtMs = nowMs;
     else if (nowMs - hiddenAtMs > HIDDEN_LIMIT_MS) refresh();
   }
 
@@ -203,7 +206,7 @@ export function connect({ url, store, onState, onCommandFallback, probe }) {
   }
 
   const timer = setInterval(watch, WATCH_EVERY_MS);
-  document.addEventListener("visibilitychange", onVisibility);
+  page.addEventListener("visibilitychange", onVisibility);
   addEventListener("online", refresh);
   open();
 
@@ -237,7 +240,7 @@ export function connect({ url, store, onState, onCommandFallback, probe }) {
       ended = true;
       clearInterval(timer);
       clearTimeout(retry);
-      document.removeEventListener("visibilitychange", onVisibility);
+      page.removeEventListener("visibilitychange", onVisibility);
       removeEventListener("online", refresh);
       drop();
     },
