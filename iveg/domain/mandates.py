@@ -228,7 +228,8 @@ def _hazards(
             )
     for peer in world.robots.values():
         age = peer.age_s(now)
-        if peer.odometry is None or age is None or age > RING_S:
+        # A recording cannot yield, and nobody yields to it.
+        if peer.odometry is None or age is None or age > RING_S or peer.is_replay:
             continue
         if peer.stands and age <= SILENCE_S:
             continue
@@ -240,7 +241,6 @@ def _hazards(
             pose.x,
             pose.y,
             rule.radius_at(age),
-            recorded=peer.is_replay,
         )
 
 

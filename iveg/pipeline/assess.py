@@ -245,7 +245,7 @@ class Assessor:
     ) -> Feedback:
         mine = [one for one in alerts if one.observer == robot.robot_id]
         newest = max(mine, key=lambda one: one.stamp, default=None)
-        odometry = robot.odometry
+        odometry = None if robot.is_replay else robot.odometry
         return Feedback(
             robot.robot_id,
             Origin(self._boot, self._seq, self._stamp(now.wall)),
@@ -261,6 +261,9 @@ class Assessor:
     def _alerts(self, now: Instant) -> Iterable[FeedbackAlert]:
         for person in self.people.known.values():
             for sighting, radius in person.rings(self.rule, now):
+                # What a recording saw long ago must not slow a robot of today.
+                if self.world.robots[sighting.observer].is_replay:
+                    continue
                 yield FeedbackAlert(
                     person.decision_id,
                     self._stamp(sighting.at.wall),

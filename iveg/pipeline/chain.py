@@ -41,6 +41,7 @@ class Chain:
     def __init__(self, start: Instant) -> None:
         self._start = start
         self.mqtt_connected = False
+        self._was_connected = False
         self.orion_error = ""
         self.orion_ok_at: float | None = None
         self.agent_error = ""
@@ -51,15 +52,21 @@ class Chain:
     def hops(self, now: Instant) -> list[Hop]:
         """Every hop, in the order in which a datum passes them."""
         return [
-            self._mqtt(),
+            self._mqtt(now),
             self._agent(now),
             self._orion(now),
             self._notifications(now),
             Hop("database", self.database),
         ]
 
-    def _mqtt(self) -> Hop:
-        return Hop("mqtt", "ok" if self.mqtt_connected else "down")
+    def _mqtt(self, now: Instant) -> Hop:
+        if self.mqtt_connected:
+            self._was_connected = True
+            return Hop("mqtt", "ok")
+        starting = now.mono - self._start.mono < GRACE_S
+        return Hop(
+            "mqtt", "unknown" if starting and not self._was_connected else "down"
+        )
 
     def _orion(self, now: Instant) -> Hop:
         age = _age(self.orion_ok_at, now)
