@@ -35,9 +35,11 @@ _log = logging.getLogger(__name__)
 
 FILTERS = tuple(
     prefix + topic
-    for prefix in ("", "/json", "json")
-    for topic in ("/+/+/attrs", "/+/+/attrs/+", "/+/+/cmdexe")
+    for prefix in ("+/+/+", "/json/+/+")
+    for topic in ("/attrs", "/attrs/+", "/cmdexe")
 )
+"""The first kind covers ``/key/device/…`` and ``json/key/device/…`` at once; a broker
+compares each message with each filter, so fewer are better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,8 +115,10 @@ class IotAgent:
 
     def _take(self, topic: str, payload: bytes) -> None:
         parts = topic.split("/")
-        if parts[0] == "json" or parts[:2] == ["", "json"]:
-            parts = parts[parts.index("json") :]
+        if parts[:2] == ["", "json"]:
+            del parts[0]
+        if parts[0] not in ("", "json"):
+            return
         _, apikey, device_id, kind, *name = parts
         try:
             taken = self._take_from(apikey, device_id, kind, name, payload)

@@ -6,6 +6,7 @@ logs, and takes it down without leaving anything behind.
 
 import asyncio
 import logging
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -35,8 +36,10 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[int]:
 
     Raises:
         SettingsError: the address is not loopback.
+        OSError: the port is taken.
     """
     host = require_loopback("IVEG_MQTT_URL", host)
+    _require_free(host, port)
     shown = f"[{host}]" if ":" in host else host
     broker = Broker(
         {
@@ -49,6 +52,14 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[int]:
         yield _port_of(broker)
     finally:
         await _close(broker)
+
+
+def _require_free(host: str, port: int) -> None:
+    # amqtt would log a traceback and raise an error that hides which port it was.
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, port))
 
 
 def _port_of(broker: Broker) -> int:
