@@ -87,6 +87,17 @@ test("a snapshot is told before what it brought", () => {
   equal(heard, ["snapshot", "robots/AGI"]);
 });
 
+test("who is told of a snapshot finds all of it in the store", () => {
+  const { store } = storeByHand();
+  /** @type {unknown[]} */
+  const found = [];
+  store.watch((_, topic) => {
+    if (topic === "snapshot") found.push(store.robots().size, store.people().length);
+  });
+  store.apply("snapshot", snapshot({ people: [person()] }));
+  equal(found, [1, 1]);
+});
+
 test("the log keeps its newest entries and no entry twice", () => {
   const { store } = storeByHand();
   for (let id = 1; id <= LOG_SIZE + 20; id += 1) store.apply("log", entry(id));

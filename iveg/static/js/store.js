@@ -115,11 +115,11 @@ export function createStore(options = {}) {
     commands = new Set();
     log = (snapshot.log ?? []).slice(-LOG_SIZE);
     values.set("snapshot", snapshot);
+    const brought = topicsOf(snapshot);
+    for (const [topic, data] of brought) keep(topic, received(data, atMs));
+    // Told only when all of it is here, so nobody sees half of a snapshot.
     hub.tell("snapshot", snapshot);
-    for (const [topic, data] of topicsOf(snapshot)) {
-      keep(topic, received(data, atMs));
-      hub.tell(topic, data);
-    }
+    for (const [topic, data] of brought) hub.tell(topic, data);
   }
 
   /** @param {string} robotId @returns {number} */
