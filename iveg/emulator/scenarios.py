@@ -52,7 +52,8 @@ class Incident:
 
     Attributes:
         at_s: Seconds into the run; again every ``every_s`` where that is not 0.
-        mute: Whether the robot says nothing; ``deaf`` hears nothing; None leaves it.
+        mute: Whether the robot says nothing, and so gets no answer either; ``deaf``
+            whether it ignores what iVeg mandates; None leaves it.
     """
 
     at_s: float
@@ -220,7 +221,7 @@ _SCENARIOS = (
     ),
     Scenario(
         "deaf",
-        "As demo; after 20 s AGII does not hear the rule any more.",
+        "As demo; after 20 s AGII drives as it likes whatever the rule says.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
         (Incident(20.0, "AGII", deaf=True),),
@@ -234,12 +235,12 @@ _SCENARIOS = (
     ),
     Scenario(
         "link-loss",
-        "As demo; every minute AGII is cut off for ten seconds.",
+        "As demo; every minute AGII is not heard for ten seconds, and stops.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
         (
-            Incident(20.0, "AGII", mute=True, deaf=True, every_s=60.0),
-            Incident(30.0, "AGII", mute=False, deaf=False, every_s=60.0),
+            Incident(20.0, "AGII", mute=True, every_s=60.0),
+            Incident(30.0, "AGII", mute=False, every_s=60.0),
         ),
     ),
 )
