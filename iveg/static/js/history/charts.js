@@ -1,0 +1,173 @@
+/**
+ * Figures that the server made and checked, in this page's colours and language.
+ *
+ * The library is large and comes from this server; it is asked for with the first
+ * figure.  A figure's `meta` says what its traces and axes are.
+ *
+ * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
+ *   y: (number | null)[], meta: Record<string, any>, line?: object,
+ *   marker?: object}} Trace
+ * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
+ * @typedef {"speed" | "detections" | "stops"} ChartName
+ * @typedef {{library: string} & Record<ChartName, Figure>} Charts
+ */
+
+import { all, need, setHidden, setText } from "../panels/dom.js";
+import { wallText } from "./madrid.js";
+
+/** @type {readonly ChartName[]} */
+export const CHARTS = ["speed", "detections", "stops"];
+const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
+/** Numbers only: month names would be in the library's language. */
+const TICKS = [
+  { dtickrange: [null, 60_000], value: "%H:%M:%S" },
+  { dtickrange: [60_000, 86_400_000], value: "%H:%M\n%d/%m" },
+  { dtickrange: [86_400_000, null], value: "%d/%m/%y" },
+];
+const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
+const SYMBOLS = { direct: "circle", fiware: "diamond", standstill: "square" };
+
+/** @type {Promise<any> | null} */
+let library = null;
+
+/**
+ * Draws all figures, each over the whole range: an hour of silence is an hour wide.
+ *
+ * @param {Charts} charts
+ * @param {import("./asked.js").Asked} asked
+ * @param {import("../i18n.js").Words} words
+ * @throws {Error} the library could not be loaded
+ */
+export async function drawCharts(charts, asked, words) {
+  for (const name of CHARTS) {
+    setText(need(`#chart-${name}-note`), noteOf(name, charts[name].data, words));
+    setHidden(need(`#chart-${name}`), charts[name].data.length === 0);
+    setHidden(need(`#chart-${name}-empty`), charts[name].data.length > 0);
+  }
+  if (CHARTS.every((name) => charts[name].data.length === 0)) return;
+  const plotly = await load(charts.library);
+  for (const name of CHARTS) {
+    const { data, layout } = charts[name];
+    if (data.length === 0) continue;
+    const traces = data.map((trace, index) => dressed(trace, index, words));
+    const place = need(`#chart-${name}`);
+    await plotly.react(place, traces, laidOut(layout, asked, words), CONFIG);
+  }
+}
+
+/** @param {string} address */
+function load(address) {
+  library ??= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = address;
+    script.onload = () => resolve(/** @type {any} */ (globalThis).Plotly);
+    script.onerror = () => {
+      library = null;
+      reject(new Error(address));
+    };
+    document.head.append(script);
+  });
+  return library;
+}
+
+/**
+ * A trace with its name, its colour and the greenhouse's clock.
+ *
+ * @param {Trace} trace @param {number} index
+ * @param {import("../i18n.js").Words} words
+ */
+function dressed(trace, index, words) {
+  const { kind, robot, class_id } = trace.meta;
+  const colour = colourOf(kind, robot ?? class_id, index);
+  const name = class_id ?? words.t(`history.trace.${kind}`, { robot });
+  if (trace.type === "bar") return { ...trace, name, marker: { color: colour } };
+  const x = trace.x.map((at) => (at === null ? null : wallText(at)));
+  const line = { ...trace.line, color: colour, width: 2 };
+  if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
+  const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
+  const marker = { color: colour, size: 9, symbol };
+  return { ...trace, x, name, line, marker };
+}
+
+/**
+ * Robots and people keep the colour that they have on the map; alarm colours stay with
+ * alarms.
+ *
+ * @param {string} kind @param {string | undefined} who @param {number} index
+ */
+function colourOf(kind, who, index) {
+  const slots = all("[data-robot][data-slot]");
+  const slot = slots.find((chip) => chip.dataset.robot === who)?.dataset.slot;
+  if (slot) return token(`--robot-${slot}`);
+  if (PEOPLE.has(String(who))) return token("--person");
+  if (kind === "class") return token(`--robot-${((index + 3) % 6) + 3}`);
+  return token(kind === "standstill" ? "--text" : `--robot-${index + 3}`);
+}
+
+/**
+ * @param {Record<string, any>} layout
+ * @param {import("./asked.js").Asked} asked
+ * @param {import("../i18n.js").Words} words
+ */
+function laidOut(layout, asked, words) {
+  const axis = (/** @type {string} */ name) => ({
+    ...layout[`${name}axis`],
+    title: { text: words.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
+    gridcolor: token("--line"),
+    zerolinecolor: token("--line-strong"),
+    linecolor: token("--line-strong"),
+    automargin: true,
+    fixedrange: name === "y",
+    ...(layout.meta[name] === "time"
+      ? {
+          range: [wallText(asked.since), wallText(asked.until)],
+          tickformatstops: TICKS,
+          hoverformat: "%d/%m %H:%M:%S",
+        }
+      : {}),
+  });
+  const line = { color: token("--text"), width: 2, dash: "dot" };
+  return {
+    ...layout,
+    xaxis: axis("x"),
+    yaxis: axis("y"),
+    shapes: layout.shapes?.map((/** @type {object} */ shape) => ({ ...shape, line })),
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: token("--font"), size: 12, color: token("--text-2") },
+    hoverlabel: { bgcolor: token("--raised"), font: { color: token("--text") } },
+    separators: words.language() === "es" ? ",." : ".,",
+    margin: { l: 48, r: 12, t: 8, b: 40 },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    showlegend: true,
+    hovermode: "closest",
+    autosize: true,
+  };
+}
+
+/**
+ * What a figure shows, in one sentence; also what it is for who cannot see it.
+ *
+ * @param {ChartName} name @param {Trace[]} data
+ * @param {import("../i18n.js").Words} words
+ */
+function noteOf(name, data, words) {
+  if (data.length === 0) return "";
+  if (name === "speed") {
+    const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
+    return words.t(seconds > 0 ? "history.note.sliced" : "history.note.exact", {
+      seconds,
+    });
+  }
+  const sum = (/** @type {Trace} */ trace) =>
+    trace.y.reduce((/** @type {number} */ total, n) => total + (n ?? 0), 0);
+  const count =
+    name === "stops"
+      ? data[0].x.length
+      : data.reduce((total, trace) => total + sum(trace), 0);
+  return words.t(`history.note.${name}`, { count });
+}
+
+/** @param {string} name */
+const token = (name) =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -1,0 +1,83 @@
+/**
+ * Times on the greenhouse's clock: Europe/Madrid on screen, UTC in data.
+ */
+
+const ZONE = "Europe/Madrid";
+const HOUR_MS = 3_600_000;
+const PARTS = new Intl.DateTimeFormat("en-GB", {
+  timeZone: ZONE,
+  hourCycle: "h23",
+  year: "numeric",
+  month: "2-digit",
+  day: "2-digit",
+  hour: "2-digit",
+  minute: "2-digit",
+  second: "2-digit",
+});
+/** @type {Map<number, number>} hour since 1970 → offset (ms) */
+const offsets = new Map();
+
+/**
+ * How far the wall clock is ahead of UTC (ms).
+ *
+ * @param {number} at Unix milliseconds
+ */
+export function offsetAt(at) {
+  // Clocks change on a full hour of UTC, so one answer holds for the hour.
+  const hour = Math.floor(at / HOUR_MS);
+  let offset = offsets.get(hour);
+  if (offset === undefined) {
+    const part = Object.fromEntries(
+      PARTS.formatToParts(hour * HOUR_MS).map(({ type, value }) => [type, value]),
+    );
+    const wall = `${part.year}-${part.month}-${part.day}T${part.hour}:${part.minute}:${part.second}Z`;
+    offset = Date.parse(wall) - hour * HOUR_MS;
+    offsets.set(hour, offset);
+  }
+  return offset;
+}
+
+/**
+ * The wall clock's text, as `datetime-local` and Plotly read it: no zone in it.
+ *
+ * @param {number} at Unix milliseconds
+ * @returns {string} `2026-11-20T09:00:00.000`
+ */
+export function wallText(at) {
+  return new Date(at + offsetAt(at)).toISOString().slice(0, 23);
+}
+
+/**
+ * The moment that a wall clock's text names; the hour that a change to winter time
+ * repeats is taken as its first round, the one that a change skips as the hour after.
+ *
+ * @param {string} text as from `datetime-local`
+ * @returns {number} Unix milliseconds; NaN where the text is none
+ */
+export function momentOf(text) {
+  const wall = Date.parse(`${text}Z`);
+  if (Number.isNaN(wall)) return Number.NaN;
+  const early = wall - offsetAt(wall - 3 * HOUR_MS);
+  return wall - offsetAt(early);
+}
+
+/**
+ * Date and time for people.
+ *
+ * @param {string | number | null} at ISO-8601 or Unix milliseconds
+ * @param {string} language
+ * @param {Intl.DateTimeFormatOptions} [more]
+ */
+export function dayAndTime(at, language, more = {}) {
+  if (at === null) return "—";
+  return new Date(at).toLocaleString(language === "es" ? "es-ES" : "en-GB", {
+    timeZone: ZONE,
+    hourCycle: "h23",
+    day: "2-digit",
+    month: "2-digit",
+    hour: "2-digit",
+    minute: "2-digit",
+    second: "2-digit",
+    ...more,
+  });
+}
