@@ -1,10 +1,6 @@
 import { ageOf } from "../../iveg/static/js/clock.js";
-import {
-  COMMANDS_SIZE,
-  createStore,
-  LOG_SIZE,
-  matches,
-} from "../../iveg/static/js/store.js";
+import { matches } from "../../iveg/static/js/hub.js";
+import { COMMANDS_SIZE, createStore, LOG_SIZE } from "../../iveg/static/js/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 

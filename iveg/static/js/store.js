@@ -19,9 +19,11 @@
  * @typedef {"connecting" | "open" | "lost" | "signed-out"} ConnectionState
  * @typedef {{state: ConnectionState, since: number}} Connection `since` (ms,
  *   `performance.now()`)
- * @typedef {(data: any, topic: string) => void} Listener
+ * @typedef {import("./hub.js").Listener} Listener
  * @typedef {ReturnType<typeof createStore>} Store
  */
+
+import { createHub, onNextFrame } from "./hub.js";
 
 /** Entries of the log that a browser keeps. */
 export const LOG_SIZE = 500;
@@ -31,9 +33,6 @@ export const COMMANDS_SIZE = 200;
 
 /** Hues that the design has for robots (`--robot-1` … `--robot-8`). */
 const ROBOT_HUES = 8;
-
-/** A hidden page gets no animation frames; alarms must be heard there all the same. */
-const HIDDEN_FLUSH_MS = 250;
 
 /**
  * @param {{now?: () => number, schedule?: (flush: () => void) => void}} [options]
@@ -257,99 +256,4 @@ function under(head, key) {
 /** @param {string} earlier ISO-8601 @param {string} later ISO-8601 */
 function secondsBetween(earlier, later) {
   return Math.max(0, (Date.parse(later) - Date.parse(earlier)) / 1000) || 0;
-}
-
-/**
- * Who listens to what.  State is told once per frame and topic, facts at once.
- *
- * @param {(flush: () => void) => void} schedule
- */
-function createHub(schedule) {
-  /** @type {Set<{pattern: string, fn: Listener}>} */
-  const listeners = new Set();
-  /** @type {Set<Listener>} */
-  const watchers = new Set();
-  /** @type {Map<string, any>} */
-  let waiting = new Map();
-
-  /** @param {string} topic @param {any} data */
-  function deliver(topic, data) {
-    for (const { pattern, fn } of [...listeners]) {
-      if (matches(pattern, topic)) guarded(fn, data, topic);
-    }
-  }
-
-  function flush() {
-    const told = waiting;
-    waiting = new Map();
-    for (const [topic, data] of told) deliver(topic, data);
-  }
-
-  return {
-    /** @param {string} pattern @param {Listener} fn */
-    subscribe(pattern, fn) {
-      const listener = { pattern, fn };
-      listeners.add(listener);
-      return () => void listeners.delete(listener);
-    },
-    /** @param {Listener} fn */
-    watch(fn) {
-      watchers.add(fn);
-      return () => void watchers.delete(fn);
-    },
-    /** @param {string} topic @param {any} data */
-    tell(topic, data) {
-      for (const fn of watchers) guarded(fn, data, topic);
-      if (topic === "log" || topic.startsWith("commands/")) {
-        deliver(topic, data);
-        return;
-      }
-      if (!waiting.size) schedule(flush);
-      waiting.set(topic, data);
-    },
-  };
-}
-
-/**
- * One panel's error must not silence the others, the STOP control among them.
- *
- * @param {Listener} fn
- * @param {any} data
- * @param {string} topic
- */
-function guarded(fn, data, topic) {
-  try {
-    fn(data, topic);
-  } catch (error) {
-    reportError(error);
-  }
-}
-
-/**
- * @param {string} pattern
- * @param {string} topic
- */
-export function matches(pattern, topic) {
-  if (pattern === topic) return true;
-  const wanted = (pattern.endsWith("/") ? `${pattern}+` : pattern).split("/");
-  if (wanted.length === 1) wanted.push("+");
-  const found = topic.split("/");
-  return (
-    wanted.length === found.length &&
-    wanted.every((word, i) => word === "+" || word === found[i])
-  );
-}
-
-/** @param {() => void} flush */
-function onNextFrame(flush) {
-  let done = false;
-  const once = () => {
-    if (done) return;
-    done = true;
-    clearTimeout(timer);
-    cancelAnimationFrame(frame);
-    flush();
-  };
-  const frame = requestAnimationFrame(once);
-  const timer = setTimeout(once, HIDDEN_FLUSH_MS);
 }
