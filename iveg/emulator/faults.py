@@ -11,6 +11,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from iveg.domain.errors import SettingsError
+
 _LARGEST_BODY = 4096
 _PATIENCE_S = 5.0
 
@@ -73,16 +75,18 @@ Obey = Callable[[FaultOrder | PersonOrder], str | None]
 _ORDER: TypeAdapter[FaultOrder | PersonOrder] = TypeAdapter(FaultOrder | PersonOrder)
 
 
-async def serve_faults(tasks: asyncio.TaskGroup, port: int, obey: Obey) -> int:
-    """Open the door in a task of its own.
+async def open_faults(port: int, obey: Obey) -> tuple[asyncio.Server, int]:
+    """Open the door; orders are taken from now on, until the server is closed.
 
     Args:
-        tasks: Where that task lives.
         port: 0 takes a free one.
         obey: Does what an order says; returns why it cannot.
 
     Returns:
-        The port.
+        The server and its port.
+
+    Raises:
+        SettingsError: somebody listens there already.
     """
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -98,15 +102,12 @@ async def serve_faults(tasks: asyncio.TaskGroup, port: int, obey: Obey) -> int:
         finally:
             writer.close()
 
-    server = await asyncio.start_server(visit, "127.0.0.1", port)
-    tasks.create_task(_serve(server), name="faults")
-    opened: int = server.sockets[0].getsockname()[1]
-    return opened
-
-
-async def _serve(server: asyncio.Server) -> None:
-    async with server:
-        await server.serve_forever()
+    try:
+        server = await asyncio.start_server(visit, "127.0.0.1", port)
+    except OSError as error:
+        allowed = "a port of 127.0.0.1 that nobody listens on"
+        raise SettingsError("fault_port", str(port), allowed) from error
+    return server, server.sockets[0].getsockname()[1]
 
 
 async def _read_body(reader: asyncio.StreamReader) -> bytes:

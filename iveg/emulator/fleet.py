@@ -16,7 +16,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import DataFileError
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS
-from iveg.emulator.faults import FaultOrder, PersonOrder, serve_faults
+from iveg.emulator.faults import FaultOrder, PersonOrder, open_faults
 from iveg.emulator.pacing import every
 from iveg.emulator.scenarios import Incident, lay_out, scenario_named
 from iveg.emulator.world import REST, Rig, World, climate_at
@@ -93,6 +93,7 @@ async def run_emulator(
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the house.
+        SettingsError: somebody listens on the fault port already.
     """
     if profile not in DETECTORS:
         known = ", ".join(DETECTORS)
@@ -104,12 +105,14 @@ async def run_emulator(
         address, apikey, uplink, slow_s, stand_s, state_directory, held, rate_hz
     )
     fleet = Fleet(world, settings)
-    async with asyncio.TaskGroup() as tasks:
-        if fault_port is not None:
-            port = await serve_faults(tasks, fault_port, fleet.obey)
-            _log.info("faults are taken on 127.0.0.1:%d", port)
-            if on_fault_port is not None:
-                on_fault_port(port)
+    if fault_port is None:
+        await fleet.run(layout.incidents)
+        return
+    server, port = await open_faults(fault_port, fleet.obey)
+    async with server:
+        _log.info("faults are taken on 127.0.0.1:%d", port)
+        if on_fault_port is not None:
+            on_fault_port(port)
         await fleet.run(layout.incidents)
 
 

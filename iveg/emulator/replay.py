@@ -8,14 +8,13 @@ detections are told again, as a robot that stands goes on seeing what it saw.
 """
 
 import asyncio
-import ipaddress
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.errors import CommandRefusedError, DataFileError, SettingsError
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
     DetectionFrame,
@@ -28,7 +27,6 @@ from iveg.domain.profiles import profile_of
 from iveg.emulator.logs import LogReader
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
-from iveg.ngsi import names
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
@@ -43,7 +41,6 @@ _NAVIGATION_EVERY_S = 1.0
 _LONGEST_STEP_S = 0.2
 _STANDS_AT_END_S = 2.0
 _FASTEST = 100.0
-_LISTEN_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +69,6 @@ async def run_replay(
     slow_s: float = 1.0,
     stand_s: float = 3.0,
     state_directory: Path,
-    allow_remote: bool = False,
-    allow_live: bool = False,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -88,20 +83,12 @@ async def run_replay(
         slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
         stand_s: See above.
         state_directory: Where the robots keep their hold files; made if missing.
-        allow_remote: The broker may be on another machine.
-        allow_live: Do not look whether one of the robots is live.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
-        SettingsError: the broker is on another machine.
-        CommandRefusedError: a robot of that name is live.
     """
     _check(files, robots, speed)
-    if not allow_remote:
-        _check_loopback(address)
     playbacks = [Playback(LogReader(file).entries, loop=loop) for file in files]
-    if not allow_live:
-        await _check_not_live(robots, address, apikey)
     settings = ReplaySettings(
         address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory
     )
@@ -109,17 +96,25 @@ async def run_replay(
         ReplayedRobot(robot_id, playback, settings)
         for robot_id, playback in zip(robots, playbacks, strict=True)
     ]
+    try:
+        await _play(replayed)
+    except BaseExceptionGroup as group:
+        broken = _first_of_files(group)
+        if broken is None:
+            raise
+        raise broken from group
+
+
+async def _play(replayed: "Sequence[ReplayedRobot]") -> None:
     async with asyncio.TaskGroup() as tasks:
         playing = [
             tasks.create_task(robot.run(), name=f"replay-{robot.robot_id}")
             for robot in replayed
         ]
-        await asyncio.gather(*(robot.ended.wait() for robot in replayed))
+        for robot in replayed:
+            await robot.ended.wait()
         for task in playing:
             task.cancel()
-
-
-# --- what is refused --------------------------------------------------------------
 
 
 def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
@@ -133,45 +128,15 @@ def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
         raise DataFileError("replay", "", reason)
 
 
-def _check_loopback(address: BrokerAddress) -> None:
-    try:
-        is_here = ipaddress.ip_address(address.host).is_loopback
-    except ValueError:
-        is_here = address.host == "localhost"
-    if not is_here:
-        allowed = "on loopback for a replay, unless it is told otherwise"
-        raise SettingsError("IVEG_MQTT_URL", address.host, allowed)
-
-
-async def _check_not_live(
-    robots: Sequence[str], address: BrokerAddress, apikey: str
-) -> None:
-    """Listen for the robots: a live one reports twice a second whatever it does.
-
-    Raises:
-        CommandRefusedError: one of them was heard.
-    """
-    heard: set[str] = set()
-    topics = {
-        names.measure_topic(apikey, robot_id + device.suffix): robot_id
-        for robot_id in robots
-        for device in names.ROBOT_DEVICES
-    }
-    link = MqttLink(
-        address,
-        "replay",
-        dict.fromkeys(topics, 0),
-        lambda topic, _: heard.add(topics[topic]),
-    )
-    listening = asyncio.create_task(link.run(), name="replay-listens")
-    await asyncio.sleep(_LISTEN_S)
-    listening.cancel()
-    await asyncio.gather(listening, return_exceptions=True)
-    for robot_id in robots:
-        if robot_id in heard:
-            raise CommandRefusedError(
-                robot_id, "replay", "a robot of this name is live"
-            )
+def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
+    """The complaint about a file among what ended the tasks."""
+    found = group.subgroup(DataFileError)
+    while found is not None:
+        first = found.exceptions[0]
+        if isinstance(first, DataFileError):
+            return first
+        found = first if isinstance(first, BaseExceptionGroup) else None
+    return None
 
 
 # --- one replayed robot -----------------------------------------------------------
