@@ -247,7 +247,7 @@ class Dss:
     def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
         """Everything that is known, for a browser that has just come."""
         views, ids = self.views, self.settings.robots
-        frames = {robot_id: views.frame(robot_id) for robot_id in ids}
+        frames = {robot_id: views.frame(robot_id, now) for robot_id in ids}
         return {
             "t": format_stamp(now.wall),
             "server": {

@@ -70,7 +70,7 @@ class Encoder:
         if kind == "robots":
             data = self._views.robot(rest, now)
         elif kind == "detections":
-            data = self._views.frame(rest)
+            data = self._views.frame(rest, now)
         elif kind == "people":
             data = self._views.people(now)
         elif kind == "alerts":

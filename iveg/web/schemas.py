@@ -202,6 +202,7 @@ class FrameJson(TypedDict):
     robot_id: str
     stamp: str | None
     road: str
+    age_s: float
     items: list[DetectionJson]
 
 

@@ -185,16 +185,17 @@ class Views:
             ],
         }
 
-    def frame(self, robot_id: str) -> schemas.FrameJson | None:
+    def frame(self, robot_id: str, now: Instant) -> schemas.FrameJson | None:
         """One robot's newest look, faint detections included."""
         robot = self._world.robot(robot_id)
-        if robot.frame is None:
+        if robot.frame is None or robot.detections_at is None:
             return None
         stamp, road = robot.frame.origin.stamp, robot.frame_road
         return {
             "robot_id": robot_id,
             "stamp": stamp,
             "road": road,
+            "age_s": round(now.mono - robot.detections_at, 3),
             "items": [
                 _detection(one, robot_id, stamp, road)
                 for one in self._assessor.placed.get(robot_id, [])
