@@ -14,7 +14,6 @@ import { onThemeChange } from "./panels/theme.js";
 /** @typedef {import("./history/asked.js").Asked} Asked */
 
 const ROWS = 20;
-const WITH_YEAR = { year: /** @type {const} */ ("numeric") };
 
 /** An answer that is not what was asked for; `status` 0 is no answer at all. */
 class AnswerError extends Error {
@@ -125,8 +124,8 @@ async function start() {
     setHidden(line, wrong === null);
     if (wrong !== null) setText(line, words.t(`history.error.${wrong}`, { status }));
     if (asked === null) return;
-    const since = dayAndTime(asked.since, words.language(), WITH_YEAR);
-    const until = dayAndTime(asked.until, words.language(), WITH_YEAR);
+    const since = dayAndTime(asked.since, { withYear: true });
+    const until = dayAndTime(asked.until, { withYear: true });
     setText(need("#history-range"), words.t("history.shown", { since, until }));
   }
 

@@ -57,27 +57,23 @@ export function wallText(at) {
 export function momentOf(text) {
   const wall = Date.parse(`${text}Z`);
   if (Number.isNaN(wall)) return Number.NaN;
-  const early = wall - offsetAt(wall - 3 * HOUR_MS);
-  return wall - offsetAt(early);
+  // Three hours back lies before any change that could make this text ambiguous.
+  const before = wall - offsetAt(wall - 3 * HOUR_MS);
+  const after = wall - offsetAt(before);
+  const isSkipped = after + offsetAt(after) !== wall;
+  return isSkipped ? before : after;
 }
 
 /**
- * Date and time for people.
+ * Date and time for people: day before month, 24 hours, as both languages have it here.
  *
  * @param {string | number | null} at ISO-8601 or Unix milliseconds
- * @param {string} language
- * @param {Intl.DateTimeFormatOptions} [more]
+ * @param {{withYear?: boolean}} [how]
  */
-export function dayAndTime(at, language, more = {}) {
+export function dayAndTime(at, { withYear = false } = {}) {
   if (at === null) return "—";
-  return new Date(at).toLocaleString(language === "es" ? "es-ES" : "en-GB", {
-    timeZone: ZONE,
-    hourCycle: "h23",
-    day: "2-digit",
-    month: "2-digit",
-    hour: "2-digit",
-    minute: "2-digit",
-    second: "2-digit",
-    ...more,
-  });
+  const [day, time] = wallText(new Date(at).getTime()).split("T");
+  const [year, month, date] = day.split("-");
+  const shown = withYear ? `${date}/${month}/${year}` : `${date}/${month}`;
+  return `${shown} ${time.slice(0, 8)}`;
 }

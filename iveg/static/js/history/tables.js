@@ -74,7 +74,7 @@ export function decisionCells(item, words) {
       : (Date.parse(item.ended_at) - Date.parse(item.started_at)) / 1000;
   const running = make("td", "rows__number", words.t("decision.running"));
   return [
-    make("td", "", dayAndTime(item.started_at, words.language())),
+    make("td", "", dayAndTime(item.started_at)),
     make("td", "rows__what", words.t(item.sentence.key, item.sentence.slots)),
     numberCell(item.distance_m, 2, words),
     lasted === null ? running : numberCell(lasted, 1, words),
@@ -91,7 +91,7 @@ export function commandCells(item, words) {
   const since = (/** @type {string | null} */ at) =>
     at === null ? null : Date.parse(at) - Date.parse(times.requested);
   return [
-    make("td", "", dayAndTime(times.requested, words.language())),
+    make("td", "", dayAndTime(times.requested)),
     make("td", "", item.robot_id),
     make("td", "", words.t(`history.kind.${item.kind}`)),
     make("td", "", words.t(`history.state.${item.state}`)),
