@@ -14,6 +14,7 @@ RELEASE is an edge: sent once, for the holds that a person saw; unconfirmed it b
 a STOP under a new id.
 """
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -23,6 +24,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     Hold,
     Instant,
+    Origin,
     Road,
     SafetyReport,
 )
@@ -60,6 +62,7 @@ STALE_S = 1.5
 FRESH_S = 1.0
 RELEASE_S = 2.0
 STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
+"""So many samples at rest, over so long, none later than this after the one before."""
 MOVED_SAMPLES = 3
 ASSUMED_BRAKING = 0.5
 """Least braking that may be counted on (m/s²)."""
@@ -67,6 +70,7 @@ BRAKING_EXTRA_S, BRAKING_CAP_S = 1.5, 5.0
 FIWARE_PAUSE_S = 2.0
 STANDING_RESEND_S = 5.0
 _EARLY_SENDS = (0.25, 0.5, 1.0)
+_ANSWERS_REMEMBERED = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +87,7 @@ class SendOnce:
     """Send a release (with ids) or a resume (without), once, through Orion alone."""
 
     robot_id: str
+    command_id: str
     kind: Literal["release", "resume"]
     challenge: str
     ids: tuple[str, ...] = ()
@@ -162,6 +167,8 @@ class StopMachine:
         self._fiware_busy = False
         self._standing_from: Instant | None = None
         self._standing_count = 0
+        self._standing_newest = float("-inf")
+        self._answers: deque[tuple[str, int]] = deque(maxlen=_ANSWERS_REMEMBERED)
         self._moving_samples = 0
         self._moved_at = float("-inf")
         self._speed = 0.0
@@ -196,10 +203,16 @@ class StopMachine:
     ) -> list[Effect]:
         """STOP: always accepted; a press during an episode joins it."""
         if self.wants_stop and self.state != "RELEASING" and self.stop is not None:
-            if by not in self.stop.requesters:
-                self.stop.requesters.append(by)
-            return [] if self.state == "STANDING" else self._send_all(at)
+            effects = [] if self.state == "STANDING" else self._send_now(at)
+            return [*effects, *self._join(self.stop, by)]
         return self._begin(by, at, new_id, key)
+
+    def _join(self, stop: Command, by: str) -> list[Effect]:
+        """One more person wants it: nothing changes but the audit."""
+        if by in stop.requesters:
+            return []
+        stop.requesters.append(by)
+        return [Changed(self.robot_id, stop.command_id, self.state, "requested")]
 
     def _begin(self, by: str, at: Instant, new_id: str, key: str) -> list[Effect]:
         """A new episode under an id that was never used before."""
@@ -207,12 +220,14 @@ class StopMachine:
         if not self._direct:
             self.stop.roads["direct"] = "off"
         self.once = None
-        self._standing_from, self._standing_count = None, 0
+        self._forget_standing()
         self._deadline = at.mono + UNCONFIRMED_S
+        # What is still on its way belongs to an earlier episode and holds up nothing.
         self._fiware_busy = False
-        effects = self._send_all(at)
-        effects.append(SetLevel(self.robot_id, "stopped", (new_id,)))
-        return [*effects, self._enter("REQUESTED", key)]
+        # First, because sends to a standing robot are planned five seconds apart.
+        changed = self._enter("REQUESTED", key)
+        level = SetLevel(self.robot_id, "stopped", (new_id,))
+        return [*self._send_now(at), level, changed]
 
     def release(
         self, by: str, seen: Iterable[str], at: Instant, new_id: str
@@ -275,46 +290,69 @@ class StopMachine:
         self._deadline = at.mono + RELEASE_S
         changed = self._enter("RELEASING", "releasing")
         return [
-            SendOnce(self.robot_id, kind, report.challenge or "", ids),
+            SendOnce(self.robot_id, new_id, kind, report.challenge or "", ids),
             changed,
         ]
 
     # --- roads --------------------------------------------------------------------
 
-    def sent(self, road: SendRoad, at: Instant, *, ok: bool) -> list[Effect]:
+    def sent(
+        self, road: SendRoad, command_id: str, at: Instant, *, ok: bool
+    ) -> list[Effect]:
         """A road took our message (PUBACK, 2xx) or failed; neither is evidence."""
-        command = self.once if self.state == "RELEASING" else self.stop
-        if road == "fiware":
-            self._fiware_busy = False
-            self._next_fiware = at.mono + FIWARE_PAUSE_S
+        command = self._command(command_id)
         if command is None:
             return []
+        if road == "fiware" and command is self.stop:
+            self._fiware_busy = False
+            self._next_fiware = at.mono + FIWARE_PAUSE_S
         command.roads[road] = "ok" if ok else "failed"
-        times = command.times
         if not ok:
             return []
+        times = command.times
         if road == "direct":
             times.sent_direct = times.sent_direct or at
         else:
             times.sent_fiware = times.sent_fiware or at
         return [self._enter("SENT", "sent")] if self.state == "REQUESTED" else []
 
-    def _send_all(self, at: Instant) -> list[Effect]:
-        assert self.stop is not None  # noqa: S101 - callers have begun an episode
-        self.stop.tries += 1
-        effects: list[Effect] = []
-        if self._direct:
-            effects.append(SendStop(self.robot_id, self.stop.command_id, "direct"))
-        effects += self._send_fiware(at)
-        self._next_direct = at.mono + self._pause(at)
-        return effects
+    def _command(self, command_id: str) -> Command | None:
+        """Our command of that id; None when an episode has ended meanwhile."""
+        for command in (self.once, self.stop):
+            if command is not None and command.command_id == command_id:
+                return command
+        return None
 
-    def _send_fiware(self, at: Instant) -> list[Effect]:
-        if self._fiware_busy or self.stop is None:
-            return []
-        self._fiware_busy = True
-        self._next_fiware = at.mono + FIWARE_PAUSE_S
-        return [SendStop(self.robot_id, self.stop.command_id, "fiware")]
+    def _send_now(self, at: Instant) -> list[Effect]:
+        """On both roads at once, whatever was due when."""
+        self._next_direct = self._next_fiware = at.mono
+        return self._send_due(at)
+
+    def _send_due(self, at: Instant) -> list[Effect]:
+        assert self.stop is not None  # noqa: S101 - callers have begun an episode
+        roads: list[SendRoad] = []
+        if self._direct and at.mono >= self._next_direct:
+            self._next_direct = at.mono + self._pause(at)
+            roads.append("direct")
+        if self._fiware_is_due(at):
+            self._fiware_busy = True
+            roads.append("fiware")
+        if roads and self.state != "STANDING":
+            self.stop.tries += 1
+        hold_id = self.stop.command_id
+        return [SendStop(self.robot_id, hold_id, road) for road in roads]
+
+    def _fiware_is_due(self, at: Instant) -> bool:
+        """One request in flight, the next two seconds after it came back.
+
+        A robot that stands is reminded on the direct road alone, where there is one.
+        """
+        if self._fiware_busy:
+            return False
+        if self.state != "STANDING":
+            return at.mono >= self._next_fiware
+        rest = STANDING_RESEND_S - FIWARE_PAUSE_S
+        return not self._direct and at.mono >= self._next_fiware + rest
 
     def _pause(self, at: Instant) -> float:
         """Direct at 0, 250, 500, 1000 ms, then 0.5 s, after 10 s every second."""
@@ -331,14 +369,28 @@ class StopMachine:
 
     def answered(self, answer: CommandAnswer, at: Instant, road: Road) -> list[Effect]:
         """The robot's own answer on ``cmdexe`` or ``cmd_info``."""
+        news = self._is_news(answer.origin)
         if self.state == "RELEASING" and self.once is not None:
+            if answer.result == "REFUSED" and not news:
+                # The other road's copy of a refusal that a person has seen already.
+                return []
             return self._answered_once(answer, at, road)
         if self.stop is None or answer.result != "LATCHED":
             return []
         if self.hold_id not in {answer.id, *(hold.id for hold in answer.holds)}:
             return []
         _note_answer(self.stop.times, at, road)
-        return self._delivered()
+        return self._delivered(at)
+
+    def _is_news(self, origin: Origin) -> bool:
+        if origin.boot is None or origin.seq is None:
+            return True
+        # The agent's copy has lost its stamp.
+        identity = origin.boot, origin.seq
+        if identity in self._answers:
+            return False
+        self._answers.append(identity)
+        return True
 
     def _answered_once(
         self, answer: CommandAnswer, at: Instant, road: Road
@@ -347,20 +399,26 @@ class StopMachine:
         if answer.result == "REFUSED":
             _note_answer(self.once.times, at, road)
             self.once.reason = answer.why
-            back: State = "STANDING" if self.once.kind == "release" else "READY"
-            changed = self._enter(back, "refused", answer.why)
+            changed = self._enter(self._before_once(), "refused", answer.why)
             self.once = None
             return [changed]
         if answer.result in ("RELEASED", "RESUMED"):
             _note_answer(self.once.times, at, road)
         return []
 
-    def _delivered(self) -> list[Effect]:
+    def _before_once(self) -> State:
+        """Where a refused release or resume came from."""
+        assert self.once is not None  # noqa: S101 - checked by the caller
+        if self.stop is None:
+            return "RUNNING"
+        return "STANDING" if self.once.kind == "release" else "READY"
+
+    def _delivered(self, at: Instant) -> list[Effect]:
         if self.state not in ("REQUESTED", "SENT", "UNCONFIRMED"):
             return []
-        assert self.stop is not None  # noqa: S101 - these states have an episode
         braking = min(self._speed / ASSUMED_BRAKING + BRAKING_EXTRA_S, BRAKING_CAP_S)
-        self._deadline = self.stop.times.requested.mono + braking
+        # From the robot's word on: before it, a robot out of reach could not brake.
+        self._deadline = at.mono + braking
         return [self._enter("DELIVERED", "delivered")]
 
     def reported(
@@ -376,14 +434,16 @@ class StopMachine:
             return self._reported_releasing(report)
         assert self.stop is not None  # noqa: S101 - every other state has an episode
         if self.hold_id not in {hold.id for hold in report.holds}:
-            self._standing_from, self._standing_count = None, 0
-            if self.state in ("STANDING", "STALE"):
+            self._forget_standing()
+            # A name that was released never holds again: only a new one can.
+            released = self.hold_id in report.released
+            if released or self.state in ("STANDING", "STALE"):
                 return self._begin("iveg", at, new_id, "moved")
             return []
         _note_answer(self.stop.times, at, road)
-        effects = self._delivered()
+        effects = self._delivered(at)
         if not _stands(report):
-            self._standing_from, self._standing_count = None, 0
+            self._forget_standing()
             if self.state in ("STANDING", "STALE"):
                 return [*effects, *self._begin("iveg", at, new_id, "moved")]
             return effects
@@ -392,8 +452,12 @@ class StopMachine:
     def _stood(self, at: Instant) -> list[Effect]:
         """One more sample at rest; five over a second are a standstill."""
         assert self.stop is not None  # noqa: S101 - called with an episode
+        if at.mono - self._standing_newest > STANDING_FRESH_S:
+            # Nobody knows what it did in the gap.
+            self._forget_standing()
         if self._standing_from is None:
             self._standing_from = at
+        self._standing_newest = at.mono
         self._standing_count += 1
         if self.state == "STANDING":
             return []
@@ -407,6 +471,9 @@ class StopMachine:
             self.stop.standstill_ms = max(0.0, 1000.0 * took)
         return [self._enter("STANDING", "standing")]
 
+    def _forget_standing(self) -> None:
+        self._standing_from, self._standing_count = None, 0
+
     def _reported_free(self, report: SafetyReport, at: Instant) -> list[Effect]:
         if self.state == "READY" and not report.holds and report.speed_factor > 0:
             return self._finish("running")
@@ -417,7 +484,8 @@ class StopMachine:
         self.stop = Command(
             ours[-1], self.robot_id, "stop", "DELIVERED", Times(at), ["iveg"]
         )
-        self._standing_from, self._standing_count = None, 0
+        self._forget_standing()
+        self._fiware_busy = False
         self._deadline = at.mono + BRAKING_CAP_S
         self._next_direct = self._next_fiware = at.mono
         level = SetLevel(self.robot_id, "stopped", (ours[-1],))
@@ -462,18 +530,7 @@ class StopMachine:
         effects = self._overdue(now, new_id)
         if not self.wants_stop or self.state == "RELEASING":
             return effects
-        if now.mono >= self._next_direct:
-            resend = self.state == "STANDING"
-            effects += self._send_all(now) if not resend else self._remind(now)
-        elif now.mono >= self._next_fiware and self.state != "STANDING":
-            effects += self._send_fiware(now)
-        return effects
-
-    def _remind(self, now: Instant) -> list[Effect]:
-        assert self.stop is not None  # noqa: S101 - STANDING has an episode
-        self._next_direct = now.mono + STANDING_RESEND_S
-        road: SendRoad = "direct" if self._direct else "fiware"
-        return [SendStop(self.robot_id, self.stop.command_id, road)]
+        return [*effects, *self._send_due(now)]
 
     def _overdue(self, now: Instant, new_id: str) -> list[Effect]:
         late = now.mono >= self._deadline
@@ -483,7 +540,7 @@ class StopMachine:
             case "DELIVERED" if late:
                 return [self._enter("STILL_MOVING", "still_moving")]
             case "STANDING" if self._report_age(now) > STALE_S:
-                self._standing_from, self._standing_count = None, 0
+                self._forget_standing()
                 self._next_direct = now.mono
                 return [self._enter("STALE", "stale")]
             case "RELEASING" if late:

@@ -262,12 +262,8 @@ class Commander:
         by = "iveg"
         if machine.stop is not None:
             by = machine.stop.command_id[-6:]
-        await self._attempt(
-            machine,
-            effect.road,
-            effect.hold_id,
-            port.stop(effect.robot_id, effect.hold_id, by),
-        )
+        sending = port.stop(effect.robot_id, effect.hold_id, by)
+        await self._attempt(machine, effect.road, effect.hold_id, sending)
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
         if effect.kind == "release":
@@ -276,25 +272,28 @@ class Commander:
             )
         else:
             sending = self._broker.resume(effect.robot_id, effect.challenge)
-        await self._attempt(machine, "fiware", None, sending)
+        await self._attempt(machine, "fiware", effect.command_id, sending)
 
     async def _attempt(
         self,
         machine: StopMachine,
         road: SendRoad,
-        hold_id: str | None,
+        command_id: str,
         sending: Coroutine[Any, Any, None],
     ) -> None:
-        """Send and tell the machine how it went; an old episode's result is dropped."""
-        ok = True
+        """Send and tell the machine how it went, whatever went wrong.
+
+        A road whose failure stayed untold would count as busy for ever.
+        """
+        ok = False
         try:
             await sending
+            ok = True
         except HopError as error:
-            ok = False
             _log.info("STOP road %s: %s", road, error)
-        if hold_id is None or hold_id == machine.hold_id:
+        finally:
             at = self._clock()
-            self._perform(machine, machine.sent(road, at, ok=ok), at)
+            self._perform(machine, machine.sent(road, command_id, at, ok=ok), at)
 
     async def _set_level(self, level: SetLevel) -> None:
         try:
