@@ -1,0 +1,201 @@
+"""A STOP machine on a bench: its clock is moved by hand, its robot is told."""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from iveg.domain.observations import CommandAnswer, Hold, Origin, Road
+from iveg.domain.stop import (
+    Changed,
+    Effect,
+    SendOnce,
+    SendRoad,
+    SendStop,
+    SetLevel,
+    StopMachine,
+)
+from tests.builders import at, safety_report
+
+BOOT_HOLD = Hold("boot-b1", "boot", "remote")
+RED_BUTTON = Hold("hw-1", "hw", "local")
+
+
+@dataclass
+class Bench:
+    """One machine with a clock that is moved by hand and a robot that is told."""
+
+    direct: bool = True
+    now: float = 0.0
+    log: list[Effect] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.machine = StopMachine("AGI", direct=self.direct)
+        self._ids = itertools.count(1)
+        self._answers = itertools.count(1)
+
+    def new_id(self) -> str:
+        return f"id-{next(self._ids)}"
+
+    def keep(self, effects: list[Effect]) -> list[Effect]:
+        self.log += effects
+        return effects
+
+    # --- what happens -------------------------------------------------------------
+
+    def press(self, by: str = "ana") -> list[Effect]:
+        return self.keep(self.machine.press(by, at(self.now), self.new_id()))
+
+    def sent(self, road: SendRoad = "direct", *, ok: bool = True) -> list[Effect]:
+        command_id = self.machine.hold_id or ""
+        return self.keep(self.machine.sent(road, command_id, at(self.now), ok=ok))
+
+    def report(
+        self,
+        *holds: Hold,
+        linear: float = 0.0,
+        angular: float = 0.0,
+        factor: float = 0.0,
+        released: tuple[str, ...] = (),
+        road: Road = "mqtt",
+    ) -> list[Effect]:
+        """The robot reports; without holds named, what it would by itself."""
+        report = safety_report(
+            "AGI",
+            *holds,
+            linear=linear,
+            angular=angular,
+            speed_factor=factor,
+            released=released,
+        )
+        return self.keep(
+            self.machine.reported(report, at(self.now), road, self.new_id())
+        )
+
+    def answer(
+        self,
+        result: str = "LATCHED",
+        *,
+        id: str | None = None,  # noqa: A002 - the wire's word
+        why: str | None = None,
+        seq: int | None = None,
+        road: Road = "mqtt",
+    ) -> list[Effect]:
+        number = next(self._answers) if seq is None else seq
+        named = self.machine.hold_id if id is None else id
+        answer = CommandAnswer("AGI", Origin("b1", number), named, result, why=why)
+        return self.keep(self.machine.answered(answer, at(self.now), road))
+
+    def odometry(self, linear: float, angular: float = 0.0) -> list[Effect]:
+        return self.keep(
+            self.machine.odometry(linear, angular, at(self.now), self.new_id())
+        )
+
+    def tick(self) -> list[Effect]:
+        return self.keep(self.machine.tick(at(self.now), self.new_id()))
+
+    def wait(self, seconds: float) -> list[Effect]:
+        """Let time pass in the loop's ticks; returns what was done in it."""
+        before = len(self.log)
+        for _ in range(round(seconds / 0.05)):
+            self.now = round(self.now + 0.05, 6)
+            self.tick()
+        return self.log[before:]
+
+    # --- shorthands ---------------------------------------------------------------
+
+    @property
+    def state(self) -> str:
+        return self.machine.state
+
+    @property
+    def ours(self) -> Hold:
+        assert self.machine.hold_id is not None
+        return Hold(self.machine.hold_id, "iveg", "remote")
+
+    def stand(self, *also: Hold) -> "Bench":
+        """Report our hold at rest until the machine believes it."""
+        for _ in range(12):
+            self.report(self.ours, *also)
+            self.wait(0.1)
+        assert self.state == "STANDING"
+        self.report(self.ours, *also)
+        return self
+
+    def release(self, *ids: str) -> list[Effect]:
+        return self.keep(self.machine.release("ana", ids, at(self.now), self.new_id()))
+
+    def resume(self) -> list[Effect]:
+        return self.keep(self.machine.resume("ana", at(self.now), self.new_id()))
+
+    def ready(self) -> "Bench":
+        """A robot that was stopped, stood, and reported the release."""
+        self.press()
+        self.stand()
+        ours = self.ours.id
+        self.release(ours)
+        self.report(released=(ours,))
+        assert self.state == "READY"
+        return self
+
+    def changes(self) -> list[str]:
+        return [one.key for one in self.log if isinstance(one, Changed)]
+
+
+def sends(effects: list[Effect], road: str | None = None) -> list[SendStop]:
+    return [
+        one for one in effects if isinstance(one, SendStop) and road in (None, one.road)
+    ]
+
+
+def once(effects: list[Effect]) -> list[SendOnce]:
+    return [one for one in effects if isinstance(one, SendOnce)]
+
+
+def levels(effects: list[Effect]) -> list[str]:
+    return [one.desired for one in effects if isinstance(one, SetLevel)]
+
+
+def _pressed() -> Bench:
+    bench = Bench()
+    bench.press()
+    return bench
+
+
+def _sent() -> Bench:
+    bench = _pressed()
+    bench.sent("direct")
+    return bench
+
+
+def _delivered() -> Bench:
+    bench = _pressed()
+    bench.report(bench.ours)
+    return bench
+
+
+def _unconfirmed() -> Bench:
+    bench = _pressed()
+    bench.wait(1.1)
+    return bench
+
+
+def _stale() -> Bench:
+    bench = _pressed()
+    bench.stand()
+    bench.wait(2.0)
+    return bench
+
+
+def _ready() -> Bench:
+    return Bench().ready()
+
+
+IN_STATE: dict[str, Callable[[], Bench]] = {
+    "RUNNING": Bench,
+    "REQUESTED": _pressed,
+    "SENT": _sent,
+    "DELIVERED": _delivered,
+    "UNCONFIRMED": _unconfirmed,
+    "STALE": _stale,
+    "READY": _ready,
+}

@@ -1,0 +1,555 @@
+"""Every row of the state table of safety.md §2.3 but the releases'."""
+
+import pytest
+
+from iveg.domain.errors import CommandRefusedError
+from iveg.domain.observations import Road
+from iveg.domain.stop import SendRoad, SendStop
+from tests.builders import at
+from tests.unit.domain.bench import (
+    RED_BUTTON,
+    Bench,
+    levels,
+    sends,
+)
+
+# --- REQUESTED, SENT --------------------------------------------------------------
+
+
+def test_a_press_asks_for_stop_on_both_roads_and_sets_the_level() -> None:
+    bench = Bench()
+
+    effects = bench.press()
+
+    assert bench.state == "REQUESTED"
+    assert [one.road for one in sends(effects)] == ["direct", "fiware"]
+    assert levels(effects) == ["stopped"]
+    assert {one.hold_id for one in sends(effects)} == {bench.machine.hold_id}
+
+
+def test_the_sends_come_before_everything_else_that_a_press_does() -> None:
+    effects = Bench().press()
+
+    assert isinstance(effects[0], SendStop)
+    assert isinstance(effects[1], SendStop)
+
+
+def test_without_the_direct_road_a_press_takes_the_other_alone() -> None:
+    bench = Bench(direct=False)
+
+    effects = bench.press()
+
+    assert [one.road for one in sends(effects)] == ["fiware"]
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.roads == {"direct": "off", "fiware": "pending"}
+
+
+@pytest.mark.parametrize("road", ["direct", "fiware"])
+def test_a_road_that_took_it_makes_it_sent(road: SendRoad) -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.sent(road)
+
+    assert bench.state == "SENT"
+
+
+def test_a_road_that_failed_does_not_make_it_sent() -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.sent("direct", ok=False)
+
+    assert bench.state == "REQUESTED"
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.roads["direct"] == "failed"
+
+
+def test_the_first_time_of_each_road_is_kept() -> None:
+    bench = Bench()
+    bench.press()
+    bench.sent("direct")
+    bench.now = 0.4
+    bench.sent("direct")
+    bench.sent("fiware")
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.times.sent_direct == at(0.0)
+    assert bench.machine.stop.times.sent_fiware == at(0.4)
+
+
+def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> None:
+    bench = Bench()
+    effects = {0.0: bench.press()}
+    while bench.now < 3.0:
+        bench.now = round(bench.now + 0.05, 6)
+        effects[bench.now] = bench.tick()
+
+    times = [time for time, done in effects.items() if sends(done, "direct")]
+
+    assert times == [0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+
+
+def test_after_ten_seconds_direct_sends_come_every_second_without_end() -> None:
+    bench = Bench()
+    bench.press()
+    bench.wait(60.0)
+
+    assert len(sends(bench.wait(20.0), "direct")) in (20, 21)
+
+
+def test_one_fiware_request_is_in_flight_at_a_time() -> None:
+    bench = Bench()
+    effects = bench.press() + bench.wait(5.0)
+
+    assert len(sends(effects, "fiware")) == 1
+
+
+def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -> None:
+    bench = Bench()
+    bench.press()
+    bench.wait(0.1)
+    bench.sent("fiware", ok=False)
+
+    early, later = bench.wait(1.9), bench.wait(0.15)
+
+    assert not sends(early, "fiware")
+    assert len(sends(later, "fiware")) == 1
+
+
+def test_without_the_direct_road_the_other_repeats_every_two_seconds() -> None:
+    bench = Bench(direct=False)
+    bench.press()
+    bench.sent("fiware")
+
+    assert len(sends(bench.wait(2.0))) == 1
+
+
+def test_the_result_of_an_earlier_episode_counts_for_nothing() -> None:
+    bench = Bench()
+    bench.press()
+    earlier = bench.ours.id
+    bench.stand()
+    bench.report()  # the hold is lost: a new episode
+
+    effects = bench.machine.sent("fiware", earlier, at(bench.now), ok=True)
+
+    assert effects == []
+    assert bench.state == "REQUESTED"
+
+
+# --- DELIVERED, UNCONFIRMED, STILL_MOVING ----------------------------------------
+
+
+@pytest.mark.parametrize("road", ["mqtt", "orion"])
+def test_the_robots_answer_with_our_id_means_delivered(road: Road) -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.answer(road=road)
+
+    assert bench.state == "DELIVERED"
+
+
+def test_a_report_with_our_hold_means_delivered() -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.report(bench.ours, linear=0.4)
+
+    assert bench.state == "DELIVERED"
+
+
+def test_an_answer_for_another_id_proves_nothing() -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.answer(id="somebody-elses")
+
+    assert bench.state == "REQUESTED"
+
+
+@pytest.mark.parametrize("result", ["RELEASED", "RESUMED", "REFUSED"])
+def test_only_latched_means_delivered(result: str) -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.answer(result)
+
+    assert bench.state == "REQUESTED"
+
+
+def test_the_times_of_both_answers_are_kept() -> None:
+    bench = Bench()
+    bench.press()
+    bench.now = 0.02
+    bench.answer(seq=1)
+    bench.now = 0.08
+    bench.answer(seq=1, road="orion")
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.times.answer_direct == at(0.02)
+    assert bench.machine.stop.times.answer_fiware == at(0.08)
+
+
+@pytest.mark.parametrize("first", ["REQUESTED", "SENT"])
+def test_no_word_of_the_robot_for_a_second_means_unconfirmed(first: str) -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(first == "SENT"):
+        bench.sent("direct")
+    assert bench.state == first
+
+    bench.wait(0.95)
+    assert bench.state == first
+    bench.wait(0.05)
+
+    assert bench.state == "UNCONFIRMED"
+
+
+def test_unconfirmed_becomes_delivered_when_the_robot_speaks() -> None:
+    bench = Bench()
+    bench.press()
+    bench.wait(30.0)
+
+    bench.report(bench.ours, linear=0.5)
+
+    assert bench.state == "DELIVERED"
+
+
+def test_a_robot_that_was_out_of_reach_gets_its_time_to_brake() -> None:
+    bench = Bench()
+    bench.press()
+    bench.wait(30.0)
+    bench.report(bench.ours, linear=0.5)
+
+    bench.wait(1.0)
+
+    assert bench.state == "DELIVERED"
+
+
+@pytest.mark.parametrize(
+    ("speed", "limit"), [(0.0, 1.5), (0.5, 2.5), (1.0, 3.5), (9.0, 5.0)]
+)
+def test_delivered_and_not_standing_after_its_braking_time_is_still_moving(
+    speed: float, limit: float
+) -> None:
+    bench = Bench()
+    bench.press()
+    bench.report(bench.ours, linear=speed)
+
+    bench.wait(limit - 0.05)
+    assert bench.state == "DELIVERED"
+    bench.wait(0.1)
+
+    assert bench.state == "STILL_MOVING"
+
+
+def test_f40_a_robot_that_acknowledges_and_drives_on_is_still_moving() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(50):
+        bench.report(bench.ours, linear=0.5)
+        bench.wait(0.1)
+
+    assert bench.state == "STILL_MOVING"
+
+
+def test_still_moving_becomes_standing_when_it_stands() -> None:
+    bench = Bench()
+    bench.press()
+    bench.report(bench.ours, linear=1.0)
+    bench.wait(4.0)
+    assert bench.state == "STILL_MOVING"
+
+    bench.stand()
+
+    assert bench.state == "STANDING"
+
+
+# --- STANDING ---------------------------------------------------------------------
+
+
+def test_standing_needs_five_samples_over_a_second() -> None:
+    bench = Bench()
+    bench.press()
+    states = []
+    for _ in range(11):
+        bench.report(bench.ours)
+        states.append(bench.state)
+        bench.now = round(bench.now + 0.1, 6)
+
+    assert states == ["DELIVERED"] * 10 + ["STANDING"]
+
+
+def test_four_samples_are_no_standstill_however_long_they_took() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(4):
+        bench.report(bench.ours)
+        bench.now = round(bench.now + 0.45, 6)
+
+    assert bench.state == "DELIVERED"
+
+
+def test_many_samples_in_less_than_a_second_are_no_standstill() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(100):
+        bench.report(bench.ours)
+        bench.now += 0.0099
+
+    assert bench.state == "DELIVERED"
+
+
+def test_a_gap_between_samples_starts_the_standstill_anew() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(4):
+        bench.report(bench.ours)
+        bench.now += 0.1
+    bench.now += 20.0
+
+    bench.report(bench.ours)
+
+    assert bench.state == "DELIVERED"
+
+
+@pytest.mark.parametrize("turn", [{"linear": 0.02}, {"angular": -0.02}])
+def test_one_moving_sample_starts_the_standstill_anew(turn: dict[str, float]) -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(10):
+        bench.report(bench.ours)
+        bench.now += 0.1
+    bench.report(
+        bench.ours, linear=turn.get("linear", 0.0), angular=turn.get("angular", 0.0)
+    )
+    bench.now += 0.1
+    bench.report(bench.ours)
+
+    assert bench.state == "DELIVERED"
+
+
+def test_reports_without_our_hold_are_no_standstill() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(30):
+        bench.report(RED_BUTTON)
+        bench.wait(0.1)
+
+    assert bench.state == "UNCONFIRMED"
+
+
+def test_fresh_odometry_that_moves_contradicts_the_report() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(30):
+        bench.report(bench.ours)
+        bench.odometry(0.3)
+        bench.now += 0.1
+
+    assert bench.state == "DELIVERED"
+
+
+def test_odometry_that_moved_half_a_second_ago_contradicts_no_more() -> None:
+    bench = Bench()
+    bench.press()
+    bench.odometry(0.3)
+
+    bench.stand()
+
+    assert bench.state == "STANDING"
+
+
+def test_the_time_to_standstill_is_that_of_the_first_standing_sample() -> None:
+    bench = Bench()
+    bench.press()
+    bench.now = 0.4
+    bench.report(bench.ours, linear=0.2)
+    bench.now = 0.5
+    bench.stand()
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.standstill_ms == pytest.approx(500.0)
+    assert bench.machine.stop.times.standing == at(0.5)
+
+
+def test_an_answer_or_a_status_alone_never_means_standing() -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(100):
+        bench.answer()
+        bench.sent("direct")
+        bench.sent("fiware")
+        bench.wait(0.05)
+
+    assert bench.state == "STILL_MOVING"
+
+
+def test_a_standing_robot_is_reminded_every_five_seconds() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    reminders = []
+    for _ in range(200):
+        bench.report(bench.ours)
+        reminders += bench.wait(0.1)
+
+    assert len(sends(reminders, "direct")) in (4, 5)
+    assert not sends(reminders, "fiware")
+    assert bench.state == "STANDING"
+
+
+def test_without_the_direct_road_it_is_reminded_on_the_other() -> None:
+    bench = Bench(direct=False)
+    bench.press()
+    bench.sent("fiware")
+    bench.stand()
+    reminders = []
+    for _ in range(200):
+        bench.report(bench.ours)
+        done = bench.wait(0.1)
+        for _ in sends(done):
+            bench.sent("fiware")
+        reminders += done
+
+    assert len(sends(reminders)) in (3, 4)
+
+
+def test_a_hold_that_is_lost_while_standing_is_stopped_again_under_a_new_id() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    lost = bench.ours.id
+
+    effects = bench.report(RED_BUTTON)
+
+    assert bench.state == "REQUESTED"
+    assert bench.ours.id != lost
+    assert bench.changes()[-1] == "moved"
+    assert len(sends(effects)) == 2
+
+
+def test_motion_in_the_report_while_standing_is_stopped_again() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+
+    bench.report(bench.ours, linear=0.3)
+
+    assert (bench.state, bench.changes()[-1]) == ("REQUESTED", "moved")
+
+
+def test_three_moving_odometries_while_standing_are_stopped_again() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.odometry(0.3)
+    bench.odometry(0.3)
+    assert bench.state == "STANDING"
+
+    bench.odometry(0.0, 0.3)
+
+    assert (bench.state, bench.changes()[-1]) == ("REQUESTED", "moved")
+
+
+def test_a_name_that_the_robot_has_released_is_replaced_by_a_new_one() -> None:
+    bench = Bench()
+    bench.press()
+    dead = bench.ours.id
+
+    bench.report(released=(dead,))
+
+    assert bench.state == "REQUESTED"
+    assert bench.ours.id != dead
+
+
+# --- STALE ------------------------------------------------------------------------
+
+
+def test_standing_without_a_report_for_a_second_and_a_half_is_stale() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+
+    bench.wait(1.5)
+    assert bench.state == "STANDING"
+    effects = bench.wait(0.05)
+
+    assert bench.state == "STALE"
+    assert sends(effects, "direct")
+
+
+def test_a_stale_robot_must_stand_a_second_before_it_is_believed() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.wait(5.0)
+
+    bench.report(bench.ours)
+    assert bench.state == "STALE"
+    bench.stand()
+
+    assert bench.state == "STANDING"
+
+
+def test_a_stale_robot_that_moves_is_stopped_again() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.wait(5.0)
+
+    bench.report(bench.ours, linear=0.3)
+
+    assert bench.state == "REQUESTED"
+
+
+# --- people -----------------------------------------------------------------------
+
+
+def test_f38_fifty_people_make_one_episode_with_fifty_lines_in_the_audit() -> None:
+    bench = Bench()
+    for number in range(50):
+        bench.press(f"operator-{number}")
+
+    assert bench.machine.stop is not None
+    assert len(bench.machine.stop.requesters) == 50
+    assert {one.hold_id for one in sends(bench.log)} == {bench.ours.id}
+    assert bench.changes() == ["requested"] * 50
+
+
+def test_a_second_press_of_the_same_person_sends_again_at_once() -> None:
+    bench = Bench()
+    bench.press()
+    bench.wait(0.1)
+
+    effects = bench.press()
+
+    assert [one.road for one in sends(effects)] == ["direct"]
+    assert bench.changes() == ["requested"]
+
+
+def test_a_press_on_a_standing_robot_joins_and_sends_nothing() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+
+    effects = bench.press("ben")
+
+    assert not sends(effects)
+    assert bench.state == "STANDING"
+
+
+def test_how_far_it_may_have_driven_grows_with_its_last_speed() -> None:
+    bench = Bench()
+    assert bench.machine.moved_m(at(0.0)) == 0.0
+    bench.press()
+    bench.report(linear=0.8, factor=1.0)
+
+    assert bench.machine.moved_m(at(2.5)) == pytest.approx(2.0)
+
+
+def test_an_illegal_step_says_where_it_stood_and_what_was_asked() -> None:
+    with pytest.raises(CommandRefusedError, match=r"READY.*RUNNING"):
+        Bench().machine._enter("READY", "ready")

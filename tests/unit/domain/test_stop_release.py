@@ -1,0 +1,373 @@
+"""Releases: who may, what is sent, and how a robot comes to drive again."""
+
+import pytest
+
+from iveg.domain.errors import CommandRefusedError
+from iveg.domain.observations import Hold
+from iveg.domain.stop import Changed
+from tests.builders import at, safety_report
+from tests.unit.domain.bench import (
+    BOOT_HOLD,
+    IN_STATE,
+    RED_BUTTON,
+    Bench,
+    levels,
+    once,
+    sends,
+)
+
+# --- RELEASING --------------------------------------------------------------------
+
+
+def test_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand(BOOT_HOLD)
+
+    bench.release(bench.ours.id, BOOT_HOLD.id)
+    effects = bench.log + bench.wait(1.5)
+
+    (sent,) = once(effects)
+    assert set(sent.ids) == {bench.ours.id, BOOT_HOLD.id}
+    assert sent.challenge == "0123456789abcdef"
+
+
+def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    assert bench.wait(1.9) == []
+
+
+@pytest.mark.parametrize("seen", [(), ("id-1",), ("id-1", "boot-b1", "more")])
+def test_a_release_of_another_set_than_the_robot_reports_is_refused(
+    seen: tuple[str, ...],
+) -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand(BOOT_HOLD)
+
+    with pytest.raises(CommandRefusedError, match="the holds changed"):
+        bench.release(*seen)
+
+    assert bench.state == "STANDING"
+
+
+def test_a_person_may_name_local_holds_too_but_they_are_not_sent() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand(RED_BUTTON)
+
+    effects = bench.release(bench.ours.id, RED_BUTTON.id)
+
+    assert once(effects)[0].ids == (bench.ours.id,)
+
+
+def test_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
+    bench = Bench()
+    bench.report(RED_BUTTON)
+
+    with pytest.raises(CommandRefusedError, match="nothing holds it"):
+        bench.release(RED_BUTTON.id)
+
+
+def test_a_release_needs_a_fresh_report() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.wait(1.1)
+
+    with pytest.raises(CommandRefusedError, match="not fresh"):
+        bench.release(bench.ours.id)
+
+
+def test_a_release_needs_a_robot_at_rest() -> None:
+    bench = Bench()
+    bench.report(BOOT_HOLD, linear=0.3)
+
+    with pytest.raises(CommandRefusedError, match="it is moving"):
+        bench.release(BOOT_HOLD.id)
+
+
+def test_a_release_needs_a_challenge() -> None:
+    bench = Bench()
+    report = safety_report("AGI", BOOT_HOLD, challenge="")
+    silent = type(report)("AGI", report.origin, 0.0, "hold", holds=(BOOT_HOLD,))
+    bench.machine.reported(silent, at(0.0), "mqtt", "unused")
+
+    with pytest.raises(CommandRefusedError, match="no challenge"):
+        bench.release(BOOT_HOLD.id)
+
+
+@pytest.mark.parametrize(
+    "state", ["REQUESTED", "SENT", "DELIVERED", "UNCONFIRMED", "STALE", "READY"]
+)
+def test_a_release_is_refused_unless_the_robot_is_known_to_stand(state: str) -> None:
+    bench = IN_STATE[state]()
+    assert bench.state == state
+
+    with pytest.raises(CommandRefusedError, match=state):
+        bench.release("id-1")
+
+
+def test_the_reported_release_of_our_hold_makes_the_robot_ready() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    ours = bench.ours.id
+    bench.release(ours)
+
+    effects = bench.report(released=(ours,))
+
+    assert bench.state == "READY"
+    assert levels(effects) == ["run"]
+    assert not bench.machine.wants_stop
+
+
+def test_a_report_that_lacks_our_hold_is_no_release_unless_it_says_so() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    bench.report()
+
+    assert bench.state == "RELEASING"
+
+
+def test_the_answer_released_is_noted_and_decides_nothing() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    bench.answer("RELEASED")
+
+    assert bench.state == "RELEASING"
+    assert bench.machine.once is not None
+    assert bench.machine.once.times.answer_direct == at(bench.now)
+
+
+def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    effects = bench.answer("REFUSED", why="challenge")
+
+    assert bench.state == "STANDING"
+    (changed,) = (one for one in effects if isinstance(one, Changed))
+    assert (changed.key, changed.why) == ("refused", "challenge")
+
+
+def test_the_second_roads_copy_of_a_refusal_does_not_refuse_the_next_try() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+    bench.answer("REFUSED", why="challenge", seq=9)
+    bench.release(bench.ours.id)
+
+    bench.answer("REFUSED", why="challenge", seq=9, road="orion")
+
+    assert bench.state == "RELEASING"
+
+
+def test_i7_a_release_without_the_robots_word_becomes_a_stop_under_a_new_id() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    old = bench.ours.id
+    bench.release(old)
+
+    bench.wait(1.95)
+    assert bench.state == "RELEASING"
+    effects = bench.wait(0.1)
+
+    assert bench.state == "REQUESTED"
+    assert bench.ours.id != old
+    assert bench.changes()[-1] == "release_unconfirmed"
+    assert len(sends(effects, "direct")) == 1
+
+
+def test_f37_a_stop_during_a_release_wins() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    old = bench.ours.id
+    bench.release(old)
+
+    effects = bench.press("ben")
+    bench.report(released=(old,))
+
+    assert bench.machine.wants_stop
+    assert bench.ours.id != old
+    assert len(sends(effects)) == 2
+    assert levels(bench.log)[-1] == "stopped"
+
+
+def test_the_result_of_a_release_is_not_taken_for_that_of_a_stop() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+    assert bench.machine.once is not None
+    release_id = bench.machine.once.command_id
+    bench.press("ben")
+
+    bench.machine.sent("fiware", release_id, at(bench.now), ok=True)
+
+    assert bench.state == "REQUESTED"
+
+
+def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    bench.sent("direct")
+
+    assert bench.machine.once is not None
+    assert bench.machine.once.times.sent_direct is None
+    assert bench.machine.once.roads["direct"] == "off"
+
+
+def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
+    bench = Bench()
+    bench.report(BOOT_HOLD)
+
+    bench.release(BOOT_HOLD.id)
+    bench.report(released=(BOOT_HOLD.id,))
+
+    assert bench.state == "READY"
+
+
+def test_such_a_release_that_is_refused_ends_where_it_began() -> None:
+    bench = Bench()
+    bench.report(BOOT_HOLD)
+    bench.release(BOOT_HOLD.id)
+
+    bench.answer("REFUSED", why="challenge")
+    bench.report(BOOT_HOLD)
+
+    assert bench.state == "RUNNING"
+    assert not bench.machine.wants_stop
+
+
+def test_such_a_release_is_not_done_while_a_remote_hold_is_left() -> None:
+    bench = Bench()
+    bench.report(BOOT_HOLD)
+    bench.release(BOOT_HOLD.id)
+
+    bench.report(BOOT_HOLD)
+
+    assert bench.state == "RELEASING"
+
+
+# --- READY, RUNNING ---------------------------------------------------------------
+
+
+def test_a_ready_robot_that_drives_runs_and_the_episode_is_over() -> None:
+    bench = Bench().ready()
+
+    bench.report(factor=1.0, linear=0.3, released=("id-1",))
+
+    assert bench.state == "RUNNING"
+    assert bench.machine.stop is None
+
+
+def test_a_resume_is_sent_once_without_ids() -> None:
+    bench = Bench().ready()
+
+    effects = bench.resume() + bench.wait(1.5)
+
+    (sent,) = once(effects)
+    assert (sent.kind, sent.ids) == ("resume", ())
+    assert bench.state == "RELEASING"
+
+
+def test_a_resume_is_done_when_the_robot_reports_that_it_may_drive() -> None:
+    bench = Bench().ready()
+    bench.resume()
+
+    bench.report(factor=0.0)
+    assert bench.state == "RELEASING"
+    bench.report(factor=0.5)
+
+    assert bench.state == "RUNNING"
+
+
+def test_a_resume_that_is_refused_leaves_the_robot_ready() -> None:
+    bench = Bench().ready()
+    bench.resume()
+
+    bench.answer("REFUSED", why="challenge")
+
+    assert bench.state == "READY"
+
+
+def test_a_resume_without_the_robots_word_becomes_a_stop() -> None:
+    bench = Bench().ready()
+    bench.resume()
+
+    bench.wait(2.1)
+
+    assert bench.machine.wants_stop
+
+
+def test_a_held_robot_cannot_be_resumed() -> None:
+    bench = Bench().ready()
+    bench.report(RED_BUTTON)
+
+    with pytest.raises(CommandRefusedError, match="still held"):
+        bench.resume()
+
+
+def test_a_stop_of_a_ready_robot_begins_a_new_episode() -> None:
+    bench = Bench().ready()
+
+    bench.press()
+
+    assert bench.state == "REQUESTED"
+    assert bench.ours.id != "id-1"
+
+
+@pytest.mark.parametrize("state", ["RUNNING", "READY"])
+def test_a_hold_of_iveg_that_nobody_here_asked_for_is_adopted(state: str) -> None:
+    bench = IN_STATE[state]()
+    found = Hold("01FROMBEFORE", "iveg", "remote")
+
+    effects = bench.report(found)
+
+    assert bench.state == "DELIVERED"
+    assert bench.machine.hold_id == found.id
+    assert levels(effects) == ["stopped"]
+    assert not once(effects)
+    bench.stand()
+    assert bench.state == "STANDING"
+
+
+def test_an_adopted_hold_is_sent_on_both_roads_like_any_other() -> None:
+    bench = Bench().ready()
+    bench.press()  # its FIWARE request is on its way for ever
+    bench.stand()
+    ours = bench.ours.id
+    bench.release(ours)
+    bench.report(released=(ours,))
+    bench.report(Hold("01FROMBEFORE", "iveg", "remote"), linear=0.3)
+
+    effects = bench.wait(0.1)
+
+    assert {one.road for one in sends(effects)} == {"direct", "fiware"}
+
+
+def test_a_boot_hold_alone_is_not_adopted() -> None:
+    bench = Bench()
+
+    bench.report(BOOT_HOLD)
+
+    assert bench.state == "RUNNING"
