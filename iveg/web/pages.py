@@ -7,7 +7,7 @@ the dependencies that are handed in.
 import json
 from collections.abc import Callable
 from importlib.resources import files
-from typing import Annotated, Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -27,6 +27,7 @@ from iveg.web.contexts import (
     Page,
     SignInPage,
     Site,
+    Theme,
 )
 from iveg.web.openapi import ApiDoc
 from iveg.web.problems import Problem
@@ -80,6 +81,8 @@ class Pages:
         """A page as a response.
 
         Args:
+            page: Its context.
+            status: HTTP status.
             policy: A Content-Security-Policy other than everybody's.
         """
         environment = self._environments[page.frame.look.language]
@@ -94,9 +97,12 @@ class Pages:
         if problem.status == 401:
             return self.sign_in(request, 401)
         known = problem.status if problem.status in _EXPLAINED else "other"
-        frame = self.frame(request, "error")
+        # Somebody signed in keeps the STOP controls, whatever page went wrong.
+        frame = self.frame(request, "error", _identified(request))
         page = ErrorPage(frame, problem.status, f"error.{known}")
-        return self._with_headers(self.draw(page, problem.status), problem)
+        response = self.draw(page, problem.status)
+        response.headers.update(problem.headers)
+        return response
 
     def refused_link(self, request: Request, _: Problem) -> Response:
         """The page for a sign-in link that is wrong."""
@@ -107,14 +113,6 @@ class Pages:
     ) -> Response:
         """How to get in."""
         return self.draw(SignInPage(self.frame(request, "signin"), wrong), status)
-
-    @staticmethod
-    def _with_headers(response: Response, problem: Problem) -> Response:
-        response.headers.update(problem.headers)
-        return response
-
-
-Whoever = TypeVar("Whoever", bound=Visitor)
 
 
 def router(
@@ -127,6 +125,7 @@ def router(
     """The routes of all pages.
 
     Args:
+        pages: What draws them.
         reader: Dependency that gives the visitor, or refuses a stranger.
         anyone: Dependency of the page that is open to strangers.
         document: The HTTP interface as it stands.
@@ -158,13 +157,26 @@ def router(
     return routes
 
 
+def _identified(request: Request) -> Visitor | None:
+    door = getattr(request.app.state, "door", None)
+    visitor: Visitor | None = None if door is None else door.identify(request)
+    return visitor
+
+
 def _look(request: Request) -> Look:
     cookies = request.cookies
     language = cookies.get(LANGUAGE_COOKIE, "")
     if language not in LANGUAGES:
         language = preferred_language(request.headers.get("accept-language", ""))
-    theme = next((t for t in THEMES if t == cookies.get(THEME_COOKIE)), "auto")
+    theme = _theme(cookies.get(THEME_COOKIE))
     return Look(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
+
+
+def _theme(wanted: str | None) -> Theme:
+    for theme in THEMES:
+        if theme == wanted:
+            return theme
+    return "auto"
 
 
 def _environment(words: Words) -> Environment:

@@ -2,7 +2,7 @@
  * The page's words: sentences with named holes, in the reader's language and habits.
  *
  * Templates live in `/static/i18n/{es,en}.json`, in nested blocks; `nav.live` walks down
- * them, and a block answers for its own name with its `default`.  Holes are `{name}`,
+ * them, and a block answers for its own name, and for names it lacks, with its `default`.  Holes are `{name}`,
  * `{name:2}` (decimals) or `{name:format}` with one of the formats below.  Elements name
  * their sentence in `data-i18n`, an attribute's in `data-i18n-<attribute>`, and the
  * values of its holes in `data-slots` (JSON), so a switch needs no reload.
@@ -68,7 +68,7 @@ export function createWords(load) {
     /** @type {string | Blocks | undefined} */
     let found = blocks;
     for (const name of key.split(".")) {
-      found = typeof found === "object" ? found[name] : undefined;
+      found = typeof found === "object" ? (found[name] ?? found.default) : undefined;
     }
     if (typeof found === "object") found = found.default;
     return typeof found === "string" ? found : null;

@@ -5,8 +5,9 @@
 import { make, need } from "./dom.js";
 
 /**
- * @typedef {{link: string, at: string | number | null, value: unknown,
- *   verdict: "ok" | "late" | "missing" | "n/a"}} Link
+ * @typedef {{link: string, at: string | number | null,
+ *   value: string | number | null,
+ *   verdict: "ok" | "late" | "missing" | "n/a" | "open"}} Link
  * @typedef {{decision_id: string, kind: string, robot_id: string | null,
  *   person_id: string | null, started_at: string | null, ended_at: string | null,
  *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}} Decision
@@ -42,15 +43,11 @@ export function createDecisionPanel({ words, dialogs }) {
     chain.append(...(shown.links ?? []).map(makeLink));
     const began = shown.started_at ? words.time(shown.started_at) : "—";
     const ended = shown.ended_at
-      ? words.time(shown.ended_at)
+      ? `${words.t("decision.ended")} ${words.time(shown.ended_at)}`
       : words.t("decision.running");
     place.replaceChildren(
       make("p", "decision__sentence", head),
-      make(
-        "small",
-        "",
-        `${words.t("decision.started")} ${began} · ${words.t("decision.ended")} ${ended}`,
-      ),
+      make("small", "", `${words.t("decision.started")} ${began} · ${ended}`),
       chain,
       make("small", "", `${words.t("decision.id")} ${shown.decision_id}`),
     );
@@ -69,29 +66,19 @@ export function createDecisionPanel({ words, dialogs }) {
       make("span", "shape"),
       make("b", "", name),
       make("small", "", `${verdict}${when}`),
-      make("p", "", textOf(link.value)),
+      make("p", "", saidOf(link)),
     );
     return item;
   }
 
-  /** A value of any depth in one line. @param {unknown} value @returns {string} */
-  function textOf(value) {
+  /** What a link found, with its unit. @param {Link} link */
+  function saidOf({ link, value }) {
     if (value === null || value === undefined) return "";
-    if (typeof value === "number") return numberOf(value);
-    if (Array.isArray(value)) return value.map(textOf).join(", ");
-    if (typeof value !== "object") return String(value);
-    return Object.entries(value)
-      .filter(([, inner]) => inner !== null)
-      .map(([name, inner]) => `${nameOf(name)}: ${textOf(inner)}`)
-      .join(" · ");
+    const key = `decision.said.${link}`;
+    return typeof value === "number" && words.has(key)
+      ? words.t(key, { value })
+      : String(value);
   }
-
-  /** @param {string} name of a value as the interface calls it */
-  const nameOf = (name) =>
-    words.has(`decision.value.${name}`) ? words.t(`decision.value.${name}`) : name;
-
-  /** @param {number} value */
-  const numberOf = (value) => words.number(value, Number.isInteger(value) ? 0 : 2);
 
   words.onChange(draw);
   return { open };

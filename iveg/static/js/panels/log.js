@@ -53,9 +53,12 @@ export function createLogPanel(app, decision) {
     return opener;
   }
 
-  /** @param {Entry} entry */
-  function keyOf(entry) {
-    return entry.key.startsWith("log.") ? entry.key : `log.${entry.key}`;
+  /** A robot may slow down for what iVeg does not know yet. @param {Entry} entry */
+  function keyOf({ key, slots }) {
+    const isBare = key.startsWith("log.speed_down.") && slots.distance === undefined;
+    return isBare && (slots.reason === "person" || slots.reason === "robot")
+      ? "log.speed_down"
+      : key;
   }
 
   /** @param {Entry} entry */

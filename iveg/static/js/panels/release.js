@@ -149,7 +149,9 @@ export function whyNotRelease(facts) {
   const common = whyNotAtAll(facts);
   if (common) return common;
   if (!robot?.holds.length) return "no_hold";
-  if (robot.holds.some(({ ack }) => ack === "local")) return "local_hold";
+  if (!robot.holds.some(({ ack }) => ack === "remote")) {
+    return robot.holds.some(({ ack }) => ack === "local") ? "local_hold" : "auto_hold";
+  }
   return isStanding(facts) ? "ok" : "not_standing";
 }
 

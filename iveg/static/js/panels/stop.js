@@ -66,7 +66,8 @@ export function createStopPanel(app) {
     if (command.kind !== "stop") return;
     const known = commands.get(command.robot_id)?.command;
     if (known && isOlder(command, known)) return;
-    commands.set(command.robot_id, { command, heardMs: performance.now() });
+    if (command.state === "RUNNING") commands.delete(command.robot_id);
+    else commands.set(command.robot_id, { command, heardMs: performance.now() });
     for (const robotId of [command.robot_id, null]) settle(robotId, command);
     drawAll();
   }

@@ -1,0 +1,164 @@
+"""The words of the page: both languages whole, and every word asked for is there."""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import pytest
+
+from iveg.web.words import Words, preferred_language, read_words
+
+ROOT = Path(__file__).parents[2]
+STATIC = ROOT / "iveg/static"
+HOLE = re.compile(r"\{(\w+)(?::(\w+))?\}")
+
+_IN_TEMPLATES = re.compile(r"""(?:say|t)\("([a-z][\w.]*\.\w+)"\s*[),]""")
+_IN_LABELS = re.compile(r"""label\("[\w-]+", "([\w.]+)"\s*[),]""")
+_IN_PYTHON = re.compile(r"""f?"((?:log|alert|health)\.[a-z_.]+)(?<!\.)["{]""")
+
+ES, EN = read_words("es"), read_words("en")
+_BLOCKS = "|".join(sorted({key.partition(".")[0] for key in ES.sentences}))
+_IN_SCRIPTS = re.compile(rf"""["`]((?:{_BLOCKS})\.[\w.]*)(["`]|\$)""")
+
+
+def holes(sentence: str) -> set[str]:
+    return {name for name, _ in HOLE.findall(sentence)}
+
+
+def sources(folder: str, *suffixes: str) -> str:
+    files = sorted((ROOT / folder).rglob("*"))
+    return "\n".join(f.read_text() for f in files if f.suffix in suffixes)
+
+
+def missing(keys: Iterable[str]) -> list[str]:
+    blocks = {
+        key.rpartition(".")[0] for key in ES.sentences if key.endswith(".default")
+    }
+    return sorted({key for key in keys if key not in ES.sentences} - blocks)
+
+
+def test_both_languages_have_the_same_keys() -> None:
+    assert sorted(ES.sentences) == sorted(EN.sentences)
+
+
+def test_both_languages_fill_the_same_holes() -> None:
+    differing = [
+        key
+        for key in ES.sentences
+        if holes(ES.sentences[key]) != holes(EN.sentences[key])
+    ]
+    assert differing == []
+
+
+def test_no_sentence_is_empty() -> None:
+    assert [key for key in ES.sentences if not ES.sentences[key].strip()] == []
+    assert [key for key in EN.sentences if not EN.sentences[key].strip()] == []
+
+
+def test_no_key_stands_twice_in_a_file() -> None:
+    def once(pairs: list[tuple[str, object]]) -> Mapping[str, object]:
+        names = [name for name, _ in pairs]
+        assert len(names) == len(set(names)), names
+        return dict(pairs)
+
+    for language in ("es", "en"):
+        text = (STATIC / f"i18n/{language}.json").read_text()
+        json.loads(text, object_pairs_hook=once)
+
+
+def test_every_word_that_scripts_ask_for_exists() -> None:
+    asked = _IN_SCRIPTS.findall(sources("iveg/static/js", ".js"))
+    assert len(asked) > 80
+    assert missing(key for key, _ in asked if not key.endswith(".")) == []
+
+
+def test_every_family_of_words_that_scripts_ask_for_exists() -> None:
+    asked = _IN_SCRIPTS.findall(sources("iveg/static/js", ".js"))
+    families = {key for key, end in asked if end == "$" or key.endswith(".")}
+    known = "\n".join(ES.sentences)
+    assert len(families) > 10
+    assert [f for f in sorted(families) if not re.search(rf"^{f}", known, re.M)] == []
+
+
+def test_every_word_that_templates_ask_for_exists() -> None:
+    text = sources("iveg/templates", ".html")
+    asked = _IN_TEMPLATES.findall(text) + _IN_LABELS.findall(text)
+    assert len(asked) > 60
+    assert missing(asked) == []
+
+
+def test_every_sentence_that_the_server_names_exists() -> None:
+    asked = _IN_PYTHON.findall(sources("iveg/pipeline", ".py"))
+    assert len(asked) > 10
+    known = set(ES.sentences)
+    unknown = [
+        key
+        for key in asked
+        if key not in known and not any(one.startswith(f"{key}.") for one in known)
+    ]
+    assert unknown == []
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        *("requested", "sent", "delivered", "standing", "unconfirmed", "stale"),
+        *("still_moving", "moved", "releasing", "ready", "refused", "running"),
+        *("reasserted", "release_unconfirmed", "adopted"),
+    ],
+)
+def test_every_step_of_a_stop_has_a_log_sentence(state: str) -> None:
+    assert f"log.stop.{state}" in ES.sentences
+
+
+@pytest.mark.parametrize(
+    ("key", "es", "en"),
+    [
+        ("ready", "PARAR {robot}", "STOP {robot}"),
+        ("late", "PARAR {robot} (enlace lento {seconds:0} s)", None),
+        ("lost", "SIN ENLACE: use la seta roja del robot", None),
+        ("asked", "Parando… {ms:0} ms", None),
+        ("acknowledged", "Confirmado, frenando…", None),
+        ("standing", "PARADO ({ms:0} ms)", None),
+        ("unconfirmed", "PARADA SIN CONFIRMAR: use la seta roja", None),
+        ("still_moving", "RECIBIDA PERO SE MUEVE", None),
+        ("stale", "visto parado hace {seconds:0} s: ahora no se sabe", None),
+        ("moved", "SE HA MOVIDO", None),
+    ],
+)
+def test_stop_says_what_the_product_says(key: str, es: str, en: str | None) -> None:
+    assert ES.sentences[f"stop.{key}"] == es
+    assert en in (None, EN.sentences[f"stop.{key}"])
+
+
+def test_no_control_is_called_an_emergency_stop() -> None:
+    named = [
+        key
+        for key in ES.sentences
+        if "emergenc" in (ES.sentences[key] + EN.sentences[key]).lower()
+    ]
+    # The honest sentence alone uses the word, to say what STOP is not.
+    assert named == ["about.stop"]
+
+
+def test_numbers_are_written_as_the_reader_writes_them() -> None:
+    words = {"n": "{value:1} m, {share:percent}"}
+    assert Words("es", words).say("n", value=1.43, share=0.94) == "1,4 m, 94 %"
+    assert Words("en", words).say("n", value=1.43, share=0.94) == "1.4 m, 94 %"
+
+
+@pytest.mark.parametrize(
+    ("header", "language"),
+    [
+        ("", "es"),
+        ("en-GB,en;q=0.9", "en"),
+        ("es-ES,es;q=0.9,en;q=0.8", "es"),
+        ("de-DE,de;q=0.9,en;q=0.5", "en"),
+        ("de, fr", "es"),
+    ],
+)
+def test_the_browsers_language_comes_first_then_spanish(
+    header: str, language: str
+) -> None:
+    assert preferred_language(header) == language

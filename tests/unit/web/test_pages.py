@@ -1,0 +1,220 @@
+"""Pages: who gets which, in which language and look, and with what in them."""
+
+import re
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from iveg.web.auth import Principal, require
+from iveg.web.contexts import Site
+from iveg.web.openapi import AnswerDoc, ApiDoc, CallDoc, FieldDoc, GroupDoc, ShapeDoc
+from iveg.web.pages import Pages, router
+from iveg.web.problems import NotSignedInError, install
+from iveg.web.security import CONTENT_SECURITY_POLICY, SecurityHeaders
+
+SITE = Site(
+    greenhouse="Almería <b>1</b>",
+    robots=("AGI", "AGII"),
+    version="9.8.7",
+    demo=True,
+    confidence_threshold=0.8,
+    radius_m=2.0,
+)
+
+API = ApiDoc(
+    "iVeg",
+    "9.8.7",
+    (
+        GroupDoc(
+            "robots",
+            (
+                CallDoc(
+                    "post",
+                    "/api/v1/robots/{robot_id}/stop",
+                    "post-stop",
+                    "stop",
+                    "Ask one robot to halt.",
+                    "Never refused.\n\nRepeated presses join.",
+                    (FieldDoc("robot_id", "text", "path", required=True),),
+                    "StopBody",
+                    (AnswerDoc("202", "Taken", "Pressed"),),
+                ),
+            ),
+        ),
+    ),
+    (ShapeDoc("Pressed", "What was made.", (FieldDoc("state", "text"),)),),
+)
+
+
+@dataclass
+class FakeDoor:
+    """Lets in whom it is told to."""
+
+    visitor: Principal | None = None
+
+    def reader(self) -> Principal:
+        if self.visitor is None:
+            raise NotSignedInError
+        return self.visitor
+
+    def identify(self, _: object) -> Principal | None:
+        return self.visitor
+
+
+@pytest.fixture
+def door() -> FakeDoor:
+    return FakeDoor(Principal("Ana <i>", "operator"))
+
+
+@pytest.fixture
+async def browser(door: FakeDoor) -> AsyncIterator[httpx.AsyncClient]:
+    pages = Pages(SITE)
+    app = FastAPI(docs_url=None, redoc_url=None)
+    app.state.door = door
+    app.include_router(
+        router(
+            pages,
+            reader=door.reader,
+            anyone=require("open"),
+            document=lambda: API,
+        )
+    )
+    install(app, pages.problem)
+    transport = httpx.ASGITransport(app=SecurityHeaders(app))
+    headers = {"Accept": "text/html"}
+    async with httpx.AsyncClient(
+        transport=transport, base_url="http://iveg", headers=headers
+    ) as client:
+        yield client
+
+
+def stops(html: str) -> list[str]:
+    return re.findall(r'data-stop="([^"]+)"', html)
+
+
+@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about", "/nowhere"])
+async def test_every_page_of_somebody_signed_in_has_each_stop_once(
+    browser: httpx.AsyncClient, path: str
+) -> None:
+    answer = await browser.get(path)
+    assert stops(answer.text) == ["AGI", "AGII", "fleet"]
+
+
+@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about"])
+async def test_a_stranger_is_told_how_to_get_in(
+    browser: httpx.AsyncClient, door: FakeDoor, path: str
+) -> None:
+    door.visitor = None
+    answer = await browser.get(path)
+    assert answer.status_code == 401
+    assert "?token=" in answer.text
+    assert stops(answer.text) == []
+
+
+async def test_the_way_in_is_open_to_strangers(
+    browser: httpx.AsyncClient, door: FakeDoor
+) -> None:
+    door.visitor = None
+    answer = await browser.get("/signin")
+    assert answer.status_code == 200
+    assert "?token=" in answer.text
+
+
+async def test_a_page_that_is_not_there_says_so_in_words(
+    browser: httpx.AsyncClient,
+) -> None:
+    answer = await browser.get("/nowhere")
+    assert answer.status_code == 404
+    assert "Esta página no existe." in answer.text
+
+
+async def test_spanish_is_what_readers_of_no_known_language_get(
+    browser: httpx.AsyncClient,
+) -> None:
+    answer = await browser.get("/", headers={"Accept-Language": "de"})
+    assert '<html lang="es"' in answer.text
+    assert "PARAR TODO" in answer.text
+
+
+async def test_the_browsers_language_is_used(browser: httpx.AsyncClient) -> None:
+    answer = await browser.get("/", headers={"Accept-Language": "en-GB,es;q=0.5"})
+    assert '<html lang="en"' in answer.text
+    assert "STOP ALL" in answer.text
+
+
+async def test_the_remembered_language_wins_over_the_browsers(
+    browser: httpx.AsyncClient,
+) -> None:
+    headers = {"Accept-Language": "en", "Cookie": "iveg_language=es"}
+    answer = await browser.get("/", headers=headers)
+    assert '<html lang="es"' in answer.text
+
+
+async def test_the_remembered_look_comes_with_the_page(
+    browser: httpx.AsyncClient,
+) -> None:
+    headers = {"Cookie": "iveg_theme=sunlight; iveg_palette=paper"}
+    answer = await browser.get("/", headers=headers)
+    assert 'data-theme="sunlight" data-palette="paper"' in answer.text
+
+
+async def test_a_made_up_look_is_ignored(browser: httpx.AsyncClient) -> None:
+    headers = {"Cookie": 'iveg_theme="><script>; iveg_language=xx'}
+    answer = await browser.get("/", headers=headers)
+    assert '<html lang="es" data-theme="auto" data-palette="iveg">' in answer.text
+
+
+@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about", "/signin"])
+async def test_no_page_holds_inline_script_or_style(
+    browser: httpx.AsyncClient, path: str
+) -> None:
+    html = (await browser.get(path)).text
+    assert re.findall(r"<script(?![^>]* src=)|<style|\sstyle=|\son[a-z]+=", html) == []
+    assert "http://" not in html.replace("http://127.0.0.1:8000/?token=", "")
+
+
+async def test_names_from_outside_are_text_and_not_markup(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/")).text
+    assert "Ana &lt;i&gt;" in html
+    assert "Almería &lt;b&gt;1&lt;/b&gt;" in html
+    assert "<b>1</b>" not in html
+
+
+async def test_only_the_history_page_may_style_as_plotly_needs(
+    browser: httpx.AsyncClient,
+) -> None:
+    header = "content-security-policy"
+    assert (await browser.get("/")).headers[header] == CONTENT_SECURITY_POLICY
+    assert "'unsafe-inline'" in (await browser.get("/history")).headers[header]
+
+
+async def test_about_says_what_stop_is_not(browser: httpx.AsyncClient) -> None:
+    html = (await browser.get("/about", headers={"Accept-Language": "en"})).text
+    assert "It is not an emergency stop and not certified." in html
+    assert "not an ISO 13850 device" in html
+    assert "80 %" in html
+
+
+async def test_the_api_is_drawn_from_its_own_document(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/docs")).text
+    assert 'href="#post-stop"' in html
+    assert 'id="post-stop"' in html
+    assert "Repeated presses join." in html
+    assert 'id="shape-Pressed"' in html
+
+
+async def test_release_and_resume_stand_apart_from_stop(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/")).text
+    strip = html[html.index('id="stops"') : html.index("</header>")]
+    assert "data-release" not in strip
+    assert re.findall(r'data-release="(\w+)"', html) == ["AGI", "AGII"]
+    assert re.findall(r'data-resume="(\w+)"', html) == ["AGI", "AGII"]
