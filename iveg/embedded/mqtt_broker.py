@@ -18,6 +18,7 @@ for _name in ("amqtt", "transitions"):
     # Both tell every packet at INFO and DEBUG, which costs more than the packet.
     logging.getLogger(_name).setLevel(logging.WARNING)
 
+_PATIENCE_S = 1.0
 _PLUGINS = {
     "amqtt.plugins.authentication.AnonymousAuthPlugin": {"allow_anonymous": True}
 }
@@ -41,7 +42,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator[int]:
     host = require_loopback("IVEG_MQTT_URL", host)
     _require_free(host, port)
     shown = f"[{host}]" if ":" in host else host
-    broker = Broker(
+    broker = _Broker(
         {
             "listeners": {"default": {"type": "tcp", "bind": f"{shown}:{port}"}},
             "plugins": _PLUGINS,
@@ -67,6 +68,48 @@ def _port_of(broker: Broker) -> int:
     return int(instance.sockets[0].getsockname()[1])
 
 
-async def _close(broker: Broker) -> None:
+async def _close(broker: "_Broker") -> None:
     # A cancelled caller must not leave the broker half closed.
-    await asyncio.shield(broker.shutdown())
+    await asyncio.shield(broker.close())
+
+
+class _Broker(Broker):  # type: ignore[misc]
+    """amqtt's broker, with the ends of its connections kept in hand.
+
+    amqtt drops a connection whose client went away rudely without closing it; the
+    socket would stay until the garbage collector complains.
+    """
+
+    def __init__(self, config: dict[str, object]) -> None:
+        super().__init__(config)
+        self._open: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+
+    async def stream_connected(
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        listener_name: str,
+    ) -> None:
+        """Serve one client to its end."""
+        task = asyncio.current_task()
+        assert task is not None  # noqa: S101 - asyncio starts servers' callbacks so
+        self._open[task] = writer
+        try:
+            await super().stream_connected(reader, writer, listener_name)
+        finally:
+            writer.close()
+            del self._open[task]
+
+    async def close(self) -> None:
+        """Stop serving; nothing of ours is left running."""
+        # A client that never said CONNECT would keep a newer asyncio waiting for it.
+        patience = asyncio.get_running_loop().call_later(_PATIENCE_S, self._hang_up)
+        await self.shutdown()
+        patience.cancel()
+        self._hang_up()
+        await asyncio.gather(*self._open, return_exceptions=True)
+
+    def _hang_up(self) -> None:
+        for task, writer in self._open.items():
+            writer.transport.abort()
+            task.cancel()

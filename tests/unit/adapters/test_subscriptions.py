@@ -1,0 +1,138 @@
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.subscriptions import (
+    PREFIX,
+    TOKEN_HEADER,
+    WANTED,
+    ensure_subscriptions,
+)
+from iveg.embedded.server import embedded_fiware
+
+URL = "http://127.0.0.1:8000/ngsi/notifications"
+TOKEN = "ab" * 16
+
+
+class FakeStore:
+    """Subscriptions as Orion would keep them, in a list."""
+
+    def __init__(self) -> None:
+        self.kept: dict[str, dict[str, Any]] = {}
+        self.calls = 0
+
+    async def read_subscriptions(self) -> list[dict[str, Any]]:
+        return [{"id": key, **one} for key, one in self.kept.items()]
+
+    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+        self.calls += 1
+        subscription_id = f"{self.calls:024x}"
+        self.kept[subscription_id] = {"status": "active", **document}
+        return subscription_id
+
+    async def update_subscription(
+        self, subscription_id: str, changes: Mapping[str, Any]
+    ) -> None:
+        self.calls += 1
+        self.kept[subscription_id].update(changes)
+
+    async def delete_subscription(self, subscription_id: str) -> None:
+        self.calls += 1
+        del self.kept[subscription_id]
+
+    def named(self, name: str) -> dict[str, Any]:
+        return next(
+            one for one in self.kept.values() if one["description"] == PREFIX + name
+        )
+
+
+async def test_each_wanted_subscription_is_made_once() -> None:
+    store = FakeStore()
+    first = await ensure_subscriptions(store, URL, TOKEN)
+    assert len(store.kept) == len(WANTED)
+    assert first.ids == frozenset(store.kept)
+
+
+async def test_twenty_restarts_make_no_second_one_and_change_nothing() -> None:
+    async with (
+        embedded_fiware() as up,
+        OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion,
+    ):
+        first = await ensure_subscriptions(orion, URL, TOKEN)
+        for _ in range(20):
+            again = await ensure_subscriptions(orion, URL, TOKEN)
+            assert again.ids == first.ids
+            assert again.mended == ()
+        assert len(await orion.read_subscriptions()) == len(WANTED)
+
+
+async def test_what_orion_is_told_is_what_it_needs() -> None:
+    store = FakeStore()
+    await ensure_subscriptions(store, URL, TOKEN)
+    lidar = store.named("lidar")
+    assert lidar["subject"] == {
+        "entities": [{"idPattern": ".*", "type": "Robot"}],
+        "condition": {"attrs": ["lidar_points", "lidar_header"]},
+    }
+    assert lidar["notification"] == {
+        "httpCustom": {"url": URL, "headers": {TOKEN_HEADER: TOKEN}, "timeout": 2000},
+        "attrs": ["lidar_points", "lidar_header"],
+        "attrsFormat": "normalized",
+    }
+    assert store.named("single uplink")["subject"]["condition"] == {
+        "attrs": ["timestamp", "pose", "class"]
+    }
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"status": "inactive"},
+        {"subject": {"entities": [{"id": "AGI"}], "condition": {"attrs": []}}},
+        {"notification": {"http": {"url": URL}, "attrs": []}},
+        {"throttling": 5},
+        {"expires": "2027-01-01T00:00:00.000Z"},
+    ],
+)
+async def test_a_damaged_subscription_is_made_right(damage: dict[str, Any]) -> None:
+    store = FakeStore()
+    await ensure_subscriptions(store, URL, TOKEN)
+    wanted = dict(store.named("odometry"))
+    store.named("odometry").update(damage)
+    mended = await ensure_subscriptions(store, URL, TOKEN)
+    assert len(mended.mended) == 1
+    assert store.named("odometry") == wanted
+    assert (await ensure_subscriptions(store, URL, TOKEN)).mended == ()
+
+
+@pytest.mark.parametrize(("url", "token"), [(URL + "2", TOKEN), (URL, "cd" * 16)])
+async def test_a_new_address_or_secret_reaches_every_subscription(
+    url: str, token: str
+) -> None:
+    store = FakeStore()
+    first = await ensure_subscriptions(store, URL, TOKEN)
+    second = await ensure_subscriptions(store, url, token)
+    assert second.ids == first.ids
+    assert len(second.mended) == len(WANTED)
+
+
+async def test_a_deleted_subscription_is_made_again() -> None:
+    store = FakeStore()
+    first = await ensure_subscriptions(store, URL, TOKEN)
+    del store.kept[next(iter(store.kept))]
+    second = await ensure_subscriptions(store, URL, TOKEN)
+    assert len(second.ids & first.ids) == len(WANTED) - 1
+    assert len(second.ids) == len(WANTED)
+
+
+async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
+    store = FakeStore()
+    await ensure_subscriptions(store, URL, TOKEN)
+    await store.create_subscription(store.named("odometry"))
+    await store.create_subscription({"description": PREFIX + "of long ago"})
+    theirs = await store.create_subscription({"description": "somebody else's"})
+    ensured = await ensure_subscriptions(store, URL, TOKEN)
+    assert len(ensured.mended) == 2
+    assert frozenset(store.kept) == ensured.ids | {theirs}

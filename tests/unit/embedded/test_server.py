@@ -1,0 +1,117 @@
+import asyncio
+import contextlib
+import gc
+import logging
+from contextlib import AsyncExitStack
+
+import aiomqtt
+import httpx
+import pytest
+
+from iveg.domain.errors import SettingsError
+from iveg.embedded.server import embedded_fiware, serve_fiware
+from tests.processes import free_ports
+
+LOOPBACK = ("127.0.0.1", 0)
+ELSEWHERE = ("0.0.0.0", 0)  # noqa: S104 - refused, which is the point
+HEADERS = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
+
+
+@pytest.mark.parametrize(
+    ("place", "setting"),
+    [(0, "IVEG_MQTT_URL"), (1, "IVEG_ORION_URL"), (2, "IVEG_IOTA_URL")],
+)
+async def test_an_address_that_others_can_reach_is_refused(
+    place: int, setting: str
+) -> None:
+    addresses = [LOOPBACK] * 3
+    addresses[place] = ELSEWHERE
+    with pytest.raises(SettingsError, match=f"{setting}='0.0.0.0'"):
+        async with embedded_fiware(*addresses):
+            pass
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.2"])
+async def test_every_name_of_loopback_will_do(host: str) -> None:
+    async with embedded_fiware((host, 0), (host, 0), (host, 0)) as up:
+        assert up.orion_port > 0
+
+
+@pytest.mark.parametrize("taken", [0, 1, 2])
+async def test_a_taken_port_is_an_os_error_and_leaves_nothing(
+    taken: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    server = await asyncio.start_server(lambda *_: None, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    addresses = [LOOPBACK] * 3
+    addresses[taken] = ("127.0.0.1", port)
+    with pytest.raises(OSError, match=r"[Aa]ddress"):
+        async with embedded_fiware(*addresses):
+            pass
+    server.close()
+    assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
+
+
+async def test_serving_says_when_it_is_ready_and_ends_when_cancelled(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    ready = asyncio.Event()
+    mqtt, orion, iota = (("127.0.0.1", port) for port in free_ports(3))
+    serving = asyncio.create_task(
+        serve_fiware(mqtt, orion, iota, notify_ready=ready.set)
+    )
+    async with asyncio.timeout(10):
+        await ready.wait()
+    async with httpx.AsyncClient() as http:
+        told = await http.get(f"http://127.0.0.1:{orion[1]}/version")
+    serving.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await serving
+    gc.collect()
+    assert told.status_code == 200
+    assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
+
+
+async def test_closing_under_clients_leaves_no_task_and_no_warning(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with AsyncExitStack() as clients:
+        async with embedded_fiware() as up:
+            http = await clients.enter_async_context(httpx.AsyncClient(headers=HEADERS))
+            mqtt = aiomqtt.Client("127.0.0.1", up.mqtt_port)
+            await mqtt.__aenter__()
+            await mqtt.subscribe("#")
+            for number in range(50):
+                await mqtt.publish("/iveg/AGI/attrs", b'{"n":%d}' % number)
+            await http.get(up.orion_url + "/v2/entities")
+            _, half = await asyncio.open_connection("127.0.0.1", up.orion_port)
+            half.write(b"POST /v2/entities HTTP/1.1\r\nContent-Le")
+            await half.drain()
+            _, rude = await asyncio.open_connection("127.0.0.1", up.orion_port)
+            rude.write(b"\x00\x01nonsense\r\n\r\n")
+            await rude.drain()
+        with contextlib.suppress(aiomqtt.MqttError):
+            await mqtt.__aexit__(None, None, None)
+        half.close()
+        rude.close()
+    for writer in (half, rude):
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+    gc.collect()
+    left = [task.get_name() for task in asyncio.all_tasks()]
+    assert len(left) == 1, left
+    assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
+
+
+async def test_a_client_that_vanishes_hurts_nobody() -> None:
+    async with embedded_fiware() as up:
+        _, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
+        writer.write(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x00\x00\x04gone")
+        await writer.drain()
+        writer.transport.abort()
+        async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as mqtt:
+            await mqtt.subscribe("x", qos=1)
+            await mqtt.publish("x", b"still here", qos=1)
+            async with asyncio.timeout(5):
+                message = await anext(aiter(mqtt.messages))
+    assert message.payload == b"still here"
