@@ -76,9 +76,7 @@ class Sample:
 def main() -> None:
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 10.0
     with tempfile.TemporaryDirectory() as directory, site(Path(directory)) as place:
-        place.start("fiware")
-        for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
-            place.wait_for_port(setting)
+        place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
         heard, samples = asyncio.run(_run(place, minutes))

@@ -2,7 +2,11 @@
 
 import os
 
+import pytest
 from hypothesis import settings
+
+# A helper's failed assertion shows its values as a test's own does.
+pytest.register_assert_rewrite("tests.processes")
 
 # A busy machine may be slow without being wrong; the suite has its own time limits.
 settings.register_profile("iveg", deadline=None, max_examples=100)

@@ -19,6 +19,7 @@ import httpx
 
 ROOT = Path(__file__).resolve().parents[1]
 _DIRTY = re.compile(r"^.*(?:\b(?:WARNING|ERROR|CRITICAL)\b|Traceback).*$", re.MULTILINE)
+_READY = re.compile(r"^ready$", re.MULTILINE)
 _STOP_WITHIN_S = 15.0
 
 T = TypeVar("T")
@@ -69,6 +70,15 @@ class Program:
     def text(self) -> str:
         """All it said so far."""
         return self.log.read_text(errors="replace")
+
+    def wait_until_ready(self, deadline_s: float = 30.0) -> None:
+        """Until it says so; a program that has ended never will."""
+
+        def is_ready() -> bool:
+            assert self.process.poll() is None, self.text()
+            return _READY.search(self.text()) is not None
+
+        until(is_ready, deadline_s, f"{self.words[0]} is ready")
 
     def complaints(self) -> list[str]:
         """Lines that a clean run does not have."""
@@ -170,12 +180,6 @@ class Site:
         with self.api() as api:
             until(lambda: _live(api) >= robots, deadline_s, f"{robots} robots LIVE")
 
-    def wait_for_port(self, setting: str, deadline_s: float = 20.0) -> None:
-        """Until somebody listens where this setting points."""
-        address = httpx.URL(self.settings[setting])
-        place = (address.host, address.port or 0)
-        until(lambda: _listens(place), deadline_s, f"a listener at {setting}")
-
     def stop_all(self) -> None:
         """Ctrl-C for what still runs, last started first; a kill where that hangs."""
         for program in reversed(self.programs):
@@ -245,9 +249,3 @@ def _live(api: httpx.Client) -> int:
     if answer.status_code != 200:
         return 0
     return sum(robot["link"] == "LIVE" for robot in answer.json()["items"])
-
-
-def _listens(place: tuple[str, int]) -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(1.0)
-        return probe.connect_ex(place) == 0

@@ -38,9 +38,7 @@ def browser() -> Iterator[Browser]:
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving; shared by the tests of a module."""
     with site(tmp_path_factory.mktemp("iveg")) as place:
-        place.start("fiware")
-        for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
-            place.wait_for_port(setting)
+        place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
         place.start("emulator")

@@ -18,9 +18,7 @@ def place(tmp_path: Path) -> Iterator[Site]:
 @pytest.fixture
 def fiware(place: Site) -> Site:
     """The embedded FIWARE runs."""
-    place.start("fiware")
-    for setting in ("IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL"):
-        place.wait_for_port(setting)
+    place.start("fiware").wait_until_ready()
     return place
 
 
