@@ -1,0 +1,404 @@
+"""The STOP machine against a real safety machine over channels that lose and mix.
+
+A person presses, releases and resumes; robot and iVeg restart; each of the four roads
+is open, slow or cut, and copies and mixes what waits on it.  The invariants bear the
+names of safety.md §2.6.
+"""
+
+import itertools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from random import Random
+from typing import Literal
+
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
+
+from iveg.domain.errors import CommandRefusedError
+from iveg.domain.feedback import Feedback
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import (
+    CommandAnswer,
+    Instant,
+    Origin,
+    Road,
+    SafetyReport,
+)
+from iveg.domain.order import Order
+from iveg.domain.stop import (
+    Changed,
+    Effect,
+    SendOnce,
+    SendStop,
+    SetLevel,
+    StopMachine,
+)
+from iveg.ngsi import codec
+from iveg.robot import effects as robot
+from iveg.robot.holds import HoldSet
+from iveg.robot.safety import SafetyMachine
+from tests.builders import START
+
+TICK_S = 0.05
+HERE = Pose2D(0.0, 0.0, 0.0)
+REST = Twist2D(0.0, 0.0)
+
+Weather = Literal["open", "slow", "cut"]
+Sort = Literal["direct", "fiware", "mqtt", "orion"]
+DOWN: tuple[Sort, ...] = ("direct", "fiware")
+UP: tuple[Sort, ...] = ("mqtt", "orion")
+SORTS = DOWN + UP
+sorts = st.sampled_from(SORTS)
+
+
+@dataclass
+class Channel:
+    """One road in one direction: what waits on it, and the weather."""
+
+    weather: Weather = "open"
+    waiting: list[object] = field(default_factory=list)
+
+    def put(self, message: object) -> None:
+        self.waiting += [message] * (self.weather != "cut")
+
+    def arrived(self) -> Iterable[object]:
+        gone = self.waiting * (self.weather == "open")
+        self.waiting = self.waiting * (self.weather == "slow")
+        return gone
+
+
+class RobotRig:
+    """A real safety machine, a drive that brakes, and its disk."""
+
+    def __init__(self) -> None:
+        self.disk = HoldSet()
+        self.boots = itertools.count(1)
+        self.names = itertools.count(1)
+        self.seq = itertools.count(1)
+        self.wished = Twist2D(0.8, 0.0)
+        self.speed = 0.0
+        self.target = 0.0
+        self.feedback_seq = 0
+
+    def boot(self, now: float) -> None:
+        self.name = f"b{next(self.boots)}"
+        self.machine = SafetyMachine(
+            "AGI",
+            self.name,
+            now,
+            stored=self.disk,
+            fresh=lambda: f"n{next(self.names)}",
+        )
+
+    def stamp(self) -> Origin:
+        return Origin(self.name, next(self.seq))
+
+
+class StopOverBadRoads(RuleBasedStateMachine):
+    """Both machines, four roads, one person."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = 0.0
+        self.roads = {name: Channel() for name in SORTS}
+        self.rig = RobotRig()
+        self.ids = itertools.count(1)
+        self.level: tuple[str, ...] = ()
+        self.journal = False
+        self.asking = False
+        self.asked = self.sent_once = 0
+        self.ended: set[str] = set()
+        self.reported_released: set[str] = set()
+        self.episode: str | None = None
+        self.restart()
+
+    # --- both sides ---------------------------------------------------------------
+
+    def at(self) -> Instant:
+        return START.later(self.now)
+
+    def new_id(self) -> str:
+        return f"01ID{next(self.ids):06d}"
+
+    def restart(self) -> None:
+        """A new iVeg: nothing is known but the journal."""
+        self.iveg = StopMachine("AGI")
+        self.order, self.asked, self.sent_once = Order(), 0, 0
+        self.samples: list[tuple[float, SafetyReport]] = []
+        self.moved_at = self.last_send = float("-inf")
+        self.releasing_since: float | None = None
+        self.episode = None
+
+    def perform(self, effects: list[Effect]) -> None:
+        for effect in effects:
+            if isinstance(effect, SendStop):
+                assert effect.hold_id not in self.ended, "an old id was sent again"
+                assert effect.hold_id == self.iveg.hold_id
+                self.last_send = max(self.last_send, self.now)
+                payload = codec.write_command(codec.write_stop(effect.hold_id, "x"))
+                self.roads[effect.road].put(payload)
+                self.perform(
+                    self.iveg.sent(effect.road, effect.hold_id, self.at(), ok=True)
+                )
+            elif isinstance(effect, SendOnce):
+                self._send_once(effect)
+            elif isinstance(effect, SetLevel):
+                self.level = effect.ids
+            else:
+                self._changed(effect)
+
+    def _send_once(self, effect: SendOnce) -> None:
+        assert self.asking, "I2, I6: nobody asked for this"
+        self.sent_once += 1
+        if effect.kind == "release":
+            value = codec.write_release(effect.ids, effect.challenge)
+        else:
+            value = codec.write_resume(effect.challenge)
+        self.roads["fiware"].put(codec.write_command(value))
+
+    def _changed(self, changed: Changed) -> None:
+        self.releasing_since = self.now if changed.state == "RELEASING" else None
+        if changed.state == "STANDING" and changed.key == "standing":
+            self._i3_standing_is_measured()
+        if changed.key == "adopted" or changed.state == "REQUESTED":
+            self._new_episode(changed)
+        if changed.key in ("ready", "running"):
+            self._i1_ended_by_the_robots_report()
+            self.journal = False
+
+    def _new_episode(self, changed: Changed) -> None:
+        new = self.iveg.hold_id
+        assert new is not None
+        self.journal = True
+        if new == self.episode:
+            return
+        assert changed.key == "adopted" or new not in self.ended
+        if self.episode is not None:
+            self.ended.add(self.episode)
+        self.episode = new
+
+    def _i1_ended_by_the_robots_report(self) -> None:
+        if self.episode is not None:
+            assert self.episode in self.reported_released, "I1"
+            self.ended.add(self.episode)
+            self.episode = None
+
+    def _i3_standing_is_measured(self) -> None:
+        run: list[float] = []
+        for when, report in reversed(self.samples):
+            held = {hold.id for hold in report.holds}
+            rests = max(abs(report.linear), abs(report.angular)) < 0.02
+            if self.iveg.hold_id not in held or not rests:
+                break
+            if run and run[-1] - when > 0.5 + 1e-9:
+                break
+            run.append(when)
+        assert len(run) >= 5, "I3: five samples"
+        assert run[0] - run[-1] >= 1.0 - 1e-9, "I3: over a second"
+        assert self.now - self.moved_at >= 0.5 - 1e-9, "I3: odometry agrees"
+
+    def carry(self, effects: tuple[robot.Effect, ...]) -> None:
+        """Do what the robot's machine wants; its words go out on both roads."""
+        for effect in effects:
+            if isinstance(effect, robot.Drive):
+                self.rig.target = effect.twist.linear_x
+            elif isinstance(effect, robot.Persist):
+                self.rig.disk = effect.holds
+            else:
+                self._say(effect)
+
+    def _say(self, effect: robot.Answer | robot.Report) -> None:
+        origin = self.rig.stamp()
+        if isinstance(effect, robot.Answer):
+            payload = codec.write_answer(replace(effect.answer, origin=origin))
+            reading = codec.read_answer("AGI", payload)
+        else:
+            payload = codec.write_safety(replace(effect.report, origin=origin))
+            reading = codec.read_measure("AGI_safety", payload)
+            self.rig.machine.reported(origin.seq or 0, self.now)
+        for road in UP:
+            for observation in reading.observations:
+                self.roads[road].put(observation)
+
+    # --- time ---------------------------------------------------------------------
+
+    def tick(self) -> None:
+        self.now = round(self.now + TICK_S, 6)
+        for down in DOWN:
+            for payload in self.roads[down].arrived():
+                assert isinstance(payload, bytes)
+                self.carry(self.rig.machine.command(payload, self.now))
+        self._drive()
+        for up in UP:
+            for word in self.roads[up].arrived():
+                self.hear(word, "mqtt" if up == "mqtt" else "orion")
+        self.perform(self.iveg.tick(self.at(), self.new_id()))
+
+    def _drive(self) -> None:
+        rig = self.rig
+        step = 1.0 * TICK_S
+        rig.speed += max(-step, min(step, rig.target - rig.speed))
+        twist = Twist2D(rig.speed, 0.0)
+        self.carry(rig.machine.odometry(HERE, twist, self.now))
+        if self.roads["mqtt"].weather == "open":
+            rig.feedback_seq += 1
+            origin = Origin("cloud", rig.feedback_seq)
+            seen = {"AGI": self.order.seq} if self.order.boot == rig.name else {}
+            feedback = Feedback("AGI", origin, seen=seen)
+            self.carry(rig.machine.feedback("AGI", feedback, self.now))
+            self._odometry(rig.speed)
+        neutral = rig.machine.may_drive
+        self.carry(rig.machine.wish(rig.wished if neutral else REST, self.now))
+
+    def _odometry(self, speed: float) -> None:
+        self.moved_at = self.now if speed >= 0.02 else self.moved_at
+        self.perform(self.iveg.odometry(speed, 0.0, self.at(), self.new_id()))
+
+    def hear(self, word: object, road: Road) -> None:
+        if isinstance(word, CommandAnswer):
+            self.perform(self.iveg.answered(word, self.at(), road))
+        if isinstance(word, SafetyReport) and self.order.judge(word.origin) == "new":
+            self.samples.append((self.now, word))
+            self.reported_released |= set(word.released)
+            self.perform(self.iveg.reported(word, self.at(), road, self.new_id()))
+
+    def run_for(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.tick()
+            self.i4_a_stop_that_does_not_stand_is_sent_all_the_time()
+            self.i7_a_release_is_confirmed_or_a_stop()
+
+    # --- what happens -------------------------------------------------------------
+
+    @initialize()
+    def begin(self) -> None:
+        self.rig.boot(self.now)
+        self.carry(self.rig.machine.release_locally(self.now))
+        self.run_for(3.0)
+
+    @rule(seconds=st.sampled_from([0.05, 0.2, 0.6, 1.2, 2.5]))
+    def time_passes(self, seconds: float) -> None:
+        self.run_for(seconds)
+
+    @rule(road=sorts, weather=st.sampled_from(["open", "open", "slow", "cut"]))
+    def the_weather_changes(self, road: Sort, weather: Weather) -> None:
+        self.roads[road].weather = weather
+
+    @rule(road=sorts, rnd=st.randoms(use_true_random=False))
+    def a_road_mixes_copies_and_loses(self, road: Sort, rnd: Random) -> None:
+        waiting = self.roads[road].waiting
+        picked = [one for one in waiting for _ in range(rnd.randint(0, 2))]
+        rnd.shuffle(picked)
+        self.roads[road].waiting = picked[:50]
+
+    @rule(by=st.sampled_from(["ana", "ben"]))
+    def somebody_presses(self, by: str) -> None:
+        self.perform(self.iveg.press(by, self.at(), self.new_id()))
+        assert self.iveg.wants_stop
+
+    @rule()
+    def somebody_releases(self) -> None:
+        seen = [hold.id for hold in self.iveg.holds if hold.ack == "remote"]
+        self._ask(lambda: self.iveg.release("ana", seen, self.at(), self.new_id()))
+
+    @rule()
+    def somebody_resumes(self) -> None:
+        self._ask(lambda: self.iveg.resume("ana", self.at(), self.new_id()))
+
+    @rule(
+        fiware=st.sampled_from(["open", "slow", "cut"]),
+        up=st.sampled_from(["open", "cut"]),
+        wait=st.sampled_from([0.3, 2.8]),
+    )
+    def a_standing_robot_is_released_in_bad_weather(
+        self, fiware: Weather, up: Weather, wait: float
+    ) -> None:
+        for road in self.roads.values():
+            road.weather = "open"
+        self.somebody_presses("ana")
+        self.run_for(3.5)
+        self.roads["fiware"].weather = fiware
+        self.somebody_releases()
+        for name in UP:
+            self.roads[name].weather = up
+        self.run_for(wait)
+
+    def _ask(self, asking: Callable[[], list[Effect]]) -> None:
+        self.asking = True
+        stood = self.samples and _rests(self.samples[-1][1])
+        fresh = self.samples and self.now - self.samples[-1][0] <= 1.0
+        try:
+            effects = asking()
+        except CommandRefusedError:
+            effects = []
+        else:
+            assert stood, "I2: standing"
+            assert fresh, "I2: fresh"
+            self.asked += 1
+        self.perform(effects)
+        self.asking = False
+
+    @rule()
+    def the_robot_reboots(self) -> None:
+        self.rig.boot(self.now)
+
+    @rule()
+    def the_crew_frees_the_robot(self) -> None:
+        self.carry(self.rig.machine.release_locally(self.now))
+
+    @rule()
+    def the_red_button_is_pressed(self) -> None:
+        self.carry(self.rig.machine.local_hold("hw", self.now))
+
+    @rule()
+    def iveg_restarts(self) -> None:
+        wanted, before = self.journal, self.episode
+        self.restart()
+        self.episode = before if wanted else None
+        if wanted:
+            again = self.iveg.press("ana", self.at(), self.new_id(), key="reasserted")
+            self.perform(again)
+
+    @rule()
+    def l1_when_messages_get_through_a_stopped_robot_is_seen_to_stand(self) -> None:
+        for road in self.roads.values():
+            road.weather = "open"
+        self.run_for(12.0)
+        assert self.iveg.state in ("RUNNING", "READY", "STANDING"), "L1"
+        held = self.rig.machine.holds.find(self.iveg.hold_id or "")
+        assert not self.iveg.wants_stop or (held and self.rig.speed < 0.02)
+
+    # --- what is always true ------------------------------------------------------
+
+    @invariant()
+    def i1_an_accepted_stop_stays_wanted_until_its_release_was_reported(self) -> None:
+        if self.episode is not None:
+            assert self.iveg.wants_stop
+
+    @invariant()
+    def i4_a_stop_that_does_not_stand_is_sent_all_the_time(self) -> None:
+        if self.iveg.wants_stop and self.iveg.state not in ("STANDING", "RELEASING"):
+            assert self.now - self.last_send <= 1.1
+
+    @invariant()
+    def i6_there_is_one_message_for_each_thing_a_person_asked(self) -> None:
+        assert self.sent_once == self.asked
+
+    @invariant()
+    def i7_a_release_is_confirmed_or_a_stop(self) -> None:
+        if self.releasing_since is not None:
+            assert self.now - self.releasing_since <= 2.5
+
+    @invariant()
+    def the_level_says_what_is_wanted(self) -> None:
+        if self.iveg.wants_stop and self.iveg.state != "RELEASING":
+            assert self.level == (self.iveg.hold_id,)
+
+
+def _rests(report: SafetyReport) -> bool:
+    return max(abs(report.linear), abs(report.angular)) < 0.02
+
+
+StopOverBadRoads.TestCase.settings = settings(max_examples=40, stateful_step_count=40)
+TestStopOverBadRoads = StopOverBadRoads.TestCase
