@@ -331,14 +331,25 @@ def _around_the_field(robots: Sequence[str]) -> tuple[tuple[Stop, ...], ...]:
 
 
 def _lanes_for(robots: Sequence[str], house: Greenhouse) -> list[Lane]:
-    """A lane each, the longest and widest to the robot that needs most room to turn."""
+    """A lane each: the one its start lies in, else the longest that is left.
+
+    Who needs most room to turn chooses first.
+    """
     lanes = sorted(house.lanes, key=lambda lane: -_long(lane.area))
     if len(robots) > len(lanes):
         reason = f"has {len(lanes)} lanes, too few for {len(robots)} robots."
         raise DataFileError(f"greenhouse {house.name!r}", "", reason)
+    chosen: dict[str, Lane] = {}
+    for robot_id, start in zip(robots, house.starts, strict=False):
+        here = [lane for lane in lanes if lane.area.contains(start.x, start.y)]
+        if here:
+            chosen[robot_id] = here[0]
+            lanes.remove(here[0])
     needy = sorted(robots, key=lambda robot_id: -profile_of(robot_id).turning_radius)
-    place_of = {robot_id: place for place, robot_id in enumerate(needy)}
-    return [lanes[place_of[robot_id]] for robot_id in robots]
+    for robot_id in needy:
+        if robot_id not in chosen:
+            chosen[robot_id] = lanes.pop(0)
+    return [chosen[robot_id] for robot_id in robots]
 
 
 def _long(area: Rectangle) -> float:

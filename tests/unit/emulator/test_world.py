@@ -220,6 +220,18 @@ def test_a_house_without_room_for_the_fleet_is_refused() -> None:
         world_of("many", crowd, load_greenhouse("agroconnect"))
 
 
+def test_a_start_of_the_house_says_in_which_lane_a_robot_drives() -> None:
+    house = load_greenhouse("agroconnect")
+    world = world_of("demo", FLEET, house)
+    lanes = set()
+
+    for _ in run(world, 30.0):
+        agi, agii = (world.rigs[robot_id].vehicle.pose for robot_id in FLEET)
+        lanes.add((house.lane_at(agi.x, agi.y), house.lane_at(agii.x, agii.y)))
+
+    assert lanes == {("Pasillo 6 sur", "Pasillo central")}
+
+
 def test_the_air_is_warm_at_two_in_the_afternoon_and_damp_at_night() -> None:
     day, night = climate_at(14 * 3600.0), climate_at(2 * 3600.0)
 
