@@ -92,12 +92,12 @@ class _Page:
         tables = list(re.finditer(rf"(?m)^\s*\[\[\s*{name}\s*\]\]", self.text))
         if index < len(tables):
             return self._line(tables[index].start())
-        start = re.search(rf"(?m)^\s*\[?\s*{name}\b", self.text)
+        start = re.search(rf"(?m)^\s*\[?\s*{name}\b(?:\s*=\s*\[)?", self.text)
         if start is None:
             return 1
         inside = self.text[start.end() :].partition("]")[0]
         items = list(re.finditer(r"\{", inside))
-        in_list = name in _LISTS and index < len(items)
+        in_list = start[0].endswith("[") and index < len(items)
         offset = start.end() + items[index].start() if in_list else start.start()
         return self._line(offset)
 

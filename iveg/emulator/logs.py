@@ -76,6 +76,8 @@ class LogReader:
                 while line := lines.readline(_LONGEST_LINE):
                     number += 1
                     entry = self._entry(number, line)
+                    while len(line) == _LONGEST_LINE and not line.endswith(b"\n"):
+                        line = lines.readline(_LONGEST_LINE)
                     if entry is not None:
                         yield entry
         except (OSError, EOFError, zlib.error) as error:

@@ -147,3 +147,33 @@ def test_a_list_of_something_else_is_refused() -> None:
     said = complaint(SMALL.replace("rows = [", "posts = [3]\nrows = ["))
 
     assert said == "shed.toml, line 4, posts: must be a list of tables."
+
+
+@pytest.mark.parametrize("label", ['""', '"' + "P" * 65 + '"', "7"])
+def test_a_label_that_nobody_can_read_is_refused(label: str) -> None:
+    said = complaint(SMALL.replace('"Pasillo 1"', label))
+
+    assert said.endswith("lanes.label: must be a text of 1 to 64 characters.")
+
+
+def test_bounds_that_are_no_table_are_refused() -> None:
+    said = complaint('name = "a"\nbounds = 3')
+
+    assert said.startswith("shed.toml, line 2, bounds: must be a table")
+
+
+def test_rows_that_are_no_list_are_refused() -> None:
+    said = complaint(SMALL.replace("rows = [", "posts = 3\nrows = ["))
+
+    assert said == "shed.toml, line 4, posts: must be a list of tables."
+
+
+def test_posts_and_starts_of_a_users_house_are_read() -> None:
+    more = (
+        "\n[[posts]]\nx = 1\ny = 2.5\nradius = 0.1\n[[starts]]\nx = 1\ny = 2\nyaw = 0\n"
+    )
+
+    house = read_greenhouse(SMALL + more, "shed.toml")
+
+    assert (house.posts[0].x, house.posts[0].radius) == (1.0, 0.1)
+    assert house.starts[0].y == 2.0

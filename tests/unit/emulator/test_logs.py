@@ -108,6 +108,18 @@ def test_a_bad_line_is_skipped_and_reported_once_with_file_and_number(
     assert why in record.getMessage()
 
 
+def test_an_endless_line_is_one_bad_line(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    endless = '{"t":1,"kind":"scan","ranges":[' + "1," * 1_500_000
+
+    entries = list(LogReader(written(tmp_path, ODOM, endless, ODOM)).entries())
+
+    assert len(entries) == 2
+    (record,) = caplog.records
+    assert "line 2 skipped: too_long" in record.getMessage()
+
+
 def test_empty_lines_are_nothing_to_report(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
