@@ -88,7 +88,7 @@ class _Page:
 
     def line_of(self, path: str, index: int) -> int:
         """The line where item ``index`` of a list, or a key of the root, stands."""
-        name = path.partition(".")[0]
+        name = re.escape(path.partition(".")[0])
         tables = list(re.finditer(rf"(?m)^\s*\[\[\s*{name}\s*\]\]", self.text))
         if index < len(tables):
             return self._line(tables[index].start())

@@ -20,7 +20,10 @@ from iveg.domain.observations import (
     Navigation,
     Odometry,
 )
-from iveg.emulator.fleet import run_emulator
+from iveg.emulator.camera import DETECTORS
+from iveg.emulator.fleet import Fleet, FleetSettings, run_emulator
+from iveg.emulator.scenarios import Incident, lay_out, scenario_named
+from iveg.emulator.world import World
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 
 TESTBED = load_greenhouse("mvsim-20x20")
@@ -266,6 +269,29 @@ async def test_the_clock_of_a_robot_can_be_wrong(
         await until(
             lambda: (cloud.of("AGI", Odometry)[-1].origin.stamp_s or 0) > right + 3500
         )
+
+
+async def test_an_incident_of_a_scenario_happens_when_it_is_due(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    layout = lay_out(scenario_named("demo"), FLEET, TESTBED)
+    world = World(TESTBED, layout, DETECTORS["perfect"], seed=1)
+    settings = FleetSettings(
+        address, "iveg", "per-topic", 1.0, 3.0, tmp_path, held=False, rate_hz=30.0
+    )
+    incidents = (Incident(1.0, "AGII", mute=True), Incident(0.1, "AGV", mute=True))
+    fleet = Fleet(world, settings)
+
+    def silent_for(scans: int) -> bool:
+        said = cloud.heard["AGII"]
+        before = len(cloud.of("AGI", LaserScan))
+        marks.append((len(said), before))
+        quiet = [seen for count, seen in marks if count == len(said)]
+        return bool(said) and before - quiet[0] > scans
+
+    marks: list[tuple[int, int]] = []
+    async with running(asyncio.create_task(fleet.run(incidents))):
+        await until(lambda: silent_for(30))
 
 
 async def test_an_unknown_profile_or_scenario_is_refused_before_anything_runs(

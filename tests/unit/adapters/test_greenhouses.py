@@ -177,3 +177,9 @@ def test_posts_and_starts_of_a_users_house_are_read() -> None:
 
     assert (house.posts[0].x, house.posts[0].radius) == (1.0, 0.1)
     assert house.starts[0].y == 2.0
+
+
+def test_an_unknown_key_is_named_whatever_is_in_it() -> None:
+    said = complaint(SMALL.replace("rows = [", '"wall(" = 3\nrows = ['))
+
+    assert "wall(: is not a field here" in said
