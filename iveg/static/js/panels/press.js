@@ -21,8 +21,10 @@ const HOPELESS = new Set([401, 403, 404]);
 /**
  * @param {Line} line
  * @param {() => void} onChange
+ * @param {(press: Pending, pressedAt: number) => Promise<number>} [send] HTTP; tests hand
+ *   in their own
  */
-export function createPresser(line, onChange) {
+export function createPresser(line, onChange, send = post) {
   /** @type {Map<string | null, Pending>} newest press by robot; null is the fleet */
   const pending = new Map();
 
@@ -31,7 +33,7 @@ export function createPresser(line, onChange) {
     const fallback = setTimeout(() => sendByLine(press, pressedAt), TAKEN_LIMIT_MS);
     while (isCurrent(press)) {
       press.tries += 1;
-      const status = await post(press, pressedAt);
+      const status = await send(press, pressedAt);
       if (status === 202 || status === 200) return accept(press, fallback);
       sendByLine(press, pressedAt);
       if (HOPELESS.has(status)) return;

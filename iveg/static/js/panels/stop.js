@@ -58,7 +58,8 @@ export function createStopPanel(app) {
   /** @param {string | null} robotId null = the whole fleet */
   function press(robotId) {
     presser.press(robotId);
-    navigator.vibrate?.(60);
+    // Before the first activation browsers refuse it, and complain.
+    if (navigator.userActivation?.isActive) navigator.vibrate?.(60);
   }
 
   /** @param {Command} command */

@@ -55,6 +55,7 @@ const LOUDEST_FIRST = /** @type {StopState[]} */ ([
   "releasing",
   "stale",
   "rearmed",
+  "standing",
 ]);
 
 /** Presses older than this without an answer are said to be so (ms). */

@@ -1,0 +1,85 @@
+import { createWords, translate } from "../../iveg/static/js/i18n.js";
+import { equal, test } from "./harness.js";
+
+const BLOCKS = {
+  es: {
+    nav: { live: "En directo" },
+    d: "a {distance:1} m ({confidence:percent}), {class:a}, {at:time}",
+    plain: "{a} y {b}",
+    log: { down: { default: "bajó", person: "bajó por una persona" } },
+    class: { a: { person: "una persona" } },
+    alert: { lost: "{robot} perdido" },
+    raised: "Alarma: {alert:sentence}",
+  },
+  en: { nav: { live: "Live" }, d: "{distance:1} m", plain: "{a} and {b}" },
+};
+
+/** @param {"es" | "en"} language */
+async function words(language) {
+  const loaded = createWords(async (wanted) => BLOCKS[wanted]);
+  await loaded.use(language);
+  return loaded;
+}
+
+test("numbers, shares, classes and times are written as Spaniards do", async () => {
+  const { t } = await words("es");
+  const slots = {
+    distance: 1.43,
+    confidence: 0.94,
+    class: "person",
+    at: "2026-11-20T12:04:11Z",
+  };
+  equal(t("d", slots).replaceAll("\u00a0", " "), "a 1,4 m (94 %), una persona, 13:04:11");
+});
+
+test("numbers are written as the English do after a switch", async () => {
+  const loaded = await words("es");
+  await loaded.use("en");
+  equal(loaded.t("d", { distance: 1.43 }), "1.4 m");
+});
+
+test("summer time is Madrid's", async () => {
+  const { time } = await words("es");
+  equal(time("2026-07-01T10:00:00Z"), "12:00:00");
+});
+
+test("a block answers for itself and for names that it lacks", async () => {
+  const { t } = await words("es");
+  equal(t("log.down"), "bajó");
+  equal(t("log.down.person"), "bajó por una persona");
+  equal(t("log.down.never_heard_of"), "bajó");
+});
+
+test("a hole without a value shows that there is none", async () => {
+  const { t } = await words("es");
+  equal(t("plain", { a: null }), "— y —");
+});
+
+test("an unknown sentence shows its name", async () => {
+  const { t, has } = await words("es");
+  equal(t("nav.nowhere"), "nav.nowhere");
+  equal(has("nav.nowhere"), false);
+});
+
+test("a sentence can stand in another", async () => {
+  const { t } = await words("es");
+  equal(t("raised", { alert: "alert.lost", robot: "AGI" }), "Alarma: AGI perdido");
+});
+
+test("a robot at rest never shows a negative zero", async () => {
+  const { number } = await words("es");
+  equal(number(-0.0004, 2), "0,00");
+  equal(number(Number.NaN, 2), "—");
+});
+
+test("markup in a value stays text", async () => {
+  const { t } = await words("es");
+  const place = document.createElement("div");
+  const line = document.createElement("p");
+  line.dataset.i18n = "plain";
+  line.dataset.slots = JSON.stringify({ a: "<img src=x>", b: "$&" });
+  place.append(line);
+  translate(place, t);
+  equal(line.childElementCount, 0);
+  equal(line.textContent, "<img src=x> y $&");
+});

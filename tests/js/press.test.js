@@ -1,0 +1,140 @@
+import { createPresser } from "../../iveg/static/js/panels/press.js";
+import { onPress } from "../../iveg/static/js/panels/stop.js";
+import { equal, test } from "./harness.js";
+
+/** A line that notes what it was given. */
+function fakeLine() {
+  /** @type {{robotId: string | null, pressId: string, pressedAt: number}[]} */
+  const sent = [];
+  return {
+    sent,
+    serverNow: () => 1000,
+    /** @param {string | null} robotId @param {string} pressId @param {number} pressedAt */
+    sendStop(robotId, pressId, pressedAt) {
+      sent.push({ robotId, pressId, pressedAt });
+      return true;
+    },
+  };
+}
+
+const nothing = () => {};
+
+test("a press that HTTP takes is not repeated over the line", async () => {
+  const line = fakeLine();
+  const presser = createPresser(line, nothing, async () => 202);
+  await presser.press("AGI");
+  equal(line.sent, []);
+  equal(presser.pending("AGI")?.accepted, true);
+});
+
+test("a press that HTTP refuses goes over the line at once, as the same press", async () => {
+  const line = fakeLine();
+  const presser = createPresser(line, nothing, async () => 401);
+  await presser.press("AGI");
+  equal(line.sent, [
+    { robotId: "AGI", pressId: presser.pending("AGI")?.pressId, pressedAt: 1000 },
+  ]);
+});
+
+test("a silent HTTP is overtaken by the line after half a second", async () => {
+  const line = fakeLine();
+  /** @type {(status: number) => void} */
+  let answer = nothing;
+  const http = new Promise((resolve) => {
+    answer = resolve;
+  });
+  const presser = createPresser(line, nothing, () => http);
+  const carried = presser.press(null);
+  const begun = performance.now();
+  while (!line.sent.length && performance.now() - begun < 3000) {
+    await new Promise((resolve) => setTimeout(resolve, 20));
+  }
+  const waited = performance.now() - begun;
+  answer(202);
+  await carried;
+  equal(line.sent.length, 1);
+  equal(waited > 450, true);
+});
+
+test("a press is repeated under one id until the server has it", async () => {
+  const line = fakeLine();
+  const answers = [0, 503, 202];
+  /** @type {string[]} */
+  const ids = [];
+  const presser = createPresser(line, nothing, async ({ pressId }) => {
+    ids.push(pressId);
+    return answers[ids.length - 1];
+  });
+  await presser.press("AGI");
+  equal(ids.length, 3);
+  equal(new Set(ids).size, 1);
+});
+
+test("two presses have two ids", async () => {
+  const presser = createPresser(fakeLine(), nothing, async () => 202);
+  await presser.press("AGI");
+  const first = presser.pending("AGI")?.pressId;
+  await presser.press("AGI");
+  equal(first === presser.pending("AGI")?.pressId, false);
+});
+
+/** A control and the number of presses that it has told. */
+function control() {
+  const button = document.createElement("button");
+  const told = { count: 0 };
+  document.body.append(button);
+  onPress(button, () => {
+    told.count += 1;
+  });
+  return { button, told };
+}
+
+/** @param {HTMLElement} on @param {string} type */
+const pointer = (on, type) =>
+  on.dispatchEvent(new PointerEvent(type, { bubbles: true, button: 0 }));
+
+/** @param {HTMLElement} on @param {string} key @param {boolean} [repeat] */
+const key = (on, key, repeat = false) =>
+  on.dispatchEvent(
+    new KeyboardEvent("keydown", { key, repeat, bubbles: true, cancelable: true }),
+  );
+
+test("a finger presses when it comes down, and once", () => {
+  const { button, told } = control();
+  pointer(button, "pointerdown");
+  equal(told.count, 1);
+  pointer(button, "pointerup");
+  button.click();
+  equal(told.count, 1);
+});
+
+test("a click without a finger, as assistive tools make it, presses", () => {
+  const { button, told } = control();
+  button.click();
+  equal(told.count, 1);
+});
+
+test("Enter and Space press once however long they are held", () => {
+  const { button, told } = control();
+  key(button, "Enter");
+  key(button, "Enter", true);
+  key(button, " ");
+  key(button, " ", true);
+  equal(told.count, 2);
+});
+
+test("the right mouse button does not press", () => {
+  const { button, told } = control();
+  button.dispatchEvent(new PointerEvent("pointerdown", { button: 2 }));
+  equal(told.count, 0);
+});
+
+test("every new touch is a new press", () => {
+  const { button, told } = control();
+  for (let n = 0; n < 3; n += 1) {
+    pointer(button, "pointerdown");
+    pointer(button, "pointerup");
+    button.click();
+  }
+  equal(told.count, 3);
+});

@@ -1,0 +1,73 @@
+import { whyNotRelease, whyNotResume } from "../../iveg/static/js/panels/release.js";
+import { command, robot } from "./builders.js";
+import { equal, test } from "./harness.js";
+
+/** @typedef {import("../../iveg/static/js/panels/release.js").Facts} Facts */
+
+const IVEG = { id: "01A", source: "iveg", ack: "remote" };
+const RED_BUTTON = { id: "hw", source: "hw", ack: "local" };
+const LINK = { id: "link", source: "link", ack: "auto" };
+const STILL = { linear: 0.001, angular: 0 };
+
+/** A robot that stands, proven, held by iVeg. @param {Partial<Facts>} [changes] */
+function facts(changes = {}) {
+  return {
+    isConnected: true,
+    role: "operator",
+    ageS: 0.1,
+    robot: robot({ mode: "STOPPED", holds: [IVEG], twist: STILL }),
+    command: command({ kind: "stop", state: "STANDING" }),
+    ...changes,
+  };
+}
+
+test("an operator may release a robot that is proven to stand", () => {
+  equal(whyNotRelease(facts()), "ok");
+});
+
+test("a viewer may not release, and may not resume", () => {
+  equal(whyNotRelease(facts({ role: "viewer" })), "role");
+  equal(whyNotResume(facts({ role: "viewer" })), "role");
+});
+
+test("nothing is released on old news or without a server", () => {
+  equal(whyNotRelease(facts({ ageS: 1.2 })), "not_fresh");
+  equal(whyNotRelease(facts({ isConnected: false })), "no_link");
+});
+
+test("a robot that still brakes is not released", () => {
+  const braking = command({ kind: "stop", state: "DELIVERED" });
+  equal(whyNotRelease(facts({ command: braking })), "not_standing");
+});
+
+test("a hold that iVeg did not make needs a standing robot all the same", () => {
+  const boot = { id: "boot-1", source: "boot", ack: "remote" };
+  const held = robot({ mode: "STOPPED", holds: [boot], twist: STILL });
+  const rolling = robot({ ...held, twist: { linear: 0.1, angular: 0 } });
+  equal(whyNotRelease(facts({ command: undefined, robot: held })), "ok");
+  equal(whyNotRelease(facts({ command: undefined, robot: rolling })), "not_standing");
+});
+
+test("the robot's own red button cannot be lifted from here", () => {
+  const held = robot({ mode: "STOPPED", holds: [RED_BUTTON], twist: STILL });
+  equal(whyNotRelease(facts({ robot: held })), "local_hold");
+});
+
+test("a lost link lifts by itself", () => {
+  const held = robot({ mode: "STOPPED", holds: [LINK], twist: STILL });
+  equal(whyNotRelease(facts({ robot: held })), "auto_hold");
+});
+
+test("a robot is resumed only after it reported its release", () => {
+  const free = robot({ mode: "STOPPED", holds: [], twist: STILL });
+  const ready = command({ kind: "stop", state: "READY" });
+  const releasing = command({ kind: "stop", state: "RELEASING" });
+  equal(whyNotResume(facts({ robot: free, command: ready })), "ok");
+  equal(whyNotResume(facts({ robot: free, command: releasing })), "not_ready");
+  equal(whyNotResume(facts({ command: ready })), "not_ready");
+});
+
+test("a robot that runs has nothing to resume", () => {
+  const running = robot({ mode: "RUNNING", holds: [] });
+  equal(whyNotResume(facts({ robot: running, command: undefined })), "not_ready");
+});
