@@ -15,6 +15,8 @@ Verdict = Literal["new", "late", "duplicate"]
 _REMEMBERED_SEQS = 128
 _REMEMBERED_BOOTS = 16
 _BUCKET_S, _BUCKETS = 5.0, 12
+_JUMP_S = 10.0
+"""No message travels that much longer than another: the clock was set (fault F16)."""
 
 
 @dataclass(slots=True)
@@ -27,6 +29,10 @@ class Order:
         default_factory=lambda: deque(maxlen=_REMEMBERED_BOOTS)
     )
     _recent: deque[int] = field(default_factory=lambda: deque(maxlen=_REMEMBERED_SEQS))
+
+    def knows_better_than(self, origin: Origin) -> bool:
+        """Whether an old record must not even be judged: it is of another boot."""
+        return self.boot is not None and origin.boot != self.boot
 
     def judge(self, origin: Origin) -> Verdict:
         """Say whether a message is newer than all before, and remember it.
@@ -47,7 +53,7 @@ class Order:
         if origin.seq in self._recent:
             return "duplicate"
         self._recent.append(origin.seq)
-        if origin.seq < self.seq:
+        if origin.seq <= self.seq:
             return "late"
         self.seq = origin.seq
         return "new"
@@ -70,6 +76,8 @@ class ClockEstimate:
         if origin.stamp_s is None:
             return 0.0
         transit = at.wall - origin.stamp_s
+        if self._buckets and abs(transit - self._least()) > _JUMP_S:
+            self._buckets.clear()
         if not self._buckets or at.mono - self._buckets[-1][0] > _BUCKET_S:
             self._buckets.append((at.mono, transit))
         elif transit < self._buckets[-1][1]:

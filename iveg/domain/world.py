@@ -116,9 +116,17 @@ class RobotState:
         (before, earlier), (after, later) = poses[index - 1], poses[index]
         return earlier.interpolate(later, (stamp_s - before) / (after - before))
 
-    def judge(self, observation: Observation, origin: Origin) -> Verdict:
-        """Place a message in its stream's order."""
-        return self._orders.setdefault(type(observation), Order()).judge(origin)
+    def judge(
+        self, observation: Observation, origin: Origin, *, asked: bool = False
+    ) -> Verdict:
+        """Place a message in its stream's order.
+
+        What Orion kept of an earlier boot must not make the present one look old.
+        """
+        order = self._orders.setdefault(type(observation), Order())
+        if asked and order.knows_better_than(origin):
+            return "late"
+        return order.judge(origin)
 
     def remember_pose(self, moment: float, pose: Pose2D) -> None:
         """Keep a pose for ``pose_at_stamp``; a clock that jumps back starts anew."""
@@ -169,7 +177,7 @@ class World:
             return "new"
         robot = self.robot(observation.robot_id)
         origin = getattr(observation, "origin", Origin())
-        verdict = robot.judge(observation, origin)
+        verdict = robot.judge(observation, origin, asked=received.asked)
         self.counters[f"{type(observation).__name__}.{verdict}"] += 1
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
@@ -195,24 +203,30 @@ def _age_when_asked(origin: Origin, at: Instant) -> float:
 
 def _update(robot: RobotState, received: Received, delay: float) -> None:
     observation, at = received.observation, received.at
+    seen_at = at.later(-delay)
     match observation:
         case Odometry():
             robot.odometry, robot.odometry_received = observation, at
-            robot.pose_at = at.mono - delay
+            robot.pose_at = _newer(robot.pose_at, seen_at)
             moment = observation.origin.stamp_s
             robot.remember_pose(at.wall if moment is None else moment, observation.pose)
         case LaserScan():
-            robot.scan, robot.scan_received = observation, at
+            robot.scan, robot.scan_received = observation, seen_at
             robot.scan_pose = robot.pose_at_stamp(observation.origin.stamp_s)
         case DetectionFrame():
             robot.frame, robot.frame_road = observation, received.road
-            robot.detections_at = at.mono - delay
+            robot.detections_at = _newer(robot.detections_at, seen_at)
             if observation.unreadable:
                 robot.unreadable_at = at.mono
         case SafetyReport():
-            robot.safety, robot.safety_received = observation, at
+            robot.safety, robot.safety_received = observation, seen_at
             robot.safety_road = received.road
         case Navigation():
             robot.navigation = observation
         case _:
             robot.command_status = getattr(observation, "status", robot.command_status)
+
+
+def _newer(before: float | None, seen_at: Instant) -> float:
+    """What is newer by its order cannot be older than what was known before it."""
+    return seen_at.mono if before is None else max(before, seen_at.mono)

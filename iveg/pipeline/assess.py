@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
+from iveg.domain.order import Verdict
 from iveg.domain.people import RING_S, People, Person, Placed
 from iveg.domain.sight import AllClear
 from iveg.domain.world import Link, RobotState, World
@@ -93,8 +94,8 @@ class Assessor:
         """Apply one observation; returns whether it became part of the state."""
         verdict = self.world.apply(received)
         observation = received.observation
-        if isinstance(observation, DetectionFrame) and verdict != "duplicate":
-            self._look(observation, received)
+        if isinstance(observation, DetectionFrame):
+            self._look_if_it_counts(observation, received, verdict)
         if verdict != "new":
             return False
         match observation:
@@ -135,7 +136,17 @@ class Assessor:
 
     # --- looks --------------------------------------------------------------------
 
-    def _look(self, frame: DetectionFrame, received: Received) -> None:
+    def _look_if_it_counts(
+        self, frame: DetectionFrame, received: Received, verdict: Verdict
+    ) -> None:
+        """A late look still saw somebody; a late answer of Orion's is yesterday's."""
+        if verdict == "new" or (verdict == "late" and not received.asked):
+            placed = self._look(frame, received)
+            if verdict == "new":
+                self.placed[frame.robot_id] = placed
+                self._hub.changed(f"detections/{frame.robot_id}")
+
+    def _look(self, frame: DetectionFrame, received: Received) -> list[Placed]:
         delay = 0.0
         robot = self.world.robot(frame.robot_id)
         if robot.detections_at is not None:
@@ -144,12 +155,11 @@ class Assessor:
         placed = self.people.sight(
             frame, self.world, self.rule, seen_at, self._new_id()
         )
-        self.placed[frame.robot_id] = placed
         for one in placed:
             self._describe(one, frame, received)
-        self._hub.changed(f"detections/{frame.robot_id}")
         if any(one.person is not None for one in placed):
             self._hub.changed("people")
+        return placed
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
         """Log a sighting at its start and write it down once in two seconds."""
