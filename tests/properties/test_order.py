@@ -1,0 +1,70 @@
+"""Whatever a network does to the messages of one boot, the newest one wins."""
+
+from collections import Counter
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iveg.domain.observations import Odometry
+from iveg.domain.order import ClockEstimate, Order
+from iveg.domain.world import World
+from tests.builders import START, at, odometry, origin, received
+
+seqs = st.lists(st.integers(0, 500), min_size=1, max_size=200)
+stamps = st.floats(-2e9, 2e9)
+
+
+@given(seqs, st.data())
+def test_any_order_of_the_same_messages_gives_the_same_newest_state(
+    sent: list[int], data: st.DataObject
+) -> None:
+    arrived = data.draw(st.permutations(sent))
+    world = World(["AGI"])
+    for seq in arrived:
+        world.apply(received(odometry(x=float(seq), origin=origin(seq))))
+
+    newest = world.robot("AGI").odometry
+    assert isinstance(newest, Odometry)
+    assert newest.pose.x == max(sent)
+
+
+@given(seqs)
+def test_each_message_is_new_late_or_a_duplicate_and_counted_as_one(
+    arrived: list[int],
+) -> None:
+    world = World(["AGI"])
+    verdicts = [world.apply(received(odometry(origin=origin(seq)))) for seq in arrived]
+
+    counted = {f"Odometry.{name}": n for name, n in Counter(verdicts).items()}
+    assert world.counters == counted
+
+
+@given(st.lists(st.tuples(st.integers(0, 50), stamps), min_size=1, max_size=60))
+def test_no_stamp_ever_orders_anything(arrived: list[tuple[int, float]]) -> None:
+    told, silent = Order(), Order()
+    for seq, stamp_s in arrived:
+        stamped = origin(seq)
+        off = type(stamped)(stamped.boot, seq, "whenever", stamp_s)
+        assert told.judge(off) == silent.judge(type(stamped)(stamped.boot, seq))
+
+
+@given(st.lists(stamps, min_size=1, max_size=100))
+def test_no_stamp_ages_a_message_by_more_than_a_network_can(
+    stamped: list[float],
+) -> None:
+    clock = ClockEstimate()
+    for number, stamp_s in enumerate(stamped):
+        one = type(origin())("a", number, "whenever", stamp_s)
+        assert 0.0 <= clock.observe(one, at(0.1 * number)) <= 10.0
+
+
+@given(st.lists(st.floats(0.0, 5.0), min_size=2, max_size=100))
+def test_the_age_never_comes_out_younger_than_the_fastest_message(
+    delays: list[float],
+) -> None:
+    clock = ClockEstimate()
+    for number, delay in enumerate(delays):
+        sent = START.wall + 0.1 * number
+        moment = type(START)(START.mono + 0.1 * number + delay, sent + delay)
+        extra = clock.observe(type(origin())("a", number, "t", sent), moment)
+        assert extra <= delay + 1e-6
