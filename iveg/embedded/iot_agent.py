@@ -1,8 +1,8 @@
 """An IoT Agent for JSON: measures from MQTT into the context broker, commands back.
 
-It shares the process with the broker and hands measures over by a call; its MQTT side
-and its north port are what the real one shows.  What it does not do is told in
-``docs/fiware.md``.
+It shares the process with both brokers: it hears devices and hands their measures over
+by a call each.  Topics, payloads and the north port are what the real one shows; what
+it does not do is told in ``docs/fiware.md``.
 """
 
 import asyncio
@@ -14,8 +14,6 @@ from typing import Any
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.errors import HopError
 from iveg.embedded.context_broker import ContextBroker, Scope
 from iveg.embedded.devices import (
     DEFAULT_APIKEY,
@@ -28,18 +26,11 @@ from iveg.embedded.devices import (
 )
 from iveg.embedded.entities import Change
 from iveg.embedded.measures import read_measures, read_single, status_changes
+from iveg.embedded.mqtt_broker import MqttBroker
 from iveg.embedded.orion_errors import NgsiError
 from iveg.embedded.registrations import read_registration
 
 _log = logging.getLogger(__name__)
-
-FILTERS = tuple(
-    prefix + topic
-    for prefix in ("+/+/+", "/json/+/+")
-    for topic in ("/attrs", "/attrs/+", "/cmdexe")
-)
-"""The first kind covers ``/key/device/…`` and ``json/key/device/…`` at once; a broker
-compares each message with each filter, so fewer are better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +57,9 @@ class IotAgent:
         mqtt: The MQTT broker that devices use.
     """
 
-    def __init__(self, broker: ContextBroker, mqtt: tuple[str, int]) -> None:
+    def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
         self._broker = broker
+        self._mqtt = mqtt
         self.registry = Registry()
         self.faults = Faults()
         self.url = ""
@@ -76,22 +68,7 @@ class IotAgent:
         """Messages that were not taken; devices are never told."""
         self._unstuck = asyncio.Event()
         self._unstuck.set()
-        self._ready = asyncio.Event()
-        self.link = MqttLink(
-            BrokerAddress(*mqtt),
-            "embedded IoT Agent",
-            dict.fromkeys(FILTERS, 0),
-            on_message=self.hear,
-            on_connect=self._ready.set,
-        )
-
-    async def run(self) -> None:
-        """Stay connected to MQTT until cancelled."""
-        await self.link.run()
-
-    async def ready(self) -> None:
-        """Wait until devices are heard."""
-        await self._ready.wait()
+        mqtt.listen(self.hear)
 
     def fail(self, faults: Faults) -> None:
         """From now on, fail like this."""
@@ -104,26 +81,30 @@ class IotAgent:
     # --- from devices -----------------------------------------------------------
 
     def hear(self, topic: str, payload: bytes) -> None:
-        """Take one MQTT message."""
-        if self.faults.deaf:
-            return
-        if self.faults.slow_s > 0:
-            loop = asyncio.get_running_loop()
-            loop.call_later(self.faults.slow_s, self._take, topic, payload)
-        else:
-            self._take(topic, payload)
+        """Take one MQTT message, if it is for the agent.
 
-    def _take(self, topic: str, payload: bytes) -> None:
+        Topics are ``/{apikey}/{device}/attrs``, ``…/attrs/{name}`` and ``…/cmdexe``,
+        the first slash or nothing also as ``/json/`` or ``json/``.
+        """
         parts = topic.split("/")
         if parts[:2] == ["", "json"]:
             del parts[0]
-        if parts[0] not in ("", "json"):
+        named = len(parts) == 5 and parts[3] == "attrs"
+        plain = len(parts) == 4 and parts[3] in ("attrs", "cmdexe")
+        if not (named or plain) or parts[0] not in ("", "json") or self.faults.deaf:
             return
+        if self.faults.slow_s > 0:
+            loop = asyncio.get_running_loop()
+            loop.call_later(self.faults.slow_s, self._take, parts, payload)
+        else:
+            self._take(parts, payload)
+
+    def _take(self, parts: list[str], payload: bytes) -> None:
         _, apikey, device_id, kind, *name = parts
         try:
             taken = self._take_from(apikey, device_id, kind, name, payload)
         except (NgsiError, AgentError) as error:
-            _log.debug("%s discarded: %s", topic, error)
+            _log.debug("a message of %s was discarded: %s", device_id, error)
             taken = False
         if not taken:
             self.discarded += 1
@@ -251,7 +232,7 @@ class IotAgent:
         """Carry out an ``op/update`` of one entity: publish its commands.
 
         A command that the device does not have is passed over in silence, and one that
-        MQTT does not take is lost: the agent says 204 to both.
+        no robot listens to is lost: the agent says 204 to both.
 
         Raises:
             AgentError: 404, no device has this entity.
@@ -270,15 +251,12 @@ class IotAgent:
 
     async def _publish(self, device: Device, command: str, value: Any) -> None:
         options = device.commands[command].get("mqtt") or {}
-        try:
-            await self.link.publish(
-                f"/{device.apikey}/{device.device_id}/cmd",
-                orjson.dumps({command: value}),
-                qos=int(options.get("qos", 0)),
-                retain=bool(options.get("retain", False)),
-            )
-        except HopError as error:
-            _log.info("a command for %s was lost: %s", device.device_id, error)
+        await self._mqtt.publish(
+            f"/{device.apikey}/{device.device_id}/cmd",
+            orjson.dumps({command: value}),
+            int(options.get("qos", 0)),
+            bool(options.get("retain", False)),
+        )
 
     async def query(
         self, tenancy: Tenancy, name: str, kind: str, names: list[str]

@@ -1,7 +1,6 @@
 """All three embedded parts in one process: MQTT broker, context broker, IoT Agent."""
 
 import asyncio
-import contextlib
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass
@@ -67,10 +66,10 @@ async def embedded_fiware(
     orion_host = require_loopback("IVEG_ORION_URL", orion[0])
     iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
     async with AsyncExitStack() as stack:
-        mqtt_port = await stack.enter_async_context(mqtt_broker(*mqtt))
+        south = await stack.enter_async_context(mqtt_broker(*mqtt))
         broker = ContextBroker()
         stack.callback(broker.close)
-        agent = IotAgent(broker, (mqtt[0], mqtt_port))
+        agent = IotAgent(broker, south)
         api = NgsiApi(broker, clock.now().wall)
         orion_port = await stack.enter_async_context(
             http_server(api.handle, orion_host, orion[1])
@@ -79,20 +78,7 @@ async def embedded_fiware(
             http_server(IotaApi(agent).handle, iota_host, iota[1])
         )
         agent.url = f"http://{iota_host}:{iota_port}"
-        await stack.enter_async_context(_running(agent))
-        yield Running(mqtt_port, orion_port, iota_port, broker, agent)
-
-
-@asynccontextmanager
-async def _running(agent: IotAgent) -> AsyncIterator[None]:
-    task = asyncio.create_task(agent.run(), name="embedded-iot-agent")
-    try:
-        await agent.ready()
-        yield
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+        yield Running(south.port, orion_port, iota_port, broker, agent)
 
 
 async def serve_fiware(
