@@ -32,7 +32,6 @@ class PostgreSQL:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self._port = int(probe.getsockname()[1])
-        self._made = 0
 
     def __enter__(self) -> Self:
         self._run(
@@ -62,14 +61,13 @@ class PostgreSQL:
         """Stop this very server at once, as a crash would."""
         self._control("stop", "-m", "immediate")
 
-    def new_database(self) -> str:
-        """The address of an empty database."""
-        self._made += 1
-        name = f"history{self._made}"
-        server = f"host=127.0.0.1 port={self._port} user=postgres"
-        with psycopg.connect(server, autocommit=True) as connection:
-            connection.execute(f"CREATE DATABASE {name}".encode())
-        return f"postgresql://postgres@127.0.0.1:{self._port}/{name}"
+    def empty_database(self) -> str:
+        """The address of the one database, emptied: far cheaper than a new one."""
+        address = f"postgresql://postgres@127.0.0.1:{self._port}/postgres"
+        with psycopg.connect(address) as connection:
+            connection.execute("DROP SCHEMA public CASCADE")
+            connection.execute("CREATE SCHEMA public")
+        return address
 
     def _control(self, *words: str) -> None:
         self._run("pg_ctl", "-D", str(self._data), "-w", *words)

@@ -13,8 +13,9 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy import Connection, text
-from sqlalchemy.exc import DatabaseError, OperationalError, SQLAlchemyError
+from sqlalchemy.exc import DatabaseError, OperationalError
 
 import iveg
 from iveg.adapters import clock
@@ -66,7 +67,7 @@ def migrations_directory() -> Path:
     return installed if installed.is_dir() else package.parent / "migrations"
 
 
-def reason_of(error: SQLAlchemyError) -> str:
+def reason_of(error: Exception) -> str:
     """What the driver said, in one line, without statement and parameters."""
     cause = getattr(error, "orig", None) or error
     return " ".join(str(cause).split())
@@ -90,7 +91,7 @@ def _upgrade(connection: Connection, where: str) -> None:
         )
     try:
         command.upgrade(config, "head")
-    except DatabaseError as error:
+    except (DatabaseError, CommandError) as error:
         raise DataFileError(
             where,
             "",

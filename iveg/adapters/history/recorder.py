@@ -187,12 +187,17 @@ class Recorder:
         try:
             await loop.run_in_executor(self._thread, self._write, batch)
         except (HopError, DataFileError) as error:
-            self._queue.put_back(batch)
             self._lose(str(error))
-            await self._spill()
+        except Exception as error:
+            # Whatever memory stumbles over, it must not take the STOP along.
+            _log.exception("history: an error of our own")
+            self._lose(repr(error))
         else:
             self._written += len(batch)
             self._come_back()
+            return
+        self._queue.put_back(batch)
+        await self._spill()
 
     def _write(self, batch: list[Waiting]) -> None:
         """In the thread: what the journal holds is older, so it goes first."""

@@ -54,7 +54,7 @@ class Store:
         except (StatementError, *_VALUE_ERRORS) as error:
             if not _is_fault_of_row(error, engine):
                 self._let_go(error)
-                raise HopError("database", _say(error)) from error
+                raise HopError("database", reason_of(error)) from error
             self._write_one_by_one(engine, rows)
 
     def close(self) -> None:
@@ -71,8 +71,8 @@ class Store:
         return self._engine
 
     def _let_go(self, error: Exception) -> None:
-        # A lock passes by itself; a check of the whole file would only add to it.
-        if "locked" not in str(error):
+        # These pass by themselves; checking the whole file again would only add to it.
+        if not any(word in str(error) for word in ("is locked", "is full")):
             self.close()
 
     def _write_one_by_one(self, engine: Engine, rows: Sequence[Waiting]) -> None:
@@ -84,7 +84,7 @@ class Store:
                         self._try_one(connection, row)
             except DBAPIError as error:
                 self._let_go(error)
-                raise HopError("database", _say(error)) from error
+                raise HopError("database", reason_of(error)) from error
 
     def _try_one(self, connection: Connection, row: Waiting) -> None:
         try:
@@ -95,7 +95,7 @@ class Store:
                 raise
             self.rejected += 1
             kind = type(row.record).__name__
-            _log.error("history: a %s cannot be stored: %s", kind, _say(error))
+            _log.error("history: a %s cannot be stored: %s", kind, reason_of(error))
 
 
 def _write(engine: Engine, rows: Sequence[Waiting]) -> None:
@@ -164,7 +164,3 @@ def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
     refused = (InterfaceError, ProgrammingError)
     # Python's SQLite driver reports a type that it cannot bind in one of these two.
     return engine.dialect.name == "sqlite" and isinstance(error, refused)
-
-
-def _say(error: Exception) -> str:
-    return reason_of(error) if isinstance(error, StatementError) else str(error)

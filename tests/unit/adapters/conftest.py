@@ -26,7 +26,7 @@ def sqlite_url(tmp_path: Path) -> str:
 
 @pytest.fixture
 def postgresql_url(postgresql: PostgreSQL) -> str:
-    return postgresql.new_database()
+    return postgresql.empty_database()
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])

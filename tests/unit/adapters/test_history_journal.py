@@ -1,8 +1,5 @@
 import errno
 import os
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -11,6 +8,7 @@ from iveg.adapters.history.journal import Journal
 from iveg.domain.errors import HopError
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
+from tests.fakes.disk import files_no_longer_than
 from tests.fakes.records import (
     alert_record,
     command_event_record,
@@ -30,16 +28,6 @@ EVERYTHING = (
 
 def rows(*records: Record) -> list[Waiting]:
     return [Waiting(record, number, 5.0) for number, record in enumerate(records, 1)]
-
-
-@contextmanager
-def files_no_longer_than(size: int) -> Iterator[None]:
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 class FullDisk:

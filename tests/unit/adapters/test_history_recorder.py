@@ -16,6 +16,7 @@ from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.domain.observations import Instant
+from tests.fakes.disk import files_no_longer_than
 from tests.fakes.postgresql import PostgreSQL
 from tests.fakes.records import (
     NOON,
@@ -201,6 +202,26 @@ async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
     assert set(stored.values()) == {1}
     assert recorder.counters["history_dropped"] == 97
     assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
+
+
+async def test_a_full_disk_stops_the_history_and_not_what_matters(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    async with recording(sqlite_url, tmp_path) as recorder:
+        recorder.offer(command_record())
+        await until(lambda: recorder.counters["history_written"] == 1)
+        with files_no_longer_than(64 * 1024):
+            for number in range(2000):
+                recorder.offer(odometry_record(at=NOON + number))
+            recorder.offer(log_record())
+            await until(lambda: state(recorder) == "down")
+            recorder.offer(log_record(id=2))
+            await until(lambda: recorder.counters["history_journalled"] >= 1)
+        await until(lambda: state(recorder) == "ok")
+        await until(lambda: recorder.counters["history_waiting"] == 0)
+
+    assert scalar(sqlite_url, "SELECT count(*) FROM log") == 2
+    assert scalar(sqlite_url, "SELECT count(*) FROM odometry") == 2000
 
 
 async def test_a_server_that_dies_is_missed_and_welcomed_back(
