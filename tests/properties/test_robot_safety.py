@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 import orjson
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from iveg.domain.feedback import CLEAR, FeedbackAlert, Mandate
@@ -12,6 +12,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
 from iveg.robot.caps import Cap, lowest
 from iveg.robot.effects import Drive
+from iveg.robot.hearsay import Hearsay
 from tests.unit.robot.hostile import (
     EVENTS,
     JUNK,
@@ -35,6 +36,7 @@ def released_by(transition: Transition) -> tuple[set[str], str]:
 
 
 @given(EVENTS)
+@example([Event("lose_iveg")])
 def test_R1_driving_implies_an_empty_hold_set(events: list[Event]) -> None:
     moving = [one for one in played(events).transitions if one.moves]
     assert moving
@@ -69,7 +71,8 @@ def test_R3_a_release_lifts_no_hold_that_it_does_not_name(events: list[Event]) -
     commanded = [one for one in played(events).transitions if one.payload is not None]
     for one in commanded:
         named, _ = released_by(one)
-        assert {hold.id for hold in one.lost} <= named
+        # A link hold clears itself by time alone, whatever comes at that moment.
+        assert {hold.id for hold in one.lost if hold.ack != "auto"} <= named
 
 
 @given(EVENTS, st.lists(NAMES, min_size=1, max_size=3))
@@ -218,7 +221,7 @@ def test_R9_junk_and_old_feedback_change_no_hold_and_move_nothing(
     assert abs(world.twist.linear_x) <= abs(twist.linear_x)
 
 
-@given(EVENTS, st.permutations(range(20)))
+@given(EVENTS, st.permutations(range(40)))
 def test_R9_commands_delivered_again_in_any_order_never_free_a_robot(
     events: list[Event], order: list[int]
 ) -> None:
@@ -230,7 +233,7 @@ def test_R9_commands_delivered_again_in_any_order_never_free_a_robot(
     assert world.twist == REST
 
 
-@given(EVENTS, st.permutations(range(20)))
+@given(EVENTS, st.permutations(range(40)))
 def test_R9_commands_delivered_again_never_make_a_waiting_robot_run(
     events: list[Event], order: list[int]
 ) -> None:
@@ -240,7 +243,9 @@ def test_R9_commands_delivered_again_never_make_a_waiting_robot_run(
     world.push(0.0)
     world.wait(0.6)
     world.crew()
+    world.ask_resume("perfect")
     world.ask_release("perfect")
+    assert world.machine.holds.remote == set()
     for which in order:
         world.again(which)
     assert world.state != "RUNNING"
@@ -334,12 +339,12 @@ def test_no_wish_exceeds_the_drive_times_the_factor(
 def test_feedback_counts_forward_only_within_a_boot_and_boots_never_return(
     order: list[tuple[str, int]],
 ) -> None:
-    rig = Rig()
+    rig, hearsay = Rig(), Hearsay("AGI")
     met: list[str] = []
     last: dict[str, int] = {}
     for boot, seq in order:
         feedback = rig.feedback(origin=Origin(boot, seq))
-        counts = rig.machine._judgement._hearsay.take("T", feedback, None, rig.now)
+        counts = hearsay.take("T", feedback, None, rig.now)
         newest = bool(met) and met[-1] == boot
         assert counts == (boot not in met or (newest and seq > last[boot]))
         if counts:

@@ -257,8 +257,39 @@ class World(Rig):
         self.wished = AHEAD
         self.run(1.5)
 
+    def episode(self, button: bool, released: str, resumed: str) -> None:
+        """Two people stop it, perhaps a crew too; then somebody wants it to drive.
+
+        Args:
+            button: Whether somebody presses the red button too.
+            released: Kind of the release.
+            resumed: What is asked in turn: ``release`` and kinds of resume.
+        """
+        self.sensors(True)
+        self.push(0.0)
+        self.press("01A")
+        self.press("01B")
+        for _ in range(button):
+            self.local("hw")
+        self.run(0.3)
+        for kind in resumed.split():
+            ask = self.ask_release if kind == "release" else self.ask_resume
+            ask(released if kind == "release" else kind)
+        self.run(0.3)
+
+    def lose_iveg(self) -> None:
+        """Silence until the ``link`` hold, then words again for a while."""
+        self.speaks = False
+        self.run(3.9)
+        self.speaks = True
+        self.run(1.6)
+
 
 NAMES = st.sampled_from(["01A", "01B", "01C"])
+
+RELEASES = st.sampled_from(["perfect", "old", "fewer", "all"])
+TURNS = st.sampled_from(["release perfect", "perfect release", "release old"])
+RESUMES = st.sampled_from(["perfect", "old"])
 
 
 def _event(name: str, *values: st.SearchStrategy[object]) -> st.SearchStrategy[Event]:
@@ -282,11 +313,13 @@ JUNK = st.one_of(
 EVENTS = st.lists(
     st.one_of(
         _event("full_speed"),
+        _event("lose_iveg"),
+        _event("episode", st.booleans(), RELEASES, TURNS),
         _event("wait", st.sampled_from([0.05, 0.2, 0.6, 1.3, 3.4])),
         _event("press", NAMES),
         _event("say", JUNK),
-        _event("ask_release", st.sampled_from(["perfect", "old", "fewer", "all"])),
-        _event("ask_resume", st.sampled_from(["perfect", "old"])),
+        _event("ask_release", RELEASES),
+        _event("ask_resume", RESUMES),
         _event("again", st.integers(0, 40)),
         _event("hear_again", st.integers(0, 400)),
         _event(
@@ -305,7 +338,7 @@ EVENTS = st.lists(
         _event("reboot"),
         _event("cut", NAMES, st.integers(0, 4)),
     ),
-    max_size=14,
+    max_size=10,
 )
 
 

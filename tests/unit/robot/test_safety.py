@@ -452,6 +452,17 @@ def test_a_wish_that_waited_behind_the_hold_does_not_move_the_robot() -> None:
     assert not rig.machine.may_drive
 
 
+def test_every_resume_needs_rest_anew() -> None:
+    rig = moving()
+    rig.stop()
+    rig.run(0.5)
+    rig.release()
+    rig.resume()
+    rig.run(2.0)
+    assert rig.state == "RUNNING"
+    assert rig.twist == REST
+
+
 def test_after_half_a_second_of_rest_the_robot_moves_with_the_ramp() -> None:
     rig = Rig(wished=REST).run(1.5)
     rig.release()
@@ -669,6 +680,18 @@ def test_noise_about_the_ring_changes_the_factor_once() -> None:
         rig.run(0.2)
     assert rig.factor == 0.5
     assert rig.factor_changes() == before + 1
+
+
+def test_a_robot_that_was_slowed_goes_on_slowly_until_it_is_well_outside() -> None:
+    rig = moving()
+    rig.alerts = (person(1.9),)
+    rig.run(0.5)
+    rig.alerts = (person(2.25),)
+    rig.run(5.0)
+    assert rig.factor == 0.5
+    rig.alerts = (person(2.35),)
+    rig.run(1.5)
+    assert rig.factor == 1.0
 
 
 def test_a_deaf_robot_drives_on_and_says_so_but_holds_still_bite() -> None:
