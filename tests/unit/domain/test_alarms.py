@@ -1,0 +1,105 @@
+"""The life of a notice after ISA-18.2."""
+
+from iveg.domain.alarms import AlarmBook, Condition
+from tests.builders import at
+
+LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")
+SLOWED = Condition("P2", "alert.person_slowed", "AGI/P1", "AGI")
+
+
+def test_what_is_wrong_is_raised_once() -> None:
+    book = AlarmBook()
+
+    first = book.sync([LOST, SLOWED], at(0), "a")
+    again = book.sync([LOST, SLOWED], at(1), "b")
+
+    assert [one.condition for one in first] == [LOST, SLOWED]
+    assert again == []
+    assert len(book.active) == 2
+
+
+def test_two_of_a_kind_are_told_apart_by_their_subject() -> None:
+    book = AlarmBook()
+    other = Condition("P1", LOST.key, "AGII", "AGII")
+
+    raised = book.sync([LOST, other], at(0), "a")
+
+    assert len({one.alert_id for one in raised}) == 2
+
+
+def test_what_is_no_longer_wrong_clears() -> None:
+    book = AlarmBook()
+    book.sync([LOST], at(0), "a")
+
+    (cleared,) = book.sync([], at(5), "b")
+
+    assert cleared.cleared == at(5)
+    assert book.active == []
+
+
+def test_what_comes_back_soon_is_the_same_alarm_counted() -> None:
+    book = AlarmBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+
+    (again,) = book.sync([LOST], at(20), "c")
+
+    assert (again.alert_id, again.count, again.raised) == (first.alert_id, 2, at(0))
+
+
+def test_what_comes_back_later_is_a_new_alarm() -> None:
+    book = AlarmBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+    book.sync([], at(40), "c")
+
+    (again,) = book.sync([LOST], at(41), "d")
+
+    assert again.alert_id != first.alert_id
+    assert again.count == 1
+
+
+def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
+    book = AlarmBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+
+    book.acknowledge(raised.alert_id, "ana", "on my way", at(3))
+
+    (active,) = book.active
+    assert active.acknowledged == at(3)
+    assert (active.acknowledged_by, active.note) == ("ana", "on my way")
+
+
+def test_only_the_first_acknowledgement_counts() -> None:
+    book = AlarmBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "mine", at(3))
+
+    again = book.acknowledge(raised.alert_id, "ben", "no, mine", at(4))
+
+    assert again is not None
+    assert again.acknowledged_by == "ana"
+
+
+def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
+    book = AlarmBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "", at(1))
+    book.sync([], at(2), "b")
+
+    (again,) = book.sync([LOST], at(3), "c")
+
+    assert again.acknowledged is None
+
+
+def test_an_alarm_that_nobody_knows_cannot_be_acknowledged() -> None:
+    assert AlarmBook().acknowledge("none", "ana", "", at(0)) is None
+
+
+def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> None:
+    book = AlarmBook()
+    book.sync([SLOWED], at(0), "a")
+    nearer = Condition("P2", SLOWED.key, SLOWED.subject, "AGI", {"distance": 0.9})
+
+    assert book.sync([nearer], at(1), "b") == []
+    assert book.active[0].condition.slots == {"distance": 0.9}

@@ -1,0 +1,288 @@
+"""Ages, links, and what a message may change."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.errors import UnknownRobotError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import (
+    Canary,
+    Climate,
+    CommandStatus,
+    Navigation,
+    Observation,
+    Origin,
+    Received,
+)
+from iveg.domain.world import RobotState, World
+from tests.builders import (
+    START,
+    at,
+    detection_frame,
+    hold,
+    odometry,
+    origin,
+    received,
+    safety_report,
+    scan,
+)
+
+
+def world_with(*observations: Observation) -> World:
+    world = World(["AGI", "AGII"])
+    for observation in observations:
+        world.apply(received(observation))
+    return world
+
+
+def asked(observation: Observation, after: float = 0.0) -> Received:
+    return replace(received(observation, after=after), asked=True)
+
+
+# --- links ------------------------------------------------------------------------
+
+
+def test_a_robot_that_was_never_heard_is_unknown() -> None:
+    robot = world_with().robot("AGI")
+
+    assert robot.link(at(0.0)) == "UNKNOWN"
+    assert robot.age_s(at(0.0)) is None
+    assert not robot.stands
+
+
+@pytest.mark.parametrize(
+    ("age", "link"),
+    [
+        (0.0, "LIVE"),
+        (1.0, "LIVE"),
+        (1.001, "LATE"),
+        (3.0, "LATE"),
+        (3.001, "LOST"),
+        (1e6, "LOST"),
+    ],
+)
+def test_the_link_is_live_to_1_s_late_to_3_s_then_lost(age: float, link: str) -> None:
+    robot = world_with(odometry()).robot("AGI")
+
+    assert robot.link(at(age)) == link
+
+
+def test_the_age_holds_what_the_message_took_beyond_the_fastest() -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(origin=origin(1))))
+    world.apply(received(odometry(origin=origin(2)), after=0.6))
+
+    assert world.robot("AGI").age_s(at(0.6)) == pytest.approx(0.6)
+
+
+def test_only_odometry_makes_a_robot_live() -> None:
+    world = world_with(safety_report(), scan(), detection_frame())
+
+    assert world.robot("AGI").link(at(0.0)) == "UNKNOWN"
+
+
+@pytest.mark.parametrize(
+    ("linear", "angular", "stands"),
+    [(0.0, 0.0, True), (0.0199, -0.0199, True), (0.02, 0.0, False), (0.0, 0.02, False)],
+)
+def test_a_robot_stands_below_two_centimetres_a_second(
+    linear: float, angular: float, stands: bool
+) -> None:
+    world = world_with(odometry(linear=linear, angular=angular))
+
+    assert world.robot("AGI").stands is stands
+
+
+# --- what was asked of Orion ------------------------------------------------------
+
+
+def test_what_was_asked_of_orion_never_looks_live() -> None:
+    world = World(["AGI"])
+    world.apply(asked(odometry()))
+
+    robot = world.robot("AGI")
+    assert robot.link(at(0.0)) == "LOST"
+    assert robot.odometry is not None
+
+
+def test_what_was_asked_is_at_least_as_old_as_its_stamp_says() -> None:
+    world = World(["AGI"])
+    world.apply(asked(odometry(origin=origin(1, after=-60.0))))
+
+    assert world.robot("AGI").age_s(at(0.0)) == pytest.approx(60.0)
+
+
+def test_a_safety_report_or_scan_that_was_asked_for_looks_old_too() -> None:
+    world = World(["AGI"])
+    world.apply(asked(safety_report()))
+    world.apply(asked(scan()))
+
+    robot = world.robot("AGI")
+    assert robot.safety_received is not None
+    assert robot.scan_received is not None
+    assert at(0.0).mono - robot.safety_received.mono > 3.0
+    assert at(0.0).mono - robot.scan_received.mono > 3.0
+
+
+def test_what_was_asked_does_not_disturb_a_robot_without_identity() -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(x=1.0, origin=Origin())))
+
+    verdict = world.apply(asked(odometry(x=2.0, origin=Origin())))
+
+    robot = world.robot("AGI")
+    assert verdict == "duplicate"
+    assert robot.odometry is not None
+    assert robot.odometry.pose.x == 1.0
+    assert robot.link(at(0.0)) == "LIVE"
+
+
+def test_a_newer_answer_does_not_make_a_live_robot_look_lost() -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(x=1.0, origin=origin(1))))
+
+    world.apply(asked(odometry(x=2.0, origin=origin(2)), after=0.1))
+
+    robot = world.robot("AGI")
+    assert robot.odometry is not None
+    assert robot.odometry.pose.x == 2.0
+    assert robot.age_s(at(0.1)) == pytest.approx(0.1)
+
+
+def test_what_orion_kept_of_an_earlier_boot_does_not_displace_the_present_one() -> None:
+    world = World(["AGI"])
+    world.apply(received(safety_report(origin=origin(1, boot="today"))))
+
+    kept = world.apply(asked(safety_report(origin=origin(900, boot="yesterday"))))
+    fresh = world.apply(received(safety_report(origin=origin(2, boot="today"))))
+
+    assert (kept, fresh) == ("late", "new")
+
+
+def test_what_was_asked_is_no_sign_of_life() -> None:
+    world = World(["AGI"])
+    world.apply(asked(odometry()))
+
+    assert world.robot("AGI").heard_at is None
+    assert world.robot("AGI").clock.offset_s is None
+
+
+# --- what a message changes -------------------------------------------------------
+
+
+def test_an_older_message_changes_nothing_but_the_count() -> None:
+    world = world_with(
+        odometry(x=5.0, origin=origin(5)), odometry(x=4.0, origin=origin(4))
+    )
+
+    newest = world.robot("AGI").odometry
+    assert newest is not None
+    assert newest.pose.x == 5.0
+    assert world.counters["Odometry.late"] == 1
+
+
+def test_the_same_message_on_the_other_road_changes_nothing_but_the_count() -> None:
+    world = World(["AGI"])
+    world.apply(received(safety_report("AGI", hold()), road="mqtt"))
+
+    world.apply(received(safety_report("AGI"), after=1.0, road="orion"))
+
+    robot = world.robot("AGI")
+    assert robot.safety is not None
+    assert robot.safety.holds == (hold(),)
+    assert robot.safety_road == "mqtt"
+    assert world.counters["SafetyReport.duplicate"] == 1
+
+
+def test_each_kind_of_message_has_an_order_of_its_own() -> None:
+    world = world_with(odometry(origin=origin(900)), safety_report(origin=origin(1)))
+
+    assert world.robot("AGI").safety is not None
+
+
+def test_a_robot_outside_the_fleet_is_refused() -> None:
+    with pytest.raises(UnknownRobotError, match="AGX"):
+        world_with(odometry("AGX"))
+
+
+def test_climate_and_canary_belong_to_no_robot() -> None:
+    world = world_with(Climate(21.5), Canary(origin()))
+
+    assert world.climate == Climate(21.5)
+    assert world.climate_received == START
+    assert world.canary_at == START.mono
+
+
+def test_an_unreadable_detection_is_remembered_with_its_moment() -> None:
+    world = world_with(detection_frame(unreadable=1))
+
+    assert world.robot("AGI").unreadable_at == START.mono
+
+
+def test_the_agents_opinion_is_kept_for_display() -> None:
+    world = world_with(CommandStatus("AGI", "PENDING"))
+
+    assert world.robot("AGI").command_status == "PENDING"
+
+
+def test_a_robot_that_a_recording_plays_says_so_in_its_task() -> None:
+    world = world_with(Navigation("AGI", origin(), "replay"))
+
+    assert world.robot("AGI").is_replay
+    assert [robot.robot_id for robot in world.live_robots()] == ["AGII"]
+
+
+# --- poses in the past ------------------------------------------------------------
+
+
+def driven() -> RobotState:
+    """One metre a second along x, a pose every second."""
+    world = World(["AGI"])
+    for second in range(10):
+        one = odometry(x=float(second), origin=origin(second, after=second))
+        world.apply(received(one, after=second))
+    return world.robot("AGI")
+
+
+def test_the_pose_at_a_stamp_is_interpolated() -> None:
+    assert driven().pose_at_stamp(START.wall + 3.25) == Pose2D(3.25, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("after", "x"), [(-5.0, 0.0), (99.0, 9.0)])
+def test_outside_the_history_the_nearest_end_counts(after: float, x: float) -> None:
+    assert driven().pose_at_stamp(START.wall + after) == Pose2D(x, 0.0, 0.0)
+
+
+def test_without_a_stamp_the_newest_pose_counts() -> None:
+    assert driven().pose_at_stamp(None) == Pose2D(9.0, 0.0, 0.0)
+
+
+def test_without_any_pose_there_is_none() -> None:
+    assert RobotState("AGI").pose_at_stamp(START.wall) is None
+
+
+def test_a_clock_that_jumps_back_begins_the_history_anew() -> None:
+    robot = driven()
+
+    robot.remember_pose(START.wall - 3600.0, Pose2D(50.0, 0.0, 0.0))
+
+    assert robot.pose_at_stamp(START.wall + 3.0) == Pose2D(50.0, 0.0, 0.0)
+
+
+def test_a_pose_a_little_late_is_left_out_of_the_history() -> None:
+    robot = driven()
+
+    robot.remember_pose(START.wall + 8.5, Pose2D(50.0, 0.0, 0.0))
+
+    assert robot.pose_at_stamp(START.wall + 8.5) == Pose2D(8.5, 0.0, 0.0)
+
+
+def test_a_scan_is_placed_with_the_pose_at_its_stamp() -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(x=0.0, origin=origin(1, after=0.0))))
+    world.apply(received(odometry(x=1.0, origin=origin(2, after=1.0)), after=1.0))
+
+    world.apply(received(scan(origin=origin(1, after=0.5)), after=1.0))
+
+    assert world.robot("AGI").scan_pose == Pose2D(0.5, 0.0, 0.0)
