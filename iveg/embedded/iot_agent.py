@@ -255,7 +255,7 @@ class IotAgent:
             f"/{device.apikey}/{device.device_id}/cmd",
             orjson.dumps({command: value}),
             int(options.get("qos", 0)),
-            bool(options.get("retain", False)),
+            retain=bool(options.get("retain", False)),
         )
 
     async def query(

@@ -101,7 +101,9 @@ class MqttBroker(Broker):  # type: ignore[misc]
         """Have every message that clients publish, as it comes; must not block."""
         self._listeners.append(listener)
 
-    async def publish(self, topic: str, payload: bytes, qos: int, retain: bool) -> None:
+    async def publish(
+        self, topic: str, payload: bytes, qos: int, *, retain: bool
+    ) -> None:
         """Publish as a client would."""
         await super()._broadcast_message(None, topic, payload, qos)
         if retain:

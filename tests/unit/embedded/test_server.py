@@ -90,6 +90,9 @@ async def test_closing_under_clients_leaves_no_task_and_no_warning(
             _, rude = await asyncio.open_connection("127.0.0.1", up.orion_port)
             rude.write(b"\x00\x01nonsense\r\n\r\n")
             await rude.drain()
+        with pytest.raises(aiomqtt.MqttError):
+            async for _ in mqtt.messages:
+                pass
         with contextlib.suppress(aiomqtt.MqttError):
             await mqtt.__aexit__(None, None, None)
         half.close()
