@@ -150,7 +150,9 @@ class MqttLink:
                 try:
                     await client.publish(topic, payload, qos=qos)
                 except aiomqtt.MqttError:
-                    return
+                    # A broker that is slow to confirm may still be there; when it is
+                    # gone, the session ends and this task with it.
+                    continue
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when there is time; a newer message of the topic takes its place."""
