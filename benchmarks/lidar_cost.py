@@ -6,11 +6,13 @@ with the bytes of its message, as share of one core at 30 Hz.
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.emulator.camera import DETECTORS
-from iveg.emulator.scenarios import lay_out, scenario_named
-from iveg.emulator.world import World
+from iveg.emulator.layout import lay_out
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.world import Rig, World
 from iveg.ngsi.codec import write_scan
 
 RATE_HZ = 30.0
@@ -34,6 +36,10 @@ def cost(work: Callable[[], object]) -> float:
     return best
 
 
+def message(rig: Rig, world: World) -> bytes:
+    return write_scan(rig.scan(world))
+
+
 def main() -> None:
     print("greenhouse    robots   sweep   with its message   core per robot at 30 Hz")
     for name, robots in CASES:
@@ -41,8 +47,8 @@ def main() -> None:
         layout = lay_out(scenario_named("demo"), robots, house)
         world = World(house, layout, DETECTORS["simulation"], seed=1)
         rig = world.rigs[robots[0]]
-        sweep = cost(lambda rig=rig, world=world: rig.scan(world))
-        both = cost(lambda rig=rig, world=world: write_scan(rig.scan(world)))
+        sweep = cost(partial(rig.scan, world))
+        both = cost(partial(message, rig, world))
         print(
             f"{name:12} {len(robots):7} {sweep * 1e6:5.0f} µs {both * 1e6:12.0f} µs "
             f"{both * RATE_HZ:18.1%}"

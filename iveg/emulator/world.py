@@ -32,9 +32,10 @@ from iveg.emulator.camera import (
 from iveg.emulator.following import Follower
 from iveg.emulator.greenhouse import Body, Disc, Scenery
 from iveg.emulator.kinematics import Odometer, Vehicle
+from iveg.emulator.layout import Layout
 from iveg.emulator.lidar import LaserModel, sweep
 from iveg.emulator.people import Person
-from iveg.emulator.scenarios import Layout, RobotScript
+from iveg.emulator.scenarios import RobotScript
 
 REST = Twist2D(0.0, 0.0)
 _LASER = LaserModel()

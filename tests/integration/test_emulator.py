@@ -21,8 +21,10 @@ from iveg.domain.observations import (
     Odometry,
 )
 from iveg.emulator.camera import DETECTORS
-from iveg.emulator.fleet import Fleet, FleetSettings, run_emulator
-from iveg.emulator.scenarios import Incident, lay_out, scenario_named
+from iveg.emulator.emulated_robot import FleetSettings
+from iveg.emulator.fleet import Fleet, run_emulator
+from iveg.emulator.layout import lay_out
+from iveg.emulator.scenarios import Incident, scenario_named
 from iveg.emulator.world import World
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 

@@ -9,8 +9,9 @@ from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS, PERSON
 from iveg.emulator.greenhouse import bodies_touch
+from iveg.emulator.layout import lay_out
 from iveg.emulator.people import RADIUS_M
-from iveg.emulator.scenarios import SCENARIOS, lay_out, scenario_named
+from iveg.emulator.scenarios import SCENARIOS, scenario_named
 from iveg.emulator.world import World, climate_at
 
 FLEET = ("AGI", "AGII")

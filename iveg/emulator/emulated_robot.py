@@ -1,0 +1,161 @@
+"""One emulated robot: its rig under its own safety node, and the faults it may have.
+
+It has three slots a period: drive and odometry, laser, camera.
+"""
+
+import asyncio
+from dataclasses import dataclass
+from pathlib import Path
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.emulator.faults import FaultOrder
+from iveg.emulator.pacing import every
+from iveg.emulator.world import REST, Rig, World
+from iveg.robot.node import RobotNode
+from iveg.robot.uplink import Form
+
+SLOTS = 3
+LONGEST_STEP_S = 0.1
+"""A machine that slept must not let a robot leap."""
+_NAVIGATION_EVERY_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class FleetSettings:
+    """What all robots of a run share.
+
+    Attributes:
+        slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
+        state_directory: Where hold files live.
+        held: Nobody releases the boot hold at the robots.
+        rate_hz: Of odometry, laser and camera each.
+    """
+
+    address: BrokerAddress
+    apikey: str
+    uplink: Form
+    slow_s: float
+    stand_s: float
+    state_directory: Path
+    held: bool
+    rate_hz: float
+
+
+class EmulatedRobot:
+    """One rig, its safety node, and the order in which they are asked."""
+
+    def __init__(self, rig: Rig, world: World, settings: FleetSettings) -> None:
+        self.robot_id = rig.robot_id
+        self._rig = rig
+        self._world = world
+        self._settings = settings
+        self._node = self._new_node(held=settings.held)
+        self._node_task: asyncio.Task[None] | None = None
+        self._tasks: asyncio.TaskGroup
+        self._started = 0.0
+        self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
+        self._is_odometry_frozen = False
+
+    def _new_node(self, *, held: bool) -> RobotNode:
+        settings = self._settings
+        return RobotNode(
+            self.robot_id,
+            address=settings.address,
+            apikey=settings.apikey,
+            profile=self._rig.profile,
+            hold_file=settings.state_directory / f"{self.robot_id}.holds.json",
+            drive=self._rig.drive,
+            slow_s=settings.slow_s,
+            stand_s=settings.stand_s,
+            uplink=settings.uplink,
+            held=held,
+        )
+
+    async def run(self, started: float, phase: float) -> None:
+        """Drive and sense until cancelled; ``started`` is when the run began."""
+        self._started = started
+        slots = (self._drive, self._scan, self._look)
+        turn = 0
+
+        def slot(dt: float) -> None:
+            nonlocal turn
+            slots[turn % SLOTS](dt)
+            turn += 1
+
+        if not self._settings.held:
+            self._node.release_locally()
+        async with asyncio.TaskGroup() as self._tasks:
+            self._start_node()
+            await asyncio.sleep(phase)
+            await every(1.0 / self._settings.rate_hz / SLOTS, slot)
+
+    # --- the slots ----------------------------------------------------------------
+
+    def _now(self) -> float:
+        return clock.now().mono - self._started
+
+    def _drive(self, dt: float) -> None:
+        now, node = self._now(), self._node
+        if self._node_task is not None:
+            # While wishes do not count navigation asks for rest: the gate wants to see
+            # that before it lets the robot move again.
+            wish = self._rig.wish(now, self._world)
+            node.wish(wish if node.may_drive else REST)
+        self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
+        if self._node_task is None:
+            return
+        if not self._is_odometry_frozen:
+            node.sense(self._rig.odometry())
+        navigation = self._rig.navigation()
+        task, told_at = self._told
+        if navigation.task != task or now - told_at >= _NAVIGATION_EVERY_S:
+            self._told = (navigation.task, now)
+            node.sense(navigation)
+
+    def _scan(self, _: float) -> None:
+        if self._node_task is not None:
+            self._node.sense(self._rig.scan(self._world))
+
+    def _look(self, _: float) -> None:
+        if self._node_task is not None:
+            self._node.sense(self._rig.look(self._now(), self._world))
+
+    # --- faults -------------------------------------------------------------------
+
+    def obey(self, order: FaultOrder) -> None:
+        """Do what a fault order says, in the order of its fields."""
+        node = self._node
+        node.mute = node.mute if order.mute is None else order.mute
+        node.deaf = node.deaf if order.deaf is None else order.deaf
+        if order.clock_offset_s is not None:
+            node.clock_offset_s = order.clock_offset_s
+        if order.freeze_odometry is not None:
+            self._is_odometry_frozen = order.freeze_odometry
+        self._blind(order)
+        if order.local_hold is not None:
+            node.add_local_hold(order.local_hold)
+        if order.release_locally:
+            node.release_locally()
+        if order.kill:
+            self._kill_node()
+        if order.revive and self._node_task is None:
+            self._node = self._new_node(held=True)
+            self._start_node()
+
+    def _blind(self, order: FaultOrder) -> None:
+        if order.hide_people is not None:
+            self._rig.hides_people = order.hide_people
+        if "false_person" in order.model_fields_set:
+            place = order.false_person
+            self._rig.false_person = None if place is None else (place.x, place.y)
+
+    def _start_node(self) -> None:
+        self._node_task = self._tasks.create_task(
+            self._node.run(), name=f"node-{self.robot_id}"
+        )
+
+    def _kill_node(self) -> None:
+        if self._node_task is not None:
+            self._node_task.cancel()
+            self._node_task = None
