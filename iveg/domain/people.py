@@ -111,6 +111,7 @@ class People:
     def __init__(self) -> None:
         self.known: dict[str, Person] = {}
         self._count = 0
+        self._faint: dict[str, list[Placed]] = {}
 
     def sight(
         self,
@@ -135,6 +136,7 @@ class People:
             if (judged := _place(detection, frame, observer, rule)) is not None
         ]
         placed = [_match_peer(one, observer, world, at) for one in placed]
+        self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
         return self._assign(placed, frame.robot_id, at, new_id)
 
     def _assign(
@@ -205,6 +207,14 @@ class People:
         }
         self.known[person_id] = replace(person, sightings=left)
         return self.known[person_id]
+
+    def is_suspected(self, person: Person, x: float, y: float, observer: str) -> bool:
+        """Whether a robot's newest look holds a faint one of the kind near a spot."""
+        return any(
+            one.class_ == person.class_
+            and math.hypot(one.position[0] - x, one.position[1] - y) <= _GATE_M
+            for one in self._faint.get(observer, ())
+        )
 
     def forget(self, now: Instant) -> list[Person]:
         """Drop who has not been seen for ten minutes; returns them."""

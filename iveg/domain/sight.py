@@ -1,7 +1,7 @@
 """Who can see what: cameras, crop, and the all-clear of an empty spot.
 
 A ring goes by time or because a robot has looked at its centre for a second and found
-nobody; never for one missing frame (safety.md §3.4).
+nobody, not even faintly; never for one missing frame (safety.md §3.4).
 """
 
 import math
@@ -38,7 +38,13 @@ class AllClear:
             for sighting in list(person.sightings.values()):
                 if not SEEN_S < sighting.age_s(now) <= RING_S:
                     continue
-                if self._is_empty(person, sighting, world, greenhouse, now, watched):
+                lookers = [
+                    robot.robot_id
+                    for robot in world.live_robots()
+                    if can_see(robot, sighting.x, sighting.y, greenhouse, now)
+                    and not _sees_faintly(robot, people, person, sighting)
+                ]
+                if self._is_empty(person, sighting, lookers, now, watched):
                     cleared.append(people.drop_sighting(person.person_id, sighting))
         self._since = watched
         return cleared
@@ -47,19 +53,22 @@ class AllClear:
         self,
         person: Person,
         sighting: Sighting,
-        world: World,
-        greenhouse: Greenhouse,
+        lookers: list[str],
         now: Instant,
         watched: dict[_Look, float],
     ) -> bool:
-        for robot in world.live_robots():
-            if not can_see(robot, sighting.x, sighting.y, greenhouse, now):
-                continue
-            look = person.person_id, sighting.observer, robot.robot_id
+        for robot_id in lookers:
+            look = person.person_id, sighting.observer, robot_id
             watched[look] = self._since.get(look, now.mono)
             if now.mono - watched[look] >= CLEAR_S:
                 return True
         return False
+
+
+def _sees_faintly(
+    robot: RobotState, people: People, person: Person, sighting: Sighting
+) -> bool:
+    return people.is_suspected(person, sighting.x, sighting.y, robot.robot_id)
 
 
 def can_see(
