@@ -1,0 +1,127 @@
+"""A small greenhouse with robots and people, moved by hand."""
+
+from dataclasses import dataclass, field, replace
+
+from iveg.domain.alerts import Rule
+from iveg.domain.feedback import Mandate
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.mandates import Change, Mandates
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    Navigation,
+    Origin,
+    Received,
+)
+from iveg.domain.people import People, Person, Placed
+from iveg.domain.sight import AllClear
+from iveg.domain.world import World
+from tests.builders import (
+    at,
+    detection,
+    detection_frame,
+    odometry,
+    origin,
+    received,
+    safety_report,
+)
+
+FIELD = Greenhouse("field", Rectangle(-100, -100, 100, 100))
+HEDGE = Greenhouse(
+    "hedge", Rectangle(-100, -100, 100, 100), rows=(Rectangle(2.9, -50, 3.1, 50),)
+)
+
+
+@dataclass
+class Scene:
+    """World, people and mandates on one clock.
+
+    Attributes:
+        now: Seconds since the start.
+    """
+
+    robots: tuple[str, ...] = ("AGI", "AGII")
+    house: Greenhouse = FIELD
+    rule: Rule = field(default_factory=Rule)
+    now: float = 0.0
+    changes: list[Change] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.world = World(self.robots)
+        self.people = People()
+        self.mandates = Mandates(self.house)
+        self.all_clear = AllClear()
+        self._seq = 0
+
+    # --- what robots say ----------------------------------------------------------
+
+    def drive(
+        self,
+        robot_id: str,
+        x: float,
+        y: float = 0.0,
+        yaw: float = 0.0,
+        *,
+        linear: float = 0.5,
+    ) -> None:
+        """A robot says where it is."""
+        self._seq += 1
+        said = odometry(robot_id, x, y, yaw, linear=linear, origin=self._origin())
+        self._apply(received(said, after=self.now))
+
+    def look(
+        self, robot_id: str, *detections: Detection, unreadable: int = 0
+    ) -> list[Placed]:
+        """A robot says what it sees."""
+        self._seq += 1
+        frame = detection_frame(
+            robot_id, *detections, unreadable=unreadable, origin=self._origin()
+        )
+        self._apply(received(frame, after=self.now))
+        return self.sight(frame)
+
+    def sight(self, frame: DetectionFrame) -> list[Placed]:
+        return self.people.sight(
+            frame, self.world, self.rule, at(self.now), f"look{self._seq}"
+        )
+
+    def report(self, robot_id: str, *, factor: float) -> None:
+        """A robot says what it applies."""
+        self._seq += 1
+        said = safety_report(robot_id, speed_factor=factor, origin=self._origin())
+        self._apply(received(said, after=self.now))
+
+    def play_back(self, robot_id: str) -> None:
+        """This robot is a recording."""
+        self._apply(received(Navigation(robot_id, self._origin(), "replay")))
+
+    def _origin(self) -> Origin:
+        return origin(self._seq, after=self.now)
+
+    def _apply(self, one: Received) -> None:
+        self.world.apply(replace(one, at=at(self.now)))
+
+    # --- what is judged -----------------------------------------------------------
+
+    def judge(self) -> dict[str, Mandate]:
+        mandates, changes = self.mandates.evaluate(
+            self.world, self.people, self.rule, at(self.now), f"d{self.now}"
+        )
+        self.changes += changes
+        return mandates
+
+    def sweep(self) -> list[Person]:
+        return self.all_clear.sweep(self.people, self.world, self.house, at(self.now))
+
+    @property
+    def everyone(self) -> list[Person]:
+        return list(self.people.known.values())
+
+
+def person(x: float, y: float = 0.0, *, probability: float = 0.94) -> Detection:
+    return detection("farmer", x, y, probability=probability)
+
+
+def machine(x: float, y: float = 0.0) -> Detection:
+    return detection("husky", x, y)

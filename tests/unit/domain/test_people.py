@@ -1,0 +1,272 @@
+"""How looks become people, and how people age."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.geometry import Box3D
+from iveg.domain.observations import Detection, Origin
+from tests.builders import (
+    START,
+    at,
+    detection,
+    detection_frame,
+    odometry,
+    origin,
+    received,
+)
+from tests.unit.domain.scene import Scene, machine, person
+
+# --- where ------------------------------------------------------------------------
+
+
+def test_a_detection_in_base_link_is_placed_with_the_pose_at_its_stamp() -> None:
+    scene = Scene()
+    for second, x in ((0, 0.0), (1, 10.0)):
+        said = odometry(x=x, yaw=math.pi / 2, origin=origin(second, after=second))
+        scene.world.apply(received(said, after=second))
+    ahead = replace(person(3.0), frame_id="base_link")
+
+    (placed,) = scene.sight(detection_frame("AGI", ahead, origin=origin(1, after=0.5)))
+
+    assert placed.position == pytest.approx((5.0, 3.0, 0.9))
+
+
+def test_a_detection_in_base_link_of_a_robot_without_pose_cannot_be_placed() -> None:
+    ahead = replace(person(3.0), frame_id="base_link")
+
+    assert Scene().look("AGI", ahead) == []
+
+
+def test_a_detection_in_map_needs_no_pose() -> None:
+    (placed,) = Scene().look("AGI", person(3.0, 4.0))
+
+    assert placed.position[:2] == (3.0, 4.0)
+
+
+# --- who --------------------------------------------------------------------------
+
+
+def test_a_confident_farmer_is_a_new_person() -> None:
+    scene = Scene()
+
+    (placed,) = scene.look("AGI", person(3.0))
+
+    assert placed.appeared
+    (known,) = scene.everyone
+    assert (known.person_id, known.class_) == ("P1", "person")
+    assert known.newest.class_id == "farmer"
+
+
+def test_a_faint_farmer_is_shown_and_is_nobody() -> None:
+    scene = Scene()
+
+    (placed,) = scene.look("AGI", person(3.0, probability=0.7999999))
+
+    assert (placed.kind, placed.person) == ("faint", None)
+    assert scene.everyone == []
+
+
+def test_another_object_is_shown_and_is_nobody() -> None:
+    scene = Scene()
+
+    (placed,) = scene.look("AGI", detection("crate", 3.0))
+
+    assert (placed.kind, placed.person) == ("other", None)
+
+
+def test_two_people_half_a_metre_apart_in_one_look_stay_two() -> None:
+    scene = Scene()
+    for tenth in range(20):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0, 0.0), person(3.0, 0.5))
+
+    assert len(scene.everyone) == 2
+    assert sorted(one.newest.y for one in scene.everyone) == [0.0, 0.5]
+
+
+def test_a_person_who_walks_stays_the_same_person() -> None:
+    scene = Scene()
+    for tenth in range(50):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0 + 0.15 * tenth))
+
+    assert [one.person_id for one in scene.everyone] == ["P1"]
+
+
+def test_someone_more_than_two_metres_away_is_someone_else() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 60.0
+
+    scene.look("AGI", person(5.01))
+
+    assert len(scene.everyone) == 2
+
+
+def test_one_person_seen_by_two_robots_has_two_observers() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 0.1
+
+    scene.look("AGII", person(3.2))
+
+    (known,) = scene.everyone
+    assert set(known.sightings) == {"AGI", "AGII"}
+    assert known.newest.observer == "AGII"
+
+
+def test_each_robots_look_keeps_a_circle_of_its_own() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.look("AGII", person(3.9))
+
+    (known,) = scene.everyone
+    circles = list(known.rings(scene.rule, at(0.0)))
+    assert sorted(sighting.x for sighting, _ in circles) == pytest.approx([3.0, 3.9])
+
+
+def test_a_robot_is_never_the_same_as_a_person() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0), machine(3.0, 0.1))
+
+    assert [one.person_id for one in scene.everyone] == ["P1", "R2"]
+
+
+def test_a_look_older_than_the_newest_of_its_robot_changes_nothing() -> None:
+    scene = Scene()
+    scene.now = 1.0
+    scene.look("AGI", person(3.0))
+    scene.now = 0.5
+
+    scene.look("AGI", person(3.3))
+
+    (known,) = scene.everyone
+    assert known.newest.x == 3.0
+
+
+def test_no_more_people_are_kept_than_the_page_can_show() -> None:
+    scene = Scene()
+    for row in range(30):
+        scene.look("AGI", *(person(10.0 * row, 10.0 * n) for n in range(10)))
+
+    assert len(scene.everyone) == 256
+
+
+# --- peers ------------------------------------------------------------------------
+
+
+def test_a_robot_seen_where_a_peer_stands_is_that_peer_and_no_second_robot() -> None:
+    scene = Scene()
+    scene.drive("AGII", 5.0)
+
+    (placed,) = scene.look("AGI", machine(5.8))
+
+    assert placed.peer == "AGII"
+    assert placed.peer_residual_m == pytest.approx(0.8)
+    assert scene.everyone == []
+
+
+def test_of_two_peers_the_nearer_one_is_seen() -> None:
+    scene = Scene(robots=("AGI", "AGII", "AG3"))
+    scene.drive("AGII", 5.0)
+    scene.drive("AG3", 5.6)
+
+    (placed,) = scene.look("AGI", machine(5.5))
+
+    assert placed.peer == "AG3"
+
+
+def test_a_robot_is_not_told_of_itself() -> None:
+    scene = Scene()
+    scene.drive("AGI", 5.0)
+
+    (placed,) = scene.look("AGI", machine(5.0))
+
+    assert placed.peer is None
+
+
+def test_a_robot_that_is_none_of_the_fleet_is_not_lost() -> None:
+    scene = Scene()
+    scene.drive("AGII", 5.0)
+
+    (placed,) = scene.look("AGI", machine(9.0))
+
+    assert placed.appeared
+    assert [one.class_ for one in scene.everyone] == ["robot"]
+
+
+def test_a_person_next_to_a_peer_is_still_a_person() -> None:
+    scene = Scene()
+    scene.drive("AGII", 5.0)
+
+    (placed,) = scene.look("AGI", person(5.0))
+
+    assert placed.peer is None
+    assert len(scene.everyone) == 1
+
+
+# --- ages -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("age", "stage"),
+    [
+        (0.0, "seen"),
+        (1.0, "seen"),
+        (1.01, "remembered"),
+        (10.0, "remembered"),
+        (10.01, "last_seen"),
+        (600.0, "last_seen"),
+        (600.1, "gone"),
+    ],
+)
+def test_a_person_is_seen_then_remembered_then_last_seen_then_gone(
+    age: float, stage: str
+) -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+
+    assert scene.everyone[0].stage(at(age)) == stage
+
+
+def test_f46_the_ring_of_somebody_whose_observer_died_grows_to_six_metres() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    known = scene.everyone[0]
+
+    radii = [next(iter(known.rings(scene.rule, at(age))))[1] for age in (0, 1.32, 2.82)]
+
+    assert radii == pytest.approx([2.0, 3.6, 6.0])
+
+
+def test_after_ten_seconds_there_is_a_mark_and_no_ring() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    known = scene.everyone[0]
+
+    assert list(known.rings(scene.rule, at(10.0)))
+    assert not list(known.rings(scene.rule, at(10.01)))
+
+
+def test_who_is_gone_is_forgotten() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+
+    assert scene.people.forget(at(599.0)) == []
+    assert [one.person_id for one in scene.people.forget(at(601.0))] == ["P1"]
+    assert scene.everyone == []
+
+
+def test_looks_without_identity_are_placed_with_the_newest_pose() -> None:
+    scene = Scene()
+    scene.drive("AGI", 4.0)
+    box = Box3D(1.0, 1.0, 0.0, 0.0, 0.0, 1.8)
+    frame = detection_frame("AGI", Detection("person", 0.9, box), origin=Origin())
+
+    (placed,) = scene.sight(frame)
+
+    assert placed.position == (5.0, 0.0, 0.9)
+    assert placed.person is not None
+    assert placed.person.first_seen == START
