@@ -105,7 +105,7 @@ def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
     robot, fastest = series.robot_id, profile_of(series.robot_id).max_speed
     at = [_ms(moment) for moment in series.at]
     lines: tuple[tuple[str, Sequence[float | None], _Trace], ...] = (
-        ("speed", series.linear, {}),
+        ("speed", [round(v, 3) for v in series.linear], {}),
         ("mandated", [fastest * f for f in series.mandated], {"shape": "hv"}),
     )
     gaps = _gaps(series)

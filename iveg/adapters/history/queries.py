@@ -27,7 +27,7 @@ from iveg.domain.records import (
     LogRecord,
 )
 
-_THREADS = 2
+_THREADS = 4
 _T = TypeVar("_T")
 
 
