@@ -183,8 +183,10 @@ class ContextBroker:
 
     def delete(self, scope: Scope, entity: Entity) -> None:
         """Forget an entity and tell those who asked to know."""
-        self.tenant(scope.service).entities.remove(entity)
+        tenant = self.tenant(scope.service)
+        tenant.entities.remove(entity)
         self._tell(scope, entity, touch_all(entity), "entityDelete")
+        tenant.concerned.pop(entity.key, None)
 
     def delete_attributes(
         self, scope: Scope, entity: Entity, names: Iterable[str]

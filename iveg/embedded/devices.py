@@ -189,10 +189,18 @@ def changed_device(device: Device, raw: Mapping[str, Any]) -> Device:
 
 
 def _mapping(raw: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    for part in ("attributes", "commands", "static_attributes"):
+        listed = raw.get(part) or []
+        if not isinstance(listed, list) or not all(map(_named, listed)):
+            raise wrong_syntax()
     return {
         one.get("object_id") or one["name"]: (one["name"], one.get("type", "Text"))
         for one in raw.get("attributes") or []
     }
+
+
+def _named(one: Any) -> bool:
+    return isinstance(one, dict) and isinstance(one.get("name"), str)
 
 
 def wrong_syntax() -> AgentError:

@@ -28,6 +28,7 @@ from iveg.embedded.entities import Change
 from iveg.embedded.measures import read_measures, read_single, status_changes
 from iveg.embedded.mqtt_broker import MqttBroker
 from iveg.embedded.orion_errors import NgsiError
+from iveg.embedded.orion_text import load_json
 from iveg.embedded.registrations import read_registration
 
 _log = logging.getLogger(__name__)
@@ -130,10 +131,7 @@ class IotAgent:
         return measures is not None
 
     def _take_answer(self, device: Device, payload: bytes, now: float) -> bool:
-        try:
-            answers = orjson.loads(payload)
-        except orjson.JSONDecodeError:
-            return False
+        answers = load_json(payload)
         if not isinstance(answers, dict):
             return False
         known = {

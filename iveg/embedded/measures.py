@@ -17,6 +17,7 @@ from iveg.embedded.orion_text import (
     UNRESTRICTED,
     check_name,
     holds_forbidden,
+    load_json,
     looks_clean,
 )
 
@@ -38,10 +39,7 @@ def read_measures(
     Raises:
         NgsiError: 400 or 413, what Orion says to the agent about it.
     """
-    try:
-        value = orjson.loads(payload)
-    except orjson.JSONDecodeError:
-        return None
+    value = load_json(payload)
     clean = _check(payload)
     if value is None or value == {}:
         value = _NOTHING

@@ -18,7 +18,7 @@ from iveg.embedded.orion_errors import (
     not_found,
     parse_error,
 )
-from iveg.embedded.orion_text import check_name, looks_clean
+from iveg.embedded.orion_text import check_name, load_json, looks_clean
 from iveg.embedded.query import matches_query, ordered
 from iveg.embedded.registrations import read_registration
 from iveg.embedded.subscriptions import (
@@ -76,10 +76,7 @@ class Call:
         Raises:
             NgsiError: 400, not JSON.
         """
-        try:
-            return orjson.loads(self.request.body)
-        except orjson.JSONDecodeError:
-            raise parse_error() from None
+        return load_json(self.request.body)
 
     def object(self) -> dict[str, Any]:
         """The body, which must be an object.
@@ -685,8 +682,8 @@ def _read_value(call: Call) -> Any:
     kind = call.request.headers.get("content-type", "")
     value: Any
     try:
-        value = orjson.loads(call.request.body)
-    except orjson.JSONDecodeError:
+        value = load_json(call.request.body)
+    except NgsiError:
         if kind.startswith("application/json"):
             raise parse_error() from None
         raise bad_request("attribute value type not recognized") from None

@@ -10,7 +10,7 @@ from typing import Any
 
 import orjson
 
-from iveg.embedded.orion_errors import bad_request
+from iveg.embedded.orion_errors import bad_request, parse_error
 
 FORBIDDEN = frozenset("<>\"'=;()")
 _SUSPECTS = tuple(bytes([code]) for code in b"<>'=;()\\")
@@ -21,7 +21,34 @@ _TEN_DECIMALS = b".0000000000"
 _EXPONENT = b"0e"
 _HUGE = 9.2e18
 _EXACT_DIGITS = b"0" * 16
+_MAX_DEPTH = 128
 UNRESTRICTED = "TextUnrestricted"
+
+
+def load_json(body: bytes) -> Any:
+    """Parse JSON that may be hostile.
+
+    Raises:
+        NgsiError: 400, not JSON, or nested so deeply that it could not be walked.
+    """
+    try:
+        value = orjson.loads(body)
+    except orjson.JSONDecodeError:
+        raise parse_error() from None
+    # Counting brackets is quick and mostly enough; a path of points has many, flat.
+    if body.count(b"[") + body.count(b"{") > _MAX_DEPTH and _too_deep(value):
+        raise parse_error()
+    return value
+
+
+def _too_deep(value: Any) -> bool:
+    level = [value]
+    for _ in range(_MAX_DEPTH):
+        parts = [one.values() if isinstance(one, dict) else one for one in level]
+        level = [one for part in parts for one in part if type(one) in (dict, list)]
+        if not level:
+            return False
+    return True
 
 
 def looks_clean(body: bytes) -> bool:

@@ -312,7 +312,10 @@ def _check_subject(subject: Any) -> None:
                 )
         for name in ("idPattern", "typePattern"):
             _check_pattern(one.get(name, ".*"), name)
-    for one in subject.get("condition", {}).get("alterationTypes", []):
+    condition = subject.get("condition", {})
+    if not isinstance(condition, dict):
+        raise bad_request("condition must be a JSON object")
+    for one in condition.get("alterationTypes", []):
         if one not in _ALTERATIONS:
             raise bad_request(f"unknown alteration type: {one}")
 
@@ -334,7 +337,9 @@ def _read_notification(raw: Any) -> dict[str, Any]:
         )
     if chosen[0] in _UNSUPPORTED:
         raise bad_request(f"{chosen[0]} is not supported by the embedded broker")
-    parts = urlsplit(str(raw[chosen[0]].get("url", "")))
+    endpoint = raw[chosen[0]]
+    url = endpoint.get("url", "") if isinstance(endpoint, dict) else ""
+    parts = urlsplit(str(url))
     if parts.scheme not in ("http", "https") or not parts.hostname:
         raise bad_request("Invalid URL parsing notification url")
     form = raw.get("attrsFormat", "normalized")

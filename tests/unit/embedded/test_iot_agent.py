@@ -1,0 +1,120 @@
+import logging
+from collections.abc import AsyncIterator
+
+import aiomqtt
+import orjson
+import pytest
+
+from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.orion import OrionClient
+from iveg.domain.errors import HopError
+from iveg.embedded.server import Running, embedded_fiware
+
+TENANT = ("agroconnect", "/greenhouse")
+
+POISON = [
+    b"[" * 8000,
+    b"[" * 900 + b"]" * 900,
+    b'{"a":' * 900 + b"1" + b"}" * 900,
+    b'{"a":' + b"[" * 300 + b'"<"' + b"]" * 300 + b"}",
+    b'{"hasOwnProperty":1}',
+    b'{"__proto__":{"a":1}}',
+    b"\xff\xfe",
+    b"null",
+]
+
+
+@pytest.fixture
+async def up() -> AsyncIterator[Running]:
+    async with embedded_fiware() as running:
+        yield running
+
+
+@pytest.fixture
+async def orion(up: Running) -> AsyncIterator[OrionClient]:
+    async with (
+        OrionClient(up.orion_url, *TENANT) as orion,
+        IotAgentClient(up.iota_url, *TENANT) as agent,
+    ):
+        await provision(agent, orion, ["AGI"], "iveg", up.orion_url)
+        yield orion
+
+
+@pytest.mark.parametrize("topic", ["/iveg/AGI/attrs", "/iveg/AGI/cmdexe"])
+@pytest.mark.parametrize("payload", POISON, ids=range(len(POISON)))
+async def test_poison_is_survived_in_silence(
+    up: Running,
+    orion: OrionClient,
+    topic: str,
+    payload: bytes,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as mqtt:
+        await mqtt.publish(topic, payload, qos=1)
+        await mqtt.publish("/iveg/AGI/attrs", b'{"alive":1}', qos=1)
+        await mqtt.publish("/iveg/AGI/attrs", b'{"alive":2}', qos=1)
+    (robot,) = await orion.read_entities("Robot", ["alive"])
+    assert robot["alive"]["value"] in (1, 2)
+    assert not [one for one in caplog.records if one.levelno >= logging.WARNING]
+
+
+async def test_what_is_discarded_is_counted(up: Running, orion: OrionClient) -> None:
+    assert await orion.read_robots() == []
+    for payload in (b"x", b'{"a":"<"}', b"[1]"):
+        up.agent.hear("/iveg/AGI/attrs", payload)
+    up.agent.hear("/AGI/mqtt_feedback", b"none of its business")
+    assert up.agent.discarded == 3
+
+
+async def test_static_attributes_go_along(up: Running, orion: OrionClient) -> None:
+    static = {"name": "maker", "type": "Text", "value": "us"}
+    device = {
+        "device_id": "S1",
+        "entity_name": "S1",
+        "entity_type": "Sensor",
+        "apikey": "iveg",
+        "static_attributes": [static],
+    }
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        await agent.create_device(device)
+    up.agent.hear("/iveg/S1/attrs", b'{"t":1}')
+    (entity,) = await orion.read_entities("Sensor", ["maker", "t"])
+    assert (entity["maker"]["value"], entity["t"]["value"]) == ("us", 1)
+
+
+@pytest.mark.parametrize(
+    "part", [{"attributes": [1]}, {"commands": "x"}, {"static_attributes": [{}]}]
+)
+async def test_a_device_of_another_shape_is_refused(
+    up: Running, part: dict[str, object]
+) -> None:
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        with pytest.raises(HopError, match="400"):
+            await agent.create_device({"device_id": "D", "apikey": "iveg", **part})
+
+
+async def test_a_command_with_quality_and_retain_is_published_so(
+    up: Running, orion: OrionClient
+) -> None:
+    go = {"name": "go", "type": "command", "mqtt": {"qos": "1", "retain": True}}
+    device = {
+        "device_id": "TB3",
+        "entity_name": "TB3",
+        "entity_type": "Robot",
+        "apikey": "iveg",
+        "commands": [go],
+    }
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        await agent.create_device(device)
+    await orion.http.ask(
+        "PATCH",
+        "/v2/entities/TB3/attrs",
+        query={"type": "Robot"},
+        body={"go": {"type": "command", "value": 1}},
+    )
+    async with aiomqtt.Client("127.0.0.1", up.mqtt_port) as late:
+        await late.subscribe("/iveg/TB3/cmd", qos=1)
+        message = await anext(aiter(late.messages))
+    assert isinstance(message.payload, bytes)
+    assert orjson.loads(message.payload) == {"go": 1}
+    assert (message.qos, message.retain) == (1, True)
