@@ -154,7 +154,7 @@ class People:
             for index in wanting
             for person_id, person in self.known.items()
             if person.class_ == out[index].class_
-            and (distance := _distance(person, out[index])) <= _gate(person, at)
+            and (distance := _distance(person, out[index], at)) < math.inf
         )
         taken: set[str] = set()
         for _, index, person_id in pairs:
@@ -261,13 +261,24 @@ def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
     return Sighting(observer, x, y, z, at, detection.class_id, detection.probability)
 
 
-def _distance(person: Person, one: Placed) -> float:
-    newest = person.newest
-    return math.hypot(newest.x - one.position[0], newest.y - one.position[1])
+def _distance(person: Person, one: Placed, at: Instant) -> float:
+    """To the nearest look that the detection may continue (m); inf when to none.
 
-
-def _gate(person: Person, at: Instant) -> float:
-    """How far one may have walked since the last look (m, capped)."""
+    Beside the newest look every fresh one counts: where two robots see one person with
+    noise, a detection that lies far from the one look seldom lies far from both.
+    """
+    x, y, _ = one.position
     return min(
-        _GATE_CAP_M, _GATE_M + _GATE_SPEED * abs(at.mono - person.newest.at.mono)
+        (
+            distance
+            for look in (person.newest, *person.sightings.values())
+            if (look is person.newest or look.age_s(at) <= SEEN_S)
+            and (distance := math.hypot(look.x - x, look.y - y)) <= _gate(look, at)
+        ),
+        default=math.inf,
     )
+
+
+def _gate(look: Sighting, at: Instant) -> float:
+    """How far one may have walked since a look (m, capped)."""
+    return min(_GATE_CAP_M, _GATE_M + _GATE_SPEED * abs(at.mono - look.at.mono))
