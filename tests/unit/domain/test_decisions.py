@@ -1,0 +1,254 @@
+"""The decision record, link by link."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.alerts import Rule
+from iveg.domain.conditions import of_decision, of_robot
+from iveg.domain.decisions import Decision, Decisions
+from iveg.domain.mandates import Crossing, Hazard
+from iveg.domain.observations import SafetyReport
+from iveg.domain.people import Sighting
+from iveg.domain.world import RobotState, World
+from tests.builders import (
+    START,
+    at,
+    detection_frame,
+    odometry,
+    origin,
+    received,
+    safety_report,
+)
+
+LOOK = Sighting("AGI", 1.0, 0.0, 0.9, START, "farmer", 0.94)
+
+
+def crossing(
+    *, speed: float = 0.8, already_slow: bool = False, sighting: Sighting | None = LOOK
+) -> Crossing:
+    hazard = Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0, sighting)
+    if sighting is None:
+        hazard = Hazard("robot", "AGI", "AGI", 1.0, 0.0, 2.0)
+    return Crossing(
+        "d-1",
+        "AGII",
+        hazard,
+        entered=START,
+        entered_m=1.43,
+        speed_before=speed,
+        in_sight=False,
+        distance_m=1.43,
+        already_slow=already_slow,
+    )
+
+
+def decision(**parts: object) -> Decision:
+    return Decision(crossing(**parts), Rule())  # type: ignore[arg-type]
+
+
+def slow() -> SafetyReport:
+    return safety_report("AGII", speed_factor=0.5, reason="person")
+
+
+def verdicts(one: Decision, after: float) -> dict[str, str]:
+    return {link.name: link.verdict for link in one.links(at(after))}
+
+
+def obeyed(one: Decision, after: float = 0.2) -> Decision:
+    done = one.published(at(0.01)).reported(slow(), at(after))
+    return done.moved(0.4, at(after))
+
+
+def test_a_decision_that_was_obeyed_has_every_link() -> None:
+    assert verdicts(obeyed(decision()), 0.3) == {
+        "detection": "ok",
+        "filter": "ok",
+        "geometry": "ok",
+        "rule": "ok",
+        "feedback": "ok",
+        "applied": "ok",
+        "observed": "ok",
+    }
+
+
+def test_every_link_has_its_time_and_value() -> None:
+    links = {link.name: link for link in obeyed(decision()).links(at(0.3))}
+
+    assert links["detection"].value == "farmer"
+    assert links["filter"].value == 0.94
+    assert links["geometry"].value == 1.43
+    assert links["rule"].value == "fleet-alert 1"
+    assert links["applied"].value == 0.5
+    assert links["observed"].value == 0.4
+    assert links["observed"].at == at(0.2).wall
+
+
+def test_links_that_have_not_come_are_open_at_first() -> None:
+    found = verdicts(decision(), 0.5)
+
+    assert (found["feedback"], found["applied"], found["observed"]) == ("open",) * 3
+
+
+def test_links_that_have_not_come_after_two_seconds_are_missing() -> None:
+    found = verdicts(decision(), 2.0)
+
+    assert (found["feedback"], found["applied"], found["observed"]) == ("missing",) * 3
+
+
+def test_links_that_had_not_come_at_the_end_are_missing() -> None:
+    assert verdicts(decision().closed(at(0.5)), 0.6)["applied"] == "missing"
+
+
+@pytest.mark.parametrize(("after", "verdict"), [(1.0, "ok"), (1.01, "late")])
+def test_a_link_after_a_second_is_late(after: float, verdict: str) -> None:
+    assert verdicts(obeyed(decision(), after), 3.0)["applied"] == verdict
+
+
+def test_a_peers_own_odometry_needs_no_detection() -> None:
+    found = verdicts(decision(sighting=None), 0.0)
+
+    assert (found["detection"], found["filter"]) == ("n/a", "n/a")
+
+
+@pytest.mark.parametrize(
+    "parts", [{"speed": 0.2}, {"speed": 0.0}, {"already_slow": True}]
+)
+def test_a_robot_that_was_slow_already_has_nothing_to_show(
+    parts: dict[str, object],
+) -> None:
+    assert verdicts(decision(**parts), 3.0)["observed"] == "n/a"
+
+
+@pytest.mark.parametrize(
+    ("speed", "seen"), [(0.44, True), (-0.44, True), (0.45, False)]
+)
+def test_the_slow_down_is_seen_at_55_percent(speed: float, seen: bool) -> None:
+    assert (decision().moved(speed, at(0.5)).observed is not None) is seen
+
+
+def test_a_report_at_full_speed_is_no_obedience() -> None:
+    faster = safety_report("AGII", speed_factor=1.0)
+
+    assert decision().reported(faster, at(0.1)).applied is None
+
+
+def test_only_the_first_time_of_a_link_counts() -> None:
+    first = obeyed(decision())
+
+    again = first.published(at(1)).reported(slow(), at(1)).moved(0.1, at(1))
+
+    assert again is first
+
+
+def test_what_is_reported_after_the_end_is_not_for_this_decision() -> None:
+    assert decision().closed(at(0.5)).reported(slow(), at(0.6)).applied is None
+
+
+# --- overdue ----------------------------------------------------------------------
+
+
+def keys(one: Decision, after: float) -> list[tuple[str, str]]:
+    return [(wrong.priority, wrong.key) for wrong in of_decision(one, at(after))]
+
+
+def test_a_slow_down_that_is_obeyed_is_expected() -> None:
+    assert keys(obeyed(decision()), 5.0) == [("P2", "alert.person_slowed")]
+
+
+@pytest.mark.parametrize(("after", "priority"), [(1.99, "P2"), (2.0, "P1")])
+def test_a_robot_that_does_not_slow_down_in_two_seconds_is_grave(
+    after: float, priority: str
+) -> None:
+    assert keys(decision(), after)[0][0] == priority
+
+
+def test_a_robot_that_says_so_and_drives_on_is_grave() -> None:
+    said = decision().published(at(0.1)).reported(slow(), at(0.1))
+
+    assert keys(said, 2.5) == [("P1", "alert.person_not_slowing")]
+
+
+def test_a_robot_that_was_slow_already_only_has_to_say_so() -> None:
+    said = decision(already_slow=True).reported(slow(), at(0.1))
+
+    assert keys(said, 5.0) == [("P2", "alert.person_slowed")]
+
+
+def test_an_ended_decision_is_never_overdue() -> None:
+    assert not decision().closed(at(1.0)).overdue(at(60.0))
+
+
+def test_a_peer_that_slows_is_no_notice_and_one_that_does_not_is_grave() -> None:
+    peer = decision(sighting=None)
+
+    assert keys(peer, 0.5) == []
+    assert keys(peer, 2.5) == [("P1", "alert.no_slow_down")]
+
+
+# --- robots -----------------------------------------------------------------------
+
+
+def robot_keys(robot: RobotState, after: float) -> list[tuple[str, str]]:
+    return [(wrong.priority, wrong.key) for wrong in of_robot(robot, at(after))]
+
+
+@pytest.mark.parametrize(
+    ("linear", "expected"),
+    [(0.5, ("P1", "alert.moving_robot_lost")), (0.0, ("P2", "alert.robot_lost"))],
+)
+def test_a_lost_robot_is_graver_when_it_was_moving(
+    linear: float, expected: tuple[str, str]
+) -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(linear=linear)))
+
+    assert robot_keys(world.robot("AGI"), 2.9) == []
+    assert robot_keys(world.robot("AGI"), 3.1) == [expected]
+
+
+@pytest.mark.parametrize(("offset", "told"), [(0.25, False), (0.3, True), (-0.3, True)])
+def test_a_clock_a_quarter_second_off_is_told(offset: float, told: bool) -> None:
+    world = World(["AGI"])
+    world.apply(received(odometry(origin=origin(1, after=offset))))
+
+    found = robot_keys(world.robot("AGI"), 0.1)
+
+    assert (("P3", "alert.clock_offset") in found) is told
+
+
+def test_an_unreadable_detection_is_told_for_ten_seconds() -> None:
+    world = World(["AGI"])
+    world.apply(received(detection_frame(unreadable=2)))
+
+    assert robot_keys(world.robot("AGI"), 9.9) == [("P3", "alert.unreadable_detection")]
+    assert robot_keys(world.robot("AGI"), 10.1) == []
+
+
+# --- the book ---------------------------------------------------------------------
+
+
+def test_decisions_are_found_by_name_by_robot_and_while_open() -> None:
+    book = Decisions()
+    book.put(decision())
+
+    assert book.get("d-1") is not None
+    assert book.get("d-2") is None
+    assert len(list(book.open_of("AGII"))) == 1
+    assert list(book.open_of("AGI")) == []
+    book.put(decision().closed(at(1)))
+    assert list(book.every_open()) == []
+    assert list(book.open_of("AGII")) == []
+
+
+def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
+    book = Decisions(keep=2)
+    opened = replace(decision(), crossing=replace(crossing(), decision_id="open"))
+    book.put(opened)
+    for number in range(5):
+        named = replace(crossing(), decision_id=f"ended-{number}")
+        book.put(Decision(named, Rule()).closed(at(number)))
+
+    assert book.get("open") is opened
+    assert book.get("ended-0") is None
+    assert book.get("ended-4") is not None
