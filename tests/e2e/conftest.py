@@ -10,7 +10,7 @@ from pathlib import Path
 from shutil import which
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
 
 from tests.processes import Site, site
 
@@ -48,23 +48,29 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture
 def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
-    """Opens a signed-in page; at the end no page may have complained."""
+    """Opens a signed-in page; at the end no page may have complained.
+
+    A test that takes the server away opens its page with ``alone=True``: a browser
+    then rightly says so.
+    """
     complaints: list[str] = []
     contexts = []
 
     def open_one(
-        width: int = 1440, height: int = 900, locale: str = "es-ES", route: str = "/"
+        width: int = 1440,
+        height: int = 900,
+        locale: str = "es-ES",
+        route: str = "/",
+        *,
+        alone: bool = False,
     ) -> Page:
         context = browser.new_context(
             viewport={"width": width, "height": height}, locale=locale
         )
         contexts.append(context)
         page = context.new_page()
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "console",
-            lambda said: complaints.append(said.text) if _bad(said.type) else None,
-        )
+        if not alone:
+            _listen(page, complaints)
         page.goto(stack.sign_in_link)
         if route != "/":
             page.goto(stack.url + route)
@@ -93,5 +99,10 @@ def screens() -> Path:
     return folder
 
 
-def _bad(kind: str) -> bool:
-    return kind in ("error", "warning")
+def _listen(page: Page, complaints: list[str]) -> None:
+    def take(said: ConsoleMessage) -> None:
+        if said.type in ("error", "warning"):
+            complaints.append(said.text)
+
+    page.on("console", take)
+    page.on("pageerror", lambda error: complaints.append(str(error)))

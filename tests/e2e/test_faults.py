@@ -41,7 +41,7 @@ def test_a_dead_fiware_turns_robots_late_then_lost_and_all_recovers(
 def test_a_dead_server_is_said_within_three_seconds_and_the_page_recovers(
     open_page: OpenPage, stack: Site
 ) -> None:
-    page = open_page()
+    page = open_page(alone=True)
     page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
 
     _program(stack, "serve").kill()
