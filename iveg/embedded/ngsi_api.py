@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import orjson
@@ -11,14 +10,26 @@ from iveg.adapters import clock
 from iveg.embedded.context_broker import ContextBroker, Scope
 from iveg.embedded.entities import Attribute, Change, Entity, read_changes
 from iveg.embedded.http_server import Request, Response
+from iveg.embedded.ngsi_request import (
+    Call,
+    check_accept,
+    check_body,
+    check_size,
+    names,
+    paging,
+    pattern,
+    read_id,
+    read_options,
+    read_value,
+    scope,
+)
 from iveg.embedded.orion_errors import (
     ATTRIBUTE_NOT_FOUND,
     NgsiError,
     bad_request,
     not_found,
-    parse_error,
 )
-from iveg.embedded.orion_text import check_name, load_json, looks_clean
+from iveg.embedded.orion_text import looks_clean
 from iveg.embedded.query import matches_query, ordered
 from iveg.embedded.registrations import read_registration
 from iveg.embedded.subscriptions import (
@@ -26,16 +37,8 @@ from iveg.embedded.subscriptions import (
     read_subscription,
     update_subscription,
 )
-from iveg.embedded.views import View, write_attributes, write_entity
+from iveg.embedded.views import write_attributes, write_entity
 
-MAX_BODY = 1 << 20
-_SERVICE = re.compile(r"[a-z0-9_]{0,50}")
-_PATH = re.compile(r"/|(/[A-Za-z0-9_]{1,50}){1,10}(/#)?|/#")
-_OPTIONS = {
-    "keyValues", "values", "unique", "count", "append", "upsert", "skipForwarding",
-    "forcedUpdate", "overrideMetadata", "normalized", "skipInitialNotification",
-    "flowControl", "noAttrDetail",
-}  # fmt: skip
 _URLS = {
     "entities_url": "/v2/entities",
     "types_url": "/v2/types",
@@ -44,73 +47,6 @@ _URLS = {
 }
 _ACTIONS = {"UPDATE": "update", "APPEND": "append", "DELETE": "delete",
             "APPEND_STRICT": "appendStrict", "REPLACE": "replace"}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Call:
-    """One request, read.
-
-    Attributes:
-        options: ``?options=``.
-        parts: The path's parts after ``/v2``.
-    """
-
-    request: Request
-    scope: Scope
-    options: frozenset[str]
-    parts: tuple[str, ...]
-
-    @property
-    def key_values(self) -> bool:
-        """Whether the body's attributes are bare values."""
-        return "keyValues" in self.options
-
-    @property
-    def kind(self) -> str:
-        """``?type=``."""
-        return self.request.query.get("type", "")
-
-    def json(self) -> Any:
-        """The body.
-
-        Raises:
-            NgsiError: 400, not JSON.
-        """
-        return load_json(self.request.body)
-
-    def object(self) -> dict[str, Any]:
-        """The body, which must be an object.
-
-        Raises:
-            NgsiError: 400.
-        """
-        value = self.json()
-        if not isinstance(value, dict):
-            raise parse_error()
-        return value
-
-    def changes(self, raw: Mapping[str, Any]) -> dict[str, Change]:
-        """Read attributes of the body.
-
-        Raises:
-            NgsiError: 400.
-        """
-        return read_changes(
-            {name: one for name, one in raw.items() if name not in ("id", "type")},
-            key_values=self.key_values,
-            clean=looks_clean(self.request.body),
-        )
-
-    def view(self) -> View:
-        """What is to be shown.
-
-        Raises:
-            NgsiError: 400.
-        """
-        forms = self.options & {"keyValues", "values", "unique"}
-        form = next(iter(forms), "normalized")
-        query = self.request.query
-        return View(form, _names(query.get("attrs")), _names(query.get("metadata")))
 
 
 _Route = Callable[["NgsiApi", Call], Awaitable[Response]]
@@ -146,12 +82,7 @@ class NgsiApi:
         return response
 
     async def _answer(self, request: Request, correlator: str) -> Response:
-        if len(request.body) > MAX_BODY:
-            raise NgsiError(
-                413,
-                "RequestEntityTooLarge",
-                f"payload size: {len(request.body)}, max size supported: {MAX_BODY}",
-            )
+        check_size(request)
         parts = tuple(part for part in request.path.split("/") if part)
         routes = _routes_of(parts)
         route = routes.get(request.method)
@@ -160,13 +91,11 @@ class NgsiApi:
             raise NgsiError(
                 405, "MethodNotAllowed", "method not allowed", ", ".join(routes)
             )
-        _check_body(request)
-        _check_accept(request)
-        scope = _scope(request, correlator, clock.now().wall)
-        options = frozenset(_names(request.query.get("options")))
-        if not options <= _OPTIONS:
-            raise bad_request("Invalid value for URI param /options/")
-        return await route(self, Call(request, scope, options, parts[1:]))
+        check_body(request)
+        check_accept(request)
+        whose = scope(request, correlator, clock.now().wall)
+        options = read_options(request)
+        return await route(self, Call(request, whose, options, parts[1:]))
 
     # --- the service itself -----------------------------------------------------
 
@@ -186,12 +115,12 @@ class NgsiApi:
     async def list_entities(self, call: Call) -> Response:
         """``GET /v2/entities``."""
         query = call.request.query
-        limit, offset = _paging(query)
+        limit, offset = paging(query)
         chosen = self._chosen(call)
         view = call.view()
         told = await self._told(call, "", view.names)
         known = {(one.id, one.type) for one in chosen}
-        wanted_id = set(_names(query.get("id")))
+        wanted_id = set(names(query.get("id")))
         for entity_id, kind in told:
             strange = (entity_id, kind) not in known
             if strange and (not wanted_id or entity_id in wanted_id):
@@ -215,9 +144,9 @@ class NgsiApi:
             if one in query and f"{one}Pattern" in query:
                 name = "IdPattern" if one == "id" else "typePattern"
                 raise bad_request(f"Incompatible parameters: {one}, {name}")
-        ids, kinds = _names(query.get("id")), _names(query.get("type"))
-        id_pattern = _pattern(query.get("idPattern"), "idPattern")
-        kind_pattern = _pattern(query.get("typePattern"), "typePattern")
+        ids, kinds = names(query.get("id")), names(query.get("type"))
+        id_pattern = pattern(query.get("idPattern"), "idPattern")
+        kind_pattern = pattern(query.get("typePattern"), "typePattern")
         found = [
             one
             for one in self._broker.tenant(call.scope.service).entities.all(
@@ -234,7 +163,7 @@ class NgsiApi:
     async def create_entity(self, call: Call) -> Response:
         """``POST /v2/entities``."""
         raw = call.object()
-        entity_id, kind = _read_id(raw)
+        entity_id, kind = read_id(raw)
         changes = call.changes(raw)
         location = {"Location": f"/v2/entities/{entity_id}?type={kind}"}
         if "upsert" in call.options:
@@ -376,7 +305,7 @@ class NgsiApi:
 
     async def put_value(self, call: Call) -> Response:
         """``PUT /v2/entities/{id}/attrs/{name}/value``."""
-        value = _read_value(call)
+        value = read_value(call)
         changes = read_changes(
             {call.parts[3]: {"value": value}},
             key_values=False,
@@ -400,7 +329,7 @@ class NgsiApi:
         entities = raw.get("entities")
         if not isinstance(entities, list) or not entities:
             raise bad_request("empty update action payload")
-        read = [(*_read_id(one), call.changes(one)) for one in entities]
+        read = [(*read_id(one), call.changes(one)) for one in entities]
         if action == "update":
             await self._broker.update_many(call.scope, read)
         elif action in ("append", "appendStrict"):
@@ -444,7 +373,7 @@ class NgsiApi:
 
     async def list_subscriptions(self, call: Call) -> Response:
         """``GET /v2/subscriptions``."""
-        limit, offset = _paging(call.request.query)
+        limit, offset = paging(call.request.query)
         known = self._broker.tenant(call.scope.service).subscriptions.values()
         shown = [one.show(call.scope.now) for one in known]
         response = _json(shown[offset : offset + limit])
@@ -491,7 +420,7 @@ class NgsiApi:
 
     async def list_registrations(self, call: Call) -> Response:
         """``GET /v2/registrations``."""
-        limit, offset = _paging(call.request.query)
+        limit, offset = paging(call.request.query)
         known = self._broker.tenant(call.scope.service).registrations.values()
         shown = [one.show() for one in known]
         response = _json(shown[offset : offset + limit])
@@ -576,120 +505,12 @@ _TABLE: tuple[tuple[tuple[str, ...], dict[str, _Route]], ...] = (
 
 
 def _routes_of(parts: tuple[str, ...]) -> dict[str, _Route]:
-    for pattern, routes in _TABLE:
-        if len(pattern) == len(parts) and all(
-            one in ("*", part) for one, part in zip(pattern, parts, strict=True)
+    for shape, routes in _TABLE:
+        if len(shape) == len(parts) and all(
+            one in ("*", part) for one, part in zip(shape, parts, strict=True)
         ):
             return routes
     raise bad_request("Service not found. Check your URL as probably it is wrong.")
-
-
-def _check_body(request: Request) -> None:
-    if request.method not in ("POST", "PUT", "PATCH"):
-        return
-    if not request.body:
-        raise NgsiError(
-            411,
-            "ContentLengthRequired",
-            "Zero/No Content-Length in PUT/POST/PATCH request",
-        )
-    kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    plain = request.path.endswith("/value")
-    if kind == "application/json" or (plain and kind == "text/plain"):
-        return
-    sentence = (
-        f"not supported content type: {kind}"
-        if kind
-        else "Content-Type header not used, default application/octet-stream is not "
-        "supported"
-    )
-    raise NgsiError(415, "UnsupportedMediaType", sentence)
-
-
-def _check_accept(request: Request) -> None:
-    accepted = {
-        one.partition(";")[0].strip()
-        for one in request.headers.get("accept", "*/*").split(",")
-    }
-    usable = {"*/*", "application/json", "application/*"}
-    if request.path.endswith("/value"):
-        usable |= {"text/plain", "text/*"}
-    if not accepted & usable:
-        raise NgsiError(
-            406, "NotAcceptable", "no acceptable mime-type in accept header"
-        )
-
-
-def _scope(request: Request, correlator: str, now: float) -> Scope:
-    service = request.headers.get("fiware-service", "").lower()
-    if _SERVICE.fullmatch(service) is None:
-        raise bad_request(
-            "bad character in tenant name - only underscore and alphanumeric "
-            "characters are allowed"
-        )
-    reads = request.method == "GET"
-    path = request.headers.get("fiware-servicepath", "/#" if reads else "/")
-    for one in path.split(","):
-        if not one.startswith("/"):
-            raise bad_request(
-                "Only /absolute/ Service Paths allowed "
-                "[a service path must begin with /]"
-            )
-        if _PATH.fullmatch(one) is None or (one.endswith("#") and not reads):
-            raise bad_request("Bad Character in Service-Path")
-    return Scope(service, path, correlator, now)
-
-
-def _paging(query: Mapping[str, str]) -> tuple[int, int]:
-    limit, offset = query.get("limit", "20"), query.get("offset", "0")
-    for name, text in (("limit", limit), ("offset", offset)):
-        if text.startswith("-"):
-            raise bad_request(
-                f"Bad pagination {name}: /{text}/ [must be a positive integer number]"
-            )
-        if not (text.isascii() and text.isdigit()):
-            raise bad_request(
-                f"Bad pagination {name}: /{text}/ [must be a decimal number]"
-            )
-    if int(limit) > 1000:
-        raise bad_request(f"Bad pagination limit: /{limit}/ [max: 1000]")
-    return int(limit), int(offset)
-
-
-def _names(text: str | None) -> tuple[str, ...]:
-    return tuple(name for name in (text or "").split(",") if name)
-
-
-def _pattern(text: str | None, name: str) -> re.Pattern[str] | None:
-    try:
-        return None if text is None else re.compile(text)
-    except re.error:
-        raise bad_request(f"Invalid regex for entity {name}") from None
-
-
-def _read_id(raw: Any) -> tuple[str, str]:
-    if not isinstance(raw, dict):
-        raise parse_error()
-    entity_id, kind = raw.get("id", ""), raw.get("type", "Thing")
-    for text, what in ((entity_id, "entity id"), (kind, "entity type")):
-        if not isinstance(text, str):
-            raise bad_request(f"Invalid JSON type for {what}")
-        check_name(text, what)
-    return entity_id, kind
-
-
-def _read_value(call: Call) -> Any:
-    kind = call.request.headers.get("content-type", "")
-    value: Any
-    try:
-        value = load_json(call.request.body)
-    except NgsiError:
-        if kind.startswith("application/json"):
-            raise parse_error() from None
-        raise bad_request("attribute value type not recognized") from None
-    if kind.startswith("application/json") and not isinstance(value, dict | list):
-        raise bad_request("Neither JSON Object nor JSON Array for attribute::value")
-    return value
 
 
 def _ghost(scope: Scope, entity_id: str, kind: str) -> Entity:
