@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import contextlib
+import logging
 import os
 import socket
 from collections.abc import Callable, Iterator
@@ -20,9 +21,10 @@ from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.app import Dss, broker_of, create_app
 from iveg.cli.running import run_until_told, sign_in_link, tell_ready
-from iveg.domain.errors import DataFileError
+from iveg.domain.errors import DataFileError, HopError
 from iveg.settings import Settings
 
+_log = logging.getLogger(__name__)
 _LIVE_ROBOT_S = 10.0
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _WS_MAX_BYTES = 65536
@@ -65,6 +67,7 @@ class _Server(uvicorn.Server):
 
 async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
     """The DSS and its page."""
+    await _upgrade_history(settings, data)
     dss = Dss(settings, data, demo=demo)
     server = _Server(
         uvicorn.Config(
@@ -89,6 +92,19 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
     except asyncio.CancelledError:
         server.should_exit = True
         await serving
+
+
+async def _upgrade_history(settings: Settings, data: Path) -> None:
+    """A database that is newer or broken ends the start; one that is away does not."""
+    data.mkdir(parents=True, exist_ok=True)
+    try:
+        await asyncio.to_thread(upgrade, _database_url(settings, data))
+    except HopError as error:
+        _log.warning("the history starts without its database: %s", error)
+
+
+def _database_url(settings: Settings, data: Path) -> str:
+    return settings.database_url or sqlite_url(data / "iveg.sqlite")
 
 
 def _print_link(settings: Settings, dss: Dss) -> None:
@@ -197,7 +213,7 @@ async def _refuse_replay(options: argparse.Namespace, settings: Settings) -> Non
 def upgrade_database(settings: Settings, data: Path) -> int:
     """Bring the history's database to the newest shape."""
     data.mkdir(parents=True, exist_ok=True)
-    upgrade(settings.database_url or sqlite_url(data / "iveg.sqlite"))
+    upgrade(_database_url(settings, data))
     print("The database is up to date.")
     return 0
 
