@@ -35,6 +35,7 @@ def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int
     data = Path(os.environ.get("IVEG_DATA_DIRECTORY") or data)
     match options.command:
         case "serve":
+            data.mkdir(parents=True, exist_ok=True)
             work = serve(settings, data, demo=options.demo)
         case "fiware":
             work = fiware(settings)
@@ -96,7 +97,6 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
 
 async def _upgrade_history(settings: Settings, data: Path) -> None:
     """A database that is newer or broken ends the start; one that is away does not."""
-    data.mkdir(parents=True, exist_ok=True)
     try:
         await asyncio.to_thread(upgrade, _database_url(settings, data))
     except HopError as error:
