@@ -10,7 +10,6 @@ The age is taken against the robot's own stamp; robot and browser share one cloc
 """
 
 import asyncio
-import json
 import tempfile
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
@@ -237,7 +236,6 @@ def _report(result: Result) -> None:
         )
     print_table(f"Robot publishes → browser has painted ({machine()})", head, rows)
     print(f"iVeg with its robots and its FIWARE: {result.cores:.2f} cores")
-    print(json.dumps({kind: _three(result.dashboard[kind]) for kind in KINDS}))
 
 
 def _three(ages: list[float]) -> list[float]:
