@@ -221,16 +221,27 @@ class Commander:
             while len(self.commands) > _KEPT:
                 del self.commands[next(iter(self.commands))]
             self._minutes.command(command, changed, at)
+            if changed.key in ("ready", "running"):
+                self._note_end(command, at)
         desired = _JOURNALLED.get(changed.key)
         if desired is not None:
+            by = "iveg" if command is None else command.requesters[0]
             self._start(
                 self._journal.wanted(
-                    machine.robot_id, desired, machine.hold_id, "iveg", at
+                    machine.robot_id, desired, machine.hold_id, by, at
                 ),
                 f"journal-{machine.robot_id}",
             )
         self._log_line(machine, command, changed, at)
         self._hub.changed(f"robots/{machine.robot_id}")
+
+    def _note_end(self, command: Command, at: Instant) -> None:
+        """A release or resume that came true has moved the STOP on, too."""
+        for earlier in reversed(self.commands.values()):
+            if earlier.robot_id == command.robot_id and earlier.kind == "stop":
+                if earlier is not command:
+                    self._minutes.command(earlier, None, at)
+                return
 
     def _command_of(self, machine: StopMachine, changed: Changed) -> Command | None:
         for command in (machine.once, machine.stop):
@@ -249,8 +260,11 @@ class Commander:
         if command is not None:
             slots["by"] = ", ".join(command.requesters)
             slots["tries"] = command.tries
-            if command.standstill_ms is not None:
-                slots["ms"] = round(command.standstill_ms)
+            took = command.standstill_ms
+            if changed.key == "delivered":
+                took = 1000.0 * (at.mono - command.times.requested.mono)
+            if took is not None:
+                slots["ms"] = round(took)
         self._minutes.log(
             LogEvent("command", f"log.stop.{changed.key}", slots, machine.robot_id), at
         )
