@@ -1,0 +1,46 @@
+"""A broker that takes everything, until it is told to fail or to hang."""
+
+import asyncio
+from collections.abc import Iterable
+from typing import Literal
+
+from iveg.domain.errors import HopError
+from iveg.domain.feedback import Feedback
+
+
+class FakeFleet:
+    """Implements ``pipeline.ports.Fleet``.
+
+    Attributes:
+        told: Feedback in the order it was offered.
+        stops: (robot, hold) in the order it was published.
+        levels: (robot, desired, ids) likewise.
+        fails: Every publication is refused.
+        opened: Cleared, every STOP hangs until it is set.
+    """
+
+    def __init__(self) -> None:
+        self.told: list[Feedback] = []
+        self.stops: list[tuple[str, str]] = []
+        self.levels: list[tuple[str, str, tuple[str, ...]]] = []
+        self.fails = False
+        self.opened = asyncio.Event()
+        self.opened.set()
+
+    def tell(self, feedback: Feedback) -> None:
+        self.told.append(feedback)
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port
+        self.stops.append((robot_id, hold_id))
+        await self._answer()
+
+    async def set_level(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        self.levels.append((robot_id, desired, tuple(ids)))
+        await self._answer()
+
+    async def _answer(self) -> None:
+        await self.opened.wait()
+        if self.fails:
+            raise HopError("mqtt", "not connected")

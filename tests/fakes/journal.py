@@ -1,0 +1,31 @@
+"""A journal in memory, on a disk that can hang."""
+
+import asyncio
+from typing import Literal
+
+from iveg.domain.observations import Instant
+
+
+class FakeJournal:
+    """Implements ``pipeline.ports.Journal``.
+
+    Attributes:
+        lines: (robot, desired, hold, by) that have reached the disk.
+        opened: Cleared, the disk hangs until it is set.
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[tuple[str, str, str | None, str]] = []
+        self.opened = asyncio.Event()
+        self.opened.set()
+
+    async def wanted(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,  # noqa: ARG002 - the port
+    ) -> None:
+        await self.opened.wait()
+        self.lines.append((robot_id, desired, hold_id, by))

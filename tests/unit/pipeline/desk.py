@@ -1,0 +1,191 @@
+"""The pipeline with fakes round it, on one clock that is moved by hand."""
+
+import asyncio
+from collections.abc import Iterable
+from dataclasses import replace
+
+from iveg.domain.alerts import Rule
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import (
+    CommandAnswer,
+    Detection,
+    Hold,
+    Observation,
+    Origin,
+    Received,
+    Road,
+)
+from iveg.domain.records import Record
+from iveg.domain.world import World
+from iveg.ngsi.codec import format_stamp
+from iveg.pipeline.assess import Assessor
+from iveg.pipeline.chain import Chain
+from iveg.pipeline.command import Commander
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.publish import Hub
+from tests.builders import (
+    START,
+    detection_frame,
+    odometry,
+    origin,
+    safety_report,
+)
+from tests.fakes.clock import FakeClock
+from tests.fakes.context_broker import FakeContextBroker
+from tests.fakes.fleet import FakeFleet
+from tests.fakes.ids import FakeIds
+from tests.fakes.journal import FakeJournal
+from tests.fakes.recorder import FakeRecorder
+
+FIELD = Greenhouse("field", Rectangle(-100, -100, 100, 100))
+
+
+class Desk:
+    """Everything between the doors; ``Desk.clock.now`` is the time (s)."""
+
+    def __init__(
+        self,
+        robots: tuple[str, ...] = ("AGI", "AGII"),
+        house: Greenhouse = FIELD,
+        *,
+        direct: bool = True,
+    ) -> None:
+        self.clock = FakeClock()
+        self.fleet = FakeFleet()
+        self.broker = FakeContextBroker()
+        self.journal = FakeJournal()
+        self.ids = FakeIds()
+        self.sink = FakeRecorder()
+        self.hub = Hub()
+        self.minutes = Minutes(self.hub, self.sink, START)
+        self.world = World(robots)
+        self.rejected: list[tuple[str, str]] = []
+        self.ingest = Ingest(
+            self.world.robots.__contains__,
+            lambda source, reason: self.rejected.append((source, reason)),
+        )
+        self.chain = Chain(START)
+        self.assessor = Assessor(
+            self.world,
+            house,
+            Rule(),
+            self.fleet,
+            self.minutes,
+            self.hub,
+            self.ids,
+            format_stamp,
+            "iveg-boot",
+        )
+        self.commander = Commander(
+            robots,
+            self.fleet,
+            self.broker,
+            self.journal,
+            self.minutes,
+            self.hub,
+            self.ids,
+            self.clock,
+            direct=direct,
+        )
+        self.loop = RuleLoop(
+            self.ingest,
+            self.assessor,
+            self.commander,
+            self.chain,
+            self.minutes,
+            self.hub,
+            self.clock,
+            lambda: "ok",
+        )
+        self.seq = 0
+
+    # --- what arrives -------------------------------------------------------------
+
+    def hear(
+        self, observation: Observation, road: Road = "mqtt", *, asked: bool = False
+    ) -> None:
+        """One observation goes through the rule loop."""
+        received = Received(observation, self.clock(), road, asked)
+        self.loop.step([received], self.clock())
+
+    def drive(self, robot_id: str, x: float = 0.0, *, linear: float = 0.5) -> None:
+        self.hear(odometry(robot_id, x, linear=linear, origin=self.next_origin()))
+
+    def look(self, robot_id: str, *seen: Detection, unreadable: int = 0) -> None:
+        frame = detection_frame(
+            robot_id, *seen, unreadable=unreadable, origin=self.next_origin()
+        )
+        self.hear(frame)
+
+    def report(
+        self,
+        robot_id: str = "AGI",
+        *holds: Hold,
+        factor: float = 0.0,
+        reason: str = "hold",
+        linear: float = 0.0,
+        released: tuple[str, ...] = (),
+        decision_id: str | None = None,
+    ) -> None:
+        report = safety_report(
+            robot_id,
+            *holds,
+            speed_factor=factor,
+            reason=reason,
+            linear=linear,
+            released=released,
+            decision_id=decision_id,
+            origin=self.next_origin(),
+        )
+        self.hear(report)
+
+    def answer(self, result: str, *, why: str | None = None) -> None:
+        """AGI answers for the hold that it was last stopped with."""
+        hold_id = self.commander.machine("AGI").hold_id
+        said = replace(self.next_origin(), stamp=None, stamp_s=None)
+        self.hear(CommandAnswer("AGI", said, hold_id, result, why=why))
+
+    def next_origin(self) -> Origin:
+        self.seq += 1
+        return origin(self.seq, after=self.clock.now)
+
+    # --- time ---------------------------------------------------------------------
+
+    async def wait(self, seconds: float) -> None:
+        """Tick through this time; tasks get their turn at each tick."""
+        for _ in range(round(seconds / 0.05)):
+            self.clock.now = round(self.clock.now + 0.05, 6)
+            self.loop.step([], self.clock())
+            await settle()
+
+    async def stand(self, robot_id: str = "AGI") -> None:
+        """The robot reports our hold at rest until it is believed."""
+        machine = self.commander.machine(robot_id)
+        for _ in range(12):
+            self.report(robot_id, Hold(machine.hold_id or "", "iveg", "remote"))
+            await self.wait(0.1)
+        assert machine.state == "STANDING"
+        self.report(robot_id, Hold(machine.hold_id or "", "iveg", "remote"))
+
+    # --- what was told ------------------------------------------------------------
+
+    def keys(self) -> list[str]:
+        """The sentences of the log, in order."""
+        return [line.key for line in self.minutes.lines]
+
+    def records(self, kind: type[Record]) -> list[Record]:
+        return [one for one in self.sink.records if isinstance(one, kind)]
+
+
+async def settle() -> None:
+    """Let every task that can go on go on."""
+    for _ in range(5):
+        await asyncio.sleep(0)
+
+
+def conditions_of(desk: Desk) -> Iterable[str]:
+    """What is wrong, by key."""
+    return [one.condition.key for one in desk.assessor.alarms.active]

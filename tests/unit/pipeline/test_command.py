@@ -1,0 +1,448 @@
+"""STOP over two roads, a disk and a restart, none of which waits for another."""
+
+import asyncio
+
+import pytest
+
+from iveg.domain.errors import CommandRefusedError, UnknownRobotError
+from iveg.domain.observations import Hold
+from iveg.domain.records import CommandEventRecord, CommandRecord
+from iveg.domain.stop import Command
+from tests.builders import safety_report
+from tests.unit.pipeline.desk import Desk, conditions_of, settle
+
+
+async def press(desk: Desk, by: str = "ana") -> Command:
+    (command,) = await desk.commander.stop(["AGI"], by, desk.clock())
+    await settle()
+    return command
+
+
+async def released(desk: Desk) -> str:
+    """A robot that stood and was released; returns the hold that it had."""
+    command = await press(desk)
+    await desk.stand()
+    held = command.command_id
+    await desk.commander.release("AGI", [held], "ana", desk.clock())
+    await settle()
+    desk.report("AGI", released=(held,))
+    await settle()
+    return held
+
+
+# --- both roads at once -----------------------------------------------------------
+
+
+async def test_i5_both_roads_have_it_before_the_disk_is_asked() -> None:
+    desk = Desk()
+    desk.journal.opened.clear()
+
+    pressing = asyncio.create_task(desk.commander.stop(["AGI"], "ana", desk.clock()))
+    await settle()
+
+    assert len(desk.fleet.stops) == 1
+    assert len(desk.broker.asked) == 1
+    assert not pressing.done()
+    desk.journal.opened.set()
+    await pressing
+
+
+async def test_the_journal_has_it_before_the_press_is_accepted() -> None:
+    desk = Desk()
+
+    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
+
+    assert desk.journal.lines == [("AGI", "stopped", command.command_id, "ana")]
+
+
+async def test_both_roads_carry_the_same_id() -> None:
+    desk = Desk()
+
+    command = await press(desk)
+
+    assert desk.fleet.stops == [("AGI", command.command_id)]
+    assert desk.broker.asked == [("stop", "AGI", (command.command_id,))]
+
+
+async def test_a_road_that_hangs_does_not_hold_up_the_other() -> None:
+    desk = Desk()
+    desk.broker.opened.clear()
+
+    command = await press(desk)
+    await desk.wait(1.0)
+
+    assert len(desk.fleet.stops) == 4
+    assert command.roads == {"direct": "ok", "fiware": "pending"}
+    desk.broker.opened.set()
+    await desk.commander.close()
+
+
+async def test_a_broker_that_hangs_does_not_hold_up_orion() -> None:
+    desk = Desk()
+    desk.fleet.opened.clear()
+
+    command = await press(desk)
+
+    assert desk.broker.asked
+    assert command.state == "SENT"
+    await desk.commander.close()
+
+
+async def test_a_road_that_fails_is_shown_and_tried_again() -> None:
+    desk = Desk()
+    desk.fleet.fails = True
+    desk.broker.refuse()
+
+    command = await press(desk)
+    await desk.wait(3.0)
+
+    assert command.roads == {"direct": "failed", "fiware": "failed"}
+    assert len(desk.fleet.stops) == 8
+    assert len(desk.broker.asked) == 2
+
+
+async def test_one_request_to_orion_is_in_flight() -> None:
+    desk = Desk()
+    desk.broker.opened.clear()
+    await press(desk)
+    await desk.wait(10.0)
+
+    assert desk.broker.most == 1
+    await desk.commander.close()
+
+
+async def test_a_failure_nobody_thought_of_is_logged_and_the_road_is_tried_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    desk = Desk()
+    desk.broker.fails = RuntimeError("nobody thought of this")
+
+    await press(desk)
+    await desk.wait(2.1)
+
+    assert len(desk.broker.asked) == 2
+    assert "nobody thought of this" in caplog.text
+
+
+async def test_without_the_direct_road_only_orion_is_asked() -> None:
+    desk = Desk(direct=False)
+
+    await press(desk)
+    await desk.wait(1.0)
+
+    assert desk.fleet.stops == []
+    assert len(desk.broker.asked) == 1
+
+
+async def test_stop_all_stops_every_robot_at_once() -> None:
+    desk = Desk()
+
+    commands = await desk.commander.stop(desk.commander.machines, "ana", desk.clock())
+    await settle()
+
+    assert [name for name, _ in desk.fleet.stops] == ["AGI", "AGII"]
+    assert len({command.command_id for command in commands}) == 2
+
+
+async def test_stopping_a_robot_outside_the_fleet_stops_nothing() -> None:
+    desk = Desk()
+
+    with pytest.raises(UnknownRobotError):
+        await desk.commander.stop(["AGI", "AGX"], "ana", desk.clock())
+
+    assert desk.fleet.stops == []
+
+
+# --- what comes back --------------------------------------------------------------
+
+
+async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
+    desk = Desk()
+
+    command = await press(desk)
+    await desk.wait(5.0)
+
+    assert command.state == "UNCONFIRMED"
+
+
+async def test_f39_reports_alone_bring_standing() -> None:
+    desk = Desk()
+    command = await press(desk)
+
+    await desk.stand()
+
+    assert command.state == "STANDING"
+    assert command.standstill_ms is not None
+
+
+async def test_the_robots_answer_alone_brings_delivered() -> None:
+    desk = Desk()
+    command = await press(desk)
+
+    desk.answer("LATCHED")
+
+    assert command.state == "DELIVERED"
+
+
+async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    for _ in range(20):
+        desk.seq = 3
+        desk.report("AGI", Hold(command.command_id, "iveg", "remote"))
+        await desk.wait(0.1)
+
+    assert command.state == "STALE"
+
+
+async def test_what_was_asked_of_orion_says_nothing_about_stop() -> None:
+    desk = Desk()
+    command = await press(desk)
+    held = Hold(command.command_id, "iveg", "remote")
+    desk.report("AGII")
+    desk.hear(safety_report("AGI", held, origin=desk.next_origin()), asked=True)
+
+    assert command.state == "SENT"
+
+
+async def test_odometry_that_moves_stops_a_standing_robot_again() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    for _ in range(3):
+        desk.drive("AGI", linear=0.4)
+    await settle()
+
+    assert desk.commander.machine("AGI").hold_id != command.command_id
+    assert desk.journal.lines[-1][1] == "stopped"
+
+
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [(None, "alert.stop_unconfirmed"), ("LATCHED", "alert.stop_still_moving")],
+)
+async def test_a_stop_that_does_not_come_true_is_a_grave_alarm(
+    word: str | None, key: str
+) -> None:
+    desk = Desk()
+    await press(desk)
+    for said in filter(None, [word]):
+        desk.answer(said)
+
+    await desk.wait(6.0)
+
+    assert key in conditions_of(desk)
+
+
+# --- release ----------------------------------------------------------------------
+
+
+async def test_i6_a_release_goes_through_orion_alone_and_once() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    before = len(desk.fleet.stops)
+
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await desk.wait(1.9)
+
+    assert [one for one in desk.broker.asked if one[0] == "release"] == [
+        ("release", "AGI", (command.command_id,))
+    ]
+    assert len(desk.fleet.stops) == before
+
+
+async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.broker.refuse()
+
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await desk.wait(5.0)
+
+    assert len([one for one in desk.broker.asked if one[0] == "release"]) == 1
+
+
+async def test_the_journal_says_run_only_after_the_robot_reported_the_release() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await settle()
+    assert [line[1] for line in desk.journal.lines] == ["stopped"]
+
+    desk.report("AGI", released=(command.command_id,))
+    await settle()
+
+    assert [line[1] for line in desk.journal.lines] == ["stopped", "run"]
+    assert desk.fleet.levels[-1] == ("AGI", "run", ())
+
+
+async def test_an_unconfirmed_release_is_written_down_as_stopped() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+
+    await desk.wait(2.2)
+
+    assert desk.journal.lines[-1][1] == "stopped"
+    assert desk.journal.lines[-1][2] != command.command_id
+
+
+async def test_a_resume_goes_through_orion_alone_and_once() -> None:
+    desk = Desk()
+    await released(desk)
+
+    await desk.commander.resume("AGI", "ana", desk.clock())
+    await desk.wait(1.9)
+
+    assert [one for one in desk.broker.asked if one[0] == "resume"] == [
+        ("resume", "AGI", ())
+    ]
+
+
+async def test_a_refused_release_is_told_with_its_reason() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+
+    desk.answer("REFUSED", why="challenge")
+
+    assert desk.keys()[-1] == "log.stop.refused"
+    assert '"why": "challenge"' in desk.minutes.lines[-1].slots
+
+
+async def test_a_release_of_a_moving_robot_is_refused() -> None:
+    desk = Desk()
+    await press(desk)
+
+    with pytest.raises(CommandRefusedError):
+        await desk.commander.release("AGI", ["x"], "ana", desk.clock())
+
+
+async def test_the_history_says_that_a_released_stop_is_over() -> None:
+    desk = Desk()
+    held = await released(desk)
+    desk.report("AGI", factor=1.0, reason="clear", linear=0.3, released=(held,))
+
+    states = [
+        one.state
+        for one in desk.sink.records
+        if isinstance(one, CommandRecord) and one.command_id == held
+    ]
+    assert states[-2:] == ["READY", "RUNNING"]
+
+
+# --- restart, broker back ---------------------------------------------------------
+
+
+async def test_a_restart_asserts_the_stop_again_under_a_new_id() -> None:
+    desk = Desk()
+
+    desk.commander.restore({"AGI": "ana"}, desk.clock())
+    await settle()
+
+    machine = desk.commander.machine("AGI")
+    assert machine.wants_stop
+    assert desk.fleet.stops == [("AGI", machine.hold_id)]
+    assert desk.journal.lines == [("AGI", "stopped", machine.hold_id, "ana")]
+    assert desk.keys() == ["log.stop.reasserted", "log.stop.sent"]
+
+
+async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
+    desk = Desk()
+
+    desk.commander.restore({"AGX": "ana"}, desk.clock())
+    await settle()
+
+    assert desk.fleet.stops == []
+
+
+async def test_a_hold_that_this_run_did_not_make_is_adopted_and_written_down() -> None:
+    desk = Desk()
+
+    desk.report("AGI", Hold("01BEFORE", "iveg", "remote"))
+    await settle()
+
+    assert desk.journal.lines == [("AGI", "stopped", "01BEFORE", "iveg")]
+    assert desk.commander.machine("AGI").wants_stop
+
+
+async def test_a_broker_that_is_back_gets_every_level_again() -> None:
+    desk = Desk()
+    command = await press(desk)
+    desk.fleet.levels.clear()
+
+    desk.commander.broker_back()
+    await settle()
+
+    assert desk.fleet.levels == [("AGI", "stopped", (command.command_id,))]
+
+
+async def test_a_level_that_cannot_be_set_holds_up_nothing() -> None:
+    desk = Desk()
+    desk.fleet.fails = True
+
+    await press(desk)
+
+    assert desk.broker.asked
+
+
+# --- audit ------------------------------------------------------------------------
+
+
+async def test_i9_each_step_is_one_row_of_the_audit() -> None:
+    desk = Desk()
+    held = await released(desk)
+    desk.report("AGI", factor=1.0, reason="clear", linear=0.3, released=(held,))
+
+    steps = [
+        one.state for one in desk.sink.records if isinstance(one, CommandEventRecord)
+    ]
+    assert steps == [
+        "REQUESTED",
+        "SENT",
+        "DELIVERED",
+        "STANDING",
+        "RELEASING",
+        "READY",
+        "RUNNING",
+    ]
+
+
+async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
+    desk = Desk()
+    for number in range(50):
+        await desk.commander.stop(["AGI"], f"operator-{number}", desk.clock())
+
+    rows = [
+        one
+        for one in desk.sink.records
+        if isinstance(one, CommandEventRecord) and one.why == "requested"
+    ]
+    assert len(rows) == 50
+    assert len({row.command_id for row in rows}) == 1
+
+
+async def test_delivered_is_told_with_the_time_it_took() -> None:
+    desk = Desk()
+    await press(desk)
+    desk.clock.now = 0.08
+    desk.answer("LATCHED")
+
+    (line,) = (one for one in desk.minutes.lines if one.key == "log.stop.delivered")
+    assert '"ms": 80' in line.slots
+
+
+async def test_old_commands_make_room() -> None:
+    desk = Desk()
+    for _ in range(250):
+        desk.commander.restore({"AGII": "ana"}, desk.clock())
+        desk.report("AGII", released=(desk.commander.machine("AGII").hold_id or "",))
+
+    assert len(desk.commander.commands) <= 200
+    await desk.commander.close()
