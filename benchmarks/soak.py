@@ -1,9 +1,10 @@
 """Minutes of driving: nothing is lost on the way and nothing grows.
 
-``python -m benchmarks.soak [MINUTES]`` (10).  Three counts must agree for each kind of
-message: what the robots numbered, what the broker passed on, what the dashboard took
-from Orion.  The dashboard's memory must be flat and all of iVeg must fit in one core.
-Exit status 1 where one of these does not hold.
+``python -m benchmarks.soak [MINUTES]`` (10).  For each kind of message, what the broker
+passed on is what iVeg took from Orion; what robots numbered and did not send was
+overtaken by their own newer message, which is rare and never befalls a safety report.
+The dashboard's memory must be flat and all of iVeg must fit in one core.  Exit status
+1 where one of these does not hold.
 """
 
 import asyncio
@@ -31,6 +32,7 @@ KINDS = {
 
 MOST_CORES = 1.0
 MOST_GROWTH_MIB = 8.0
+_MOST_OVERTAKEN = 0.01
 _SETTLE_S = 3.0
 
 
@@ -125,16 +127,35 @@ def _sample(place: Site, minute: float) -> Sample:
 def _report(
     heard: Heard, counters: dict[str, int], samples: list[Sample], minutes: float
 ) -> list[str]:
+    return [*_report_messages(heard, counters, minutes), *_report_cost(samples)]
+
+
+def _report_messages(
+    heard: Heard, counters: dict[str, int], minutes: float
+) -> list[str]:
     failures = []
     rows = []
     numbered = heard.numbered()
+    # iVeg also reads the whole of Orion now and then: one of each kind a robot.
+    reads = counters.get("orion.SafetyReport", 0) - heard.messages["_safety"]
     for suffix, (_, counter) in KINDS.items():
-        counts = (numbered[suffix], heard.messages[suffix], counters.get(counter, 0))
+        sent, taken = heard.messages[suffix], counters.get(counter, 0) - reads
+        overtaken = numbered[suffix] - sent
+        counts = (numbered[suffix], overtaken, sent, taken)
         rows.append([suffix[1:], *map(str, counts)])
-        if len(set(counts)) != 1 or counts[0] == 0:
-            failures.append(f"{suffix[1:]}: counts differ: {counts}")
-    head = ["measure", "numbered by robots", "at the broker", "taken by iVeg"]
+        if sent != taken or sent == 0:
+            failures.append(f"{suffix[1:]}: {sent} at the broker, {taken} at iVeg")
+        if overtaken > _MOST_OVERTAKEN * sent:
+            failures.append(f"{suffix[1:]}: robots overtook {overtaken} of their own")
+    if numbered["_safety"] != heard.messages["_safety"]:
+        failures.append("a safety report never reached the broker")
+    head = ["measure", "numbered", "overtaken on robot", "at the broker", "at iVeg"]
     print_table(f"Messages in {minutes:g} min ({machine()})", head, rows)
+    return failures
+
+
+def _report_cost(samples: list[Sample]) -> list[str]:
+    failures = []
     # The first quarter fills caches and trails; growth is what comes after it.
     settled, last = samples[len(samples) // 4], samples[-1]
     growth = last.rss_mib - settled.rss_mib
