@@ -22,12 +22,14 @@ export function createDialogs() {
     opener = by;
     dialog.show();
     if (by) setAttribute(by, "aria-expanded", "true");
+    tell(true);
   }
 
   /** @param {boolean} [isDone] whether the focus goes back to where it came from */
   function close(isDone = true) {
     current?.close();
     current = null;
+    tell(false);
     if (opener) setAttribute(opener, "aria-expanded", "false");
     if (isDone && opener?.isConnected) opener.focus();
     opener = null;
@@ -51,7 +53,14 @@ export function createDialogs() {
     for (const other of all(`[data-drawer="${id}"]`)) {
       setAttribute(other, "aria-expanded", String(isOpen));
     }
+    tell(isOpen);
     if (isOpen) drawer?.focus();
+  }
+
+  /** @param {HTMLElement} drawer */
+  function closeDrawer(drawer) {
+    const button = all(`[data-drawer="${drawer.id}"]`)[0];
+    if (button) toggleDrawer(button);
   }
 
   document.addEventListener("click", (event) => {
@@ -69,8 +78,18 @@ export function createDialogs() {
   document.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;
     if (current) close();
-    else for (const open of all("[data-open]")) open.removeAttribute("data-open");
+    else for (const drawer of all("[data-open]")) closeDrawer(drawer);
   });
 
   return { open, close, isOpen: (/** @type {Element} */ it) => it === current };
+}
+
+/**
+ * STOP controls on cards have to get out from under a panel.
+ *
+ * @param {boolean} isOpen
+ */
+function tell(isOpen) {
+  document.body.toggleAttribute("data-panel", isOpen);
+  document.dispatchEvent(new CustomEvent("iveg:panel"));
 }

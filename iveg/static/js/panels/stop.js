@@ -1,8 +1,9 @@
 /**
  * The STOP controls: one a robot, one for the fleet, on every page.
  *
- * Each control exists once.  On a phone a robot's control stands in its card, elsewhere
- * in the strip; it is moved, not copied, so there is one state to believe.  What it says
+ * Each control exists once.  On a phone, and in a big fleet, a robot's control stands in
+ * its card, else in the strip; it is moved, not copied, so there is one state to believe.
+ * A panel that opens over the cards of a phone finds them in the strip.  What it says
  * comes from `stop_view.js`, what it sends goes through `press.js`.
  */
 
@@ -14,6 +15,9 @@ import { since, stateOfCommand, viewOfFleet, viewOfRobot } from "./stop_view.js"
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Command} Command */
 /** @typedef {import("./stop_view.js").View} View */
+
+/** More robots than this have their controls on their cards on every screen. */
+const STRIP_HOLDS = 4;
 
 const PHONE = matchMedia("(max-width: 767px)");
 const TICK_MS = 100;
@@ -192,13 +196,17 @@ export function createStopPanel(app) {
     });
   }
 
-  /** Cards hold their robot's control on a phone, the strip elsewhere. */
+  /** Cards hold their robot's control on a phone and in a big fleet, else the strip. */
   function place() {
+    const isMany = controls.size - 1 > STRIP_HOLDS;
+    const isPanelOpen = document.body.hasAttribute("data-panel");
+    const isOnCards = isMany || (PHONE.matches && !isPanelOpen);
+    strip.toggleAttribute("data-many", isMany);
     for (const [id, control] of controls) {
       const slot = document.querySelector(
         `[data-robot="${CSS.escape(id)}"] [data-part="stop"]`,
       );
-      const home = PHONE.matches && slot ? slot : strip;
+      const home = isOnCards && slot ? slot : strip;
       if (control.parentElement !== home) {
         home.insertBefore(
           control,
@@ -211,6 +219,7 @@ export function createStopPanel(app) {
   for (const control of all("[data-stop]")) adopt(control);
   place();
   PHONE.addEventListener("change", place);
+  document.addEventListener("iveg:panel", place);
   onFleetKeys(() => press(null));
   store.subscribe("snapshot", restart);
   store.subscribe("commands/", take);
