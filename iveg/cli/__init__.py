@@ -50,6 +50,11 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
             from iveg.cli.parts import provision_fleet
 
             return provision_fleet(settings)
+        case "doctor":
+            from iveg.cli.doctor import run_doctor
+
+            data = Path(os.environ.get("IVEG_DATA_DIRECTORY") or data)
+            return run_doctor(settings, data)
         case "demo":
             from iveg.cli.demo import demo
 
@@ -105,6 +110,7 @@ def _parser() -> argparse.ArgumentParser:
             "--until-eof", action="store_true", help="end when the input closes"
         )
     commands.add_parser("provision", help="make devices and subscriptions")
+    commands.add_parser("doctor", help="try every hop once and say what is broken")
     commands.add_parser("settings", help="print docs/settings.md")
     database = commands.add_parser("db", help="the history's database")
     database.add_argument("action", choices=("upgrade",))

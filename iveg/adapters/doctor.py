@@ -1,0 +1,172 @@
+"""Doors that only ``iveg doctor`` opens: a probe device, a look at the database.
+
+They tell the reason of a failure where the doors of a running iVeg try again.
+"""
+
+import asyncio
+import contextlib
+import secrets
+import socket
+import ssl
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+
+import aiomqtt
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy.exc import DatabaseError
+
+from iveg.adapters.history.engine import reading_engine, sqlite_file
+from iveg.adapters.history.migrate import alembic_config, reason_of
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.errors import HopError
+
+_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+_REFUSED = 128
+"""From this code on, a broker's answer to a subscription is a refusal."""
+
+
+class Ear:
+    """Waits for messages by a mark that nobody else can know."""
+
+    def __init__(self) -> None:
+        self._awaited: dict[bytes, asyncio.Event] = {}
+
+    def mark(self) -> str:
+        """A new mark to send; from now on it is listened for."""
+        mark = secrets.token_hex(8)
+        self._awaited[mark.encode()] = asyncio.Event()
+        return mark
+
+    def hear(self, payload: bytes) -> None:
+        """Take a message."""
+        for mark, heard in self._awaited.items():
+            if mark in payload:
+                heard.set()
+
+    async def heard(self, mark: str, within_s: float) -> None:
+        """Return once a message has carried the mark.
+
+        Raises:
+            TimeoutError: none has.
+        """
+        async with asyncio.timeout(within_s):
+            await self._awaited[mark.encode()].wait()
+
+
+class ProbeDevice:
+    """A device at the broker that hears a few topics and may publish."""
+
+    def __init__(self, client: aiomqtt.Client, ear: Ear) -> None:
+        self._client = client
+        self.ear = ear
+
+    async def publish(self, topic: str, payload: bytes, within_s: float) -> None:
+        """Publish at QoS 1; return when the broker has it.
+
+        Raises:
+            HopError: the connection is gone, or the broker did not confirm.
+        """
+        try:
+            await self._client.publish(topic, payload, qos=1, timeout=within_s)
+        except aiomqtt.MqttError as error:
+            raise HopError("mqtt", str(error)) from error
+
+
+@asynccontextmanager
+async def probe_device(
+    address: BrokerAddress, topics: Sequence[str], within_s: float
+) -> AsyncIterator[ProbeDevice]:
+    """Be connected while the block lasts; a lost connection is not mended.
+
+    Args:
+        address: The broker.
+        topics: What the device hears.
+        within_s: How long the broker may take to let us in (s).
+
+    Raises:
+        HopError: the broker is away, refuses us or refuses a topic.
+    """
+    client = aiomqtt.Client(
+        address.host,
+        address.port,
+        username=address.user,
+        password=address.password,
+        timeout=within_s,
+        tls_context=ssl.create_default_context() if address.tls else None,
+        socket_options=_NODELAY,
+    )
+    device = ProbeDevice(client, Ear())
+    async with contextlib.AsyncExitStack() as stack:
+        try:
+            await client.__aenter__()
+            stack.push_async_callback(_leave, client)
+            for topic in topics:
+                await _subscribe(client, topic)
+        except (aiomqtt.MqttError, OSError) as error:
+            raise HopError("mqtt", str(error) or type(error).__name__) from error
+        hearing = asyncio.create_task(_hear(client, device.ear), name="doctor-mqtt")
+        stack.push_async_callback(_end, hearing)
+        yield device
+
+
+async def _subscribe(client: aiomqtt.Client, topic: str) -> None:
+    granted = await client.subscribe(topic, qos=1)
+    for code in granted:
+        value = code if isinstance(code, int) else code.value
+        if value >= _REFUSED:
+            raise HopError("mqtt", f"gives no echo: it refuses to let us hear {topic}")
+
+
+async def _hear(client: aiomqtt.Client, ear: Ear) -> None:
+    # A lost connection shows in what does not arrive; nobody waits for this task.
+    with contextlib.suppress(aiomqtt.MqttError):
+        async for message in client.messages:
+            if isinstance(message.payload, bytes):
+                ear.hear(message.payload)
+
+
+async def _end(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def _leave(client: aiomqtt.Client) -> None:
+    with contextlib.suppress(aiomqtt.MqttError):
+        await client.__aexit__(None, None, None)
+
+
+def check_database(database_url: str) -> None:
+    """See that the history can be read and has the newest shape; change nothing.
+
+    Raises:
+        HopError: it is not there, cannot be read, or has another shape.
+        SettingsError: the address cannot be used.
+    """
+    file = sqlite_file(database_url)
+    if file is not None and not file.is_file():
+        raise HopError("database", "there is none; `iveg db upgrade` makes it")
+    engine = reading_engine(database_url)
+    try:
+        with engine.connect() as connection:
+            found = MigrationContext.configure(connection).get_current_revision()
+            steps = ScriptDirectory.from_config(alembic_config(connection))
+            known = [step.revision for step in steps.walk_revisions()]
+    except DatabaseError as error:
+        raise HopError("database", reason_of(error)) from error
+    finally:
+        engine.dispose()
+    _compare(found, known)
+
+
+def _compare(found: str | None, newest_first: Sequence[str]) -> None:
+    newest = newest_first[0]
+    if found == newest:
+        return
+    if found is not None and found not in newest_first:
+        raise HopError("database", f"a newer iVeg wrote it (migration {found})")
+    raise HopError(
+        "database",
+        f"it is at migration {found or 'none'} and the newest is {newest}; "
+        "`iveg db upgrade` mends that",
+    )

@@ -1,0 +1,268 @@
+"""What the findings of ``iveg doctor`` mean: rows, sentences, exit code; no I/O.
+
+A hop is tried only when those it stands on are well, so that one broken part is one
+failed row and not six.  The order is the order of the examination.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+State = Literal["ok", "failed", "not tried"]
+
+
+class Hop(StrEnum):
+    """What is examined, as the table names it."""
+
+    BROKER = "MQTT broker: connect, echo"
+    ORION = "Orion answers"
+    AGENT = "IoT Agent answers"
+    DEVICE = "probe device can be made"
+    MEASURE = "measure: MQTT > agent > Orion"
+    NOTIFICATION = "notification: Orion > here"
+    COMMAND = "command: Orion > agent > MQTT"
+    ANSWER = "answer: MQTT > agent > Orion"
+    DIRECT = "command straight over MQTT"
+    DATABASE = "database, newest migration"
+    PAGE = "iVeg's own page, /healthz"
+
+
+NEEDS: Mapping[Hop, tuple[Hop, ...]] = {
+    Hop.BROKER: (),
+    Hop.ORION: (),
+    Hop.AGENT: (),
+    Hop.DEVICE: (Hop.ORION, Hop.AGENT),
+    Hop.MEASURE: (Hop.BROKER, Hop.DEVICE),
+    Hop.NOTIFICATION: (Hop.ORION,),
+    Hop.COMMAND: (Hop.BROKER, Hop.DEVICE),
+    Hop.ANSWER: (Hop.COMMAND,),
+    Hop.DIRECT: (Hop.BROKER,),
+    Hop.DATABASE: (),
+    Hop.PAGE: (),
+}
+"""What each hop stands on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """The addresses that sentences name.
+
+    Attributes:
+        broker: Host and port of the MQTT broker.
+        user: Who we are there; empty for nobody.
+        listener: Where Orion was asked to post to.
+        topics: The probe device's topics, up to the last slash.
+    """
+
+    broker: str
+    user: str
+    orion: str
+    agent: str
+    listener: str
+    database: str
+    page: str
+    topics: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One hop that was tried.
+
+    Attributes:
+        took_s: How long it took, or how long was waited (s).
+        trouble: None where it went well; what was said where it was refused; empty
+            where nothing came in time.
+    """
+
+    hop: Hop
+    took_s: float
+    trouble: str | None = None
+
+    @property
+    def well(self) -> bool:
+        """Whether the hop did its part."""
+        return self.trouble is None
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table; ``sentence`` is empty where all is well."""
+
+    hop: Hop
+    state: State
+    took_s: float | None = None
+    sentence: str = ""
+
+
+Findings = Mapping[Hop, Finding]
+
+
+def missing(hop: Hop, findings: Findings) -> tuple[Hop, ...]:
+    """The hops that a hop stands on and that were not well."""
+    return tuple(
+        need for need in NEEDS[hop] if need not in findings or not findings[need].well
+    )
+
+
+def judge(findings: Findings, stack: Stack) -> list[Row]:
+    """Every hop with its state and, where it failed, what to look at."""
+    return [_row(hop, findings, stack) for hop in Hop]
+
+
+def exit_code(rows: Sequence[Row]) -> int:
+    """0 where every hop is well, else 1."""
+    return int(any(row.state != "ok" for row in rows))
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The rows as text: hop, state, milliseconds, and sentences below their row."""
+    wide = max(len(hop) for hop in Hop)
+    lines = [f"{'hop':<{wide}}  {'state':<9}  {'ms':>6}"]
+    for row in rows:
+        took = "" if row.took_s is None else f"{row.took_s * 1000:.0f}"
+        lines.append(f"{row.hop:<{wide}}  {row.state:<9}  {took:>6}".rstrip())
+        if row.sentence:
+            lines.append(f"    {row.sentence}")
+    return "\n".join(lines)
+
+
+def _row(hop: Hop, findings: Findings, stack: Stack) -> Row:
+    finding = findings.get(hop)
+    if finding is None:
+        because = " and ".join(f"“{need}”" for need in missing(hop, findings))
+        return Row(hop, "not tried", None, f"Stands on {because}." if because else "")
+    if finding.trouble is None:
+        return Row(hop, "ok", finding.took_s)
+    said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
+    return Row(hop, "failed", finding.took_s, _SENTENCES[hop](said, stack, findings))
+
+
+def _broker(said: str, stack: Stack, _: Findings) -> str:
+    if "not auth" in said.lower() or "password" in said.lower():
+        who = f"user {stack.user}" if stack.user else "nobody in particular"
+        return (
+            f"The broker at {stack.broker} refuses {who} ({said}): look at "
+            "IVEG_MQTT_USER and IVEG_MQTT_PASSWORD and at the broker's password file."
+        )
+    if "echo" in said:
+        return (
+            f"The broker at {stack.broker} lets us in and {said}: look at its access "
+            f"list; user {stack.user or '(nobody)'} must write and read "
+            f"{stack.topics}#."
+        )
+    return (
+        f"No MQTT at {stack.broker} ({said}): look whether the broker runs, and at "
+        "IVEG_MQTT_URL."
+    )
+
+
+def _orion(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"No Orion at {stack.orion} ({said}): look whether Orion and its MongoDB run, "
+        "and at IVEG_ORION_URL."
+    )
+
+
+def _agent(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"No IoT Agent at {stack.agent} ({said}): look whether it runs, at its log, "
+        "and at IVEG_IOTA_URL."
+    )
+
+
+def _device(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"The agent at {stack.agent} does not take a device with a command ({said}): "
+        "it registers the command at Orion, so look at the agent's own address of "
+        "Orion, at its MongoDB and at IVEG_FIWARE_SERVICE and IVEG_FIWARE_SERVICEPATH."
+    )
+
+
+def _measure(said: str, stack: Stack, findings: Findings) -> str:
+    command = findings.get(Hop.COMMAND)
+    if command is not None and command.well:
+        return (
+            "The agent sends commands and does not hear: a measure on "
+            f"{stack.topics}attrs is not in Orion ({said}); its connection is deaf or "
+            "the broker's access list keeps the topic from it: restart the agent and "
+            "look at its log."
+        )
+    return (
+        f"A measure on {stack.topics}attrs is not in Orion ({said}): look whether the "
+        "agent is connected to the same broker, may read the topic, and reaches Orion "
+        "at the address that iVeg gave it (IVEG_IOTA_CB_URL)."
+    )
+
+
+def _notification(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"Orion did not post to {stack.listener} ({said}): look whether Orion's "
+        "machine reaches this one there (firewall, container network), and at the "
+        "host in IVEG_NOTIFY_URL."
+    )
+
+
+def _command(said: str, stack: Stack, _: Findings) -> str:
+    if said.startswith("404"):
+        return (
+            f"Orion cannot pass a command on ({said}): with this answer it says that "
+            "it does not reach the agent; look at IOTA_PROVIDER_URL of the agent, the "
+            "address under which Orion calls it."
+        )
+    return (
+        f"Orion took a command and the device never got it ({said}): look whether the "
+        f"agent is connected to the broker and may write {stack.topics}cmd. STOP still "
+        "goes straight over MQTT."
+    )
+
+
+def _answer(said: str, stack: Stack, findings: Findings) -> str:
+    measure = findings.get(Hop.MEASURE)
+    if measure is not None and not measure.well:
+        return (
+            f"The device's answer on {stack.topics}cmdexe is not in Orion ({said}), "
+            "nor was its measure: it is the same deafness of the agent."
+        )
+    return (
+        f"The device's answer on {stack.topics}cmdexe is not in Orion ({said}), though "
+        "its measure was: look whether the broker lets the agent read the topic."
+    )
+
+
+def _direct(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"A command straight on {stack.topics}cmd did not arrive ({said}): look at the "
+        f"broker's access list; user {stack.user or '(nobody)'} must write /+/+/cmd."
+    )
+
+
+def _database(said: str, stack: Stack, _: Findings) -> str:
+    if "iveg db upgrade" in said:
+        return f"The history in {stack.database} cannot be used yet: {said}."
+    return (
+        f"The history in {stack.database} cannot be read ({said}): look whether the "
+        "server runs, and at IVEG_DATABASE_URL. STOP and the live map go on without."
+    )
+
+
+def _page(said: str, stack: Stack, _: Findings) -> str:
+    return (
+        f"iVeg itself does not answer at {stack.page} ({said}): look whether `iveg "
+        "serve` runs, and at IVEG_HOST and IVEG_PORT."
+    )
+
+
+_SENTENCES: Mapping[Hop, Callable[[str, Stack, Findings], str]] = {
+    Hop.BROKER: _broker,
+    Hop.ORION: _orion,
+    Hop.AGENT: _agent,
+    Hop.DEVICE: _device,
+    Hop.MEASURE: _measure,
+    Hop.NOTIFICATION: _notification,
+    Hop.COMMAND: _command,
+    Hop.ANSWER: _answer,
+    Hop.DIRECT: _direct,
+    Hop.DATABASE: _database,
+    Hop.PAGE: _page,
+}

@@ -1,0 +1,249 @@
+"""The doctor against a FIWARE that is up, deaf, half dead or gone."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from iveg.adapters.history.migrate import upgrade
+from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.orion import OrionClient
+from iveg.cli.diagnosis import Hop, State, exit_code, judge
+from iveg.cli.doctor import DESCRIPTION, PROBE_ID, Examination
+from iveg.embedded.http_server import Request, Response, http_server
+from iveg.embedded.iot_agent import Faults
+from iveg.embedded.server import Running, embedded_fiware
+from iveg.settings import Settings
+from tests.integration.emulator_cloud import until
+from tests.processes import Site, free_ports
+
+SHORT_S, LONG_S = 0.5, 20.0
+TENANT = ("agroconnect", "/greenhouse")
+
+
+@pytest.fixture
+async def up() -> AsyncIterator[Running]:
+    async with embedded_fiware() as running:
+        yield running
+
+
+@pytest.fixture
+async def page() -> AsyncIterator[int]:
+    async with http_server(healthy, "127.0.0.1", 0) as port:
+        yield port
+
+
+async def healthy(request: Request) -> Response:
+    return Response(200 if request.path == "/healthz" else 404)
+
+
+@pytest.fixture
+async def settings(up: Running, page: int, tmp_path: Path) -> Settings:
+    database = f"sqlite:///{tmp_path / 'history.sqlite'}"
+    await asyncio.to_thread(upgrade, database)
+    return Settings(
+        port=page,
+        mqtt_url=up.mqtt_url,
+        orion_url=up.orion_url,
+        iota_url=up.iota_url,
+        database_url=database,
+    )
+
+
+async def examine(
+    settings: Settings, folder: Path, patience_s: float = LONG_S
+) -> tuple[dict[Hop, State], Examination]:
+    examination = Examination(settings, folder, patience_s)
+    async with asyncio.timeout(60):
+        await examination.run()
+    rows = judge(examination.findings, examination.stack)
+    return {row.hop: row.state for row in rows}, examination
+
+
+async def leftovers(up: Running) -> list[dict[str, Any]]:
+    """Whatever of the doctor's is still at Orion or the agent."""
+    async with (
+        OrionClient(up.orion_url, *TENANT) as orion,
+        IotAgentClient(up.iota_url, *TENANT) as agent,
+    ):
+        entities = await orion.read_entities("Probe", ["probe"])
+        return [
+            *[one for one in entities if one["id"] == PROBE_ID],
+            *[one for one in await orion.read_registrations() if PROBE_ID in str(one)],
+            *[
+                one
+                for one in await orion.read_subscriptions()
+                if one.get("description") == DESCRIPTION
+            ],
+            *[one for one in await agent.read_devices() if PROBE_ID in str(one)],
+            *await agent.read_groups(),
+        ]
+
+
+async def test_a_whole_chain_is_well_and_nothing_of_the_doctors_stays(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    states, examination = await examine(settings, tmp_path)
+
+    assert states == dict.fromkeys(Hop, "ok")
+    assert examination.left_behind == []
+    assert await leftovers(up) == []
+
+
+async def test_a_group_that_was_there_stays(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    async with IotAgentClient(up.iota_url, *TENANT) as agent:
+        group = {"apikey": "iveg", "resource": "/iot/json", "entity_type": "Robot"}
+        await agent.create_group(group)
+        await examine(settings, tmp_path)
+
+        assert [one["apikey"] for one in await agent.read_groups()] == ["iveg"]
+
+
+async def test_what_a_killed_doctor_left_is_no_hindrance_and_goes(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    async with (
+        OrionClient(up.orion_url, *TENANT) as orion,
+        IotAgentClient(up.iota_url, *TENANT) as agent,
+    ):
+        device = {"device_id": PROBE_ID, "entity_name": PROBE_ID, "apikey": "iveg"}
+        await agent.create_device({**device, "entity_type": "Probe"})
+        await orion.create_subscription(
+            {
+                "description": DESCRIPTION,
+                "subject": {"entities": [{"id": PROBE_ID, "type": "Probe"}]},
+                "notification": {"http": {"url": "http://127.0.0.1:9/"}},
+            }
+        )
+
+    states, _ = await examine(settings, tmp_path)
+
+    assert states == dict.fromkeys(Hop, "ok")
+    assert await leftovers(up) == []
+
+
+async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    up.agent.fail(Faults(deaf=True))
+
+    states, examination = await examine(settings, tmp_path, SHORT_S)
+
+    failed = {hop for hop, state in states.items() if state != "ok"}
+    assert failed == {Hop.MEASURE, Hop.ANSWER}
+    rows = judge(examination.findings, examination.stack)
+    assert "deaf" in next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    assert exit_code(rows) == 1
+    assert await leftovers(up) == []
+
+
+async def test_a_dead_broker_leaves_orion_and_the_page_well(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    dead = replace(settings, mqtt_url=f"mqtt://127.0.0.1:{free_ports(1)[0]}")
+
+    states, _ = await examine(dead, tmp_path, SHORT_S)
+
+    assert states[Hop.BROKER] == "failed"
+    assert {hop for hop, state in states.items() if state == "not tried"} == {
+        Hop.MEASURE,
+        Hop.COMMAND,
+        Hop.ANSWER,
+        Hop.DIRECT,
+    }
+    assert states[Hop.NOTIFICATION] == states[Hop.PAGE] == "ok"
+    assert await leftovers(up) == []
+
+
+async def test_a_dead_orion_leaves_the_straight_road_well(
+    settings: Settings, tmp_path: Path
+) -> None:
+    dead = replace(settings, orion_url=f"http://127.0.0.1:{free_ports(1)[0]}")
+
+    states, examination = await examine(dead, tmp_path, SHORT_S)
+
+    assert states[Hop.ORION] == "failed"
+    assert states[Hop.BROKER] == states[Hop.AGENT] == states[Hop.DIRECT] == "ok"
+    assert states[Hop.DEVICE] == states[Hop.NOTIFICATION] == "not tried"
+    assert examination.left_behind == []
+
+
+async def test_an_address_that_orion_cannot_reach_is_a_failed_notification(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    url = "http://nowhere.invalid:8000/ngsi/notifications"
+
+    states, examination = await examine(
+        replace(settings, notify_url=url), tmp_path, SHORT_S
+    )
+
+    assert {hop for hop, state in states.items() if state != "ok"} == {Hop.NOTIFICATION}
+    rows = judge(examination.findings, examination.stack)
+    sentence = next(row for row in rows if row.hop == Hop.NOTIFICATION).sentence
+    assert "http://nowhere.invalid:" in sentence
+    assert "IVEG_NOTIFY_URL" in sentence
+    assert await leftovers(up) == []
+
+
+async def test_a_doctor_that_is_sent_away_still_tidies_up(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    up.agent.fail(Faults(deaf=True))
+    examination = Examination(settings, tmp_path, LONG_S)
+    visit = asyncio.create_task(examination.run())
+    await until(lambda: Hop.DEVICE in examination.findings, LONG_S)
+
+    visit.cancel()
+    await asyncio.gather(visit, return_exceptions=True)
+
+    assert Hop.MEASURE not in examination.findings
+    assert await leftovers(up) == []
+
+
+async def test_a_history_that_is_not_there_is_not_made(
+    settings: Settings, tmp_path: Path
+) -> None:
+    file = tmp_path / "none.sqlite"
+
+    states, _ = await examine(
+        replace(settings, database_url=f"sqlite:///{file}"), tmp_path
+    )
+
+    assert states[Hop.DATABASE] == "failed"
+    assert not file.exists()
+
+
+async def test_a_history_without_migrations_is_told_from_a_good_one(
+    settings: Settings, tmp_path: Path
+) -> None:
+    (tmp_path / "empty.sqlite").touch()
+    empty = replace(settings, database_url=f"sqlite:///{tmp_path / 'empty.sqlite'}")
+
+    _, examination = await examine(empty, tmp_path)
+
+    trouble = examination.findings[Hop.DATABASE].trouble
+    assert "it is at migration none" in str(trouble)
+
+
+def test_the_command_prints_the_table_and_ends_with_1_where_nothing_runs(
+    place: Site,
+) -> None:
+    doctor = place.start("doctor")
+
+    assert doctor.process.wait(60) == 1
+    assert doctor.text().startswith("hop")
+    assert f"No Orion at {place.settings['IVEG_ORION_URL']}" in doctor.text()
+    assert doctor.complaints() == []
+
+
+def test_the_command_ends_with_0_beside_a_running_iveg(served: Site) -> None:
+    doctor = served.start("doctor")
+
+    assert doctor.process.wait(90) == 0, doctor.text()
+    served.stop_all()
+    served.assert_clean()
