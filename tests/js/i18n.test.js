@@ -29,7 +29,10 @@ test("numbers, shares, classes and times are written as Spaniards do", async () 
     class: "person",
     at: "2026-11-20T12:04:11Z",
   };
-  equal(t("d", slots).replaceAll("\u00a0", " "), "a 1,4 m (94 %), una persona, 13:04:11");
+  equal(
+    t("d", slots).replaceAll("\u00a0", " "),
+    "a 1,4 m (94 %), una persona, 13:04:11",
+  );
 });
 
 test("numbers are written as the English do after a switch", async () => {
