@@ -172,7 +172,7 @@ class Desk:
 
     # --- what was told ------------------------------------------------------------
 
-    def keys(self) -> list[str]:
+    def sentences(self) -> list[str]:
         """The sentences of the log, in order."""
         return [line.key for line in self.minutes.lines]
 

@@ -312,7 +312,7 @@ async def test_a_refused_release_is_told_with_its_reason() -> None:
 
     desk.answer("REFUSED", why="challenge")
 
-    assert desk.keys()[-1] == "log.stop.refused"
+    assert desk.sentences()[-1] == "log.stop.refused"
     assert '"why": "challenge"' in desk.minutes.lines[-1].slots
 
 
@@ -350,7 +350,7 @@ async def test_a_restart_asserts_the_stop_again_under_a_new_id() -> None:
     assert machine.wants_stop
     assert desk.fleet.stops == [("AGI", machine.hold_id)]
     assert desk.journal.lines == [("AGI", "stopped", machine.hold_id, "ana")]
-    assert desk.keys() == ["log.stop.reasserted", "log.stop.sent"]
+    assert desk.sentences() == ["log.stop.reasserted", "log.stop.sent"]
 
 
 async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:

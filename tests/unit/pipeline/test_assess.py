@@ -1,0 +1,419 @@
+"""The rule at work: feedback, log, alarms and the heartbeat of the fleet."""
+
+import json
+
+import pytest
+
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Hold, Origin
+from iveg.domain.records import (
+    AlertRecord,
+    DecisionRecord,
+    DetectionRecord,
+    OdometryRecord,
+)
+from tests.builders import detection, detection_frame, odometry, origin
+from tests.unit.pipeline.desk import Desk, conditions_of
+
+HEDGE = Greenhouse(
+    "hedge", Rectangle(-100, -100, 100, 100), rows=(Rectangle(2.9, -50, 3.1, 50),)
+)
+
+
+def watched(desk: Desk) -> Desk:
+    """Both robots are there, look, and report that they drive."""
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+    desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
+    desk.report("AGII", factor=1.0, reason="clear", linear=0.5)
+    return desk
+
+
+def meet(desk: Desk, x: float = 1.5) -> None:
+    """AGII sees a farmer ``x`` metres before AGI."""
+    desk.look("AGII", detection("farmer", x))
+
+
+# --- feedback ---------------------------------------------------------------------
+
+
+def test_a_sighting_is_told_to_the_fleet_at_once() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+
+    meet(desk)
+
+    told = {one.robot_id: one for one in desk.fleet.told}
+    assert set(told) == {"AGI", "AGII"}
+    assert told["AGI"].mandates["AGI"].reason == "person"
+    assert told["AGII"].alert is not None
+    assert told["AGII"].alert.class_id == "farmer"
+    assert told["AGII"].alert.radius_m == pytest.approx(2.0)
+    assert told["AGI"].alert is None
+    assert len(told["AGI"].alerts) == 1
+
+
+def test_feedback_says_where_iveg_believes_each_robot_to_be() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    newest = {one.robot_id: one for one in desk.fleet.told}
+    assert newest["AGII"].pose is not None
+    assert newest["AGII"].pose.x == 50.0
+    assert newest["AGII"].pose_stamp is not None
+
+
+def test_feedback_says_which_report_of_each_robot_was_seen() -> None:
+    desk = watched(Desk())
+    desk.report("AGI", factor=0.5, reason="stale")
+    seen = desk.seq
+
+    meet(desk)
+
+    assert desk.fleet.told[-1].seen["AGI"] == seen
+
+
+def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    numbers = [one.origin.seq for one in desk.fleet.told]
+    assert len(set(numbers)) == len(numbers)
+    assert {one.origin.boot for one in desk.fleet.told} == {"iveg-boot"}
+
+
+def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
+    desk = watched(Desk())
+    desk.look("AGII", detection("crate", 9.0))
+    desk.assessor.tell(desk.clock())
+
+    alert = next(one for one in desk.fleet.told[::-1] if one.robot_id == "AGII").alert
+    assert alert is not None
+    assert (alert.class_, alert.position) == (None, None)
+    assert alert.stamp
+
+
+async def test_the_heartbeat_comes_ten_times_a_second_and_from_the_loop_alone() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+
+    await desk.wait(2.0)
+
+    to_agi = [one for one in desk.fleet.told if one.robot_id == "AGI"]
+    assert 20 <= len(to_agi) <= 24
+
+
+async def test_f14_a_loop_that_hangs_sends_nothing() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+    desk.clock.now += 2.0
+
+    assert desk.fleet.told == []
+
+
+# --- decisions --------------------------------------------------------------------
+
+
+def test_a_decision_is_written_down_with_its_feedback() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert (newest.robot_id, newest.observer) == ("AGI", "AGII")
+    assert newest.feedback_at is not None
+    assert json.loads(newest.rule_parameters)["threshold"] == 0.8
+    verdicts = {one["link"]: one["verdict"] for one in json.loads(newest.links)}
+    assert verdicts["feedback"] == "ok"
+
+
+def test_what_the_robot_applies_and_shows_completes_the_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    mandate = desk.assessor.mandates["AGI"]
+
+    desk.report(
+        "AGI", factor=0.5, reason="person", decision_id=mandate.decision_id, linear=0.5
+    )
+    desk.drive("AGI", 0.0, linear=0.2)
+
+    decision = desk.assessor.decisions.get(mandate.decision_id or "")
+    assert decision is not None
+    assert decision.applied is not None
+    assert decision.speed_after == 0.2
+
+
+async def test_the_end_of_a_crossing_ends_its_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for tenth in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0)
+        desk.drive("AGII", 50.0)
+        desk.look("AGI")
+        desk.look("AGII", detection("farmer", 1.5 + 0.1 * tenth))
+
+    assert list(desk.assessor.decisions.every_open()) == []
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert newest.ended_at is not None
+
+
+def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
+    desk = Desk(house=HEDGE)
+    desk.drive("AGI", 2.0)
+    desk.drive("AGII", 50.0)
+
+    desk.look("AGII", detection("farmer", 3.9))
+
+    assert desk.assessor.protected_unseen == 1
+
+
+# --- alarms -----------------------------------------------------------------------
+
+
+async def test_a_slow_down_is_a_notice_and_no_line_of_its_own() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(0.1)
+
+    assert conditions_of(desk) == ["alert.person_slowed"]
+    assert "log.alert.raised" not in desk.sentences()
+
+
+async def test_a_robot_that_does_not_slow_down_raises_a_grave_alarm() -> None:
+    desk = watched(Desk())
+    for _ in range(22):
+        meet(desk)
+        desk.drive("AGI", 0.0)
+        desk.drive("AGII", 50.0)
+        desk.look("AGI")
+        await desk.wait(0.1)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert "log.alert.raised" in desk.sentences()
+
+
+async def test_a_moving_robot_that_is_lost_raises_and_its_return_clears() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    assert "alert.moving_robot_lost" in conditions_of(desk)
+
+    watched(desk)
+    await desk.wait(0.1)
+
+    assert "alert.moving_robot_lost" not in conditions_of(desk)
+    assert desk.sentences().count("log.alert.cleared") == 2
+
+
+async def test_acknowledging_is_written_down_and_told() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    (first, *_) = desk.assessor.alarms.active
+
+    desk.assessor.acknowledge(first.alert_id, "ana", "seen", desk.clock())
+
+    newest = desk.records(AlertRecord)[-1]
+    assert isinstance(newest, AlertRecord)
+    assert (newest.acknowledged_by, newest.note) == ("ana", "seen")
+    assert desk.sentences()[-1] == "log.alert.acknowledged"
+
+
+def test_an_alarm_that_nobody_knows_is_acknowledged_by_nobody() -> None:
+    desk = Desk()
+
+    assert desk.assessor.acknowledge("none", "ana", "", desk.clock()) is None
+    assert desk.sentences() == []
+
+
+# --- the log ----------------------------------------------------------------------
+
+
+async def test_a_link_that_comes_and_goes_is_told_once_each_time() -> None:
+    desk = watched(Desk())
+    await desk.wait(4.0)
+
+    links = [line.key for line in desk.minutes.lines if line.robot_id == "AGI"]
+    assert [key for key in links if key.startswith("log.link")] == [
+        "log.link.live",
+        "log.link.late",
+        "log.link.lost",
+    ]
+
+
+def test_a_speed_change_is_told_with_who_saw_whom() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    mandate = desk.assessor.mandates["AGI"]
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=mandate.decision_id)
+
+    line = desk.minutes.lines[-1]
+    slots = json.loads(line.slots)
+    assert line.key == "log.speed_down.person"
+    assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
+
+
+def test_a_robot_that_reports_nothing_is_told_by_its_mandate() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+
+    meet(desk)
+
+    assert desk.sentences()[-1] == "log.speed_down.person"
+
+
+def test_a_long_sighting_is_one_line_and_a_row_every_two_seconds() -> None:
+    desk = watched(Desk())
+    for _ in range(50):
+        desk.clock.now = round(desk.clock.now + 0.1, 6)
+        desk.look("AGII", detection("farmer", 80.0))
+
+    assert desk.sentences().count("log.detection") == 1
+    assert len(desk.records(DetectionRecord)) == 3
+
+
+@pytest.mark.parametrize(
+    ("class_id", "probability", "key"),
+    [
+        ("farmer", 0.6, "log.detection_faint"),
+        ("crate", 0.9, "log.detection_unmapped"),
+    ],
+)
+def test_faint_and_unmapped_detections_are_never_silently_ignored(
+    class_id: str, probability: float, key: str
+) -> None:
+    desk = watched(Desk())
+
+    desk.look("AGII", detection(class_id, 80.0, probability=probability))
+
+    assert desk.sentences()[-1] == key
+
+
+async def test_a_person_who_is_not_seen_any_more_is_remembered_then_expired() -> None:
+    desk = watched(Desk())
+    meet(desk, 80.0)
+    await desk.wait(11.0)
+
+    told = [key for key in desk.sentences() if key.startswith("log.person")]
+    assert told == ["log.person_remembered", "log.person_expired"]
+
+
+async def test_who_is_gone_leaves_the_page() -> None:
+    desk = watched(Desk())
+    meet(desk, 80.0)
+    desk.clock.now = 601.0
+    await desk.wait(0.05)
+
+    assert desk.assessor.people.known == {}
+
+
+async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
+    desk = watched(Desk())
+    desk.look("AGII", detection("farmer", 4.0))
+    for _ in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0, linear=0.0)
+        desk.look("AGI")
+
+    assert "log.person_cleared" in desk.sentences()
+
+
+def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
+    desk = watched(Desk())
+    for number in range(1100):
+        desk.look("AGII", detection(f"thing-{number}", 80.0))
+    desk.clock.now = 60.0
+
+    desk.loop.step([], desk.clock())
+
+    assert desk.assessor._looks == {}
+
+
+# --- what counts ------------------------------------------------------------------
+
+
+def test_poses_are_written_down_twice_a_second() -> None:
+    desk = Desk()
+    for tenth in range(100):
+        desk.clock.now = tenth / 10
+        desk.drive("AGI", 0.1 * tenth)
+
+    assert 19 <= len(desk.records(OdometryRecord)) <= 24
+
+
+def test_the_same_look_on_the_other_road_is_one_sighting() -> None:
+    desk = watched(Desk())
+    frame = detection_frame("AGII", detection("farmer", 9.0), origin=desk.next_origin())
+    desk.hear(frame, "mqtt")
+    desk.hear(frame, "orion")
+
+    assert desk.world.counters["DetectionFrame.duplicate"] == 1
+    assert len(desk.records(DetectionRecord)) == 1
+
+
+def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> None:
+    desk = watched(Desk())
+    late = desk.next_origin()
+    desk.look("AGII")
+
+    desk.hear(detection_frame("AGII", detection("farmer", 1.0), origin=late))
+    desk.loop.step([], desk.clock())
+    desk.clock.now = 0.1
+    desk.loop.step([], desk.clock())
+
+    assert desk.assessor.mandates["AGI"].reason == "person"
+    assert desk.assessor.placed["AGII"] == []
+
+
+def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
+    desk = watched(Desk())
+    kept = Origin("yesterday", 5, None, None)
+
+    desk.hear(
+        detection_frame("AGII", detection("farmer", 1.0), origin=kept), asked=True
+    )
+
+    assert desk.assessor.people.known == {}
+
+
+def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
+    desk = watched(Desk())
+    meet(desk, 5.5)
+    desk.clock.now = 2.9
+    desk.drive("AGI", 0.0)
+    desk.look("AGI")
+
+    assert desk.assessor.mandates["AGI"].reason == "person"
+
+
+def test_who_crosses_whom_is_known() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    assert [one.robot_id for one in desk.assessor.crossings] == ["AGI"]
+
+
+def test_a_held_robot_says_so_in_the_log_once() -> None:
+    desk = watched(Desk())
+    for _ in range(3):
+        desk.report("AGI", Hold("hw-1", "hw", "local"), factor=0.0, reason="hold")
+
+    assert desk.sentences().count("log.speed_down.hold") == 1
+
+
+def test_older_odometry_moves_nobody() -> None:
+    desk = watched(Desk())
+
+    desk.hear(odometry("AGI", 99.0, origin=origin(0)))
+
+    pose = desk.world.robot("AGI").odometry
+    assert pose is not None
+    assert pose.pose.x == 0.0

@@ -1,0 +1,123 @@
+"""One loop, one order: take what came, then let time pass."""
+
+import asyncio
+
+from iveg.domain.observations import Canary, CommandAnswer, Origin, Received
+from iveg.pipeline.publish import MAX_PENDING
+from tests.builders import odometry, origin
+from tests.unit.pipeline.desk import Desk, settle
+
+
+async def test_the_loop_takes_what_waits_without_being_called() -> None:
+    desk = Desk()
+    running = asyncio.create_task(desk.loop.run())
+    desk.ingest.offer(Received(odometry(), desk.clock()))
+
+    browser = desk.hub.join()
+    async with asyncio.timeout(5):
+        _, topics = await browser.take()
+
+    assert "robots/AGI" in topics
+
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+def test_time_passes_once_in_a_tick_however_much_arrives() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    ticked = len(desk.fleet.told)
+    for _ in range(20):
+        desk.loop.step([], desk.clock())
+
+    assert len(desk.fleet.told) == ticked
+
+
+async def test_the_second_roads_copy_of_an_answer_keeps_its_time() -> None:
+    desk = Desk()
+    (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
+    await settle()
+    answer = CommandAnswer("AGI", Origin("b", 1), command.command_id, "LATCHED")
+    desk.hear(answer, "mqtt")
+    desk.clock.now = 0.3
+    desk.hear(answer, "orion")
+
+    assert command.times.answer_direct is not None
+    assert command.times.answer_fiware == desk.clock()
+
+
+def test_the_canary_that_came_back_is_evidence_for_the_chain() -> None:
+    desk = Desk()
+    desk.clock.now = 1.0
+
+    desk.hear(Canary(origin()))
+
+    assert desk.chain.canary_at == desk.clock().mono
+
+
+async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:
+    desk = Desk()
+    desk.chain.mqtt_connected = True
+    await desk.wait(0.1)
+    desk.chain.mqtt_connected = False
+    await desk.wait(1.0)
+    desk.chain.mqtt_connected = True
+    await desk.wait(1.0)
+
+    hops = [line.key for line in desk.minutes.lines if line.key.startswith("log.hop")]
+    assert hops == ["log.hop.down", "log.hop.back"]
+
+
+async def test_health_is_told_every_second() -> None:
+    desk = Desk()
+    before = desk.hub.versions["health"]
+
+    await desk.wait(5.0)
+
+    assert desk.hub.versions["health"] - before >= 5
+
+
+# --- to whom it may concern -------------------------------------------------------
+
+
+async def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
+    hub = Desk().hub
+    browser = hub.join()
+    for number in range(3):
+        hub.changed("robots/AGI")
+        hub.append("log", number)
+
+    events, topics = await browser.take()
+
+    assert events == [("log", 0), ("log", 1), ("log", 2)]
+    assert topics == ["robots/AGI"]
+
+
+async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() -> None:
+    hub = Desk().hub
+    browser = hub.join()
+    for number in range(MAX_PENDING + 1):
+        hub.append("log", number)
+
+    assert browser.overflowed
+    assert len(browser.pending) == MAX_PENDING
+
+
+def test_who_has_gone_gets_nothing() -> None:
+    hub = Desk().hub
+    browser = hub.join()
+    assert hub.watchers == 1
+
+    hub.leave(browser)
+    hub.changed("robots/AGI")
+
+    assert (hub.watchers, browser.dirty) == (0, {})
+
+
+def test_log_numbers_grow_also_over_a_restart() -> None:
+    first, later = Desk(), Desk()
+    first.drive("AGI")
+    later.minutes._next_id = int(1000 * (first.clock().wall + 10))
+    later.drive("AGI")
+
+    assert later.minutes.lines[0].id > first.minutes.lines[-1].id
