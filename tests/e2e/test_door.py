@@ -73,6 +73,16 @@ def test_every_answer_binds_the_browser(operator: httpx.Client, path: str) -> No
     assert headers["cache-control"] == "no-store"
 
 
+def test_a_link_that_is_wrong_gets_a_page_that_binds_the_browser_too(
+    stranger: httpx.Client,
+) -> None:
+    answer = stranger.get("/?token=" + "0" * 32)
+
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
+    assert answer.headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+
+
 @pytest.mark.parametrize(
     "headers", [{}, {"X-IVEG": "1"}, {"X-IVEG": "1", "Origin": "http://evil.test"}]
 )
