@@ -217,6 +217,8 @@ class StopMachine:
     def _begin(self, by: str, at: Instant, new_id: str, key: str) -> list[Effect]:
         """A new episode under an id that was never used before."""
         self.stop = Command(new_id, self.robot_id, "stop", "REQUESTED", Times(at), [by])
+        if key != "requested":
+            self.stop.reason = key
         if not self._direct:
             self.stop.roads["direct"] = "off"
         self.once = None
