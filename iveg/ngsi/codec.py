@@ -129,7 +129,11 @@ def read_entity(entity: Mapping[str, Any]) -> Reading:
         return _read_one(entity_id, _climate, attributes)
     if (entity_id, entity_type) == (names.CANARY_ID, names.CANARY_TYPE):
         return _read_one(entity_id, _canary, attributes)
-    return _problem(payloads.clean_text(entity_id), "foreign_entity", entity_type)
+    return _problem(
+        payloads.clean_text(entity_id),
+        "foreign_entity",
+        payloads.clean_text(entity_type),
+    )
 
 
 def _attribute_value(attribute: Any) -> Any:

@@ -66,7 +66,7 @@ class LidarHeaderValue(OriginFields):
 
 
 LidarPoints = Annotated[
-    list[Annotated[float, Field(ge=0, allow_inf_nan=False)] | None],
+    list[Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] | None],
     Field(max_length=MAX_BEAMS),
 ]
 
