@@ -1,0 +1,365 @@
+"""What the contract says is read; what iVeg writes is as the contract says."""
+
+import math
+
+import numpy as np
+import orjson
+import pytest
+
+from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import (
+    Canary,
+    Climate,
+    CommandAnswer,
+    CommandStatus,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+)
+from iveg.ngsi import codec, names
+from tests.builders import START, at, notification, odometry, origin, pose_value
+
+LISTING_1 = b"""{
+  "id": "AGX", "type": "Robot",
+  "base_pose_ground_truth": {"type": "object", "value": {
+    "x": 14.134062767, "y": 11.46727562, "yaw": -0.386157338,
+    "linear_velocity": 0.999, "angular_velocity": 0.34}},
+  "bounding_boxes": {"type": "object", "value": {
+    "class_id": "farmer", "probability": 0.945, "position": {
+      "xmin": 0.4506256580352783, "ymin": -0.3164764642715454,
+      "xmax": 0.7936256527900696, "ymax": 0.11368180811405182,
+      "zmin": -0.25958430767059326, "zmax": 0.10506562888622284}}},
+  "lidar_points": {"type": "array", "value": [5.3208699226379395, 5.330774307250977]},
+  "metadata": {"TimeInstant": {"type": "DateTime", "value": "2026-04-26T10:21:14.660Z"}}
+}"""
+
+
+def entity(**attributes: object) -> list[object]:
+    reading = codec.read_entity({"id": "AGI", "type": "Robot", **attributes})
+    assert reading.problems == ()
+    return list(reading.observations)
+
+
+# --- Orion ------------------------------------------------------------------------
+
+
+def test_the_papers_listing_1_is_accepted_as_it_stands() -> None:
+    body = b'{"subscriptionId": "s", "data": [' + LISTING_1 + b"]}"
+
+    _, reading = codec.read_notification(body)
+
+    pose, sweep, frame = reading.observations
+    assert reading.problems == ()
+    assert isinstance(pose, Odometry)
+    assert pose.pose == Pose2D(14.134062767, 11.46727562, -0.386157338)
+    assert isinstance(sweep, LaserScan)
+    assert isinstance(frame, DetectionFrame)
+    assert frame.detections[0].class_id == "farmer"
+    assert frame.detections[0].frame_id == "base_link"
+
+
+def test_a_notification_names_its_subscription() -> None:
+    subscription, reading = codec.read_notification(notification(subscription_id="s-7"))
+
+    assert subscription == "s-7"
+    assert reading.observations == (odometry(origin=origin()),)
+
+
+def test_key_values_are_read_like_normalized_attributes() -> None:
+    (pose,) = entity(base_pose_ground_truth=pose_value(1.0, 2.0))
+
+    assert isinstance(pose, Odometry)
+    assert pose.pose == Pose2D(1.0, 2.0, 0.0)
+
+
+def test_a_single_box_and_a_list_of_boxes_are_both_accepted() -> None:
+    sides = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
+    box = {
+        "class_id": "farmer",
+        "probability": 1,
+        "position": dict.fromkeys(sides, 1.0),
+    }
+    (one,) = entity(bounding_boxes=box)
+    (many,) = entity(bounding_boxes=[box, box])
+
+    assert isinstance(one, DetectionFrame)
+    assert isinstance(many, DetectionFrame)
+    assert (len(one.detections), len(many.detections)) == (1, 2)
+
+
+def test_an_empty_list_says_looked_and_saw_nothing() -> None:
+    (frame,) = entity(bounding_boxes=[], detection_header={"boot": "b", "seq": 4})
+
+    assert frame == DetectionFrame("AGI", Origin("b", 4), ())
+
+
+def test_attributes_that_nobody_knows_or_that_are_null_are_skipped() -> None:
+    assert entity(colour="red", navigation=None, cmd="") == []
+
+
+def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
+    status, answer = entity(
+        cmd_status="OK", cmd_info={"id": "01A", "r": "LATCHED", "boot": "b", "seq": 1}
+    )
+
+    assert status == CommandStatus("AGI", "OK")
+    assert answer == CommandAnswer("AGI", Origin("b", 1), "01A", "LATCHED")
+
+
+def test_climate_and_canary_are_read() -> None:
+    air = {
+        "id": names.CLIMATE_ID,
+        "type": names.CLIMATE_TYPE,
+        "temperature": {"type": "Number", "value": 21.5},
+        "relativeHumidity": 0.6,
+    }
+    probe = {"id": names.CANARY_ID, "type": names.CANARY_TYPE, "probe": {"seq": 3}}
+
+    assert codec.read_entity(air).observations == (Climate(21.5, 0.6, None),)
+    assert codec.read_entity(probe).observations == (Canary(Origin(None, 3)),)
+
+
+def test_a_foreign_entity_is_counted_by_its_kind() -> None:
+    (problem,) = codec.read_entity({"id": "x", "type": "Room"}).problems
+
+    assert (problem.reason, problem.detail) == ("foreign_entity", "Room")
+
+
+# --- Algorithm 1 ------------------------------------------------------------------
+
+
+def test_algorithm_1s_single_payload_is_accepted() -> None:
+    payload = orjson.dumps(
+        {
+            "class": "farmer",
+            "conf": 0.91,
+            "position_3D": {"x": 1.0, "y": 2.0, "z": 0.9},
+            "pose": {
+                "x": 3.0,
+                "y": 4.0,
+                "yaw": 0.5,
+                "linear_velocity": 0.4,
+                "angular_velocity": 0.1,
+            },
+            "laser_scan": [1.0, None, 3.0, 4.0],
+            "timestamp": "2026-11-20T10:00:00.000Z",
+        }
+    )
+
+    reading = codec.read_measure("AGI", payload)
+
+    pose, sweep, frame = reading.observations
+    assert reading.problems == ()
+    assert isinstance(pose, Odometry)
+    assert pose.twist == Twist2D(0.4, 0.1)
+    assert pose.origin.stamp == "2026-11-20T10:00:00.000Z"
+    assert isinstance(sweep, LaserScan)
+    assert sweep.angle_min == -math.pi
+    assert sweep.angle_increment == pytest.approx(math.pi / 2)
+    assert isinstance(frame, DetectionFrame)
+    (seen,) = frame.detections
+    assert seen.box.centre == pytest.approx((1.0, 2.0, 0.9))
+    assert (seen.frame_id, seen.probability) == ("map", 0.91)
+
+
+def test_a_pose_of_algorithm_1_may_carry_its_own_stamp() -> None:
+    (pose,) = entity(pose={"x": 0, "y": 0, "yaw": 0, "stamp": "2026-01-01T00:00:00Z"})
+
+    assert isinstance(pose, Odometry)
+    assert pose.origin.stamp_s == pytest.approx(1767225600.0)
+
+
+def test_a_detection_of_algorithm_1_without_confidence_is_counted() -> None:
+    (frame,) = entity(**{"class": "farmer", "position_3D": {"x": 1, "y": 2, "z": 0}})
+
+    assert isinstance(frame, DetectionFrame)
+    assert frame.unreadable == 1
+
+
+# --- scans ------------------------------------------------------------------------
+
+
+def test_null_is_no_return() -> None:
+    (sweep,) = entity(lidar_points=[1.0, None, 3])
+
+    assert isinstance(sweep, LaserScan)
+    assert sweep.ranges.dtype == np.float32
+    assert sweep.ranges.tolist() == [1.0, math.inf, 3.0]
+
+
+def test_a_header_says_where_the_laser_sits_and_looks() -> None:
+    header = {
+        "angle_min": -1.0,
+        "angle_increment": 0.5,
+        "range_min": 0.1,
+        "range_max": 20.0,
+        "x": 0.3,
+        "y": -0.1,
+        "yaw": 0.2,
+        "seq": 8,
+    }
+    (sweep,) = entity(lidar_points=[1.0], lidar_header=header)
+
+    assert isinstance(sweep, LaserScan)
+    assert sweep.mount == Pose2D(0.3, -0.1, 0.2)
+    assert (sweep.angle_min, sweep.range_max, sweep.origin.seq) == (-1.0, 20.0, 8)
+
+
+# --- stamps -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("2023-11-14T22:13:20.000Z", START.wall),
+        ("2023-11-14T22:13:20+00:00", START.wall),
+        ("2023-11-15T00:13:20+02:00", START.wall),
+        ("2023-11-14T22:13:20", START.wall),
+        ("garbage", None),
+        ("", None),
+        ("1700000000", None),
+    ],
+)
+def test_stamps_are_iso_8601_in_utc_or_nothing(
+    text: str, seconds: float | None
+) -> None:
+    assert codec.parse_stamp(text) == seconds
+
+
+def test_a_stamp_is_kept_exactly_as_sent() -> None:
+    value = {**pose_value(), "stamp": "2023-11-14T23:13:20.1234+01:00"}
+    (pose,) = entity(base_pose_ground_truth=value)
+
+    assert isinstance(pose, Odometry)
+    assert pose.origin.stamp == "2023-11-14T23:13:20.1234+01:00"
+
+
+def test_a_written_stamp_has_milliseconds_and_a_z() -> None:
+    assert codec.format_stamp(START.wall + 0.25) == "2023-11-14T22:13:20.250Z"
+
+
+# --- commands, feedback -----------------------------------------------------------
+
+
+def test_commands_are_written_as_the_contract_says() -> None:
+    stop = codec.write_command(codec.write_stop("01A", "opaque"))
+
+    assert stop == b'{"cmd":{"stop":{"id":"01A","by":"opaque"}}}'
+    assert codec.write_release(["01A", "boot-1"], "c") == {
+        "release": {"ids": ["01A", "boot-1"], "ch": "c"}
+    }
+    assert codec.write_resume("c") == {"resume": {"ch": "c"}}
+    assert codec.write_desired("stopped", ["01A"]) == (
+        b'{"desired":"stopped","ids":["01A"]}'
+    )
+
+
+def test_feedback_is_written_as_the_contract_says() -> None:
+    alert = FeedbackAlert(
+        "d-1", "t", "person", "farmer", 0.94, (1.0, 2.0, 0.9), 2.0, "AGI"
+    )
+    feedback = Feedback(
+        "AGI",
+        Origin("b", 412, "t"),
+        alert,
+        (alert,),
+        Pose2D(1.0, 2.0, 0.1),
+        Twist2D(0.5, 0.0),
+        "t",
+        {"AGII": Mandate(0.5, "person", None, 1.43, "d-1")},
+        {"AGII": 8731},
+    )
+
+    written = orjson.loads(codec.write_feedback(feedback))
+
+    told = {
+        "decision_id": "d-1",
+        "class": "person",
+        "class_id": "farmer",
+        "conf": 0.94,
+        "position": {"x": 1.0, "y": 2.0, "z": 0.9},
+        "radius_m": 2.0,
+        "stamp": "t",
+        "observer": "AGI",
+    }
+    assert written == {
+        "boot": "b",
+        "seq": 412,
+        "stamp": "t",
+        "robot_id": "AGI",
+        "alert": told,
+        "alerts": [told],
+        "robot_pose": {
+            "x": 1.0,
+            "y": 2.0,
+            "yaw": 0.1,
+            "linear_velocity": 0.5,
+            "angular_velocity": 0.0,
+            "stamp": "t",
+        },
+        "mandates": {
+            "AGII": {
+                "speed_factor": 0.5,
+                "reason": "person",
+                "distance_m": 1.43,
+                "decision_id": "d-1",
+            }
+        },
+        "seen": {"AGII": 8731},
+    }
+
+
+def test_feedback_with_nothing_to_tell_says_null() -> None:
+    written = orjson.loads(codec.write_feedback(Feedback("AGI", Origin())))
+
+    assert (written["alert"], written["alerts"]) == (None, [])
+    assert written["robot_pose"] is None
+
+
+def test_another_object_is_told_as_a_stamp_alone() -> None:
+    feedback = Feedback("AGI", Origin(), FeedbackAlert("", "t"))
+
+    assert orjson.loads(codec.write_feedback(feedback))["alert"] == {"stamp": "t"}
+
+
+def test_every_measure_carries_its_stamp_at_the_top_level_too() -> None:
+    written = orjson.loads(codec.write_odometry(odometry(origin=origin())))
+
+    assert written["TimeInstant"] == codec.format_stamp(at(0).wall)
+
+
+# --- names ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("device", "robot"),
+    [
+        ("AGI", "AGI"),
+        ("AGI_odom", "AGI"),
+        ("AGII_lidar2D", "AGII"),
+        ("AGI_yolox_bounding_boxes", "AGI"),
+        ("AGI_safety", "AGI"),
+        ("AGI_nav", "AGI"),
+    ],
+)
+def test_a_device_belongs_to_its_robot(device: str, robot: str) -> None:
+    assert names.robot_of_device(device) == robot
+
+
+def test_no_attribute_name_holds_what_orion_forbids() -> None:
+    for device in names.ROBOT_DEVICES:
+        for name, _ in device.attributes:
+            assert not set(name) & set("<>\"'=;()")
+
+
+def test_navigation_is_read_with_goal_and_path() -> None:
+    path = [[0, 0], [1, 2]]
+    value = {"task": "harvest", "goal": {"x": 1, "y": 2}, "path": path}
+    (intent,) = entity(navigation=value)
+
+    assert intent == Navigation(
+        "AGI", Origin(), "harvest", (1.0, 2.0), ((0.0, 0.0), (1.0, 2.0))
+    )

@@ -1,0 +1,317 @@
+"""What must not pass the door: refused or cleaned, and its neighbours unharmed."""
+
+import time
+import warnings
+
+import orjson
+import pytest
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    SafetyReport,
+)
+from iveg.ngsi import codec, payloads
+from tests.builders import notification, pose_value
+
+BOX = {
+    "class_id": "farmer",
+    "probability": 0.9,
+    "position": dict.fromkeys(("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"), 1.0),
+    "frame_id": "map",
+}
+NUMBERS = ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"]
+
+
+def odometry_payload(x: str) -> bytes:
+    value = f'{{"x": {x}, "y": 0.0, "yaw": 0.0}}'
+    return f'{{"base_pose_ground_truth": {value}}}'.encode()
+
+
+def boxes(*raw: object) -> DetectionFrame:
+    payload = orjson.dumps({"bounding_boxes": list(raw)})
+    (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", payload).observations
+    assert isinstance(frame, DetectionFrame)
+    return frame
+
+
+# --- numbers (F27) ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_f27_numbers_that_are_none_are_refused(number: str) -> None:
+    reading = codec.read_measure("AGI_odom", odometry_payload(number))
+
+    assert reading.observations == ()
+    (problem,) = reading.problems
+    assert problem.source.startswith("AGI")
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_f27_a_notification_with_a_number_that_is_none_is_refused(number: str) -> None:
+    body = notification().replace(b'"x":0.0', f'"x":{number}'.encode())
+    assert number.encode() in body
+
+    with pytest.raises(UnreadableError):
+        codec.read_notification(body)
+
+
+@pytest.mark.parametrize("text", ['"nan"', '"1.0"', "true", "null", "[1]", "{}", "1e7"])
+def test_f27_what_is_no_number_in_range_is_not_made_one(text: str) -> None:
+    reading = codec.read_measure("AGI_odom", odometry_payload(text))
+
+    assert reading.observations == ()
+    assert reading.problems[0].reason == "bad_base_pose_ground_truth"
+
+
+@pytest.mark.parametrize("probability", [1.2, -0.1, True, "0.9", None, 10**400])
+def test_a_probability_that_is_none_makes_the_box_unreadable(
+    probability: object,
+) -> None:
+    body = {**BOX, "probability": "here"}
+    text = orjson.dumps({"bounding_boxes": [BOX, body]})
+    text = text.replace(b'"here"', repr(probability).encode().replace(b"'", b'"'))
+    text = text.replace(b"True", b"true").replace(b"None", b"null")
+
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", text)
+
+    frames = [one for one in reading.observations if isinstance(one, DetectionFrame)]
+    assert [(len(one.detections), one.unreadable) for one in frames] in ([(1, 1)], [])
+    assert frames or reading.problems
+
+
+def test_a_box_without_probability_or_position_is_counted_not_guessed() -> None:
+    frame = boxes(
+        BOX,
+        {name: value for name, value in BOX.items() if name != "probability"},
+        {name: value for name, value in BOX.items() if name != "position"},
+        "no box at all",
+    )
+
+    assert len(frame.detections) == 1
+    assert frame.unreadable == 3
+
+
+def test_a_range_too_long_for_any_laser_is_refused_without_a_warning() -> None:
+    payload = b'{"lidar_points": [1.0, 1e300]}'
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        reading = codec.read_measure("AGI_lidar2D", payload)
+
+    assert reading.problems[0].reason == "bad_lidar_points"
+
+
+def test_a_negative_range_is_refused() -> None:
+    reading = codec.read_measure("AGI_lidar2D", b'{"lidar_points": [-1.0]}')
+
+    assert reading.problems
+
+
+def test_a_seq_beyond_what_numbers_hold_is_refused() -> None:
+    value = {**pose_value(), "seq": 2**53 + 1}
+    payload = orjson.dumps({"base_pose_ground_truth": value})
+
+    assert codec.read_measure("AGI_odom", payload).problems
+
+
+# --- size and depth (F26, F28) ----------------------------------------------------
+
+
+@pytest.mark.parametrize("bracket", [b"[", b'{"a":'])
+def test_f28_a_hundred_thousand_brackets_are_refused_at_once(bracket: bytes) -> None:
+    body = bracket * 100_000
+    started = time.perf_counter()
+
+    with pytest.raises(UnreadableError):
+        codec.load_json(body)
+
+    assert time.perf_counter() - started < 0.1
+
+
+@pytest.mark.parametrize(("levels", "refused"), [(32, False), (33, True), (900, True)])
+def test_the_limit_is_thirty_two_levels(levels: int, refused: bool) -> None:
+    body = b"[" * levels + b"]" * levels
+    reasons = []
+    try:
+        codec.load_json(body)
+    except UnreadableError as error:
+        reasons.append(error.reason)
+
+    assert (reasons == ["too_deep"]) is refused
+
+
+def test_depth_is_counted_behind_numbers_too() -> None:
+    with pytest.raises(UnreadableError, match="too_deep"):
+        codec.load_json(b"[1, " * 40 + b"1" + b"]" * 40)
+
+
+def test_f26_five_megabytes_of_points_are_refused() -> None:
+    payload = b'{"lidar_points": [' + b"1.0," * 1_250_000 + b"1.0]}"
+
+    reading = codec.read_measure("AGI_lidar2D", payload)
+
+    assert reading.observations == ()
+    assert reading.problems[0].reason == "bad_lidar_points"
+
+
+def test_more_boxes_than_anybody_sees_are_refused() -> None:
+    payload = orjson.dumps({"bounding_boxes": [BOX] * (payloads.MAX_BOXES + 1)})
+
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
+
+    assert reading.problems[0].reason == "bad_bounding_boxes"
+
+
+# --- text (F29, F32) --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("sent", "kept"),
+    [
+        ("farmer", "farmer"),
+        ("far\u0000mer", "farmer"),
+        ("\u202efarmer\u2066", "farmer"),
+        ("far\u200bmer\u200f", "farmer"),
+        ("a\nb\r\tc", "abc"),
+        ("e\u0301", "\u00e9"),
+        ("<script>", "<script>"),
+        ("x" * 10_000, "x" * 64),
+        ("", ""),
+    ],
+)
+def test_f29_text_is_cleaned_and_cut(sent: str, kept: str) -> None:
+    frame = boxes({**BOX, "class_id": sent})
+
+    assert frame.detections[0].class_id == kept
+
+
+def test_f29_half_a_character_is_refused() -> None:
+    payload = b'{"bounding_boxes": [{"class_id": "\\ud800"}]}'
+
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
+
+    assert reading.problems[0].reason == "not_json"
+
+
+def test_problems_never_carry_control_marks_into_the_log() -> None:
+    kind = "Spy\r\nERROR all is lost"
+    reading = codec.read_entity({"id": "a\nb\u202e", "type": kind})
+
+    (problem,) = reading.problems
+    assert problem.source == "ab"
+    assert "\n" not in problem.detail
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a/b", "a+", "#", "a b", "climate", "x" * 65, "ä"]
+)
+def test_f33_a_robot_id_that_could_be_a_topic_is_refused(name: str) -> None:
+    assert codec.read_entity({"id": name, "type": "Robot"}).problems
+    assert codec.read_measure(name, b"{}").problems
+
+
+# --- neighbours -------------------------------------------------------------------
+
+
+def test_one_bad_attribute_does_not_hurt_its_neighbours() -> None:
+    body = notification(
+        {
+            "base_pose_ground_truth": {"x": "here"},
+            "navigation": {"task": "harvest"},
+            "safety_state": {"speed_factor": 2, "reason": "clear"},
+        }
+    )
+
+    _, reading = codec.read_notification(body)
+
+    assert [type(one) for one in reading.observations] == [Navigation]
+    assert {one.reason for one in reading.problems} == {
+        "bad_base_pose_ground_truth",
+        "bad_safety_state",
+    }
+
+
+def test_one_bad_entity_does_not_hurt_its_neighbours() -> None:
+    good = {"id": "AGI", "type": "Robot", "base_pose_ground_truth": pose_value()}
+    body = {"subscriptionId": "s", "data": [{"id": 1}, {"type": "Robot"}, good]}
+
+    _, reading = codec.read_notification(orjson.dumps(body))
+
+    assert [type(one) for one in reading.observations] == [Odometry]
+    assert len(reading.problems) == 2
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"null",
+        b"[]",
+        b"{}",
+        b'{"subscriptionId": 1, "data": []}',
+        b'{"subscriptionId": "s"}',
+        b'{"subscriptionId": "s", "data": {}}',
+        b'{"subscriptionId": "s", "data": [1]}',
+        b"\xff\xfe",
+        b'{"subscriptionId": "s", "data": []}trailing',
+    ],
+)
+def test_what_is_no_notification_is_unreadable(body: bytes) -> None:
+    with pytest.raises(UnreadableError):
+        codec.read_notification(body)
+
+
+@pytest.mark.parametrize("payload", [b"", b"null", b"[]", b"7", b"stop", b"\x00"])
+def test_what_is_no_measure_or_answer_is_a_problem(payload: bytes) -> None:
+    assert codec.read_measure("AGI", payload).problems
+    assert codec.read_answer("AGI", payload).problems
+
+
+@pytest.mark.parametrize(
+    "payload", [b"", b"{}", b"[]", b'{"robot_id": 7}', b'{"robot_id": "A", "seen": 1}']
+)
+def test_what_is_no_feedback_counts_as_none(payload: bytes) -> None:
+    with pytest.raises(UnreadableError):
+        codec.read_feedback(payload)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"speed_factor": 1.5},
+        {"reason": "because"},
+        {"holds": [{"id": "x", "source": "me", "ack": "remote"}]},
+        {"released": ["x"] * 65},
+        {"v": True},
+    ],
+)
+def test_a_safety_report_that_is_wrong_in_one_place_is_no_report(
+    changes: dict[str, object],
+) -> None:
+    value = {"speed_factor": 1, "reason": "clear", **changes}
+
+    reading = codec.read_measure("AGI_safety", orjson.dumps({"safety_state": value}))
+
+    assert not [one for one in reading.observations if isinstance(one, SafetyReport)]
+    assert reading.problems[0].reason == "bad_safety_state"
+
+
+def test_a_problem_does_not_repeat_what_was_sent() -> None:
+    secret = "s3cret-" * 3
+    payload = orjson.dumps({"base_pose_ground_truth": {"x": secret}})
+
+    (problem,) = codec.read_measure("AGI_odom", payload).problems
+
+    assert secret not in problem.detail
+
+
+def test_a_scan_with_a_bad_header_is_refused_whole() -> None:
+    payload = orjson.dumps({"lidar_points": [1.0], "lidar_header": {"angle_min": 0}})
+
+    reading = codec.read_measure("AGI_lidar2D", payload)
+
+    assert not [one for one in reading.observations if isinstance(one, LaserScan)]
