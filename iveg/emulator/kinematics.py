@@ -105,6 +105,8 @@ class Odometer:
         self._walk(0, self.along, way, self.memory_m)
         self._walk(1, self.across, way, self.memory_m)
         self._walk(2, self.turning, angle, self.memory_rad)
+        # Driving along a row shows a localizer its heading, too.
+        self._error[2] *= math.exp(-way / self.memory_m)
         x, y = truth.transform(self._error[0], self._error[1])
         return Pose2D(x, y, wrap_angle(truth.yaw + self._error[2]))
 
