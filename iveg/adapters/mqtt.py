@@ -96,6 +96,7 @@ class MqttLink:
             try:
                 await self._session()
             except (aiomqtt.MqttError, OSError) as error:
+                _heed_cancellation()
                 if not self._loss_told:
                     _log.warning("%s: broker lost: %s", self._name, error)
                     self._loss_told = True
@@ -122,6 +123,7 @@ class MqttLink:
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
+            _heed_cancellation()
             self._client = client
             self._loss_told = False
             self.connects += 1
@@ -152,7 +154,8 @@ class MqttLink:
                 except aiomqtt.MqttError:
                     # A broker that is slow to confirm may still be there; when it is
                     # gone, the session ends and this task with it.
-                    continue
+                    _log.debug("%s: %s was not confirmed", self._name, topic)
+                _heed_cancellation()
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when there is time; a newer message of the topic takes its place."""
@@ -175,4 +178,17 @@ class MqttLink:
         try:
             await client.publish(topic, payload, qos=qos, retain=retain, timeout=1.5)
         except aiomqtt.MqttError as error:
+            _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
+        _heed_cancellation()
+
+
+def _heed_cancellation() -> None:
+    """Be cancelled if somebody asked for it.
+
+    Before Python 3.12 ``asyncio.wait_for``, which aiomqtt uses, may swallow a
+    cancellation that meets its result; the task would live on and the part never end.
+    """
+    task = asyncio.current_task()
+    if task is not None and task.cancelling():
+        raise asyncio.CancelledError

@@ -174,6 +174,9 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
             apikey=settings.apikey,
             speed=options.speed,
             loop=options.loop,
+            uplink=settings.uplink,
+            slow_s=settings.feedback_slow_s,
+            stand_s=settings.feedback_stand_s,
             state_directory=Path(directory),
         )
 

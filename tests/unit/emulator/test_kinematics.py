@@ -126,4 +126,20 @@ def test_odometry_errs_more_along_than_across() -> None:
     along, across = np.std([p.x for p in found]), np.std([p.y for p in found])
     assert along == pytest.approx(0.02 * 2.0, rel=0.15)
     assert across == pytest.approx(0.01 * 2.0, rel=0.15)
+
+
+def test_odometry_errs_by_a_share_of_the_angle_turned() -> None:
+    odometer = Odometer(np.random.default_rng(1))
+    found = [odometer.measure(ORIGIN, Twist2D(0.0, 0.3), 0.5) for _ in range(5_000)]
+
     assert np.std([p.yaw for p in found]) == pytest.approx(0.03, rel=0.15)
+
+
+def test_a_heading_error_is_forgotten_along_a_row() -> None:
+    odometer = Odometer(np.random.default_rng(1))
+    turned = odometer.measure(ORIGIN, Twist2D(0.0, 1.0), 3.0)
+    for _ in range(20):
+        along = odometer.measure(ORIGIN, Twist2D(1.0, 0.0), 0.5)
+
+    assert abs(turned.yaw) > 0.001
+    assert abs(along.yaw) < 0.01 * abs(turned.yaw)
