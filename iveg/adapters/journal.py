@@ -17,6 +17,9 @@ from iveg.domain.observations import Instant
 _log = logging.getLogger(__name__)
 
 
+_STOPPED = {"stopped": True, "run": False}
+
+
 class FileJournal:
     """The journal in one file; implements ``pipeline.ports.Journal``."""
 
@@ -24,6 +27,8 @@ class FileJournal:
         self._path = path
         self._file: IO[bytes] | None = None
         self._lock = asyncio.Lock()
+        self._torn = False
+        """The last line may be half written: the next one must not be glued to it."""
 
     def read(self) -> dict[str, str]:
         """Robots that were to stand when iVeg last ran → who asked.
@@ -36,14 +41,16 @@ class FileJournal:
         except FileNotFoundError:
             return wanted
         for number, line in enumerate(lines, 1):
+            if not line:
+                continue
             try:
                 entry = orjson.loads(line)
-                robot_id, desired = entry["robot_id"], entry["desired"]
-                by = str(entry["by"])
+                robot_id, by = str(entry["robot_id"]), str(entry["by"])
+                stopped = _STOPPED[entry["desired"]]
             except (orjson.JSONDecodeError, KeyError, TypeError):
                 _log.warning("%s, line %d: not readable, skipped", self._path, number)
                 continue
-            if desired == "stopped":
+            if stopped:
                 wanted[robot_id] = by
             else:
                 wanted.pop(robot_id, None)
@@ -79,12 +86,26 @@ class FileJournal:
     def _append(self, line: bytes) -> None:
         if self._file is None:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._path.open("ab", buffering=0)
-        self._file.write(line)
+            self._file = self._path.open("a+b", buffering=0)
+            self._torn = not _ends_a_line(self._file)
+        if self._torn:
+            line = b"\n" + line
+        self._torn = True
+        written = self._file.write(line)
         os.fsync(self._file.fileno())
+        if written != len(line):
+            raise OSError(f"{written} of {len(line)} bytes written")
+        self._torn = False
 
     def close(self) -> None:
         """Let the file go."""
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def _ends_a_line(file: IO[bytes]) -> bool:
+    if file.seek(0, os.SEEK_END) == 0:
+        return True
+    file.seek(-1, os.SEEK_END)
+    return file.read(1) == b"\n"
