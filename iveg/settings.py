@@ -256,7 +256,7 @@ class Settings:
                 values[name] = row.metadata["read"](text)
             except _NotAllowedError as error:
                 variable = row.metadata["variable"]
-                shown = "(hidden)" if variable in _SECRETS else text
+                shown = "(hidden)" if variable in _SECRETS else _without_login(text)
                 raise SettingsError(variable, shown, str(error)) from error
         settings = cls(**values)
         if settings.feedback_stand_s <= settings.feedback_slow_s:
@@ -273,6 +273,11 @@ class Settings:
             row.metadata["variable"]: _write(getattr(self, name))
             for name, row in self.__dataclass_fields__.items()
         }
+
+
+def _without_login(text: str) -> str:
+    """An address without user and password, for a sentence that is shown."""
+    return re.sub(r"//[^/]*@", "//(hidden)@", text)
 
 
 def _write(value: Any) -> str:
