@@ -1,0 +1,113 @@
+"""What is wanted of each robot outlives crashes, torn lines and full disks."""
+
+import asyncio
+import logging
+from pathlib import Path
+
+import orjson
+import pytest
+
+from iveg.adapters.journal import FileJournal
+from tests.builders import START
+
+
+async def write(path: Path, *lines: tuple[str, str]) -> FileJournal:
+    journal = FileJournal(path)
+    for robot_id, desired in lines:
+        assert desired in ("stopped", "run")
+        await journal.wanted(
+            robot_id, "stopped" if desired == "stopped" else "run", "01A", "ana", START
+        )
+    return journal
+
+
+async def test_what_was_wanted_last_is_wanted_after_a_restart(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "commands.jsonl"
+    journal = await write(
+        path, ("AGI", "stopped"), ("AGII", "stopped"), ("AGII", "run")
+    )
+    journal.close()
+
+    assert FileJournal(path).read() == {"AGI": "ana"}
+
+
+async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+
+    (line,) = path.read_bytes().splitlines()
+
+    assert orjson.loads(line) == {
+        "at": START.wall,
+        "robot_id": "AGI",
+        "desired": "stopped",
+        "hold_id": "01A",
+        "by": "ana",
+    }
+    journal.close()
+
+
+def test_without_a_file_nothing_is_wanted(tmp_path: Path) -> None:
+    assert FileJournal(tmp_path / "none").read() == {}
+
+
+async def test_a_line_that_a_crash_cut_short_hurts_no_other(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    (await write(path, ("AGI", "stopped"))).close()
+    with path.open("ab") as file:
+        file.write(b'{"at": 1, "robot_id": "AGI", "desi')
+
+    (await write(path, ("AGII", "stopped"))).close()
+
+    assert FileJournal(path).read() == {"AGI": "ana", "AGII": "ana"}
+    assert "line 2: not readable, skipped" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"7",
+        b"[]",
+        b"{}",
+        b'{"robot_id": "AGI", "by": "x"}',
+        b'{"robot_id": "AGI", "by": "x", "desired": "sttoped"}',
+        b'{"robot_id": "AGI", "by": "x", "desired": []}',
+        b"\xff\x00",
+    ],
+)
+async def test_a_line_that_says_nothing_releases_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, line: bytes
+) -> None:
+    caplog.set_level(logging.ERROR)
+    path = tmp_path / "commands.jsonl"
+    (await write(path, ("AGI", "stopped"))).close()
+    with path.open("ab") as file:
+        file.write(line + b"\n")
+
+    assert FileJournal(path).read() == {"AGI": "ana"}
+
+
+async def test_lines_of_many_at_once_are_whole(tmp_path: Path) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = FileJournal(path)
+    await asyncio.gather(
+        *(
+            journal.wanted(f"R{number}", "stopped", "01A", "ana", START)
+            for number in range(40)
+        )
+    )
+    journal.close()
+
+    assert len(FileJournal(path).read()) == 40
+
+
+async def test_a_disk_that_fails_is_logged_and_holds_up_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "taken").write_text("a file where a directory should be")
+
+    await write(tmp_path / "taken" / "commands.jsonl", ("AGI", "stopped"))
+
+    assert "could not be written" in caplog.text

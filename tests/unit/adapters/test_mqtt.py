@@ -1,0 +1,203 @@
+"""One connection that comes back by itself, against a real broker."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import AsyncIterator, Callable
+
+import orjson
+import pytest
+
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.roads import MqttRoad
+from iveg.domain.errors import HopError
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Origin
+from iveg.embedded.mqtt_broker import mqtt_broker
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
+    async with asyncio.timeout(within_s):
+        while not true():  # noqa: ASYNC110 - what is waited for has no event
+            await asyncio.sleep(0.01)
+
+
+@contextlib.asynccontextmanager
+async def running(*links: MqttLink) -> AsyncIterator[None]:
+    tasks = [asyncio.create_task(link.run()) for link in links]
+    try:
+        yield
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def losses_told(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [
+        one.message
+        for one in caplog.records
+        if one.name.startswith("iveg.adapters") and one.levelno >= logging.WARNING
+    ]
+
+
+class Heard:
+    """A link that keeps what it hears."""
+
+    def __init__(self, port: int, *topics: str) -> None:
+        self.messages: list[tuple[str, bytes]] = []
+        self.connects = self.losses = 0
+        self.link = MqttLink(
+            BrokerAddress("127.0.0.1", port),
+            "test",
+            dict.fromkeys(topics, 1),
+            lambda topic, payload: self.messages.append((topic, payload)),
+            self._connected,
+            self._lost,
+        )
+
+    def _connected(self) -> None:
+        self.connects += 1
+
+    def _lost(self) -> None:
+        self.losses += 1
+
+
+# --- addresses --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("mqtt://broker:1884", BrokerAddress("broker", 1884)),
+        ("mqtt://broker", BrokerAddress("broker", 1883)),
+        ("mqtts://broker", BrokerAddress("broker", 8883, tls=True)),
+        ("mqtt://a:b%40c@broker", BrokerAddress("broker", 1883, "a", "b@c")),
+        ("mqtt://[::1]:1883", BrokerAddress("::1", 1883)),
+    ],
+)
+def test_an_address_is_read_from_its_url(url: str, address: BrokerAddress) -> None:
+    assert BrokerAddress.from_url(url) == address
+
+
+def test_user_and_password_of_their_own_win_over_the_url() -> None:
+    address = BrokerAddress.from_url("mqtt://a:b@broker", "c", "d")
+
+    assert (address.user, address.password) == ("c", "d")
+
+
+# --- a connection -----------------------------------------------------------------
+
+
+async def test_what_is_published_and_offered_arrives() -> None:
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        port = broker.port
+        heard = Heard(port, "/a", "/b")
+        async with running(heard.link):
+            await until(lambda: heard.link.connected)
+            await heard.link.publish("/a", b"1")
+            heard.link.offer("/b", b"2")
+            await until(lambda: len(heard.messages) == 2)
+
+    assert sorted(heard.messages) == [("/a", b"1"), ("/b", b"2")]
+
+
+async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() -> None:
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        port = broker.port
+        heard = Heard(port, "/a", "/b")
+        for number in range(10):
+            heard.link.offer("/a", str(number).encode())
+        heard.link.offer("/b", b"b")
+        async with running(heard.link):
+            await until(lambda: len(heard.messages) == 2)
+
+    assert sorted(heard.messages) == [("/a", b"9"), ("/b", b"b")]
+    assert heard.link.replaced == 9
+
+
+async def test_publishing_while_away_fails_loudly() -> None:
+    link = Heard(free_port()).link
+
+    with pytest.raises(HopError, match="not connected"):
+        await link.publish("/a", b"1")
+
+
+async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    port = free_port()
+    heard = Heard(port, "/a")
+    async with running(heard.link):
+        async with mqtt_broker("127.0.0.1", port):
+            await until(lambda: heard.link.connected)
+        await until(lambda: heard.losses == 1)
+        assert not heard.link.connected
+        async with mqtt_broker("127.0.0.1", port):
+            await until(lambda: heard.link.connected)
+            await heard.link.publish("/a", b"again")
+            await until(lambda: heard.messages)
+            assert (heard.connects, heard.losses) == (2, 1)
+            assert len(losses_told(caplog)) == 1
+
+
+async def test_a_broker_that_is_not_there_yet_is_told_once_and_found_when_it_comes(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    port = free_port()
+    heard = Heard(port)
+    async with running(heard.link):
+        await until(lambda: losses_told(caplog))
+        async with mqtt_broker("127.0.0.1", port):
+            await until(lambda: heard.link.connected)
+            assert len(losses_told(caplog)) == 1
+            assert (heard.connects, heard.losses) == (1, 0)
+
+
+# --- the direct road --------------------------------------------------------------
+
+
+async def test_the_direct_road_speaks_as_the_contract_says() -> None:
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        port = broker.port
+        heard = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired", "/+/mqtt_feedback")
+        road = MqttRoad(heard.link, "iveg")
+        async with running(heard.link):
+            await until(lambda: heard.link.connected)
+            await road.stop("AGI", "01A", "x")
+            await road.set_level("AGI", "stopped", ["01A"])
+            road.tell(Feedback("AGI", Origin("b", 1, "t")))
+            await until(lambda: len(heard.messages) == 3)
+
+    said = {topic: orjson.loads(payload) for topic, payload in heard.messages}
+    assert said["/iveg/AGI/cmd"] == {"cmd": {"stop": {"id": "01A", "by": "x"}}}
+    assert said["/AGI/iveg/desired"] == {"desired": "stopped", "ids": ["01A"]}
+    assert said["/AGI/mqtt_feedback"]["robot_id"] == "AGI"
+
+
+async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> None:
+    async with mqtt_broker("127.0.0.1", 0) as broker:
+        port = broker.port
+        iveg = Heard(port)
+        road = MqttRoad(iveg.link, "iveg")
+        async with running(iveg.link):
+            await until(lambda: iveg.link.connected)
+            await road.set_level("AGI", "stopped", ["01A"])
+            await road.stop("AGI", "01A", "x")
+            robot = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired")
+            async with running(robot.link):
+                await until(lambda: robot.messages)
+                await iveg.link.publish("/iveg/AGI/cmd", b"last")
+                await until(lambda: robot.messages[-1][1] == b"last")
+
+    assert [topic for topic, _ in robot.messages] == [
+        "/AGI/iveg/desired",
+        "/iveg/AGI/cmd",
+    ]

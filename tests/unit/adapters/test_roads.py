@@ -1,0 +1,78 @@
+"""The FIWARE road: what reaches Orion, and what its failures become."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import orjson
+import pytest
+
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.roads import OrionRoad
+from iveg.domain.errors import HopError
+
+
+@asynccontextmanager
+async def orion(
+    status: bytes, *, answers: bool = True
+) -> AsyncIterator[tuple[OrionRoad, list[tuple[str, object]]]]:
+    """A server that answers every request alike, and what it was asked."""
+    asked: list[tuple[str, object]] = []
+    hanging = asyncio.Event()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        head = await reader.readuntil(b"\r\n\r\n")
+        length = int(head.lower().split(b"content-length: ")[1].split(b"\r\n")[0])
+        body = orjson.loads(await reader.readexactly(length))
+        asked.append((head.split(b"\r\n")[0].decode(), body))
+        if not answers:
+            await hanging.wait()
+        writer.write(b"HTTP/1.1 " + status + b"\r\nContent-Length: 0\r\n\r\n")
+        await writer.drain()
+        writer.close()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    port = server.sockets[0].getsockname()[1]
+    async with OrionClient(f"http://127.0.0.1:{port}", "s", "/p") as client:
+        yield OrionRoad(client), asked
+    hanging.set()
+    server.close()
+    await server.wait_closed()
+
+
+@pytest.mark.parametrize(
+    ("what", "value"),
+    [
+        ("stop", {"stop": {"id": "01A", "by": "x"}}),
+        ("release", {"release": {"ids": ["01A", "boot-1"], "ch": "c"}}),
+        ("resume", {"resume": {"ch": "c"}}),
+    ],
+)
+async def test_a_command_is_one_attribute_alone(what: str, value: object) -> None:
+    async with orion(b"204 No Content") as (road, asked):
+        calls = {
+            "stop": lambda: road.stop("AGI", "01A", "x"),
+            "release": lambda: road.release("AGI", ["01A", "boot-1"], "c"),
+            "resume": lambda: road.resume("AGI", "c"),
+        }
+        await calls[what]()
+
+    assert asked == [
+        (
+            "PATCH /v2/entities/AGI/attrs?type=Robot HTTP/1.1",
+            {"cmd": {"type": "command", "value": value}},
+        )
+    ]
+
+
+@pytest.mark.parametrize("status", [b"404 Not Found", b"500 Oh"])
+async def test_f6_a_refusal_is_a_failed_hop(status: bytes) -> None:
+    async with orion(status) as (road, _):
+        with pytest.raises(HopError):
+            await road.stop("AGI", "01A", "x")
+
+
+async def test_f7_a_slow_orion_is_given_up_after_a_second_and_a_half() -> None:
+    async with orion(b"204 No Content", answers=False) as (road, _):
+        with pytest.raises(HopError, match=r"1\.5 s"):
+            await road.stop("AGI", "01A", "x")

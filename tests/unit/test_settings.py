@@ -1,0 +1,178 @@
+"""Every bad value is one sentence with setting, value and what is allowed."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from iveg.domain.errors import SettingsError
+from iveg.settings import Settings, default_data_directory, describe
+
+BAD = [
+    ("IVEG_PORT", "0", "a port from 1 to 65535"),
+    ("IVEG_PORT", "65536", "a port from 1 to 65535"),
+    ("IVEG_PORT", "http", "a port from 1 to 65535"),
+    ("IVEG_PORT", "\u0663", "a port from 1 to 65535"),
+    ("IVEG_MQTT_URL", "broker:1883", "an address such as mqtt://host:port"),
+    ("IVEG_MQTT_URL", "http://broker", "an address such as mqtt://host:port"),
+    ("IVEG_MQTT_URL", "mqtt://broker:99999", "an address such as mqtt://host:port"),
+    ("IVEG_ORION_URL", "mqtt://orion", "an address such as http://host:port"),
+    ("IVEG_IOTA_URL", "http://", "an address such as http://host:port"),
+    ("IVEG_IOTA_CB_URL", "orion", "an address such as http://host:port"),
+    ("IVEG_NOTIFY_URL", "/ngsi", "an address such as http://host:port"),
+    ("IVEG_FIWARE_SERVICE", "Agro Connect", "1 to 50 of a-z, 0-9 and _"),
+    ("IVEG_FIWARE_SERVICEPATH", "greenhouse", "a path such as /greenhouse"),
+    ("IVEG_APIKEY", "a/b", "1 to 64 letters, digits, _ and -"),
+    ("IVEG_ROBOTS", "AGI,AGI", "different names"),
+    ("IVEG_ROBOTS", "AGI,", "different names"),
+    ("IVEG_ROBOTS", "climate", "different names"),
+    ("IVEG_ROBOTS", "a+b", "different names"),
+    ("IVEG_DATABASE_URL", "mysql://x/y", "an SQLAlchemy address"),
+    ("IVEG_CONFIDENCE_THRESHOLD", "1.01", "a number from 0 to 1"),
+    ("IVEG_CONFIDENCE_THRESHOLD", "nan", "a number from 0 to 1"),
+    ("IVEG_CONFIDENCE_THRESHOLD", "high", "a number from 0 to 1"),
+    ("IVEG_SAFETY_RADIUS_M", "0.4", "a number from 0.5 to 6"),
+    ("IVEG_SAFETY_RADIUS_M", "inf", "a number from 0.5 to 6"),
+    ("IVEG_STOP_DIRECT", "yes", "on or off"),
+    ("IVEG_DIRECT_READ", "1", "on or off"),
+    ("IVEG_FEEDBACK_SLOW_S", "0", "a number from 0.1 to 10"),
+    ("IVEG_FEEDBACK_STAND_S", "61", "a number from 0.2 to 60"),
+    ("IVEG_UPLINK", "both", "one of per-topic, single"),
+]
+SECRET = [
+    ("IVEG_NOTIFY_TOKEN", "short", "32 to 128 hexadecimal digits"),
+    ("IVEG_NOTIFY_TOKEN", "z" * 64, "32 to 128 hexadecimal digits"),
+    ("IVEG_SIGN_IN_TOKEN", "guess-me", "32 to 128 hexadecimal digits"),
+    ("IVEG_API_TOKEN", "has space inside it", "16 to 256 visible characters"),
+]
+
+
+def sentence(variable: str, value: str) -> str:
+    with pytest.raises(SettingsError) as caught:
+        Settings.from_environment({variable: value})
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(("variable", "value", "allowed"), BAD)
+def test_a_bad_value_is_one_sentence_with_setting_value_and_what_is_allowed(
+    variable: str, value: str, allowed: str
+) -> None:
+    told = sentence(variable, value)
+
+    assert told.startswith(f"{variable}={value!r} cannot be used: it must be ")
+    assert allowed in told
+    assert "\n" not in told
+
+
+@pytest.mark.parametrize(("variable", "value", "allowed"), SECRET)
+def test_a_bad_secret_is_told_without_the_secret(
+    variable: str, value: str, allowed: str
+) -> None:
+    told = sentence(variable, value)
+
+    assert value not in told
+    assert allowed in told
+
+
+@pytest.mark.parametrize("variable", ["IVEG_MQTT_URL", "IVEG_DATABASE_URL"])
+def test_a_password_inside_an_address_is_not_told(variable: str) -> None:
+    told = sentence(variable, "ftp://iveg:s3cr3t@host/x")
+
+    assert "s3cr3t" not in told
+    assert "ftp://(hidden)@host/x" in told
+
+
+def test_a_robot_stands_later_than_it_slows() -> None:
+    with pytest.raises(SettingsError, match="more than IVEG_FEEDBACK_SLOW_S"):
+        Settings.from_environment({"IVEG_FEEDBACK_SLOW_S": "3.0"})
+
+
+def test_an_empty_environment_gives_the_defaults_of_the_contract() -> None:
+    settings = Settings.from_environment({})
+
+    assert (settings.host, settings.port) == ("127.0.0.1", 8000)
+    assert settings.robots == ("AGI", "AGII")
+    assert (settings.confidence_threshold, settings.safety_radius_m) == (0.80, 2.0)
+    assert (settings.stop_direct, settings.direct_read) == (True, True)
+    assert settings.fiware_service == "agroconnect"
+    assert settings.greenhouse == "mvsim-20x20"
+
+
+def test_an_empty_value_means_the_default() -> None:
+    assert Settings.from_environment({"IVEG_PORT": ""}) == Settings()
+
+
+def test_variables_of_others_are_left_alone() -> None:
+    assert Settings.from_environment({"PORT": "x", "IVEG_OTHER": "y"}) == Settings()
+
+
+GOOD = {
+    "IVEG_HOST": "0.0.0.0",  # noqa: S104 - read, not bound
+    "IVEG_PORT": "8080",
+    "IVEG_MQTT_URL": "mqtts://user:pass@broker:8884",
+    "IVEG_MQTT_USER": "iveg",
+    "IVEG_MQTT_PASSWORD": "pa,ss wörd",
+    "IVEG_ORION_URL": "http://orion:1026",
+    "IVEG_IOTA_URL": "https://iota",
+    "IVEG_IOTA_CB_URL": "http://orion.internal:1026",
+    "IVEG_NOTIFY_URL": "http://iveg:8000/ngsi/notifications",
+    "IVEG_NOTIFY_TOKEN": "ab" * 32,
+    "IVEG_FIWARE_SERVICE": "farm_1",
+    "IVEG_FIWARE_SERVICEPATH": "/a/b",
+    "IVEG_APIKEY": "key-1",
+    "IVEG_ROBOTS": "AGI,AGII,AG3",
+    "IVEG_DATABASE_URL": "postgresql+psycopg://u:p@db/iveg",
+    "IVEG_API_TOKEN": "a-long-enough-token!",
+    "IVEG_SIGN_IN_TOKEN": "cd" * 32,
+    "IVEG_CONFIDENCE_THRESHOLD": "0.75",
+    "IVEG_SAFETY_RADIUS_M": "2.5",
+    "IVEG_STOP_DIRECT": "off",
+    "IVEG_DIRECT_READ": "OFF",
+    "IVEG_FEEDBACK_SLOW_S": "0.5",
+    "IVEG_FEEDBACK_STAND_S": "2.0",
+    "IVEG_UPLINK": "single",
+    "IVEG_GREENHOUSE": "none",
+}
+
+
+def test_every_setting_can_be_set() -> None:
+    settings = Settings.from_environment(GOOD)
+
+    assert set(GOOD) == {row.metadata["variable"] for row in fields(Settings)}
+    for row in fields(Settings):
+        assert getattr(settings, row.name) != row.default
+
+
+@pytest.mark.parametrize("environment", [{}, GOOD], ids=["defaults", "all set"])
+def test_a_child_process_gets_the_same_settings(environment: dict[str, str]) -> None:
+    settings = Settings.from_environment(environment)
+
+    assert Settings.from_environment(settings.to_environment()) == settings
+
+
+def test_a_slash_at_the_end_of_an_address_does_not_matter() -> None:
+    environment = {"IVEG_ORION_URL": "http://orion:1026/"}
+
+    assert Settings.from_environment(environment).orion_url == "http://orion:1026"
+
+
+@pytest.mark.parametrize(
+    ("environment", "directory"),
+    [
+        ({}, "/home/ana/.local/share/iveg"),
+        ({"XDG_DATA_HOME": ""}, "/home/ana/.local/share/iveg"),
+        ({"XDG_DATA_HOME": "/data"}, "/data/iveg"),
+    ],
+)
+def test_data_lives_where_the_desktop_specification_says(
+    environment: dict[str, str], directory: str
+) -> None:
+    assert default_data_directory(environment, Path("/home/ana")) == Path(directory)
+
+
+def test_the_page_of_settings_names_every_one_with_its_default() -> None:
+    page = describe()
+
+    for row in fields(Settings):
+        assert f"## `{row.metadata['variable']}`" in page
+    assert "Default: `0.8`." in page
