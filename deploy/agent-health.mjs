@@ -5,10 +5,9 @@
 // and no canary has reached Orion for ten seconds, the agent is deaf.  Seen so for ten
 // seconds more it is ended, and the restart policy starts it afresh.  Runs as the
 // container's health check; exit code 0 is healthy.
-"use strict";
 
-const fs = require("node:fs");
-const net = require("node:net");
+import fs from "node:fs";
+import net from "node:net";
 
 const { env } = process;
 const SILENT_SINCE = env.AGENT_SILENT_SINCE || "/tmp/agent-silent-since";
@@ -92,4 +91,4 @@ async function main() {
   return 1;
 }
 
-main().then((code) => process.exit(code));
+process.exit(await main());

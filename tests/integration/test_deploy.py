@@ -1,0 +1,589 @@
+"""The broker's access list before a real Mosquitto; the agent's health check."""
+
+import asyncio
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import AsyncIterator, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import aiomqtt
+import pytest
+
+from iveg.adapters.orion import OrionClient
+from iveg.cli.diagnosis import Hop, judge
+from iveg.cli.doctor import Examination
+from iveg.embedded.http_server import Request, Response, http_server
+from iveg.embedded.server import Running, embedded_fiware
+from iveg.ngsi import names
+from iveg.settings import Settings
+from tests.processes import ROOT, children_of, free_ports
+
+SPY = "spy"
+"""Hears and says everything; only the tests know it."""
+
+
+def program(name: str) -> str:
+    """Where a program is; continuous integration has them all."""
+    found = shutil.which(name, path=f"{os.environ['PATH']}:/usr/sbin")
+    if found is None:
+        assert "CI" not in os.environ, f"{name} must be installed here"
+        pytest.skip(f"{name} is not installed")
+    return found
+
+
+@dataclass
+class Broker:
+    """A Mosquitto with the deployment's own configuration."""
+
+    port: int
+    tls_port: int
+    folder: Path
+    passwords: dict[str, str] = field(default_factory=dict)
+
+    def client(self, user: str | None, password: str | None = None) -> aiomqtt.Client:
+        return aiomqtt.Client(
+            "127.0.0.1",
+            self.port,
+            username=user,
+            password=password or self.passwords.get(user or ""),
+            timeout=20.0,
+        )
+
+    def log(self) -> str:
+        return (self.folder / "log").read_text()
+
+
+@pytest.fixture(scope="module")
+def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
+    mosquitto = program("mosquitto")
+    folder = tmp_path_factory.mktemp("broker")
+    port, tls_port = free_ports(2)
+    broker = Broker(port, tls_port, folder)
+    make_users(broker)
+    make_certificate(folder / "secrets/mosquitto/tls")
+    conf = folder / "mosquitto.conf"
+    conf.write_text(local(ROOT / "deploy/mosquitto.conf", broker) + as_root())
+    encrypted = folder / "secrets/mosquitto/conf.d/mosquitto-tls.conf"
+    encrypted.write_text(local(ROOT / "deploy/mosquitto-tls.conf", broker))
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [mosquitto, "-c", str(conf)], stdout=log, stderr=subprocess.STDOUT
+        )
+    try:
+        wait_for(port)
+        yield broker
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+def make_users(broker: Broker) -> None:
+    """Users and access list as ``deploy/make-secrets`` makes them, and the spy."""
+    secrets = broker.folder / "secrets"
+    subprocess.run(
+        [
+            *(sys.executable, str(ROOT / "deploy/make-secrets"), "--emulator"),
+            *("--directory", str(secrets), "--state", str(broker.folder / "state")),
+        ],
+        check=True,
+        stdout=subprocess.DEVNULL,
+        timeout=60,
+    )
+    env = dict(
+        line.split("=", 1)
+        for line in (secrets / "env").read_text().splitlines()
+        if line and line[0] != "#"
+    )
+    robots = (secrets / "mqtt-users").read_text().splitlines()
+    broker.passwords = {
+        **dict(line.split() for line in robots),
+        "iveg_dss": env["IVEG_MQTT_PASSWORD"],
+        "iot_agent": env["MQTT_AGENT_PASSWORD"],
+        "iveg_emulator": env["MQTT_EMULATOR_PASSWORD"],
+        "iveg_health": env["MQTT_HEALTH_PASSWORD"],
+        SPY: env["MQTT_HEALTH_PASSWORD"],
+    }
+    users = (secrets / "mosquitto/passwords").read_text()
+    health = next(one for one in users.splitlines() if one.startswith("iveg_health:"))
+    with (secrets / "mosquitto/passwords").open("a") as out:
+        out.write(f"{SPY}:{health.partition(':')[2]}\n")
+    with (secrets / "mosquitto/acl").open("a") as out:
+        out.write(f"\nuser {SPY}\ntopic readwrite #\n")
+
+
+def local(conf: Path, broker: Broker) -> str:
+    """The deployment's configuration with this machine's paths and ports."""
+    return (
+        conf.read_text()
+        .replace("/mosquitto/secrets", str(broker.folder / "secrets/mosquitto"))
+        .replace("/mosquitto/data", str(broker.folder / "state/mosquitto"))
+        .replace("listener 1883", f"listener {broker.port} 127.0.0.1")
+        .replace("listener 8883", f"listener {broker.tls_port} 127.0.0.1")
+    )
+
+
+def as_root() -> str:
+    """Started by root, Mosquitto would become a user who cannot enter here."""
+    return "\nuser root\n" if os.geteuid() == 0 else ""
+
+
+def make_certificate(folder: Path) -> None:
+    subprocess.run(
+        [
+            *(program("openssl"), "req", "-x509", "-newkey", "rsa:2048", "-nodes"),
+            *("-days", "2", "-subj", "/CN=localhost"),
+            *("-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1"),
+            *("-keyout", str(folder / "server.key")),
+            *("-out", str(folder / "server.crt")),
+        ],
+        check=True,
+        capture_output=True,
+        timeout=60,
+    )
+
+
+def wait_for(port: int) -> None:
+    deadline = time.monotonic() + 20
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", port), timeout=1).close()
+        except OSError:
+            assert time.monotonic() < deadline, "Mosquitto does not listen"
+        else:
+            return
+
+
+# --- who may write what -----------------------------------------------------------
+
+DEVICES = ("", "_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety", "_nav")
+
+
+def of_robot(robot: str) -> set[str]:
+    """What safety.md 5.2.8 lets a robot write, written out once more by hand."""
+    plain = {f"/iveg/{robot}{suffix}/attrs" for suffix in DEVICES}
+    plain.add(f"/iveg/{robot}/cmdexe")
+    return plain | {f"/json{topic}" for topic in plain}
+
+
+AIR = {"/iveg/climate/attrs", "/json/iveg/climate/attrs"}
+COMMANDS = {"/iveg/AGI/cmd", "/iveg/AGII/cmd"}
+FEEDBACK = {"/AGI/mqtt_feedback", "/AGII/mqtt_feedback"}
+DESIRED = {"/AGI/iveg/desired", "/AGII/iveg/desired"}
+PROBES = {
+    "/iveg/iveg-doctor/attrs",
+    "/iveg/iveg-doctor/cmd",
+    "/iveg/iveg-doctor/cmdexe",
+    "/iveg/iveg-doctor/echo",
+}
+CANARY = {"/iveg/iveg-canary/attrs"}
+ELSEWHERE = {
+    "/1234/AGI/attrs",
+    "/other/AGI/attrs",
+    "/iveg/AGI/attrs/pose",
+    "/iveg/AGI/configuration/commands",
+    "/iveg/AGIII/attrs",
+    "anything",
+}
+TOPICS = sorted(
+    of_robot("AGI")
+    | of_robot("AGII")
+    | AIR
+    | COMMANDS
+    | FEEDBACK
+    | DESIRED
+    | PROBES
+    | CANARY
+    | ELSEWHERE
+)
+MAY_WRITE = {
+    "AGI": of_robot("AGI"),
+    "AGII": of_robot("AGII"),
+    "climate": AIR,
+    "iot_agent": COMMANDS | {"/iveg/iveg-doctor/cmd"},
+    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | PROBES | CANARY,
+    "iveg_emulator": of_robot("AGI") | of_robot("AGII") | AIR,
+    "iveg_health": set(),
+}
+REPORTS = {
+    topic
+    for topic in TOPICS
+    if topic.startswith("/iveg/") and topic.endswith(("/attrs", "/cmdexe"))
+}
+MAY_READ = {
+    "AGI": {"/iveg/AGI/cmd", "/AGI/iveg/desired", *FEEDBACK},
+    "AGII": {"/iveg/AGII/cmd", "/AGII/iveg/desired", *FEEDBACK},
+    "climate": set(),
+    "iot_agent": REPORTS
+    | {topic for topic in TOPICS if topic.startswith("/json/")}
+    | {"/iveg/AGI/attrs/pose"},
+    "iveg_dss": REPORTS | PROBES,
+    "iveg_emulator": COMMANDS | FEEDBACK | DESIRED,
+    "iveg_health": set(),
+}
+
+
+@pytest.mark.parametrize("user", MAY_WRITE)
+async def test_a_user_writes_what_the_table_says_and_nothing_else(
+    user: str, broker: Broker
+) -> None:
+    async with broker.client(SPY) as spy, broker.client(user) as client:
+        await spy.subscribe("#", qos=1)
+        for topic in TOPICS:
+            await client.publish(topic, user, qos=1)
+        await spy.publish("end", SPY, qos=1)
+        written = await heard_until_end(spy)
+
+    assert written[user] == MAY_WRITE[user]
+
+
+@pytest.mark.parametrize("user", MAY_READ)
+async def test_a_user_reads_what_the_table_says_and_nothing_else(
+    user: str, broker: Broker
+) -> None:
+    async with broker.client(SPY) as spy, broker.client(user) as client:
+        # At QoS 0 nothing waits for an acknowledgement, so the order is kept.
+        await client.subscribe("#", qos=0)
+        for topic in TOPICS:
+            await spy.publish(topic, SPY, qos=1)
+        # The broker answers in turn: what was to come has come before this answer.
+        await client.unsubscribe("#")
+        came = range(len(client.messages))
+        read = {str((await anext(client.messages)).topic) for _ in came}
+
+    assert read == MAY_READ[user]
+
+
+async def heard_until_end(client: aiomqtt.Client) -> dict[str, set[str]]:
+    """Topics by who wrote there."""
+    heard: dict[str, set[str]] = defaultdict(set)
+    async with asyncio.timeout(20):
+        async for message in client.messages:
+            if str(message.topic) == "end":
+                break
+            assert isinstance(message.payload, bytes)
+            heard[message.payload.decode()].add(str(message.topic))
+    return heard
+
+
+async def test_robot_a_cannot_speak_as_robot_b(broker: Broker) -> None:
+    async with broker.client("iveg_dss") as dss, broker.client("AGI") as robot:
+        await dss.subscribe("/iveg/+/attrs", qos=1)
+        await robot.publish("/iveg/AGII_odom/attrs", b"lie", qos=1)
+        await robot.publish("/iveg/AGI_odom/attrs", b"truth", qos=1)
+        async with asyncio.timeout(20):
+            first = await anext(dss.messages)
+
+    assert (str(first.topic), first.payload) == ("/iveg/AGI_odom/attrs", b"truth")
+
+
+async def test_iveg_stops_a_robot_and_no_robot_stops_another(broker: Broker) -> None:
+    async with (
+        broker.client("iveg_dss") as dss,
+        broker.client("AGI") as robot,
+        broker.client("AGII") as other,
+    ):
+        await robot.subscribe("/iveg/AGI/cmd", qos=1)
+        await other.publish("/iveg/AGI/cmd", b"from a robot", qos=1)
+        await dss.publish("/iveg/AGI/cmd", b"stop", qos=1)
+        async with asyncio.timeout(20):
+            first = await anext(robot.messages)
+
+    assert first.payload == b"stop"
+
+
+async def test_the_agents_shared_subscriptions_hear_robots(broker: Broker) -> None:
+    async with broker.client("iot_agent") as agent, broker.client("AGI") as robot:
+        for topic in ("/+/+/attrs", "/+/+/attrs/+", "/+/+/cmdexe"):
+            await agent.subscribe(f"$share/json/{topic}", qos=1)
+        await robot.publish("/iveg/AGI/cmdexe", b"answer", qos=1)
+        async with asyncio.timeout(20):
+            first = await anext(agent.messages)
+
+    assert first.payload == b"answer"
+
+
+async def test_the_health_check_reads_the_brokers_uptime(broker: Broker) -> None:
+    async with broker.client("iveg_health") as health:
+        await health.subscribe("$SYS/broker/uptime")
+        async with asyncio.timeout(30):
+            first = await anext(health.messages)
+
+    assert isinstance(first.payload, bytes)
+    assert b"seconds" in first.payload
+
+
+@pytest.mark.parametrize(
+    ("user", "password"), [(None, None), ("AGI", "wrong"), ("AGIII", "any")]
+)
+async def test_strangers_are_not_let_in(
+    user: str | None, password: str | None, broker: Broker
+) -> None:
+    with pytest.raises(aiomqtt.MqttError, match=r"(?i)not authori[sz]ed"):
+        async with broker.client(user, password):
+            pass
+
+
+async def test_a_message_over_the_limit_ends_its_sender_and_nobody_else(
+    broker: Broker,
+) -> None:
+    async with broker.client("iveg_dss") as dss:
+        await dss.subscribe("/iveg/+/attrs", qos=1)
+        with contextlib.suppress(aiomqtt.MqttError):
+            async with broker.client("AGI") as robot:
+                await robot.publish("/iveg/AGI/attrs", bytes(200_000), qos=1)
+        async with broker.client("AGI") as robot:
+            await robot.publish("/iveg/AGI/attrs", bytes(100_000), qos=1)
+        async with asyncio.timeout(20):
+            first = await anext(dss.messages)
+
+    assert first.payload == bytes(100_000)
+
+
+async def test_robots_may_come_encrypted(broker: Broker) -> None:
+    trust = ssl.create_default_context(
+        cafile=broker.folder / "secrets/mosquitto/tls/server.crt"
+    )
+    client = aiomqtt.Client(
+        "127.0.0.1",
+        broker.tls_port,
+        username="AGI",
+        password=broker.passwords["AGI"],
+        tls_context=trust,
+        timeout=20.0,
+    )
+
+    async with broker.client("iveg_dss") as dss, client as robot:
+        await dss.subscribe("/iveg/AGI/attrs", qos=1)
+        await robot.publish("/iveg/AGI/attrs", b"encrypted", qos=1)
+        async with asyncio.timeout(20):
+            first = await anext(dss.messages)
+
+    assert first.payload == b"encrypted"
+
+
+@pytest.mark.parametrize(
+    ("user", "broker_state", "said"),
+    [
+        ("iveg_dss", "ok", ""),
+        ("AGI", "failed", "access list"),
+        ("AGIII", "failed", "IVEG_MQTT_PASSWORD"),
+    ],
+)
+async def test_the_doctor_tells_a_closed_door_from_a_short_list(
+    user: str, broker_state: str, said: str, broker: Broker, tmp_path: Path
+) -> None:
+    nobody = f"http://127.0.0.1:{free_ports(1)[0]}"
+    settings = Settings(
+        mqtt_url=f"mqtt://127.0.0.1:{broker.port}",
+        mqtt_user=user,
+        mqtt_password=broker.passwords.get(user, "any"),
+        orion_url=nobody,
+        iota_url=nobody,
+    )
+    examination = Examination(settings, tmp_path, 2.0)
+
+    await examination.run()
+
+    rows = {row.hop: row for row in judge(examination.findings, examination.stack)}
+    assert rows[Hop.BROKER].state == broker_state
+    assert said in rows[Hop.BROKER].sentence
+    assert (rows[Hop.DIRECT].state == "ok") == (broker_state == "ok")
+
+
+def test_the_broker_had_nothing_to_complain_of(broker: Broker) -> None:
+    """Last: what the tests above provoked are refusals, not faults."""
+    provoked = ("run as root", "oversize")
+    complaints = [
+        line
+        for line in broker.log().splitlines()
+        if ("Warning" in line or "Error" in line)
+        and not any(word in line for word in provoked)
+    ]
+
+    assert complaints == []
+
+
+# --- the agent's health check -----------------------------------------------------
+
+
+@dataclass
+class Patient:
+    """An agent in a container: a process whose parent is the container's init."""
+
+    init: asyncio.subprocess.Process
+    environment: dict[str, str]
+    said: str = ""
+
+    async def check(self) -> int:
+        """What the container engine runs every five seconds; its exit code."""
+        check = await asyncio.create_subprocess_exec(
+            program("node"),
+            str(ROOT / "deploy/agent-health.mjs"),
+            env={"PATH": os.environ["PATH"], **self.environment},
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+        )
+        said, _ = await check.communicate()
+        self.said = said.decode()
+        return int(check.returncode or 0)
+
+    def counts(self) -> bool:
+        """Whether the check has begun to count the silence."""
+        return Path(self.environment["AGENT_SILENT_SINCE"]).exists()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the agent's process, and with it the container's, is gone."""
+        return self.init.returncode is not None
+
+
+@pytest.fixture
+async def up() -> AsyncIterator[Running]:
+    async with embedded_fiware() as running:
+        yield running
+
+
+@pytest.fixture
+async def singer() -> AsyncIterator[int]:
+    """Stands for iVeg, which answers and sings."""
+
+    async def answer(request: Request) -> Response:
+        return Response(200 if request.path == "/healthz" else 404)
+
+    async with http_server(answer, "127.0.0.1", 0) as port:
+        yield port
+
+
+@pytest.fixture
+async def patient(up: Running, singer: int, tmp_path: Path) -> AsyncIterator[Patient]:
+    # A shell that waits for its child, as a container's init does.
+    init = await asyncio.create_subprocess_exec("/bin/sh", "-c", "sleep 300; exit 0")
+    patient = Patient(
+        init,
+        {
+            "AGENT_PARENT": str(init.pid),
+            "AGENT_SILENT_SINCE": str(tmp_path / "silent-since"),
+            "AGENT_SILENCE_MS": "300",
+            "AGENT_SINGER_URL": f"http://127.0.0.1:{singer}",
+            "IOTA_NORTH_PORT": str(up.iota_port),
+            "IOTA_CB_HOST": "127.0.0.1",
+            "IOTA_CB_PORT": str(up.orion_port),
+            "IOTA_MQTT_HOST": "127.0.0.1",
+            "IOTA_MQTT_PORT": str(up.mqtt_port),
+            "IVEG_FIWARE_SERVICE": "agroconnect",
+            "IVEG_FIWARE_SERVICEPATH": "/greenhouse",
+        },
+    )
+    yield patient
+    end_children(init.pid)
+    await init.wait()
+
+
+def end_children(pid: int) -> None:
+    for child in children_of(pid):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
+
+
+async def sing(up: Running) -> None:
+    """One canary reaches Orion."""
+    async with OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion:
+        await orion.http.ask(
+            "POST",
+            "/v2/entities",
+            query={"options": "upsert"},
+            body={
+                "id": names.CANARY_ID,
+                "type": names.CANARY_TYPE,
+                "probe": {"type": "object", "value": {"seq": 1}},
+            },
+        )
+
+
+async def first_deaf_look(patient: Patient) -> None:
+    """Check until the canary is too old."""
+    async with asyncio.timeout(30):
+        while await patient.check() == 0:
+            pass
+
+
+async def test_an_agent_that_hears_is_healthy(up: Running, patient: Patient) -> None:
+    patient.environment["AGENT_SILENCE_MS"] = "60000"
+    await sing(up)
+
+    assert await patient.check() == 0
+    assert patient.said == ""
+
+
+async def test_before_the_first_canary_nobody_is_called_deaf(patient: Patient) -> None:
+    assert await patient.check() == 0
+
+
+async def test_a_deaf_agent_is_ended_and_not_on_the_first_look(
+    up: Running, patient: Patient
+) -> None:
+    await sing(up)
+    await first_deaf_look(patient)
+    lived = children_of(patient.init.pid)
+
+    async with asyncio.timeout(30):
+        while children_of(patient.init.pid):
+            assert await patient.check() == 1
+        await patient.init.wait()
+
+    assert len(lived) == 1
+    assert "deaf: no canary for" in patient.said
+
+
+async def test_an_agent_that_hears_again_starts_with_a_clean_slate(
+    up: Running, patient: Patient
+) -> None:
+    await sing(up)
+    await first_deaf_look(patient)
+    counted = patient.counts()
+
+    patient.environment["AGENT_SILENCE_MS"] = "60000"
+    await sing(up)
+
+    assert counted
+    assert await patient.check() == 0
+    assert not patient.counts()
+
+
+async def test_a_hung_agent_is_unhealthy_whatever_the_canary_says(
+    up: Running, patient: Patient
+) -> None:
+    await sing(up)
+    patient.environment["IOTA_NORTH_PORT"] = str(free_ports(1)[0])
+
+    assert await patient.check() == 1
+    assert "deaf: no answer" in patient.said
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [
+        ("AGENT_SINGER_URL", "http://127.0.0.1:{}"),
+        ("IOTA_MQTT_PORT", "{}"),
+        ("IOTA_CB_PORT", "{}"),
+    ],
+)
+async def test_the_agent_does_not_answer_for_others(
+    variable: str, value: str, up: Running, patient: Patient
+) -> None:
+    await sing(up)
+    await first_deaf_look(patient)
+
+    patient.environment[variable] = value.format(free_ports(1)[0])
+
+    assert await patient.check() == 0
+    assert not patient.ended

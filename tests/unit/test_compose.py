@@ -1,0 +1,344 @@
+"""The real stack as it is written down: what can be known without starting it."""
+
+import fnmatch
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml  # type: ignore[import-untyped]
+
+from iveg.settings import Settings
+from tests.processes import ROOT
+
+COMPOSE = (ROOT / "compose.yaml").read_text()
+SERVICES: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["services"]
+NETWORKS: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["networks"]
+KNOWN = {row.metadata["variable"] for row in fields(Settings)}
+ASKED = set(re.findall(r"(?<!\$)\$\{(\w+)(:-|:\?|\})", COMPOSE))
+PRIVATE = ("mongodb", "orion", "iot-agent", "postgresql", "iveg-migrate", "emulator")
+DOCKERFILE = (ROOT / "Dockerfile").read_text()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What ``deploy/make-secrets`` makes."""
+    return make_secrets(tmp_path_factory.mktemp("site"))
+
+
+def make_secrets(folder: Path, *more: str) -> Path:
+    secrets = folder / "secrets"
+    state = str(folder / "state")
+    command = [sys.executable, str(ROOT / "deploy/make-secrets"), *more]
+    subprocess.run(
+        [*command, "--directory", str(secrets), "--state", state],
+        check=True,
+        capture_output=True,
+        timeout=60,
+    )
+    return secrets
+
+
+def env_of(secrets: Path) -> dict[str, str]:
+    lines = (secrets / "env").read_text().splitlines()
+    return dict(line.split("=", 1) for line in lines if line and line[0] != "#")
+
+
+def environment(service: str) -> dict[str, str]:
+    told: dict[str, str] = SERVICES[service].get("environment", {})
+    return told
+
+
+def test_compose_keeps_to_the_compose_specification() -> None:
+    check = subprocess.run(
+        [
+            *(sys.executable, "-m", "check_jsonschema"),
+            *("--builtin-schema", "vendor.compose-spec", str(ROOT / "compose.yaml")),
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+    assert check.returncode == 0, check.stdout + check.stderr
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_every_variable_of_iveg_is_a_setting(service: str) -> None:
+    ours = {name for name in environment(service) if name.startswith("IVEG_")}
+
+    assert ours <= KNOWN
+
+
+def test_what_iveg_is_told_can_be_read(made: Path) -> None:
+    env = env_of(made)
+    told = {name: filled(value, env) for name, value in environment("iveg").items()}
+
+    settings = Settings.from_environment(told)
+
+    assert settings.robots == ("AGI", "AGII")
+    assert settings.mqtt_user == "iveg_dss"
+    assert settings.notify_url == "http://iveg:8000/ngsi/notifications"
+
+
+def filled(text: str, env: dict[str, str]) -> str:
+    return re.sub(r"\$\{(\w+)[^}]*\}", lambda found: env[found[1]], text)
+
+
+def test_every_variable_is_made_or_has_a_default(made: Path) -> None:
+    env = env_of(made)
+
+    for name, how in ASKED:
+        assert env.get(name), f"{name} is in no env file"
+        assert how != "}", f"{name} may be missing in silence"
+
+
+def test_no_secret_has_a_default() -> None:
+    optional = {name for name, how in ASKED if how == ":-"}
+
+    assert [name for name in optional if re.search("PASSWORD|TOKEN", name)] == []
+
+
+def test_the_start_refuses_without_any_of_the_secrets(made: Path) -> None:
+    example = (ROOT / "deploy/env.example").read_text()
+    chosen = set(re.findall(r"^(\w+)=", example, re.MULTILINE))
+    required = {name for name, how in ASKED if how == ":?"}
+
+    assert required == set(env_of(made)) - chosen
+
+
+def test_the_example_holds_no_secret() -> None:
+    example = (ROOT / "deploy/env.example").read_text()
+
+    assert re.findall(r"^\w*(?:PASSWORD|TOKEN)\w*=", example, re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_no_container_has_more_rights_than_it_needs(service: str) -> None:
+    stands = SERVICES[service]
+
+    assert stands["read_only"] is True
+    assert stands["cap_drop"] == ["ALL"]
+    assert stands["security_opt"] == ["no-new-privileges:true"]
+    assert "mem_limit" in stands
+    assert not stands.get("privileged")
+    assert stands.get("user", "") not in ("root", "0")
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_every_image_is_pinned_to_a_version(service: str) -> None:
+    tag = SERVICES[service]["image"].partition(":")[2]
+
+    assert re.match(r"\d+\.\d+", tag)
+
+
+@pytest.mark.parametrize("service", PRIVATE)
+def test_what_asks_nobody_who_he_is_cannot_be_reached(service: str) -> None:
+    networks = SERVICES[service]["networks"]
+
+    assert "ports" not in SERVICES[service]
+    assert [name for name in networks if not NETWORKS[name].get("internal")] == []
+
+
+def test_every_long_running_service_says_whether_it_is_well() -> None:
+    silent = {name for name, one in SERVICES.items() if "healthcheck" not in one}
+
+    assert silent == {"iveg-migrate", "emulator"}
+
+
+def test_ports_open_on_loopback_unless_a_site_chooses_otherwise() -> None:
+    ports = [port for one in SERVICES.values() for port in one.get("ports", [])]
+
+    assert len(ports) == 3
+    assert [port for port in ports if ":-127.0.0.1}:" not in port] == []
+
+
+def test_the_history_is_migrated_before_iveg_serves() -> None:
+    wanted = SERVICES["iveg"]["depends_on"]["iveg-migrate"]["condition"]
+
+    assert SERVICES["iveg-migrate"]["command"] == ["db", "upgrade"]
+    assert wanted == "service_completed_successfully"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("IOTA_MQTT_RETRIES", "1000000"),
+        ("IOTA_MQTT_RETRY_TIME", "2"),
+        ("IOTA_MQTT_KEEPALIVE", "5"),
+        ("IOTA_MQTT_QOS", "1"),
+        ("IOTA_REGISTRY_TYPE", "mongodb"),
+        ("IOTA_TIMESTAMP", "true"),
+    ],
+)
+def test_the_agent_never_gives_up_and_forgets_nothing(name: str, value: str) -> None:
+    assert environment("iot-agent")[name] == value
+
+
+def test_orion_queues_notifications_instead_of_a_thread_each() -> None:
+    command = SERVICES["orion"]["command"]
+
+    assert command[command.index("-notificationMode") + 1] == "threadpool:120:12"
+
+
+@pytest.mark.parametrize("service", ["iveg", "emulator", "iveg-migrate"])
+def test_only_what_a_service_needs_is_told_to_it(service: str, made: Path) -> None:
+    """The emulator plays robots: it is not to know iVeg's own secrets."""
+    passwords = {
+        found
+        for value in environment(service).values()
+        for found in re.findall(r"\$\{(\w*(?:PASSWORD|TOKEN))", value)
+    }
+
+    assert (
+        passwords
+        == {
+            "iveg": {
+                "POSTGRES_PASSWORD",
+                "IVEG_MQTT_PASSWORD",
+                "IVEG_NOTIFY_TOKEN",
+                "IVEG_API_TOKEN",
+                "IVEG_SIGN_IN_TOKEN",
+            },
+            "emulator": {"MQTT_EMULATOR_PASSWORD"},
+            "iveg-migrate": {"POSTGRES_PASSWORD"},
+        }[service]
+    )
+
+
+def test_mounted_files_are_there_or_are_made(made: Path) -> None:
+    mounts = [
+        mount.split(":")[0]
+        for one in SERVICES.values()
+        for mount in one.get("volumes", [])
+        if mount.startswith("./")
+    ]
+    deploy = made.parent
+
+    assert len(mounts) == 4
+    for mount in mounts:
+        inside = Path(mount).relative_to("deploy")
+        assert (ROOT / mount).is_file() or (deploy / inside).is_dir(), mount
+
+
+# --- the image --------------------------------------------------------------------
+
+
+def test_the_image_is_made_of_files_that_the_build_may_see() -> None:
+    ignore = (ROOT / ".dockerignore").read_text().splitlines()
+    allowed = [line[1:] for line in ignore if line.startswith("!")]
+    copies = re.findall(r"^COPY (?!--from)(.+) \S+$", DOCKERFILE, re.MULTILINE)
+    sources = [source for line in copies for source in line.split()]
+
+    assert ignore[1] == "*"
+    assert sorted(allowed) == sorted(sources)
+    assert [source for source in sources if not (ROOT / source).exists()] == []
+
+
+def test_no_secret_gets_into_the_image() -> None:
+    ignore = (ROOT / ".dockerignore").read_text().splitlines()
+    allowed = [line[1:] for line in ignore if line.startswith("!")]
+
+    assert not any(fnmatch.fnmatch("deploy/secrets/env", one) for one in allowed)
+    assert (ROOT / "deploy/.gitignore").read_text().split() == ["secrets/", "state/"]
+
+
+def test_the_image_takes_postgresqls_driver_from_the_lock_file() -> None:
+    program = re.findall(r"awk '(.+?)' dev\.lock", DOCKERFILE)
+    taken = subprocess.run(
+        ["/usr/bin/awk", *program, str(ROOT / "requirements/dev.lock")],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+
+    wanted = re.findall(r"^([\w-]+)==", taken, re.MULTILINE)
+    assert wanted == ["psycopg", "psycopg-binary"]
+    assert taken.count("--hash=sha256:") > len(wanted)
+
+
+def test_the_image_runs_as_nobody_in_particular() -> None:
+    user = re.findall(r"^USER (\d+):", DOCKERFILE, re.MULTILINE)
+
+    assert int(user[-1]) >= 1000
+
+
+# --- make-secrets -----------------------------------------------------------------
+
+
+def test_every_secret_is_random_and_long(tmp_path: Path) -> None:
+    first = env_of(make_secrets(tmp_path / "a"))
+    second = env_of(make_secrets(tmp_path / "b"))
+    secret = [name for name in first if re.search("PASSWORD|TOKEN", name)]
+
+    assert len(secret) == 9
+    assert len({first[name] for name in secret}) == len(secret)
+    assert [name for name in secret if first[name] == second[name]] == []
+    assert {len(first[name]) for name in secret} == {64}
+
+
+def test_made_again_nothing_changes_but_what_was_deleted(tmp_path: Path) -> None:
+    secrets = make_secrets(tmp_path)
+    before, robots = env_of(secrets), (secrets / "mqtt-users").read_text()
+    env = (secrets / "env").read_text()
+    gone = f"IVEG_API_TOKEN={before['IVEG_API_TOKEN']}\n"
+    (secrets / "env").write_text(env.replace(gone, ""))
+
+    after = env_of(make_secrets(tmp_path))
+
+    changed = {name for name in after if after[name] != before[name]}
+    assert changed == {"IVEG_API_TOKEN"}
+    assert set(after) == set(before)
+    assert (secrets / "mqtt-users").read_text() == robots
+
+
+def test_users_follow_the_fleet(tmp_path: Path) -> None:
+    secrets = make_secrets(tmp_path)
+    kept = (secrets / "mqtt-users").read_text().split()[1]
+    env = (secrets / "env").read_text()
+    (secrets / "env").write_text(env.replace("=AGI,AGII", "=AGI,NEW"))
+
+    make_secrets(tmp_path)
+
+    users = dict(
+        line.split() for line in (secrets / "mqtt-users").read_text().splitlines()
+    )
+    assert list(users) == ["AGI", "NEW", "climate"]
+    assert users["AGI"] == kept
+    assert "AGII" not in (secrets / "mosquitto/acl").read_text()
+
+
+def test_secrets_are_closed_to_others(made: Path) -> None:
+    open_ = [path for path in (made, *made.rglob("*")) if path.stat().st_mode & 0o077]
+
+    assert open_ == []
+
+
+def test_a_fleet_that_cannot_be_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    secrets = tmp_path / "secrets"
+    secrets.mkdir()
+    (secrets / "env").write_text("IVEG_ROBOTS=A/B\n")
+
+    with pytest.raises(subprocess.CalledProcessError) as refused:
+        make_secrets(tmp_path)
+
+    assert refused.value.returncode == 2
+    assert b"IVEG_ROBOTS" in refused.value.stderr
+    assert [path.name for path in secrets.iterdir()] == ["env"]
+
+
+def test_no_part_can_be_taken_for_a_robot(made: Path) -> None:
+    users = re.findall(
+        r"^user (\S+)$", (made / "mosquitto/acl").read_text(), re.MULTILINE
+    )
+    parts = [user for user in users if user not in ("AGI", "AGII", "climate")]
+
+    assert parts == ["iot_agent", "iveg_dss", "iveg_health"]
+    assert [user for user in parts if re.fullmatch("[A-Za-z0-9-]+", user)] == []
