@@ -7,7 +7,7 @@ nothing keeps no queue and is closed after a while (fault F23).
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from typing import Annotated, Any
 
 import orjson
@@ -19,12 +19,13 @@ from iveg.domain.records import LogRecord
 from iveg.domain.stop import Command
 from iveg.ngsi.codec import load_json
 from iveg.pipeline.publish import Hub, Subscriber
-from iveg.web.auth import Principal, require
+from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
 from iveg.web.views import Views, log_line
 
 _log = logging.getLogger(__name__)
 TOO_SLOW = 4008
 _SEND_LIMIT_S = 10.0
+_SESSION_CHECK_S = 0.5
 _MAX_MESSAGE = 65536
 _SNAPSHOT_LINES = 200
 _CACHE = 512
@@ -141,8 +142,11 @@ def router(
                 sender = tasks.create_task(
                     _send(websocket, subscriber, encoder), name="live-send"
                 )
+                watcher = tasks.create_task(
+                    _watch_session(websocket, principal), name="live-session"
+                )
                 tasks.create_task(
-                    _listen(websocket, clock, stop, principal, sender),
+                    _listen(websocket, clock, stop, principal, (sender, watcher)),
                     name="live-listen",
                 )
         except* (WebSocketDisconnect, ConnectionError, RuntimeError) as gone:
@@ -171,6 +175,21 @@ async def _send(websocket: WebSocket, subscriber: Subscriber, encoder: Encoder) 
             return
 
 
+async def _watch_session(websocket: WebSocket, principal: Principal) -> None:
+    """Close soon after the session is over; STOP stays possible over HTTP."""
+    while True:
+        await asyncio.sleep(_SESSION_CHECK_S)
+        if not _may_still(websocket, principal, "read"):
+            await websocket.close(NO_SESSION)
+            return
+
+
+def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bool:
+    door: Door = websocket.app.state.door
+    current = door.sessions.current(principal)
+    return current is not None and current.may(action)
+
+
 async def _send_state(websocket: WebSocket, topic: str, encoder: Encoder) -> None:
     frame = encoder.frame(topic)
     if frame is None:
@@ -186,7 +205,7 @@ async def _listen(
     clock: Callable[[], Instant],
     stop: Stop,
     principal: Principal,
-    sender: asyncio.Task[None],
+    others: Iterable[asyncio.Task[None]],
 ) -> None:
     try:
         while True:
@@ -203,7 +222,8 @@ async def _listen(
     except WebSocketDisconnect:
         return
     finally:
-        sender.cancel()
+        for task in others:
+            task.cancel()
 
 
 async def _answer(
@@ -218,7 +238,8 @@ async def _answer(
         await websocket.send_text(text("pong", pong).decode())
     elif message.get("type") == "stop":
         robot_id = message.get("robot_id")
-        if principal.may("stop") and (robot_id is None or isinstance(robot_id, str)):
+        allowed = _may_still(websocket, principal, "stop")
+        if allowed and (robot_id is None or isinstance(robot_id, str)):
             try:
                 await stop(robot_id, principal.name)
             except UnknownRobotError as error:
