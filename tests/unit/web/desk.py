@@ -1,0 +1,139 @@
+"""The web face over a pipeline with fakes, for somebody of any role."""
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import AsyncIterator
+from typing import Any
+
+import httpx
+import uvicorn
+from fastapi import FastAPI
+
+from iveg.domain.observations import Instant
+from iveg.ngsi.codec import format_stamp
+from iveg.web import (
+    alerts,
+    commands,
+    health,
+    live,
+    notifications,
+    problems,
+    robots,
+    security,
+)
+from iveg.web.auth import Door, NotifySecret, Principal, Role
+from iveg.web.views import Views
+from tests.unit.pipeline.desk import Desk
+
+HOST = "iveg.test"
+API_TOKEN = "a-token-for-programs"
+SECRET = "ab" * 32
+TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
+
+
+class WebDesk(Desk):
+    """A desk that browsers, programs and Orion can reach."""
+
+    def __init__(self, robots_: tuple[str, ...] = ("AGI", "AGII")) -> None:
+        super().__init__(robots_)
+        self.heard: list[Instant] = []
+        self.door = Door(
+            sign_in_token="cd" * 32,
+            api_token=API_TOKEN,
+            now=lambda: self.clock().mono,
+        )
+        self.views = Views(self.assessor, self.commander)
+        self.encoder = live.Encoder(self.views, self.hub, self.clock, self.health)
+        self.app = FastAPI()
+        self.app.state.door = self.door
+        for router in self._routers():
+            self.app.include_router(router)
+        problems.install(self.app)
+        self.app.add_middleware(security.BodyLimit)
+
+    def _routers(self) -> list[Any]:
+        return [
+            notifications.router(
+                self.ingest,
+                NotifySecret(SECRET),
+                self.clock,
+                "ours".__eq__,
+                ("agroconnect", "/greenhouse"),
+                self.heard.append,
+            ),
+            live.router(self.hub, self.encoder, self.snapshot, self.clock, self.stop),
+            robots.router(self.views, self.clock, self.health),
+            commands.router(self.commander, self.clock),
+            alerts.router(self.assessor, self.clock),
+            health.router(self.clock, self.health),
+        ]
+
+    # --- what the web asks --------------------------------------------------------
+
+    def health(self, now: Instant) -> Any:
+        return health.health_of(self.chain, lambda: Counter({"some": 1}), now)
+
+    def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
+        return {
+            "t": format_stamp(now.wall),
+            "user": {"name": principal.name, "role": principal.role},
+            "robots": self.views.robots(now),
+            "commands": self.views.open_commands(now),
+        }
+
+    async def stop(self, robot_id: str | None, by: str) -> None:
+        targets = self.commander.machines if robot_id is None else [robot_id]
+        await self.commander.stop(targets, by, self.clock())
+
+    # --- who asks -----------------------------------------------------------------
+
+    def cookie(self, role: Role = "operator", name: str = "ana") -> dict[str, str]:
+        """The header of a browser in which somebody is signed in."""
+        return {"Cookie": f"iveg={self.door.sessions.open(name, role)}"}
+
+    def browser(self, role: Role = "operator") -> httpx.AsyncClient:
+        """The page of somebody of this role."""
+        page = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin", **self.cookie(role)}
+        return self._client(page)
+
+    def program(self) -> httpx.AsyncClient:
+        return self._client({"Authorization": f"Bearer {API_TOKEN}"})
+
+    def stranger(self) -> httpx.AsyncClient:
+        return self._client({})
+
+    def orion(self) -> httpx.AsyncClient:
+        return self._client({"X-Iveg-Notify-Token": SECRET, **TENANT})
+
+    def _client(self, headers: dict[str, str]) -> httpx.AsyncClient:
+        transport = httpx.ASGITransport(self.app)
+        return httpx.AsyncClient(
+            transport=transport, base_url=f"http://{HOST}", headers=headers
+        )
+
+    # --- over a socket ------------------------------------------------------------
+
+    @contextlib.asynccontextmanager
+    async def serving(self) -> AsyncIterator[str]:
+        """A real server; yields host and port."""
+        config = uvicorn.Config(
+            self.app,
+            host="127.0.0.1",
+            port=0,
+            log_config=None,
+            lifespan="off",
+            ws="websockets-sansio",
+            timeout_graceful_shutdown=1,
+        )
+        server = uvicorn.Server(config)
+        serving = asyncio.create_task(server.serve())
+        async with asyncio.timeout(10):
+            while not server.started:  # noqa: ASYNC110 - uvicorn has no event
+                await asyncio.sleep(0.01)
+        try:
+            port = server.servers[0].sockets[0].getsockname()[1]
+            yield f"127.0.0.1:{port}"
+        finally:
+            server.should_exit = True
+            await serving

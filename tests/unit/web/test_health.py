@@ -1,0 +1,65 @@
+"""What supervisors and Prometheus are told of the chain."""
+
+from tests.unit.web.desk import WebDesk
+
+
+def whole(desk: WebDesk) -> WebDesk:
+    now = desk.clock().mono
+    desk.chain.mqtt_connected = True
+    desk.chain.orion_ok_at = desk.chain.canary_at = desk.chain.notified_at = now
+    desk.chain.database = "ok"
+    return desk
+
+
+async def test_anybody_may_ask_whether_the_process_answers_and_learns_no_more() -> None:
+    async with WebDesk().stranger() as stranger:
+        answer = await stranger.get("/healthz")
+
+    assert (answer.status_code, answer.text) == (200, "ok\n")
+
+
+async def test_ready_is_200_only_when_every_hop_is_well() -> None:
+    async with whole(WebDesk()).program() as program:
+        well = await program.get("/readyz")
+    async with WebDesk().program() as program:
+        ill = await program.get("/readyz")
+
+    assert (well.status_code, well.json()) == (200, {"ok": True})
+    assert (ill.status_code, ill.json()) == (503, {"ok": False})
+
+
+async def test_every_hop_is_told_with_its_state_age_and_sentence() -> None:
+    desk = whole(WebDesk())
+    desk.clock.now = 1.0
+    async with desk.program() as program:
+        told = (await program.get("/api/v1/health")).json()
+
+    assert told["ok"] is True
+    assert [one["hop"] for one in told["hops"]] == [
+        "mqtt",
+        "iot_agent",
+        "orion",
+        "notifications",
+        "database",
+    ]
+    agent = told["hops"][1]
+    assert agent["key"] == "health.hop.iot_agent.ok"
+    assert agent["age_s"] == 1.0
+    assert told["counters"] == {"some": 1}
+
+
+async def test_prometheus_reads_counters_and_hops() -> None:
+    async with whole(WebDesk()).program() as program:
+        text = (await program.get("/metrics")).text
+
+    assert 'iveg_events_total{name="some"} 1' in text.splitlines()
+    assert 'iveg_hop_up{hop="orion"} 1' in text.splitlines()
+
+
+async def test_strangers_get_no_figures() -> None:
+    async with WebDesk().stranger() as stranger:
+        answers = [
+            (await stranger.get(path)).status_code for path in ("/readyz", "/metrics")
+        ]
+
+    assert answers == [401, 401]
