@@ -6,6 +6,7 @@ import secrets
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -333,7 +334,7 @@ def create_app(dss: Dss) -> FastAPI:
             drawn,
             reader=require("read"),
             anyone=require("open"),
-            document=lambda: openapi.describe_api(app),
+            document=cache(lambda: openapi.describe_api(app)),
         )
     )
 
@@ -344,9 +345,10 @@ def create_app(dss: Dss) -> FastAPI:
 
     app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
     problems.install(app, drawn.problem)
-    app.add_middleware(security.SecurityHeaders)
     app.add_middleware(security.BodyLimit)
     app.add_middleware(SignInLink, door=dss.door, refusal=drawn.refused_link)
+    # Last is outermost: a refusal carries the headers, too.
+    app.add_middleware(security.SecurityHeaders)
     return app
 
 

@@ -14,6 +14,7 @@ from iveg.web.openapi import AnswerDoc, ApiDoc, CallDoc, FieldDoc, GroupDoc, Sha
 from iveg.web.pages import Pages, router
 from iveg.web.problems import NotSignedInError, install
 from iveg.web.security import CONTENT_SECURITY_POLICY, SecurityHeaders
+from iveg.web.words import read_words
 
 SITE = Site(
     greenhouse="Almería <b>1</b>",
@@ -136,7 +137,7 @@ async def test_spanish_is_what_readers_of_no_known_language_get(
 ) -> None:
     answer = await browser.get("/", headers={"Accept-Language": "de"})
     assert '<html lang="es"' in answer.text
-    assert "PARAR TODO" in answer.text
+    assert read_words("es").say("stop.ready_fleet") in answer.text
 
 
 async def test_the_browsers_language_is_used(browser: httpx.AsyncClient) -> None:
