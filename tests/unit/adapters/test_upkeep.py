@@ -1,0 +1,143 @@
+"""The chain is made whole, and mended, with no hand on it."""
+
+import asyncio
+import contextlib
+import logging
+from collections.abc import AsyncIterator, Callable
+
+import pytest
+
+from iveg.adapters import clock
+from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.upkeep import Upkeep
+from iveg.domain.observations import Odometry
+from iveg.embedded.server import Running, embedded_fiware
+from iveg.ngsi import codec, names
+from iveg.pipeline.chain import Chain
+from iveg.pipeline.ingest import Ingest
+from tests.builders import odometry
+
+SERVICE = ("agroconnect", "/greenhouse")
+
+
+async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
+    async with asyncio.timeout(within_s):
+        while not true():  # noqa: ASYNC110 - what is waited for has no event
+            await asyncio.sleep(0.02)
+
+
+class Site:
+    """Upkeep over a FIWARE that can be reached, or cannot."""
+
+    def __init__(self, fiware: Running, *, orion_url: str = "") -> None:
+        self.heard: list[tuple[str, bytes]] = []
+        self.chain = Chain(clock.now())
+        self.ingest = Ingest({"AGI"}.__contains__)
+        self.orion = OrionClient(orion_url or fiware.orion_url, *SERVICE)
+        self.agent = IotAgentClient(fiware.iota_url, *SERVICE)
+        self.link = MqttLink(
+            BrokerAddress("127.0.0.1", fiware.mqtt_port),
+            "test",
+            {names.measure_topic("iveg", names.CANARY_ID): 0},
+            lambda topic, payload: self.heard.append((topic, payload)),
+        )
+        self.upkeep = Upkeep(
+            self.orion,
+            self.agent,
+            self.link,
+            self.chain,
+            self.ingest,
+            robots=["AGI"],
+            apikey="iveg",
+            context_broker_url=fiware.orion_url,
+            notify_url="http://127.0.0.1:9/ngsi/notifications",
+            notify_token="ab" * 32,
+            boot="boot",
+            read_clock=clock.now,
+        )
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator["Site"]:
+        tasks = [
+            asyncio.create_task(self.link.run()),
+            asyncio.create_task(self.upkeep.run()),
+        ]
+        try:
+            yield self
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self.orion.close()
+            await self.agent.close()
+
+
+@pytest.fixture
+async def fiware() -> AsyncIterator[Running]:
+    async with embedded_fiware() as running:
+        yield running
+
+
+async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -> None:
+    async with Site(fiware).running() as site:
+        await until(lambda: site.upkeep.subscription_ids)
+        kept = await site.orion.read_subscriptions()
+
+    assert {one["id"] for one in kept} == site.upkeep.subscription_ids
+    assert site.chain.agent_error == ""
+    assert site.chain.orion_ok_at is not None
+
+
+async def test_the_canary_sings_on_the_road_of_every_measure(fiware: Running) -> None:
+    async with Site(fiware).running() as site:
+        await until(lambda: site.heard)
+
+    topic, payload = site.heard[0]
+    assert topic == "/iveg/iveg-canary/attrs"
+    assert b'"boot":"boot"' in payload
+
+
+async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
+    fiware: Running,
+) -> None:
+    async with Site(fiware).running() as site:
+        await until(lambda: site.upkeep.subscription_ids)
+        await site.link.publish(
+            "/iveg/AGI_odom/attrs", codec.write_odometry(odometry())
+        )
+        read = []
+        async with asyncio.timeout(15):
+            while not read:
+                await site.ingest.wait(0.1)
+                read = [
+                    one
+                    for one in site.ingest.drain()
+                    if isinstance(one.observation, Odometry)
+                ]
+
+    assert all(one.asked for one in read)
+    assert {one.road for one in read} == {"orion"}
+
+
+async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
+    fiware: Running, caplog: pytest.LogCaptureFixture
+) -> None:
+    down = Site(fiware, orion_url="http://127.0.0.1:9")
+    async with down.running() as site:
+        await until(lambda: site.chain.orion_error)
+        await until(lambda: len(_warnings(caplog)) >= 2)
+        site.upkeep._tell("orion", None)
+
+    told = [line for line in _warnings(caplog) if line.startswith("orion ")]
+    assert len(told) == 1
+    assert "cannot be reached" in site.chain.orion_error
+
+
+def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [
+        one.getMessage()
+        for one in caplog.records
+        if one.levelno >= logging.WARNING and one.name == "iveg.adapters.upkeep"
+    ]

@@ -1,0 +1,141 @@
+"""Words and settings become parts, or one clear sentence and an exit code."""
+
+import socket
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from iveg import __version__
+from iveg.cli import UNUSABLE, main
+from iveg.cli.demo import _on_free_ports
+from iveg.cli.running import sign_in_link
+from iveg.domain.errors import SettingsError
+from iveg.settings import Settings, describe
+
+
+@pytest.fixture(autouse=True)
+def clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """No variable of this machine, and a data directory of its own."""
+    for name in Settings().to_environment():
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """The exit code, also where argparse ends the process."""
+    try:
+        return main(arguments)
+    except SystemExit as ended:
+        return int(ended.code or 0)
+
+
+def test_settings_prints_the_page_of_settings(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["settings"]) == 0
+    assert capsys.readouterr().out == describe()
+
+
+def test_version_prints_the_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"iveg {__version__}\n"
+
+
+def test_a_bad_setting_stops_the_start_with_one_sentence(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IVEG_PORT", "http")
+
+    assert run(["serve"]) == UNUSABLE
+    told = capsys.readouterr().err.splitlines()
+    assert told == [
+        "iveg: IVEG_PORT='http' cannot be used: it must be a port from 1 to 65535."
+    ]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["dance"],
+        ["emulator", "--robots", "0"],
+        ["emulator", "--robots", "101"],
+        ["emulator", "--profile", "dream"],
+        ["replay", "log.jsonl"],
+        ["replay", "log.jsonl", "--robot", "AGI", "--speed", "0"],
+        ["db", "downgrade"],
+    ],
+)
+def test_words_that_mean_nothing_are_refused(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == UNUSABLE
+    assert "usage:" in capsys.readouterr().err
+
+
+def test_a_recording_of_a_robot_outside_the_fleet_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["replay", "log.jsonl", "--robot", "AGX"]) == UNUSABLE
+    assert "AGX" in capsys.readouterr().err
+
+
+def test_a_recording_is_not_played_on_a_broker_elsewhere(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IVEG_MQTT_URL", "mqtt://greenhouse.test")
+
+    assert run(["replay", "log.jsonl", "--robot", "AGI"]) == UNUSABLE
+    assert "not on loopback" in capsys.readouterr().err
+
+
+def test_provisioning_a_fiware_that_is_away_says_so(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("IVEG_IOTA_URL", "http://127.0.0.1:9")
+    monkeypatch.setenv("IVEG_ORION_URL", "http://127.0.0.1:9")
+
+    assert run(["provision"]) == 1
+    assert "cannot be reached" in capsys.readouterr().err
+
+
+def test_the_database_is_made_where_data_lives(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert run(["db", "upgrade"]) == 0
+    assert (tmp_path / "iveg" / "iveg.sqlite").exists()
+    assert capsys.readouterr().out == "The database is up to date.\n"
+
+
+# --- the demo's addresses ---------------------------------------------------------
+
+
+def test_a_default_port_that_is_taken_moves_and_a_chosen_one_does_not() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        settings = Settings(port=port, mqtt_url=f"mqtt://127.0.0.1:{port}")
+
+        moved = _on_free_ports(settings, {})
+        with pytest.raises(SettingsError, match="a port that is free"):
+            _on_free_ports(settings, {"IVEG_PORT": str(port)})
+
+    assert moved.port != port
+    assert moved.mqtt_url != settings.mqtt_url
+
+
+def test_the_demos_fiware_is_on_loopback_alone() -> None:
+    with pytest.raises(SettingsError, match="loopback"):
+        _on_free_ports(Settings(mqtt_url="mqtt://10.1.2.3:1883"), {})
+
+
+@pytest.mark.parametrize(
+    ("host", "link"),
+    [
+        ("127.0.0.1", "http://127.0.0.1:8000/?token=abc"),
+        ("::1", "http://[::1]:8000/?token=abc"),
+    ],
+)
+def test_the_link_signs_a_browser_in(host: str, link: str) -> None:
+    assert sign_in_link(Settings(host=host), "abc") == link
