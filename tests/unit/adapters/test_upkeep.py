@@ -104,10 +104,9 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
 ) -> None:
     async with Site(fiware).running() as site:
         await until(lambda: site.upkeep.subscription_ids)
-        await site.link.publish(
-            "/iveg/AGI_odom/attrs", codec.write_odometry(odometry())
-        )
-        read = []
+        measure = codec.write_odometry(odometry())
+        await site.link.publish("/iveg/AGI_odom/attrs", measure)
+        read: list[Received] = []
         async with asyncio.timeout(15):
             while not read:
                 await site.ingest.wait(0.1)
