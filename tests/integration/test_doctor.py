@@ -6,19 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.cli.diagnosis import Hop, State, exit_code, judge
-from iveg.cli.doctor import DESCRIPTION, PROBE_ID, Examination
+from iveg.cli.doctor import Examination
+from iveg.cli.probe import DESCRIPTION, PROBE_ID
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.iot_agent import Faults
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.settings import Settings
 from tests.integration.emulator_cloud import until
 from tests.processes import Site, free_ports
+from tests.processes import until as wait_for
 
 SHORT_S, LONG_S = 0.5, 20.0
 TENANT = ("agroconnect", "/greenhouse")
@@ -247,3 +250,19 @@ def test_the_command_ends_with_0_beside_a_running_iveg(served: Site) -> None:
     assert doctor.process.wait(90) == 0, doctor.text()
     served.stop_all()
     served.assert_clean()
+
+
+def test_ctrl_c_ends_a_visit_with_a_table_and_nothing_left(fiware: Site) -> None:
+    agent = fiware.settings["IVEG_IOTA_URL"]
+    tenant = {"Fiware-Service": TENANT[0], "Fiware-ServicePath": TENANT[1]}
+    with httpx.Client(base_url=agent, headers=tenant, trust_env=False) as http:
+        http.post("/test/faults", json={"deaf": True}).raise_for_status()
+        doctor = fiware.start("doctor")
+        wait_for(lambda: PROBE_ID in http.get("/iot/devices").text, 30, "the probe")
+
+        code = doctor.interrupt()
+
+        assert code == 1
+        assert "not tried" in doctor.text()
+        assert http.get("/iot/devices").json()["count"] == 0
+    assert doctor.complaints() == []

@@ -1,0 +1,193 @@
+"""What ``iveg doctor`` makes at Orion and the agent, and its removal.
+
+What is to be removed is noted before it is made: a request that was cancelled or timed
+out may have been carried out all the same.
+"""
+
+from collections.abc import Awaitable
+from typing import Any
+
+from iveg.adapters.iot_agent import RESOURCE, IotAgentClient
+from iveg.adapters.orion import OrionClient
+from iveg.domain.errors import HopError
+from iveg.ngsi import names
+
+PROBE_ID, PROBE_TYPE = "iveg-doctor", names.CANARY_TYPE
+DESCRIPTION = "iveg doctor"
+"""Of the subscription.  Not ``iVeg: …``: a running iVeg removes such strangers."""
+_ENTITY = f"/v2/entities/{PROBE_ID}"
+_TYPE = {"type": PROBE_TYPE}
+
+
+class Probe:
+    """The probe's device, entity and subscription.
+
+    Args:
+        orion: Where the entity is.
+        agent: Where the device is.
+        apikey: First part of its topics.
+
+    Attributes:
+        left_behind: What could not be removed, as sentences.
+    """
+
+    def __init__(self, orion: OrionClient, agent: IotAgentClient, apikey: str) -> None:
+        self._orion = orion
+        self._agent = agent
+        self._apikey = apikey
+        self._made_device = self._made_group = self._touched_orion = False
+        self.left_behind: list[str] = []
+
+    def topic(self, last: str) -> str:
+        """A topic of the probe's."""
+        return f"/{self._apikey}/{PROBE_ID}/{last}"
+
+    # --- making and using ---------------------------------------------------------
+
+    async def make_device(self, orion_url: str) -> None:
+        """Make the device, and its group where iVeg has never run.
+
+        Raises:
+            HopError: the agent does not take it.
+        """
+        self._made_device = self._touched_orion = True
+        known = [one.get("apikey") for one in await self._agent.read_groups()]
+        if self._apikey not in known:
+            self._made_group = True
+            await self._agent.create_group(_group(self._apikey, orion_url))
+        await self._agent.delete_device(PROBE_ID)
+        if not await self._agent.create_device(_device(self._apikey)):
+            raise HopError("iot_agent", "says that there is such a device already")
+
+    async def subscribe(self, url: str) -> str:
+        """Ask Orion to post changes of the entity; the id of the subscription.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        self._touched_orion = True
+        return await self._orion.create_subscription(_subscription(url))
+
+    async def change(self, mark: str) -> None:
+        """Change the entity at Orion itself, past the agent.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        attribute = {"type": "object", "value": {"mark": mark}}
+        body = {"id": PROBE_ID, "type": PROBE_TYPE, "probe": attribute}
+        query = {"options": "upsert"}
+        await self._orion.http.ask("POST", "/v2/entities", query=query, body=body)
+
+    async def command(self, mark: str) -> None:
+        """Command it: ``cmd`` alone, with its type, or Orion loses it in silence.
+
+        Raises:
+            HopError: Orion does not take it.
+        """
+        command = {names.COMMAND: {"type": "command", "value": {"probe": mark}}}
+        path = f"{_ENTITY}/attrs"
+        await self._orion.http.ask("PATCH", path, query=_TYPE, body=command)
+
+    async def holds(self, attribute: str, mark: str) -> bool:
+        """Whether Orion has the mark in an attribute.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        query = {**_TYPE, "attrs": attribute, "options": "skipForwarding"}
+        found = await self._orion.http.ask("GET", _ENTITY, query=query, also=(404,))
+        return mark in found.text
+
+    async def why_not_notified(self, subscription_id: str) -> str:
+        """Why Orion says that a notification did not arrive; empty where it does not.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        for one in await self._orion.read_subscriptions():
+            if one.get("id") == subscription_id:
+                told = one.get("notification", {})
+                if told.get("lastFailureReason"):
+                    return str(told["lastFailureReason"])
+                if told.get("lastSuccess"):
+                    return "Orion believes that it did; somebody else answers there"
+        return ""
+
+    # --- removing -----------------------------------------------------------------
+
+    async def remove(self) -> None:
+        """Remove all that was made, the device first: it may still write."""
+        if self._made_device:
+            await self._try("device", self._agent.delete_device(PROBE_ID))
+        if self._made_group:
+            await self._try("group", self._delete_group())
+        if self._touched_orion:
+            await self._try("subscription", self._delete_subscriptions())
+            await self._try("registration", self._delete_registrations())
+            await self._try("entity", self._delete_entity())
+
+    async def _try(self, what: str, removing: Awaitable[object]) -> None:
+        try:
+            await removing
+        except HopError as error:
+            self.left_behind.append(
+                f"The {what} of {PROBE_ID} may be left behind ({error}); the next "
+                "`iveg doctor` removes it."
+            )
+
+    async def _delete_group(self) -> None:
+        query = {"resource": RESOURCE, "apikey": self._apikey}
+        path = "/iot/services"
+        await self._agent.http.ask("DELETE", path, query=query, also=(404,))
+
+    async def _delete_subscriptions(self) -> None:
+        for one in await self._orion.read_subscriptions():
+            if one.get("description") == DESCRIPTION:
+                await self._orion.delete_subscription(one["id"])
+
+    async def _delete_registrations(self) -> None:
+        for one in await self._orion.read_registrations():
+            entities = one.get("dataProvided", {}).get("entities", [])
+            if any(entity.get("id") == PROBE_ID for entity in entities):
+                await self._orion.delete_registration(one["id"])
+
+    async def _delete_entity(self) -> None:
+        await self._orion.http.ask("DELETE", _ENTITY, query=_TYPE, also=(404,))
+
+
+def _group(apikey: str, orion_url: str) -> dict[str, Any]:
+    return {
+        "apikey": apikey,
+        "resource": RESOURCE,
+        "cbroker": orion_url,
+        "entity_type": names.ROBOT_TYPE,
+        "attributes": [],
+        "lazy": [],
+        "commands": [],
+        "static_attributes": [],
+    }
+
+
+def _device(apikey: str) -> dict[str, Any]:
+    return {
+        "device_id": PROBE_ID,
+        "entity_name": PROBE_ID,
+        "entity_type": PROBE_TYPE,
+        "apikey": apikey,
+        "protocol": "JSON",
+        "transport": "MQTT",
+        "attributes": [{"object_id": "probe", "name": "probe", "type": "object"}],
+        "commands": [{"name": names.COMMAND, "type": "command"}],
+    }
+
+
+def _subscription(url: str) -> dict[str, Any]:
+    return {
+        "description": DESCRIPTION,
+        "subject": {
+            "entities": [{"id": PROBE_ID, "type": PROBE_TYPE}],
+            "condition": {"attrs": ["probe"]},
+        },
+        "notification": {"http": {"url": url}, "attrs": ["probe"]},
+    }
