@@ -102,6 +102,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
     replay.add_argument("--loop", action="store_true", help="start over at the end")
+    replay.add_argument("--odom-topic", metavar="TOPIC", help="of a ROS bag")
+    replay.add_argument("--scan-topic", metavar="TOPIC", help="of a ROS bag")
+    replay.add_argument(
+        "--bag-time",
+        action="store_true",
+        help="a ROS bag plays by when it was recorded, not by its stamps",
+    )
     replay.add_argument(
         "--force", action="store_true", help="also where a live robot may be listening"
     )

@@ -163,6 +163,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:
     """Recorded logs of real robots, played like any robot."""
+    from iveg.adapters.bags import BagTopics
     from iveg.emulator.replay import run_replay
 
     await _refuse_replay(options, settings)
@@ -178,6 +179,8 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
             slow_s=settings.feedback_slow_s,
             stand_s=settings.feedback_stand_s,
             state_directory=Path(directory),
+            topics=BagTopics(options.odom_topic, options.scan_topic),
+            bag_time=options.bag_time,
         )
 
 

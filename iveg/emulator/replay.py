@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iveg.adapters import clock
+from iveg.adapters.bags import BagTopics
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Twist2D
@@ -24,9 +25,9 @@ from iveg.domain.observations import (
     Origin,
 )
 from iveg.domain.profiles import profile_of
-from iveg.emulator.logs import LogReader
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
+from iveg.emulator.recordings import open_recording
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
@@ -69,6 +70,8 @@ async def run_replay(
     slow_s: float = 1.0,
     stand_s: float = 3.0,
     state_directory: Path,
+    topics: BagTopics | None = None,
+    bag_time: bool = False,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -83,12 +86,18 @@ async def run_replay(
         slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
         stand_s: See above.
         state_directory: Where the robots keep their hold files; made if missing.
+        topics: Which of a ROS bag are read; see ``open_recording``.
+        bag_time: Bags play by when they were recorded; see ``open_recording``.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
     """
     _check(files, robots, speed)
-    playbacks = [Playback(LogReader(file).entries, loop=loop) for file in files]
+    recordings = [
+        open_recording(file, profile_of(robot_id).laser, topics, bag_time=bag_time)
+        for file, robot_id in zip(files, robots, strict=True)
+    ]
+    playbacks = [Playback(one.entries, loop=loop) for one in recordings]
     settings = ReplaySettings(
         address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory
     )

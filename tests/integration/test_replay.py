@@ -5,7 +5,7 @@ import gzip
 import itertools
 import logging
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -21,7 +21,9 @@ from iveg.domain.observations import (
 )
 from iveg.emulator.replay import run_replay
 from tests import data
+from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.integration.emulator_cloud import Cloud, broker, running, until
+from tests.processes import Site
 
 AISLE = Path(data.__file__).parent / "aisle.jsonl"
 REAL = Path(__file__).resolve().parents[3] / "shared" / "data"
@@ -198,3 +200,45 @@ async def test_the_logs_of_the_real_robot_play_together_and_cleanly(
     assert cloud.of("AGI", LaserScan)[-1].ranges.size == 897
     assert cloud.problems == []
     assert caplog.records == []
+
+
+@pytest.mark.parametrize(
+    ("write", "name"),
+    [
+        (ros1_bag, "log.bag"),
+        (db3_bag, "run"),
+        (mcap_bag, "run"),
+        (bag_directory, "run"),
+    ],
+)
+async def test_a_bag_of_ros_is_played_like_any_recording(
+    address: BrokerAddress,
+    cloud: Cloud,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    write: Callable[[Path, Sequence[Said]], Path],
+    name: str,
+) -> None:
+    bag = write(tmp_path / name, drive(2.0))
+
+    with caplog.at_level(logging.WARNING):
+        await asyncio.wait_for(replay(address, tmp_path, bag, speed=4.0), 30.0)
+
+    scan = cloud.of("AGI", LaserScan)[-1]
+    assert farthest(cloud) == pytest.approx(1.9, abs=0.05)
+    assert scan.ranges.tolist() == [1.0, float("inf"), float("inf"), 2.5]
+    assert cloud.problems == []
+    assert caplog.records == []
+
+
+def test_a_broken_bag_ends_the_command_with_one_sentence_and_status_two(
+    place: Site,
+) -> None:
+    file = place.directory / "log.mcap"
+    file.write_bytes(b"no bag")
+
+    replaying = place.start("replay", str(file), "--robot", "AGI", "--force")
+
+    assert replaying.process.wait(30.0) == 2
+    (said,) = replaying.text().splitlines()
+    assert "log.mcap: cannot be read" in said

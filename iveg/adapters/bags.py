@@ -1,0 +1,226 @@
+"""The door to ROS bags: odometry and laser scans out of recordings of ROS 1 and ROS 2.
+
+Reads ``.db3`` and ``.mcap`` files, directories of ROS 2 and ``.bag`` files through
+rosbags.  The two messages are alike in all releases of ROS, so their usual definitions
+serve and no other definition of a bag is looked at.  What is left out: transforms; the
+odometry frame is taken for ``map``, and the laser sits where the robot's profile says.
+"""
+
+import logging
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.stores.ros2_humble import nav_msgs__msg__Odometry as RosOdometry
+from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__LaserScan as RosScan
+
+from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import LaserScan, Odometry, Origin
+
+_log = logging.getLogger(__name__)
+ODOMETRY, SCAN = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"
+_FARTHEST_M, _FASTEST, _MOST_BEAMS = 1e6, 1e3, 4096
+_LONGEST_RANGE_M = 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopics:
+    """Which topics are read; None takes the only one of its type."""
+
+    odometry: str | None = None
+    scan: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BagMessage:
+    """One message of a bag.
+
+    Attributes:
+        logged_s: When the recorder wrote it (s).
+        stamp_s: What its header says (s); 0 where the sender filled nothing in.
+    """
+
+    logged_s: float
+    stamp_s: float
+    observation: Odometry | LaserScan
+
+
+class Bag:
+    """One recording of ROS, read from its start as often as asked, never held whole.
+
+    Args:
+        path: A file ``.db3``, ``.mcap`` or ``.bag``, or a directory of ROS 2.
+        topics: Which to read.
+        mount: The laser's pose in ``base_link``.
+
+    Raises:
+        DataFileError: it cannot be read, or its topics leave open which is meant.
+    """
+
+    def __init__(self, path: Path, topics: BagTopics, mount: Pose2D) -> None:
+        self._path = path
+        self._mount = mount
+        self._is_ros1 = path.suffix == ".bag" and not path.is_dir()
+        self._store = get_typestore(
+            Stores.ROS1_NOETIC if self._is_ros1 else Stores.ROS2_HUMBLE
+        )
+        self._reported: set[str] = set()
+        with self._open() as reader:
+            found = reader.connections
+            odometry = self._choose(found, ODOMETRY, topics.odometry, "--odom-topic")
+            scan = self._choose(found, SCAN, topics.scan, "--scan-topic")
+        if odometry is None:
+            raise self._unusable(f"holds no topic of type {ODOMETRY}")
+        self._topics = {odometry: ODOMETRY} | ({scan: SCAN} if scan else {})
+
+    def messages(self) -> Iterator[BagMessage]:
+        """All messages of both topics, in the order in which they were recorded.
+
+        A message that cannot be used is skipped and reported once a topic.
+
+        Raises:
+            DataFileError: the recording breaks off.
+        """
+        with self._open() as reader:
+            wanted = [
+                one
+                for one in reader.connections
+                if self._topics.get(one.topic) == one.msgtype
+            ]
+            records = reader.messages(connections=wanted)
+            while True:
+                try:
+                    connection, logged, data = next(records)
+                except StopIteration:
+                    return
+                except Exception as error:  # whatever a damaged file provokes
+                    raise self._unreadable(error) from error
+                message = self._message(connection, logged, bytes(data))
+                if message is not None:
+                    yield message
+
+    # --- the file -----------------------------------------------------------------
+
+    @contextmanager
+    def _open(self) -> Iterator[Ros1Reader | Ros2Reader]:
+        reader: Ros1Reader | Ros2Reader
+        with ExitStack() as stack:
+            try:
+                reader = (
+                    Ros1Reader(self._path) if self._is_ros1 else Ros2Reader(self._path)
+                )
+                stack.enter_context(reader)
+            except Exception as error:  # whatever a foreign file provokes
+                raise self._unreadable(error) from error
+            yield reader
+
+    def _choose(
+        self, found: list[Connection], kind: str, wanted: str | None, option: str
+    ) -> str | None:
+        """The topic to read; None when there is none of its type."""
+        topics = sorted({one.topic for one in found if one.msgtype == kind})
+        there = f"{kind}: {', '.join(topics) or 'none'}"
+        if wanted is not None:
+            if wanted not in topics:
+                raise self._unusable(f"{option} {wanted} is not among those of {there}")
+            return wanted
+        if len(topics) > 1:
+            raise self._unusable(f"{option} must name one of those of {there}")
+        return topics[0] if topics else None
+
+    def _unusable(self, reason: str) -> DataFileError:
+        return DataFileError(str(self._path), "", f"{reason}.")
+
+    def _unreadable(self, error: Exception) -> DataFileError:
+        said = " ".join(str(error).split()) or type(error).__name__
+        return self._unusable(f"cannot be read: {said.rstrip('.')}")
+
+    # --- its messages -------------------------------------------------------------
+
+    def _message(
+        self, connection: Connection, logged: int, data: bytes
+    ) -> BagMessage | None:
+        try:
+            stamp_s, observation = self._read(connection.msgtype, data)
+        except Exception as error:  # whatever foreign bytes provoke
+            if connection.topic not in self._reported:
+                self._reported.add(connection.topic)
+                _log.warning(
+                    "%s, %s: unusable messages are skipped, such as at %d ns: %s",
+                    self._path,
+                    connection.topic,
+                    logged,
+                    str(error) or type(error).__name__,
+                )
+            return None
+        return BagMessage(logged / 1e9, stamp_s, observation)
+
+    def _read(self, kind: str, data: bytes) -> tuple[float, Odometry | LaserScan]:
+        store = self._store
+        read = store.deserialize_ros1 if self._is_ros1 else store.deserialize_cdr
+        message = read(data, kind)
+        if kind == ODOMETRY:
+            odometry = cast("RosOdometry", message)
+            return _stamp_of(odometry), _odometry(odometry)
+        scan = cast("RosScan", message)
+        return _stamp_of(scan), _scan(scan, self._mount)
+
+
+def _stamp_of(message: RosOdometry | RosScan) -> float:
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec / 1e9)
+
+
+def _odometry(message: RosOdometry) -> Odometry:
+    """Seen from above: pose in the odometry frame, twist in the robot's own."""
+    place, turned = message.pose.pose.position, message.pose.pose.orientation
+    twist = message.twist.twist
+    x, y, z, w = turned.x, turned.y, turned.z, turned.w
+    if not 0.0 < x * x + y * y + z * z + w * w < math.inf:
+        raise UnreadableError("bad_orientation", "a quaternion without length")
+    yaw = math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    _bounded(_FARTHEST_M, place.x, place.y)
+    _bounded(_FASTEST, twist.linear.x, twist.angular.z)
+    return Odometry(
+        "",
+        Origin(),
+        Pose2D(place.x, place.y, yaw),
+        Twist2D(twist.linear.x, twist.angular.z),
+    )
+
+
+def _scan(message: RosScan, mount: Pose2D) -> LaserScan:
+    """Whatever is no distance (nan, inf, below zero) is no return."""
+    ranges = np.array(message.ranges, np.float32)
+    if ranges.size > _MOST_BEAMS:
+        raise UnreadableError("too_long", f"more than {_MOST_BEAMS} ranges")
+    ranges[~((ranges >= 0.0) & (ranges <= _FARTHEST_M))] = np.inf
+    least, most = message.range_min, message.range_max
+    _bounded(_FARTHEST_M, message.angle_min, message.angle_increment, least)
+    if not most > 0.0:
+        raise UnreadableError("bad_range", "range_max must be more than 0")
+    most = min(most, _LONGEST_RANGE_M)
+    return LaserScan(
+        "",
+        Origin(),
+        message.angle_min,
+        message.angle_increment,
+        max(0.0, least),
+        most,
+        mount,
+        ranges,
+    )
+
+
+def _bounded(limit: float, *numbers: float) -> None:
+    if not all(abs(number) <= limit for number in numbers):
+        raise UnreadableError("out_of_bounds", "a number that is none or too large")
