@@ -63,11 +63,12 @@ class DepthPicture:
 
     def points(self, index: Indices) -> Floats:
         """The cloud's points p = (p_x, p_y, p_z) at pc_index; shape (n, 3), (m)."""
-        rows, columns = np.divmod(index, self.camera.width)
+        rows = index // self.camera.width
+        columns = index - rows * self.camera.width
         z = self.depth.reshape(-1)[index].astype(np.float64)
         x = (columns - self.camera.cx) / self.camera.focal * z
         y = (rows - self.camera.cy) / self.camera.focal * z
-        return np.stack((x, y, z), axis=1)
+        return np.stack((x, y, z)).T
 
     def continuous(self, index: Indices, most: float) -> NDArray[np.bool_]:
         """|p_z,k - p_z,k-1| ≤ τ_max: whether each depth agrees with its left neighbour.
@@ -86,7 +87,7 @@ class DepthPicture:
         here = depth[index].astype(np.float64)
         left = depth[index - 1].astype(np.float64)
         measured = (here > 0.0) & (left > 0.0) & (here < np.inf) & (left < np.inf)
-        jump = np.subtract(here, left, out=np.full(here.shape, np.inf), where=measured)
+        jump = np.subtract(here, left, out=np.full(here.shape, np.nan), where=measured)
         near: NDArray[np.bool_] = np.abs(jump) <= most
         return near & (index % self.camera.width > 0)
 

@@ -1,14 +1,15 @@
 """Mask and depth together: the 3D box, its centre, and its place in the work frame.
 
 Source: the seed paper, section "Spatial grounding", from the 3D box to P_work, and the
-table of object parameters; Algorithm 1's ``SpatialGrounding``.  What it leaves out: the
-box holds the *visible* surface only, so its centre stands before the true one by about
-half the target's depth (0.12 m for a person).
+table of object parameters; Algorithm 1's ``SpatialGrounding``.  The printed box holds
+the *visible* surface only, so its centre stands before the true one: by about 0.18 m
+for a person, by half its length for a robot seen from behind.  ``Grounding.hidden``
+mends it where it is known.
 """
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -60,16 +61,19 @@ class Grounding:
         iterations: T; ``rim`` of them are not grown back (``mask.eroded``).
         factors: e_c by class, 0 to 100; ``factor`` for any other.
         most_jump: τ_max (m).
+        hidden: How far a class goes on behind what is seen of it (m), added to the far
+            face; none by default, which is the paper's box.  0.36 fits a person.
     """
 
     p_min: float = 0.80
     least_kernel: float = 9.0
     most_kernel: float = 0.006
     iterations: int = 3
-    rim: int = 3
+    rim: int = 2
     factors: Mapping[str, float] = field(default_factory=dict)
     factor: float = 0.0
     most_jump: float = 0.10
+    hidden: Mapping[str, float] = field(default_factory=dict)
 
     def cross(self, class_id: str, width: int) -> int:
         """Edge of the structuring element (pixels) in a box ``width`` wide."""
@@ -156,6 +160,8 @@ def ground(
     if not accepted.size:
         return Ungrounded(segment.class_id, segment.probability, "no_depth")
     box = _hull(picture.points(accepted))
+    behind = settings.hidden.get(segment.class_id, 0.0)
+    box = replace(box, zmax=box.zmax + behind)
     return Grounded(segment.class_id, segment.probability, box, accepted.size)
 
 
