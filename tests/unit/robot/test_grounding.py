@@ -1,0 +1,366 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Box3D, Pose2D
+from iveg.domain.observations import Detection, Origin
+from iveg.domain.profiles import AGI
+from iveg.robot.grounding.cloud import (
+    DepthPicture,
+    Pinhole,
+    cloud_index,
+    top_left,
+)
+from iveg.robot.grounding.locate import (
+    Grounded,
+    Grounding,
+    Mount,
+    Segment,
+    Ungrounded,
+    ground,
+    look,
+    to_detection,
+)
+from iveg.robot.grounding.mask import (
+    Mask,
+    belongs_to_mask,
+    eroded,
+    kernel_area,
+    kernel_size,
+    read_mask,
+    write_mask,
+)
+
+LENS = Pinhole(40, 30, 20.0, 19.5, 14.5)
+AS_IS = Grounding(iterations=0, rim=0)
+MOUNT = Mount(Pose2D(0.4, 0.0, 0.0), 0.6)
+
+
+def picture(depth: float = 2.0) -> NDArray[np.float32]:
+    return np.full((LENS.height, LENS.width), depth, np.float32)
+
+
+def segment(
+    mask: Mask | None = None, *, left: int = 10, top: int = 5, probability: float = 0.9
+) -> Segment:
+    body = np.ones((8, 6), np.bool_) if mask is None else mask
+    height, width = body.shape
+    centre = left + width / 2, top + height / 2
+    return Segment("farmer", probability, *centre, width, height, write_mask(body))
+
+
+def grounded(
+    seen: Segment, depth: NDArray[np.float32], settings: Grounding = AS_IS
+) -> Grounded:
+    answer = ground(seen, DepthPicture(LENS, depth), settings)
+    assert isinstance(answer, Grounded)
+    return answer
+
+
+def refusal(seen: Segment, depth: NDArray[np.float32]) -> str:
+    answer = ground(seen, DepthPicture(LENS, depth), AS_IS)
+    assert isinstance(answer, Ungrounded)
+    return answer.reason
+
+
+def drawn(picture: str) -> Mask:
+    rows = picture.split()
+    return np.array([[cell == "#" for cell in row] for row in rows])
+
+
+# --- bitset ---------------------------------------------------------------------------
+
+
+def test_the_first_pixel_is_the_highest_bit_and_rows_follow_without_padding() -> None:
+    bits = bytes([0b1000_0001, 0b0100_0000])
+
+    assert [n for n in range(15) if belongs_to_mask(bits, 5, n % 5, n // 5)] == [
+        0,
+        7,
+        9,
+    ]
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_a_mask_with_too_few_or_too_many_bytes_is_refused(count: int) -> None:
+    with pytest.raises(UnreadableError, match=f"{count} bytes for 5 × 3 pixels"):
+        read_mask(bytes(count), 5, 3)
+
+
+@pytest.mark.parametrize(("width", "height"), [(0, 4), (4, -1), (10**6, 10**6)])
+def test_a_mask_of_no_possible_size_is_refused(width: int, height: int) -> None:
+    with pytest.raises(UnreadableError, match="bad_mask_size"):
+        read_mask(b"", width, height)
+
+
+# --- kernel and erosion ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("factor", "area"), [(0.0, 49.0), (50.0, 24.5), (90.0, 9.0), (100.0, 9.0)]
+)
+def test_the_printed_kernel_shrinks_to_its_least_as_the_factor_grows(
+    factor: float, area: float
+) -> None:
+    assert kernel_area(factor, 9.0, 49.0) == area
+
+
+@pytest.mark.parametrize("factor", [-0.1, 100.1, math.nan])
+def test_an_erosion_factor_outside_the_percentages_is_refused(factor: float) -> None:
+    with pytest.raises(UnreadableError, match="bad_erosion_factor"):
+        kernel_area(factor, 9.0, 49.0)
+
+
+@pytest.mark.parametrize(("area", "edge"), [(0.0, 1), (8.9, 2), (9.0, 3), (24.5, 4)])
+def test_the_cross_is_as_wide_as_the_floor_of_the_areas_root(
+    area: float, edge: int
+) -> None:
+    assert kernel_size(area) == edge
+
+
+def test_a_class_with_a_factor_of_its_own_is_eroded_with_a_cross_of_its_own() -> None:
+    settings = Grounding(factors={"AGII": 75.0})
+
+    assert settings.cross("farmer", 200) == 15
+    assert settings.cross("AGII", 200) == 7
+
+
+def test_opening_takes_a_stalk_off_but_for_an_arm_and_rounds_the_corners() -> None:
+    mask = drawn(".........  .#####...  .########  .#####...  .#####...  .........")
+    body = drawn(".........  ..####...  .######..  .#####...  ..###....  .........")
+
+    np.testing.assert_array_equal(eroded(mask, 3, 1), body)
+
+
+def test_the_formula_as_printed_would_keep_the_stalk_and_lose_the_body() -> None:
+    mask = drawn(".........  .#####...  .########  .#####...  .#####...  .........")
+
+    printed = mask & ~eroded(mask, 3, 1)
+
+    assert printed[2, 7:].all()
+    assert not printed[2, 2:6].any()
+
+
+def test_an_opening_leaves_an_arm_in_a_touching_leaf_and_the_rim_takes_it_away() -> (
+    None
+):
+    mask = np.zeros((40, 40), np.bool_)
+    mask[5:35, 5:25] = True
+    mask[16:23, 25:40] = True
+
+    assert eroded(mask, 3, 4)[:, 25:].any()
+    assert not eroded(mask, 3, 4, rim=4)[:, 25:].any()
+    assert eroded(mask, 3, 4, rim=4)[20, 15]
+
+
+def test_a_target_too_small_to_erode_is_kept_rather_than_lost() -> None:
+    mask = np.ones((3, 2), np.bool_)
+
+    np.testing.assert_array_equal(eroded(mask, 7, 3, rim=2), mask)
+
+
+def test_an_even_cross_opens_without_moving_the_body() -> None:
+    mask = np.zeros((12, 12), np.bool_)
+    mask[2:10, 3:9] = True
+
+    inside = eroded(mask, 4, 1)
+
+    assert not (inside & ~mask).any()
+    assert inside[2].any()
+    assert inside[9].any()
+    assert inside[:, 3].any()
+    assert inside[:, 8].any()
+
+
+# --- cloud index and filter -----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("centre", "size", "corner"),
+    [((13.0, 9.0), (6, 8), (10, 5)), ((12.5, 9.5), (5, 9), (10, 5))],
+)
+def test_the_corner_is_half_a_box_up_and_left_of_the_centre(
+    centre: tuple[float, float], size: tuple[int, int], corner: tuple[int, int]
+) -> None:
+    assert top_left(*centre, *size) == corner
+
+
+def test_a_pixel_of_the_mask_finds_its_point_in_the_cloud() -> None:
+    mask = drawn("..  .#")
+
+    assert cloud_index(mask, (10, 5), LENS).tolist() == [(1 + 5) * 40 + (1 + 10)]
+
+
+def test_what_a_box_holds_beyond_the_picture_is_left_out() -> None:
+    mask = np.ones((4, 4), np.bool_)
+
+    assert cloud_index(mask, (-3, -2), LENS).tolist() == [0, 40]
+    assert cloud_index(mask, (39, 29), LENS).tolist() == [29 * 40 + 39]
+    assert cloud_index(mask, (50, 5), LENS).size == 0
+    assert cloud_index(mask, (5, -9), LENS).size == 0
+
+
+@pytest.mark.parametrize(("jump", "accepted"), [(0.25, True), (0.2501, False)])
+def test_a_depth_may_differ_from_its_left_neighbour_by_the_bound_and_no_more(
+    jump: float, accepted: bool
+) -> None:
+    depth = picture(2.0)
+    depth[5, 10:] = 2.0 + jump
+
+    found = DepthPicture(LENS, depth).continuous(np.array([5 * 40 + 10]), 0.25)
+
+    assert found.tolist() == [accepted]
+
+
+@pytest.mark.parametrize("hole", [0.0, -1.0, math.nan, math.inf, -math.inf])
+def test_a_hole_is_never_accepted_and_vouches_for_nobody(hole: float) -> None:
+    depth = picture()
+    depth[5, 10] = hole
+    around = np.array([5 * 40 + 9, 5 * 40 + 10, 5 * 40 + 11])
+
+    found = DepthPicture(LENS, depth).continuous(around, math.inf)
+
+    assert found.tolist() == [True, False, False]
+
+
+def test_the_first_column_has_no_neighbour_in_the_row_above() -> None:
+    index = np.array([0, 39, 40, 41])
+
+    accepted = DepthPicture(LENS, picture()).continuous(index, 0.1)
+
+    assert accepted.tolist() == [False, True, False, True]
+
+
+def test_depth_of_another_shape_than_the_camera_is_refused() -> None:
+    with pytest.raises(UnreadableError, match=r"\(30, 41\) instead of \(30, 40\)"):
+        DepthPicture(LENS, np.zeros((30, 41), np.float32))
+
+
+# --- box ------------------------------------------------------------------------------
+
+
+def test_the_box_spans_the_accepted_points_in_the_optical_frame() -> None:
+    depth = picture(2.0)
+    depth[5:9] = 2.05
+
+    found = grounded(segment(), depth)
+
+    left, right = (10 - 19.5) / 20 * 2.05, (15 - 19.5) / 20 * 2.0
+    top, bottom = (5 - 14.5) / 20 * 2.05, (12 - 14.5) / 20 * 2.0
+    assert found.points == 48
+    assert found.box == Box3D(
+        pytest.approx(left),
+        pytest.approx(right),
+        pytest.approx(top),
+        pytest.approx(bottom),
+        2.0,
+        pytest.approx(2.05),
+    )
+    assert found.centre == pytest.approx(
+        ((left + right) / 2, (top + bottom) / 2, 2.025)
+    )
+    assert found.dimensions == pytest.approx((right - left, bottom - top, 0.05))
+
+
+def test_a_crop_row_seen_past_the_target_does_not_stretch_its_box() -> None:
+    depth = picture(2.0)
+    depth[:, 15] = 6.0
+
+    assert grounded(segment(), depth).box.zmax == 2.0
+
+
+def test_what_is_known_to_be_hidden_moves_the_far_face_only() -> None:
+    seen = grounded(segment(), picture()).box
+
+    whole = grounded(segment(), picture(), replace(AS_IS, hidden={"farmer": 0.4})).box
+
+    assert whole == replace(seen, zmax=2.4)
+
+
+@pytest.mark.parametrize(("probability", "taken"), [(0.8, True), (0.7999999, False)])
+def test_the_least_probability_is_inclusive(probability: float, taken: bool) -> None:
+    answer = ground(segment(probability=probability), DepthPicture(LENS, picture()))
+
+    assert isinstance(answer, Grounded) is taken
+
+
+def test_a_target_without_a_place_says_why() -> None:
+    nothing = np.zeros((8, 6), np.bool_)
+
+    assert refusal(segment(probability=0.5), picture()) == "unsure"
+    assert refusal(segment(nothing), picture()) == "empty"
+    assert refusal(segment(left=60), picture()) == "empty"
+    assert refusal(segment(), picture(0.0)) == "no_depth"
+
+
+@pytest.mark.parametrize("probability", [math.nan, -0.1, 1.1])
+def test_a_probability_that_is_none_is_refused(probability: float) -> None:
+    with pytest.raises(UnreadableError, match="bad_probability"):
+        refusal(segment(probability=probability), picture())
+
+
+def test_a_centre_that_is_nowhere_is_refused() -> None:
+    with pytest.raises(UnreadableError, match="bad_centre"):
+        refusal(replace(segment(), x_c=math.inf), picture())
+
+
+# --- work frame -----------------------------------------------------------------------
+
+
+def place(robot: Pose2D | None) -> Detection:
+    """A target 2 m ahead, 0.3 m to the right, 0.1 m below the camera."""
+    box = Box3D(0.2, 0.4, -0.4, 0.6, 1.9, 2.1)
+    return to_detection(Grounded("farmer", 0.9, box, 7), MOUNT, robot)
+
+
+def test_right_of_the_camera_is_minus_y_of_base_link_and_down_is_minus_z() -> None:
+    found = place(None)
+
+    assert found.frame_id == "base_link"
+    assert (found.class_id, found.probability) == ("farmer", 0.9)
+    assert found.box.centre == pytest.approx((2.4, -0.3, 0.5))
+    assert (found.box.zmin, found.box.zmax) == pytest.approx((0.0, 1.0))
+
+
+def test_a_robot_that_looks_along_y_puts_the_target_there_in_map() -> None:
+    found = place(Pose2D(10.0, 20.0, math.pi / 2))
+
+    assert found.frame_id == "map"
+    assert found.box.centre == pytest.approx((10.3, 22.4, 0.5))
+    assert found.box.xmax - found.box.xmin == pytest.approx(0.2)
+
+
+def test_a_camera_that_looks_left_sees_what_stands_left() -> None:
+    mount = Mount(Pose2D(0.0, 0.0, math.pi / 2), 0.6)
+    box = Box3D(-0.1, 0.1, -0.1, 0.1, 1.9, 2.1)
+
+    found = to_detection(Grounded("farmer", 0.9, box, 7), mount)
+
+    assert found.box.centre == pytest.approx((0.0, 2.0, 0.6))
+
+
+def test_a_profile_says_where_its_camera_sits() -> None:
+    assert Mount.of(AGI) == MOUNT
+
+
+def test_a_look_reports_the_placed_and_counts_the_sure_that_have_no_place() -> None:
+    depth = picture()
+    depth[:, 20:] = 0.0
+    segments = [
+        segment(),
+        segment(left=30),
+        segment(probability=0.3),
+        replace(segment(), bits=b""),
+    ]
+
+    frame = look(
+        "AGI", Origin(seq=3), segments, DepthPicture(LENS, depth), MOUNT, AS_IS
+    )
+
+    assert (frame.robot_id, frame.origin.seq) == ("AGI", 3)
+    assert [found.frame_id for found in frame.detections] == ["base_link"]
+    assert frame.unreadable == 2
