@@ -1,5 +1,5 @@
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -252,14 +252,7 @@ def test_the_box_spans_the_accepted_points_in_the_optical_frame() -> None:
     left, right = (10 - 19.5) / 20 * 2.05, (15 - 19.5) / 20 * 2.0
     top, bottom = (5 - 14.5) / 20 * 2.05, (12 - 14.5) / 20 * 2.0
     assert found.points == 48
-    assert found.box == Box3D(
-        pytest.approx(left),
-        pytest.approx(right),
-        pytest.approx(top),
-        pytest.approx(bottom),
-        2.0,
-        pytest.approx(2.05),
-    )
+    assert astuple(found.box) == pytest.approx((left, right, top, bottom, 2.0, 2.05))
     assert found.centre == pytest.approx(
         ((left + right) / 2, (top + bottom) / 2, 2.025)
     )
