@@ -135,17 +135,18 @@ async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
 ) -> None:
     port = free_port()
     heard = Heard(port, "/a")
-    async with running(heard.link):
-        async with mqtt_broker("127.0.0.1", port):
+    async with contextlib.AsyncExitStack() as first:
+        await first.enter_async_context(mqtt_broker("127.0.0.1", port))
+        async with running(heard.link):
             await until(lambda: heard.link.connected)
-        await until(lambda: heard.losses == 1)
-        assert not heard.link.connected
-        async with mqtt_broker("127.0.0.1", port):
-            await until(lambda: heard.link.connected)
-            await heard.link.publish("/a", b"again")
-            await until(lambda: heard.messages)
-            assert (heard.connects, heard.losses) == (2, 1)
-            assert len(losses_told(caplog)) == 1
+            await first.aclose()
+            await until(lambda: heard.losses == 1)
+            async with mqtt_broker("127.0.0.1", port):
+                await until(lambda: heard.link.connected)
+                await heard.link.publish("/a", b"again")
+                await until(lambda: heard.messages)
+                assert (heard.connects, heard.losses) == (2, 1)
+                assert len(losses_told(caplog)) == 1
 
 
 async def test_a_broker_that_is_not_there_yet_is_told_once_and_found_when_it_comes(

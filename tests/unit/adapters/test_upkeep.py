@@ -12,7 +12,7 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.upkeep import Upkeep
-from iveg.domain.observations import Odometry
+from iveg.domain.observations import Odometry, Received
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
 from iveg.pipeline.chain import Chain
