@@ -94,7 +94,16 @@ def _parser() -> argparse.ArgumentParser:
     emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
     )
-    emulator.add_argument("--fault-port", type=int, metavar="PORT")
+    emulator.add_argument(
+        "--fault",
+        nargs="+",
+        default=[],
+        metavar="[ROBOT:]FIELD=VALUE",
+        help="what is wrong from the start, such as drop_percent=10 AGI:deaf=true",
+    )
+    emulator.add_argument(
+        "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
+    )
     replay = commands.add_parser("replay", help="recorded logs as robots")
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")
     replay.add_argument(

@@ -129,6 +129,7 @@ async def fiware(settings: Settings) -> None:
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     """Robots, people and air that are not there."""
     from iveg.emulator.fleet import run_emulator
+    from iveg.emulator.orders import read_words
 
     robots = list(settings.robots)
     if options.robots is not None:
@@ -149,6 +150,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 stand_s=settings.feedback_stand_s,
                 state_directory=Path(directory),
                 held=options.held,
+                faults=read_words(options.fault, robots),
                 fault_port=options.fault_port,
             ),
             name="emulator",

@@ -4,13 +4,15 @@ It has three slots a period: drive and odometry, laser, camera.
 """
 
 import asyncio
-from dataclasses import dataclass
+from contextlib import AsyncExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
-from iveg.emulator.faults import FaultOrder
+from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import every
+from iveg.emulator.relay import Relay
 from iveg.emulator.world import REST, Rig, World
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
@@ -19,6 +21,14 @@ SLOTS = 3
 LONGEST_STEP_S = 0.1
 """A machine that slept must not let a robot leap."""
 _NAVIGATION_EVERY_S = 1.0
+LINK_FIELDS = {
+    "drop_percent",
+    "duplicate_percent",
+    "reorder_percent",
+    "delay_ms",
+    "jitter_ms",
+}
+"""Fields of a fault order that its radio obeys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,17 +53,32 @@ class FleetSettings:
 
 
 class EmulatedRobot:
-    """One rig, its safety node, and the order in which they are asked."""
+    """One rig, its safety node, and the order in which they are asked.
 
-    def __init__(self, rig: Rig, world: World, settings: FleetSettings) -> None:
+    Args:
+        relay: Its way to the broker where that may be bad; None leads straight there.
+
+    Attributes:
+        started: Set when orders are obeyed.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        world: World,
+        settings: FleetSettings,
+        relay: Relay | None = None,
+    ) -> None:
         self.robot_id = rig.robot_id
+        self.started = asyncio.Event()
+        self._relay = relay
         self._rig = rig
         self._world = world
         self._settings = settings
         self._node = self._new_node(held=settings.held)
         self._node_task: asyncio.Task[None] | None = None
         self._tasks: asyncio.TaskGroup
-        self._started = 0.0
+        self._run_began = 0.0
         self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
         self._is_odometry_frozen = False
 
@@ -61,7 +86,7 @@ class EmulatedRobot:
         settings = self._settings
         return RobotNode(
             self.robot_id,
-            address=settings.address,
+            address=self._relay.address if self._relay else settings.address,
             apikey=settings.apikey,
             profile=self._rig.profile,
             hold_file=settings.state_directory / f"{self.robot_id}.holds.json",
@@ -72,9 +97,9 @@ class EmulatedRobot:
             held=held,
         )
 
-    async def run(self, started: float, phase: float) -> None:
-        """Drive and sense until cancelled; ``started`` is when the run began."""
-        self._started = started
+    async def run(self, began: float, phase: float) -> None:
+        """Drive and sense until cancelled; ``began`` is when the run began."""
+        self._run_began = began
         slots = (self._drive, self._scan, self._look)
         turn = 0
 
@@ -85,15 +110,19 @@ class EmulatedRobot:
 
         if not self._settings.held:
             self._node.release_locally()
-        async with asyncio.TaskGroup() as self._tasks:
+        async with AsyncExitStack() as stack:
+            if self._relay is not None:
+                await stack.enter_async_context(self._relay)
+            self._tasks = await stack.enter_async_context(asyncio.TaskGroup())
             self._start_node()
+            self.started.set()
             await asyncio.sleep(phase)
             await every(1.0 / self._settings.rate_hz / SLOTS, slot)
 
     # --- the slots ----------------------------------------------------------------
 
     def _now(self) -> float:
-        return clock.now().mono - self._started
+        return clock.now().mono - self._run_began
 
     def _drive(self, dt: float) -> None:
         now, node = self._now(), self._node
@@ -130,8 +159,8 @@ class EmulatedRobot:
         node.deaf = node.deaf if order.deaf is None else order.deaf
         if order.clock_offset_s is not None:
             node.clock_offset_s = order.clock_offset_s
-        if order.freeze_odometry is not None:
-            self._is_odometry_frozen = order.freeze_odometry
+        self._freeze(order)
+        self._disturb(order)
         self._blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
@@ -142,6 +171,21 @@ class EmulatedRobot:
         if order.revive and self._node_task is None:
             self._node = self._new_node(held=True)
             self._start_node()
+
+    def _freeze(self, order: FaultOrder) -> None:
+        if order.freeze_odometry is not None:
+            self._is_odometry_frozen = order.freeze_odometry in (True, "silent")
+
+    def _disturb(self, order: FaultOrder) -> None:
+        """The radio's part; without a relay there is no order that names it."""
+        if self._relay is None:
+            return
+        radio = self._relay.radio
+        told = order.model_dump(include=LINK_FIELDS, exclude_none=True)
+        radio.faults = replace(radio.faults, **told)
+        if order.freeze_odometry is not None:
+            repeats = order.freeze_odometry == "repeat"
+            radio.faults = replace(radio.faults, repeats_odometry=repeats)
 
     def _blind(self, order: FaultOrder) -> None:
         if order.hide_people is not None:

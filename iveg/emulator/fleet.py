@@ -9,6 +9,8 @@ import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import DataFileError
@@ -20,9 +22,12 @@ from iveg.emulator.emulated_robot import (
     EmulatedRobot,
     FleetSettings,
 )
-from iveg.emulator.faults import FaultOrder, PersonOrder, open_faults
+from iveg.emulator.faults import open_faults
 from iveg.emulator.layout import lay_out
+from iveg.emulator.orders import FaultOrder, Order
 from iveg.emulator.pacing import every
+from iveg.emulator.radio import Radio
+from iveg.emulator.relay import Relay
 from iveg.emulator.scenarios import Incident, scenario_named
 from iveg.emulator.world import World, climate_at
 from iveg.ngsi import names
@@ -48,6 +53,7 @@ async def run_emulator(
     state_directory: Path,
     held: bool = False,
     rate_hz: float = 30.0,
+    faults: Sequence[FaultOrder] = (),
     fault_port: int | None = None,
     on_fault_port: Callable[[int], None] | None = None,
 ) -> None:
@@ -67,6 +73,7 @@ async def run_emulator(
         state_directory: Where the robots keep their hold files; made if missing.
         held: The robots stay held until somebody releases them.
         rate_hz: Of odometry, laser and camera each.
+        faults: What is wrong from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
         on_fault_port: Told which port it became.
 
@@ -83,29 +90,40 @@ async def run_emulator(
     settings = FleetSettings(
         address, apikey, uplink, slow_s, stand_s, state_directory, held, rate_hz
     )
-    fleet = Fleet(world, settings)
+    incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
+    is_radio_bad = bool(faults) or fault_port is not None
+    fleet = Fleet(world, settings, radio_seed=seed if is_radio_bad else None)
     if fault_port is None:
-        await fleet.run(layout.incidents)
+        await fleet.run(incidents)
         return
     server, port = await open_faults(fault_port, fleet.obey)
     async with server:
         _log.info("faults are taken on 127.0.0.1:%d", port)
         if on_fault_port is not None:
             on_fault_port(port)
-        await fleet.run(layout.incidents)
+        await fleet.run(incidents)
 
 
 class Fleet:
-    """The robots and people of a run, kept going in time."""
+    """The robots and people of a run, kept going in time.
 
-    def __init__(self, world: World, settings: FleetSettings) -> None:
+    Args:
+        radio_seed: Of the chance in the robots' radios, which then obey orders; None
+            leads the robots straight to the broker.
+    """
+
+    def __init__(
+        self, world: World, settings: FleetSettings, radio_seed: int | None = None
+    ) -> None:
         self._world = world
         self._settings = settings
         self._started = clock.now()
         settings.state_directory.mkdir(parents=True, exist_ok=True)
         self._robots = {
-            robot_id: EmulatedRobot(rig, world, settings)
-            for robot_id, rig in world.rigs.items()
+            robot_id: EmulatedRobot(
+                rig, world, settings, _relay(settings, robot_id, place, radio_seed)
+            )
+            for place, (robot_id, rig) in enumerate(world.rigs.items())
         }
 
     async def run(self, incidents: Sequence[Incident] = ()) -> None:
@@ -142,21 +160,19 @@ class Fleet:
             await every(_CLIMATE_EVERY_S, tell)
 
     async def _happen(self, incident: Incident) -> None:
-        robot = self._robots.get(incident.robot_id)
+        robot = self._robots.get(incident.order.robot)
         if robot is None:
             return
+        await robot.started.wait()
         await asyncio.sleep(incident.at_s)
-        order = FaultOrder(
-            robot=incident.robot_id, mute=incident.mute, deaf=incident.deaf
-        )
         while True:
-            _log.info("%s: mute %s, deaf %s", order.robot, order.mute, order.deaf)
-            robot.obey(order)
+            _log.info("%s", incident.order.model_dump_json(exclude_unset=True))
+            robot.obey(incident.order)
             if incident.every_s == 0.0:
                 return
             await asyncio.sleep(incident.every_s)
 
-    def obey(self, order: FaultOrder | PersonOrder) -> str | None:
+    def obey(self, order: Order) -> str | None:
         """Do what a fault order says.
 
         Returns:
@@ -172,3 +188,14 @@ class Fleet:
             return f"there are {len(self._world.people)} people, counted from 0"
         self._world.people[order.person].place(order.x, order.y, hold=order.hold)
         return None
+
+
+def _relay(
+    settings: FleetSettings, robot_id: str, place: int, seed: int | None
+) -> Relay | None:
+    """A robot's way to the broker; chance of its own, apart from the world's."""
+    if seed is None:
+        return None
+    devices = (f"{robot_id}_odom", robot_id)
+    topics = frozenset(names.measure_topic(settings.apikey, one) for one in devices)
+    return Relay(settings.address, Radio(topics, np.random.default_rng((seed, place))))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
+from iveg.emulator.orders import FaultOrder
 from iveg.emulator.people import Stop
 from iveg.emulator.routes import Route, Station, route_of
 
@@ -48,14 +49,11 @@ class Incident:
 
     Attributes:
         at_s: Seconds into the run; again every ``every_s`` where that is not 0.
-        mute: Whether the robot says nothing, and so gets no answer either; ``deaf``
-            whether it ignores what iVeg mandates; None leaves it.
+        order: What.
     """
 
     at_s: float
-    robot_id: str
-    mute: bool | None = None
-    deaf: bool | None = None
+    order: FaultOrder
     every_s: float = 0.0
 
 
@@ -209,7 +207,7 @@ _SCENARIOS = (
         "As demo; after 20 s AGII drives as it likes whatever the rule says.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
-        (Incident(20.0, "AGII", deaf=True),),
+        (Incident(20.0, FaultOrder(robot="AGII", deaf=True)),),
     ),
     Scenario(
         "noisy-crossing",
@@ -224,8 +222,8 @@ _SCENARIOS = (
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
         (
-            Incident(20.0, "AGII", mute=True, every_s=60.0),
-            Incident(30.0, "AGII", mute=False, every_s=60.0),
+            Incident(20.0, FaultOrder(robot="AGII", mute=True), every_s=60.0),
+            Incident(30.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
         ),
     ),
 )

@@ -1,14 +1,16 @@
 """The emulated fleet on a real broker, with a small iVeg that hears and answers."""
 
 import asyncio
+import itertools
 import json
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 import httpx
 import pytest
 
+from iveg.adapters import clock
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError, SettingsError
@@ -19,11 +21,13 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
     Odometry,
+    SafetyReport,
 )
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.emulated_robot import FleetSettings
 from iveg.emulator.fleet import Fleet, run_emulator
 from iveg.emulator.layout import lay_out
+from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scenarios import Incident, scenario_named
 from iveg.emulator.world import World
 from tests.integration.emulator_cloud import Cloud, broker, running, until
@@ -46,7 +50,7 @@ async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
         yield small
 
 
-class Faults:
+class FaultPort:
     """Speaks to the fault port."""
 
     def __init__(self) -> None:
@@ -68,7 +72,8 @@ def emulator(
     scenario: str = "nlos",
     robots: tuple[str, ...] = FLEET,
     held: bool = False,
-    faults: Faults | None = None,
+    faults: Sequence[FaultOrder] = (),
+    port: FaultPort | None = None,
 ) -> asyncio.Task[None]:
     return asyncio.create_task(
         run_emulator(
@@ -80,8 +85,9 @@ def emulator(
             profile="perfect",
             state_directory=folder / "state",
             held=held,
-            fault_port=None if faults is None else 0,
-            on_fault_port=None if faults is None else faults.opened,
+            faults=faults,
+            fault_port=None if port is None else 0,
+            on_fault_port=None if port is None else port.opened,
         )
     )
 
@@ -168,19 +174,19 @@ async def test_without_feedback_the_robots_come_to_a_stand(
 async def test_faults_are_done_as_ordered(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    faults = Faults()
-    async with running(emulator(address, tmp_path, faults=faults)):
+    port = FaultPort()
+    async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.speed("AGII") > 0.5)
 
-        done = await faults.post({"robot": "AGII", "local_hold": "hw"})
+        done = await port.post({"robot": "AGII", "local_hold": "hw"})
         assert done.status_code == 204
         await until(lambda: [h.source for h in cloud.report("AGII").holds] == ["hw"])
-        await faults.post({"robot": "AGII", "release_locally": True})
+        await port.post({"robot": "AGII", "release_locally": True})
         await until(lambda: cloud.speed("AGII") > 0.5)
 
-        await faults.post({"robot": "AGII", "kill": True})
+        await port.post({"robot": "AGII", "kill": True})
         before = cloud.report("AGII").origin.boot
-        await faults.post({"robot": "AGII", "revive": True})
+        await port.post({"robot": "AGII", "revive": True})
         await until(lambda: cloud.report("AGII").origin.boot != before)
         assert [h.source for h in cloud.report("AGII").holds] == ["boot"]
 
@@ -188,13 +194,13 @@ async def test_faults_are_done_as_ordered(
 async def test_a_mute_robot_says_nothing_and_a_frozen_one_no_odometry(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    faults = Faults()
-    async with running(emulator(address, tmp_path, faults=faults)):
+    port = FaultPort()
+    async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.newest("AGI", Odometry))
         await until(lambda: cloud.newest("AGII", Odometry))
 
-        await faults.post({"robot": "AGI", "mute": True})
-        await faults.post({"robot": "AGII", "freeze_odometry": True})
+        await port.post({"robot": "AGI", "mute": True})
+        await port.post({"robot": "AGII", "freeze_odometry": True})
         reports, scans = (
             len(cloud.of("AGI", LaserScan)),
             len(cloud.of("AGII", LaserScan)),
@@ -209,7 +215,7 @@ async def test_a_mute_robot_says_nothing_and_a_frozen_one_no_odometry(
 async def test_a_person_who_was_placed_is_seen_there_and_hidden_on_demand(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    faults = Faults()
+    port = FaultPort()
     boxes: list[float] = []
 
     def seen_at(ahead: float) -> bool:
@@ -221,52 +227,136 @@ async def test_a_person_who_was_placed_is_seen_there_and_hidden_on_demand(
         frame = cloud.newest("AGI", DetectionFrame)
         return frame is not None and not frame.detections
 
-    async with running(emulator(address, tmp_path, faults=faults)):
+    async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.newest("AGI", DetectionFrame))
 
-        await faults.post({"person": 0, "x": 10.0, "y": 8.8, "hold": True})
+        await port.post({"person": 0, "x": 10.0, "y": 8.8, "hold": True})
         await until(lambda: seen_at(5.0))
-        await faults.post({"robot": "AGI", "hide_people": True})
+        await port.post({"robot": "AGI", "hide_people": True})
         await until(sees_nobody)
-        await faults.post({"robot": "AGI", "false_person": {"x": 10.0, "y": 6.8}})
+        await port.post({"robot": "AGI", "false_person": {"x": 10.0, "y": 6.8}})
         await until(lambda: seen_at(3.0))
-        await faults.post({"robot": "AGI", "false_person": None})
+        await port.post({"robot": "AGI", "false_person": None})
         await until(sees_nobody)
+
+
+def counts_of(cloud: Cloud, robot_id: str) -> list[int]:
+    return [o.origin.seq or 0 for o in cloud.of(robot_id, Odometry)]
+
+
+async def test_a_bad_radio_loses_doubles_and_disorders_telemetry_alone(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    order = FaultOrder(
+        robot="AGII", drop_percent=25.0, duplicate_percent=25.0, reorder_percent=25.0
+    )
+    async with running(emulator(address, tmp_path, faults=[order])):
+        await until(lambda: len(cloud.of("AGII", Odometry)) > 150, 30.0)
+        await until(lambda: len(cloud.of("AGII", SafetyReport)) > 8)
+
+    bad, good = counts_of(cloud, "AGII"), counts_of(cloud, "AGI")
+    reports = [o.origin.seq or 0 for o in cloud.of("AGII", SafetyReport)]
+    assert 0.6 < len(set(bad)) / (max(bad) - min(bad) + 1) < 0.9
+    assert 1.05 < len(bad) / len(set(bad)) < 1.5
+    assert sum(b < a for a, b in itertools.pairwise(bad)) > len(bad) / 20
+    assert good == list(range(good[0], good[0] + len(good)))
+    assert reports == list(range(reports[0], reports[0] + len(reports)))
+    assert cloud.problems == []
+
+
+async def test_a_slow_radio_brings_everything_late_and_in_order(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    port = FaultPort()
+
+    def age() -> float:
+        newest = cloud.newest("AGII", Odometry)
+        return (
+            0.0 if newest is None else clock.now().wall - (newest.origin.stamp_s or 0)
+        )
+
+    async with running(emulator(address, tmp_path, port=port)):
+        await until(lambda: cloud.newest("AGII", Odometry) and age() < 0.3)
+
+        await port.post({"robot": "AGII", "delay_ms": 700.0, "jitter_ms": 200.0})
+        await until(lambda: 0.7 < age() < 1.5)
+        await port.post({"robot": "AGII", "delay_ms": 0.0, "jitter_ms": 0.0})
+        await until(lambda: age() < 0.3)
+
+    counted = counts_of(cloud, "AGII")
+    assert counted == sorted(counted)
+
+
+async def test_odometry_that_repeats_itself_says_the_same_stamp_and_count_again(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    port = FaultPort()
+
+    def repeats() -> int:
+        counted = counts_of(cloud, "AGII")
+        return counted.count(counted[-1])
+
+    async with running(emulator(address, tmp_path, port=port)):
+        await until(lambda: cloud.speed("AGII") > 0.3)
+
+        await port.post({"robot": "AGII", "freeze_odometry": "repeat"})
+        await until(lambda: repeats() > 30)
+        told = {(o.origin, o.pose) for o in cloud.of("AGII", Odometry)[-20:]}
+        assert len(told) == 1
+
+        await port.post({"robot": "AGII", "freeze_odometry": False})
+        await until(lambda: repeats() == 1)
+
+
+async def test_a_killed_robot_comes_back_through_its_bad_radio(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    order = FaultOrder(robot="AGII", delay_ms=50.0, kill=True)
+    port = FaultPort()
+    async with running(emulator(address, tmp_path, faults=[order], port=port)):
+        await until(lambda: len(cloud.of("AGI", LaserScan)) > 30)
+        assert cloud.of("AGII", LaserScan) == []
+
+        await port.post({"robot": "AGII", "revive": True})
+        await until(lambda: [h.source for h in cloud.report("AGII").holds] == ["boot"])
 
 
 @pytest.mark.parametrize(
-    ("order", "status"),
+    ("order", "status", "why"),
     [
-        ({"robot": "AGI", "mute": "yes"}, 400),
-        ({"robot": "AGI", "explode": True}, 400),
-        ([], 400),
-        ({"robot": "AGV"}, 409),
-        ({"person": 99, "x": 0.0, "y": 0.0}, 409),
+        ({"robot": "AGI", "mute": "yes"}, 400, "mute: Input should be a valid boolean"),
+        ({"robot": "AGI", "explode": True}, 400, "explode: Extra inputs are not"),
+        ({"robot": "AGI", "drop_percent": 101}, 400, "drop_percent: Input should be l"),
+        ({"robot": "AGI", "false_person": {"x": 1.0}}, 400, "false_person.y: Field re"),
+        ({"person": 0, "x": 1.0}, 400, "y: Field required"),
+        ([], 400, "an order has a robot or a person"),
+        ({"robot": "AGV"}, 409, "there is no robot AGV"),
+        ({"person": 99, "x": 0.0, "y": 0.0}, 409, "there are 1 people, counted from 0"),
     ],
 )
-async def test_an_order_that_cannot_be_done_is_refused(
-    address: BrokerAddress, tmp_path: Path, order: object, status: int
+async def test_an_order_that_cannot_be_done_is_refused_with_a_sentence(
+    address: BrokerAddress, tmp_path: Path, order: object, status: int, why: str
 ) -> None:
-    faults = Faults()
-    async with running(emulator(address, tmp_path, faults=faults)):
-        await until(lambda: faults.port)
+    port = FaultPort()
+    async with running(emulator(address, tmp_path, port=port)):
+        await until(lambda: port.port)
 
-        refused = await faults.post(order)
-        read = await faults.post(order, method="GET")
+        refused = await port.post(order)
+        read = await port.post(order, method="GET")
 
-    assert refused.status_code == status
+    assert (refused.status_code, why in refused.text) == (status, True)
     assert read.status_code == 400
 
 
 async def test_the_clock_of_a_robot_can_be_wrong(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    faults = Faults()
-    async with running(emulator(address, tmp_path, faults=faults)):
+    port = FaultPort()
+    async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.newest("AGI", Odometry))
         right = cloud.of("AGI", Odometry)[-1].origin.stamp_s or 0.0
 
-        await faults.post({"robot": "AGI", "clock_offset_s": 3600.0})
+        await port.post({"robot": "AGI", "clock_offset_s": 3600.0})
 
         await until(
             lambda: (cloud.of("AGI", Odometry)[-1].origin.stamp_s or 0) > right + 3500
@@ -281,7 +371,10 @@ async def test_an_incident_of_a_scenario_happens_when_it_is_due(
     settings = FleetSettings(
         address, "iveg", "per-topic", 1.0, 3.0, tmp_path, held=False, rate_hz=30.0
     )
-    incidents = (Incident(1.0, "AGII", mute=True), Incident(0.1, "AGV", mute=True))
+    incidents = (
+        Incident(1.0, FaultOrder(robot="AGII", mute=True)),
+        Incident(0.1, FaultOrder(robot="AGV", mute=True)),
+    )
     fleet = Fleet(world, settings)
 
     def silent_for(scans: int) -> bool:

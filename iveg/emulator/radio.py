@@ -1,0 +1,117 @@
+"""A bad radio: what a robot publishes is lost, late, doubled or out of order.
+
+Pure but for its seed.  Loss, doubles and disorder befall telemetry (QoS 0) alone, since
+TCP and QoS 1 deliver all else once and in order; delay befalls all that is published.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFaults:
+    """How bad it is; percentages of telemetry, one drawn apart from the other.
+
+    Attributes:
+        drop_percent: Lost.
+        duplicate_percent: Delivered twice.
+        reorder_percent: Delivered after the next of the same topic.
+        delay_ms: Added to all; ``jitter_ms`` at most more, order kept.
+        repeats_odometry: In place of odometry its last message goes out again.
+    """
+
+    drop_percent: float = 0.0
+    duplicate_percent: float = 0.0
+    reorder_percent: float = 0.0
+    delay_ms: float = 0.0
+    jitter_ms: float = 0.0
+    repeats_odometry: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One MQTT packet.
+
+    Attributes:
+        topic: Where it is published to; None for a packet of another kind.
+        qos: 0 to 2.
+        raw: All its bytes.
+    """
+
+    topic: str | None
+    qos: int
+    raw: bytes
+
+    @property
+    def is_telemetry(self) -> bool:
+        """Whether it may get lost."""
+        return self.topic is not None and self.qos == 0
+
+
+class Radio:
+    """Decides what becomes of each packet that a robot sends.
+
+    Args:
+        odometry: Topics that carry odometry.
+        rng: Where chance comes from; a message of telemetry draws thrice.
+
+    Attributes:
+        faults: How bad the radio is now.
+        counters: What was dropped, duplicated, reordered, repeated.
+    """
+
+    def __init__(self, odometry: frozenset[str], rng: np.random.Generator) -> None:
+        self.faults = LinkFaults()
+        self.counters: Counter[str] = Counter()
+        self._odometry = odometry
+        self._rng = rng
+        self._last: dict[str, Packet] = {}
+        self._overtaken: dict[str, list[Packet]] = {}
+        self._newest_due = 0.0
+
+    def pass_on(self, packet: Packet, now: float) -> list[tuple[float, bytes]]:
+        """What goes out for a packet, and when (same clock as ``now``, s)."""
+        if packet.topic is None:
+            return [(now, packet.raw)]
+        if not packet.is_telemetry:
+            return [(self._due(now), packet.raw)]
+        out = self._disturbed(self._repeated(packet, packet.topic), packet.topic)
+        return [(self._due(now), one.raw) for one in out]
+
+    def _repeated(self, packet: Packet, topic: str) -> Packet:
+        """The packet; of frozen odometry the last one that went through unfrozen."""
+        if topic not in self._odometry:
+            return packet
+        if self.faults.repeats_odometry and topic in self._last:
+            self.counters["repeated"] += 1
+            return self._last[topic]
+        self._last[topic] = packet
+        return packet
+
+    def _disturbed(self, packet: Packet, topic: str) -> list[Packet]:
+        faults = self.faults
+        dropped, doubled, overtaken = (self._rng.random(3) * 100.0).tolist()
+        waiting = self._overtaken.pop(topic, [])
+        if dropped < faults.drop_percent:
+            self.counters["dropped"] += 1
+            return waiting
+        out = [packet]
+        if doubled < faults.duplicate_percent:
+            self.counters["duplicated"] += 1
+            out.append(packet)
+        if overtaken < faults.reorder_percent and not waiting:
+            self.counters["reordered"] += 1
+            self._overtaken[topic] = out
+            return []
+        return out + waiting
+
+    def _due(self, now: float) -> float:
+        faults = self.faults
+        late_ms = faults.delay_ms
+        if faults.jitter_ms > 0.0:
+            late_ms += self._rng.uniform(0.0, faults.jitter_ms)
+        # One connection keeps its order; disorder is a fault of its own.
+        self._newest_due = max(self._newest_due, now + late_ms / 1000.0)
+        return self._newest_due

@@ -1,0 +1,165 @@
+"""The way from a robot to the broker through its bad radio: a relay on loopback.
+
+The robot's own software connects here and knows nothing of it, so that what is tested
+is what rides on a real robot.  What the broker says comes back untouched.
+"""
+
+import asyncio
+import contextlib
+import socket
+import ssl
+from types import TracebackType
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.emulator.radio import Packet, Radio
+
+_PUBLISH = 3
+_MOST_WAITING = 4000
+"""Packets on the way: ten seconds of all topics at 30 Hz, thrice over."""
+_CHUNK = 65536
+
+
+class Relay:
+    """Listens for one robot; use it with ``async with``.
+
+    Args:
+        broker: Where the robot means to go.
+        radio: What becomes of its packets.
+
+    Attributes:
+        address: Where the robot connects instead.
+    """
+
+    def __init__(self, broker: BrokerAddress, radio: Radio) -> None:
+        self.radio = radio
+        self._broker = broker
+        self._socket = socket.create_server(("127.0.0.1", 0))
+        port = self._socket.getsockname()[1]
+        self.address = BrokerAddress("127.0.0.1", port, broker.user, broker.password)
+        self._visits: set[asyncio.Task[None]] = set()
+
+    async def __aenter__(self) -> "Relay":
+        self._server = await asyncio.start_server(self._visit, sock=self._socket)
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._server.close()
+        for visit in self._visits:
+            visit.cancel()
+        await asyncio.gather(*self._visits, return_exceptions=True)
+
+    async def _visit(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        task = asyncio.current_task()
+        assert task is not None  # noqa: S101 - a coroutine that runs is in a task
+        self._visits.add(task)
+        try:
+            # A broker that is away, or goes: the robot sees its connection closed.
+            with contextlib.suppress(OSError, asyncio.IncompleteReadError):
+                await self._connect(reader, writer)
+        except asyncio.CancelledError:
+            pass  # the relay closes; nobody waits for this task's word
+        finally:
+            self._visits.discard(task)
+            writer.close()
+
+    async def _connect(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        tls = ssl.create_default_context() if self._broker.tls else None
+        down, up = await asyncio.open_connection(
+            self._broker.host, self._broker.port, ssl=tls
+        )
+        try:
+            await self._carry(reader, writer, down, up)
+        finally:
+            up.close()
+
+    async def _carry(
+        self,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        down: asyncio.StreamReader,
+        up: asyncio.StreamWriter,
+    ) -> None:
+        """Both ways until one end closes."""
+        waiting: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue(_MOST_WAITING)
+        ways = [
+            asyncio.create_task(way, name=f"relay-{name}")
+            for name, way in (
+                ("down", _copy(down, writer)),
+                ("up", self._take(reader, up, waiting)),
+                ("late", _send_when_due(waiting, up)),
+            )
+        ]
+        try:
+            await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for way in ways:
+                way.cancel()
+            await asyncio.gather(*ways, return_exceptions=True)
+
+    async def _take(
+        self,
+        reader: asyncio.StreamReader,
+        up: asyncio.StreamWriter,
+        waiting: asyncio.Queue[tuple[float, bytes]],
+    ) -> None:
+        while True:
+            packet = await read_packet(reader)
+            for due, raw in self.radio.pass_on(packet, clock.now().mono):
+                if packet.topic is None:
+                    up.write(raw)
+                elif waiting.full():
+                    self.radio.counters["overflowed"] += 1
+                else:
+                    waiting.put_nowait((due, raw))
+            await up.drain()
+
+
+async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    while data := await reader.read(_CHUNK):
+        writer.write(data)
+        await writer.drain()
+
+
+async def _send_when_due(
+    waiting: asyncio.Queue[tuple[float, bytes]], up: asyncio.StreamWriter
+) -> None:
+    while True:
+        due, raw = await waiting.get()
+        late = due - clock.now().mono
+        if late > 0.0:
+            await asyncio.sleep(late)
+        up.write(raw)
+        await up.drain()
+
+
+async def read_packet(reader: asyncio.StreamReader) -> Packet:
+    """One packet of MQTT 3.1.1: kind and flags, length of 1 to 4 bytes, the rest.
+
+    Raises:
+        asyncio.IncompleteReadError: the sender has closed.
+    """
+    head = await reader.readexactly(1)
+    length, shift = 0, 0
+    for _ in range(4):
+        part = await reader.readexactly(1)
+        head += part
+        length |= (part[0] & 0x7F) << shift
+        shift += 7
+        if part[0] < 0x80:
+            break
+    rest = await reader.readexactly(length)
+    if head[0] >> 4 != _PUBLISH:
+        return Packet(None, 0, head + rest)
+    size = int.from_bytes(rest[:2], "big")
+    topic = rest[2 : 2 + size].decode("utf-8", "replace")
+    return Packet(topic, head[0] >> 1 & 3, head + rest)
