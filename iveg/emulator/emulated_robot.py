@@ -75,7 +75,7 @@ class EmulatedRobot:
         self._rig = rig
         self._world = world
         self._settings = settings
-        self._node = self._new_node(held=settings.held)
+        self._node: RobotNode
         self._node_task: asyncio.Task[None] | None = None
         self._tasks: asyncio.TaskGroup
         self._run_began = 0.0
@@ -108,11 +108,12 @@ class EmulatedRobot:
             slots[turn % SLOTS](dt)
             turn += 1
 
-        if not self._settings.held:
-            self._node.release_locally()
         async with AsyncExitStack() as stack:
             if self._relay is not None:
                 await stack.enter_async_context(self._relay)
+            self._node = self._new_node(held=self._settings.held)
+            if not self._settings.held:
+                self._node.release_locally()
             self._tasks = await stack.enter_async_context(asyncio.TaskGroup())
             self._start_node()
             self.started.set()

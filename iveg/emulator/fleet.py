@@ -182,6 +182,8 @@ class Fleet:
             robot = self._robots.get(order.robot)
             if robot is None:
                 return f"there is no robot {order.robot}"
+            if not robot.started.is_set():
+                return f"{order.robot} has not started yet"
             robot.obey(order)
             return None
         if order.person >= len(self._world.people):

@@ -6,7 +6,6 @@ is what rides on a real robot.  What the broker says comes back untouched.
 
 import asyncio
 import contextlib
-import socket
 import ssl
 from types import TracebackType
 
@@ -28,19 +27,21 @@ class Relay:
         radio: What becomes of its packets.
 
     Attributes:
-        address: Where the robot connects instead.
+        address: Where the robot connects instead, once the relay is open.
     """
 
     def __init__(self, broker: BrokerAddress, radio: Radio) -> None:
         self.radio = radio
+        self.address = broker
         self._broker = broker
-        self._socket = socket.create_server(("127.0.0.1", 0))
-        port = self._socket.getsockname()[1]
-        self.address = BrokerAddress("127.0.0.1", port, broker.user, broker.password)
         self._visits: set[asyncio.Task[None]] = set()
 
     async def __aenter__(self) -> "Relay":
-        self._server = await asyncio.start_server(self._visit, sock=self._socket)
+        self._server = await asyncio.start_server(self._visit, "127.0.0.1", 0)
+        host, port = self._server.sockets[0].getsockname()
+        self.address = BrokerAddress(
+            host, port, self._broker.user, self._broker.password
+        )
         return self
 
     async def __aexit__(
