@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 from iveg.domain.errors import SettingsError
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
+_RESERVED = frozenset({"climate", "iveg-canary", "iveg-doctor"})
 
 
 class _NotAllowedError(Exception):
@@ -91,10 +92,7 @@ def _url(*schemes: str) -> Callable[[str], str]:
 
 def _robots(value: str) -> tuple[str, ...]:
     robots = tuple(name.strip() for name in value.split(","))
-    usable = all(
-        _ROBOT_ID.fullmatch(name) and name not in ("climate", "iveg-canary")
-        for name in robots
-    )
+    usable = all(_ROBOT_ID.fullmatch(name) and name not in _RESERVED for name in robots)
     if not usable or len(set(robots)) != len(robots):
         raise _NotAllowedError(
             "different names of letters, digits and hyphens, separated by commas"
@@ -181,6 +179,12 @@ class Settings:
         _matching(r"(sqlite|postgresql)(\+\w+)?://.*", "an SQLAlchemy address"),
         "",
         "History; empty: an SQLite file in the user's data directory.",
+    )
+    data_directory: str = setting(
+        "IVEG_DATA_DIRECTORY",
+        _text,
+        "",
+        "Where the database and the journals live; empty: the user's data directory.",
     )
     api_token: str = setting(
         "IVEG_API_TOKEN",

@@ -37,7 +37,9 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _run(options: argparse.Namespace, settings: Settings) -> int:
-    data = default_data_directory(os.environ, Path.home())
+    data = Path(
+        settings.data_directory or default_data_directory(os.environ, Path.home())
+    )
     match options.command:
         case "settings":
             print(describe(), end="")
@@ -53,7 +55,6 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
         case "doctor":
             from iveg.cli.doctor import run_doctor
 
-            data = Path(os.environ.get("IVEG_DATA_DIRECTORY") or data)
             return run_doctor(settings, data)
         case "demo":
             from iveg.cli.demo import demo

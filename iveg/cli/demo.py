@@ -44,19 +44,19 @@ def demo(
     emulator: bool = True,
 ) -> int:
     """Run the demo; returns the exit code."""
+    directory = data / "demo"
     placed = replace(
         _on_free_ports(settings, environment),
         sign_in_token=settings.sign_in_token or secrets.token_hex(32),
         notify_token=settings.notify_token or secrets.token_hex(32),
+        data_directory=str(directory),
     )
-    directory = data / "demo"
     # Each demo is a new greenhouse: nothing of the last one's robots is still held.
     with contextlib.suppress(FileNotFoundError):
         (directory / "commands.jsonl").unlink()
     child_environment = {
         **environment,
         **placed.to_environment(),
-        "IVEG_DATA_DIRECTORY": str(directory),
     }
     parts = [["fiware"], ["serve", "--demo"], *([["emulator"]] if emulator else [])]
     return run_until_told(_supervise(parts, placed, child_environment))

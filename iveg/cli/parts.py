@@ -4,7 +4,6 @@ import argparse
 import asyncio
 import contextlib
 import logging
-import os
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -32,7 +31,6 @@ _WS_MAX_BYTES = 65536
 
 def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int:
     """Run one part until it is told to end; returns the exit code."""
-    data = Path(os.environ.get("IVEG_DATA_DIRECTORY") or data)
     match options.command:
         case "serve":
             data.mkdir(parents=True, exist_ok=True)

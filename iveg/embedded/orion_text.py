@@ -107,7 +107,7 @@ def print_value(value: Any) -> bytes:
     if b'"' in text or b"-0" in text:
         return orjson.dumps(_as_double(value))
     # Numbers alone, such as a sweep: a trailing ".0" can only be an integer's.
-    return text.replace(b".0,", b",").replace(b".0]", b"]")
+    return text.replace(b".0,", b",").replace(b".0]", b"]").removesuffix(b".0")
 
 
 def _as_double(value: Any) -> Any:

@@ -21,7 +21,7 @@ FEEDBACK_FILTER = "/+/mqtt_feedback"
 DESIRED_TOPIC = "/{robot_id}/iveg/desired"
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
-_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID})
+_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID, "iveg-doctor"})
 
 
 @dataclass(frozen=True, slots=True)

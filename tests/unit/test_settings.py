@@ -122,6 +122,7 @@ GOOD = {
     "IVEG_APIKEY": "key-1",
     "IVEG_ROBOTS": "AGI,AGII,AG3",
     "IVEG_DATABASE_URL": "postgresql+psycopg://u:p@db/iveg",
+    "IVEG_DATA_DIRECTORY": "/var/lib/iveg",
     "IVEG_API_TOKEN": "a-long-enough-token!",
     "IVEG_SIGN_IN_TOKEN": "cd" * 32,
     "IVEG_CONFIDENCE_THRESHOLD": "0.75",
