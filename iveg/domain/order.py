@@ -14,6 +14,7 @@ Verdict = Literal["new", "late", "duplicate"]
 
 _REMEMBERED_SEQS = 128
 _REMEMBERED_BOOTS = 16
+_GROWN_TO_RETURN = 5
 _BUCKET_S, _BUCKETS = 5.0, 12
 _JUMP_S = 10.0
 """No message travels that much longer than another: the clock was set (fault F16)."""
@@ -21,13 +22,18 @@ _JUMP_S = 10.0
 
 @dataclass(slots=True)
 class Order:
-    """Where one stream (robot and kind) stands."""
+    """Where one stream (robot and kind) stands.
+
+    A straggler of a boot that was never seen looks like a new start, and would make
+    the living boot an old one for ever.  So an old boot that goes on counting, five
+    times with no word of the present one in between, is taken for what it is.
+    """
 
     boot: str | None = None
     seq: int = -1
-    _old_boots: deque[str] = field(
-        default_factory=lambda: deque(maxlen=_REMEMBERED_BOOTS)
-    )
+    _old: dict[str, int] = field(default_factory=dict)
+    _returning: str | None = None
+    _grown: int = 0
     _recent: deque[int] = field(default_factory=lambda: deque(maxlen=_REMEMBERED_SEQS))
 
     def knows_better_than(self, origin: Origin) -> bool:
@@ -42,14 +48,11 @@ class Order:
         if origin.boot is None or origin.seq is None:
             return "new"
         if origin.boot != self.boot:
-            if origin.boot in self._old_boots:
+            if origin.boot in self._old and not self._returns(origin.boot, origin.seq):
                 return "late"
-            if self.boot is not None:
-                self._old_boots.append(self.boot)
-            self.boot, self.seq = origin.boot, origin.seq
-            self._recent.clear()
-            self._recent.append(origin.seq)
+            self._begin(origin.boot, origin.seq)
             return "new"
+        self._returning = None
         if origin.seq in self._recent:
             return "duplicate"
         self._recent.append(origin.seq)
@@ -57,6 +60,26 @@ class Order:
             return "late"
         self.seq = origin.seq
         return "new"
+
+    def _returns(self, boot: str, seq: int) -> bool:
+        """Whether an old boot has gone on counting while the present one was silent."""
+        if seq <= self._old[boot]:
+            return False
+        self._old[boot] = seq
+        if boot != self._returning:
+            self._returning, self._grown = boot, 0
+        self._grown += 1
+        return self._grown >= _GROWN_TO_RETURN
+
+    def _begin(self, boot: str, seq: int) -> None:
+        self._old.pop(boot, None)
+        if self.boot is not None:
+            self._old[self.boot] = self.seq
+        while len(self._old) > _REMEMBERED_BOOTS:
+            del self._old[next(iter(self._old))]
+        self.boot, self.seq, self._returning = boot, seq, None
+        self._recent.clear()
+        self._recent.append(seq)
 
 
 @dataclass(slots=True)
