@@ -56,6 +56,44 @@ def test_a_boot_that_was_seen_before_the_present_one_is_late() -> None:
     assert (order.boot, order.seq) == ("b", 1)
 
 
+def test_a_straggler_of_an_unseen_boot_does_not_silence_the_living_one() -> None:
+    order = Order()
+    order.judge(origin(1, boot="living"))
+    order.judge(origin(900, boot="straggler"))
+
+    verdicts = [order.judge(origin(seq, boot="living")) for seq in range(2, 8)]
+
+    assert verdicts == ["late"] * 4 + ["new"] * 2
+
+
+def test_an_old_boot_that_repeats_itself_does_not_come_back() -> None:
+    order = Order()
+    for seq in range(10):
+        order.judge(origin(seq, boot="old"))
+    order.judge(origin(1, boot="new"))
+
+    assert {order.judge(origin(seq, boot="old")) for seq in range(10)} == {"late"}
+    assert order.boot == "new"
+
+
+def test_an_old_boot_does_not_come_back_while_the_present_one_speaks() -> None:
+    order = Order()
+    order.judge(origin(1, boot="old"))
+    for seq in range(50):
+        order.judge(origin(seq, boot="new"))
+        order.judge(origin(100 + seq, boot="old"))
+
+    assert (order.boot, order.seq) == ("new", 49)
+
+
+def test_boots_that_are_long_gone_are_forgotten() -> None:
+    order = Order()
+    for number in range(100):
+        order.judge(origin(1, boot=f"boot-{number}"))
+
+    assert len(order._old) == 16
+
+
 @pytest.mark.parametrize("nameless", [Origin(), Origin("a"), Origin(None, 3)])
 def test_a_message_without_identity_is_new_by_arrival(nameless: Origin) -> None:
     order = Order()
