@@ -91,7 +91,7 @@ class DetectorModel:
 DETECTORS: Mapping[str, DetectorModel] = {
     "field": DetectorModel(0.72),
     "simulation": DetectorModel(0.85, spread=0.03),
-    "noisy": DetectorModel(0.80, spread=0.06, flicker=0.06, position=0.10, jitter=0.05),
+    "noisy": DetectorModel(0.80, 0.06, 0.06, 0.0, 0.10, 0.05, {}),
     "perfect": DetectorModel(0.95, 0.0, 0.0, 0.0, 0.0, 0.0, {}),
 }
 

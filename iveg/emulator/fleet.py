@@ -28,7 +28,8 @@ from iveg.emulator.orders import FaultOrder, Order
 from iveg.emulator.pacing import every
 from iveg.emulator.radio import Radio
 from iveg.emulator.relay import Relay
-from iveg.emulator.scenarios import Incident, scenario_named
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.scripts import Incident
 from iveg.emulator.world import World, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate

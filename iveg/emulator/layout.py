@@ -15,9 +15,8 @@ from iveg.domain.greenhouse import Greenhouse, Lane
 from iveg.domain.profiles import profile_of
 from iveg.emulator.people import Stop
 from iveg.emulator.routes import route_of
-from iveg.emulator.scenarios import Incident, RobotScript, Scenario
+from iveg.emulator.scripts import TESTBED, Incident, RobotScript, Scenario
 
-TESTBED = "mvsim-20x20"
 _RING_CORNERS = ((18.0, 2.0), (18.0, 18.0), (2.0, 18.0), (2.0, 2.0))
 _END_M, _KEEP_OFF_M = 0.5, 0.9
 _FIELD_M, _FIELD_PITCH_M = 12.0, 20.0
@@ -38,10 +37,14 @@ def lay_out(scenario: Scenario, robots: Sequence[str], house: Greenhouse) -> Lay
     """Fit a scenario to a fleet and a house.
 
     Raises:
-        DataFileError: the house has no room for so many robots.
+        DataFileError: the house has no room for so many robots, or is not the one that
+            the scenario is about.
     """
     extra = scenario.incidents, scenario.detector
-    if house.name == TESTBED and set(robots) <= set(scenario.robots):
+    if scenario.house not in (TESTBED, house.name):
+        reason = f"is about {scenario.house}, not {house.name}: see IVEG_GREENHOUSE."
+        raise DataFileError(f"scenario {scenario.name!r}", "", reason)
+    if house.name == scenario.house and set(robots) <= set(scenario.robots):
         scripts = {robot_id: scenario.robots[robot_id] for robot_id in robots}
         return Layout(scripts, scenario.people, *extra)
     if house.name == TESTBED:

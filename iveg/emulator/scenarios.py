@@ -1,80 +1,22 @@
-"""Named runs as data: who drives where, who walks where, what goes wrong when.
+"""Named runs as data: who drives where, who walks where, what goes wrong, what follows.
 
-The scripts are written for the testbed of the paper (``mvsim-20x20``): corridors lie at
-x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from y = 3.5 to 16.5 m.
-``layout.py`` fits a scenario to another fleet or another house.
+All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
+corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
+y = 3.5 to 16.5 m.  ``layout.py`` fits a scenario to another fleet or another house.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.people import Stop
-from iveg.emulator.routes import Route, Station, route_of
+from iveg.emulator.routes import Station
+from iveg.emulator.scripts import Incident, RobotScript, Scenario
 
 _FOREVER_S = 1e9
-_NORTH, _SOUTH = math.pi / 2, -math.pi / 2
-
-
-@dataclass(frozen=True, slots=True)
-class RobotScript:
-    """Where one robot starts and drives.
-
-    Attributes:
-        corners: Of its route, rounded with ``radius`` (m).
-        closed: A round; otherwise there and back.
-        cruise: (m/s).
-        task: Its intent in a word.
-    """
-
-    start: Pose2D
-    corners: tuple[tuple[float, float], ...]
-    radius: float
-    task: str
-    closed: bool = True
-    cruise: float = 0.8
-    stations: tuple[Station, ...] = ()
-
-    def route(self) -> Route:
-        """The way as points."""
-        return route_of(self.corners, self.radius, self.closed)
-
-
-@dataclass(frozen=True, slots=True)
-class Incident:
-    """Something that goes wrong on purpose.
-
-    Attributes:
-        at_s: Seconds into the run; again every ``every_s`` where that is not 0.
-        order: What.
-    """
-
-    at_s: float
-    order: FaultOrder
-    every_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """One named run.
-
-    Attributes:
-        about: What it shows, in one sentence.
-        robots: Scripts by robot id; a fleet with others drives ``many``'s round.
-        people: The round of each person.
-        detector: Takes the place of the profile that was asked for.
-    """
-
-    name: str
-    about: str
-    robots: Mapping[str, RobotScript]
-    people: tuple[tuple[Stop, ...], ...] = ()
-    incidents: tuple[Incident, ...] = ()
-    detector: str | None = None
-
+_NORTH, _SOUTH, _WEST = math.pi / 2, -math.pi / 2, math.pi
 
 # --- robots of the testbed --------------------------------------------------------
 
@@ -106,6 +48,19 @@ _HAUL = RobotScript(
     stations=(Station(13.2, 15.0, dwell_s=1.0, period_s=80.0),),
 )
 _HAUL_ON = RobotScript(Pose2D(13.2, 15.2, _SOUTH), _HAUL_CORNERS, 2.3, "hauling")
+_LAPS = RobotScript(
+    Pose2D(8.9, 7.8, _NORTH),
+    ((8.9, 7.2), (8.9, 12.8), (11.1, 12.8), (11.1, 7.2)),
+    0.6,
+    "scouting",
+)
+_THROUGH = RobotScript(Pose2D(10.0, 6.0, _NORTH), _SCOUT_CORNERS, 0.6, "scouting")
+_PAST_THE_END = RobotScript(
+    Pose2D(10.4, 9.0, _NORTH),
+    ((10.4, 2.2), (10.4, 17.8), (6.0, 17.8), (6.0, 2.2)),
+    0.6,
+    "scouting",
+)
 _BESIDE = RobotScript(
     Pose2D(15.0, 6.5, _NORTH),
     ((15.0, 6.5), (15.0, 14.0)),
@@ -153,77 +108,115 @@ _CARRIER = (
     Stop(8.7, 17.2),
 )
 _FOUR_PEOPLE = (_PICKER_IN_3, _WALKER_IN_2, _PICKER_IN_5, _CARRIER)
-_STANDER = tuple(
-    Stop(x, y, 20.0, 20.0)
-    for x, y in ((11.2, 9.0), (11.2, 3.0), (8.9, 18.9), (4.9, 10.0))
-)
-_HALF_HIDDEN = (Stop(12.7, 17.1, 4.0, 8.0), Stop(11.5, 17.1, 4.0, 8.0))
+_STANDER = (Stop(10.0, 10.0, 60.0, 60.0),)
+_AT_THE_END = (Stop(11.9, 17.2, 60.0, 60.0),)
 _CROSSER = (Stop(8.6, 10.0, 1.0, 3.0), Stop(11.4, 10.0, 1.0, 3.0))
+
+# --- the field test of the paper --------------------------------------------------
+
+_FACES_GROWER = RobotScript(
+    Pose2D(25.0, 31.5, _SOUTH),
+    ((25.0, 31.6), (25.0, 30.6)),
+    0.0,
+    "watching",
+    closed=False,
+    stations=(Station(25.0, 31.4, period_s=_FOREVER_S, offset_s=_FOREVER_S),),
+)
+_FACES_AWAY = RobotScript(
+    Pose2D(20.0, 23.9, _WEST),
+    ((26.5, 23.9), (19.5, 23.9)),
+    0.0,
+    "hauling",
+    closed=False,
+)
+"""Looks west, drives a little, then comes back east in reverse, past the aisle whose
+grower it never looks at."""
+_GROWER_IN_6 = (Stop(24.3, 25.5, 60.0, 60.0),)
 
 _SCENARIOS = (
     Scenario(
         "demo",
         "Two robots and four people; robots slow for people seen and unseen.",
+        "AGII slows for the worker whom only AGI sees, and drives on afterwards.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
     ),
     Scenario(
         "nlos",
-        "AGI sees a person whom AGII cannot see; AGII slows.",
+        "AGI sees a person across the crop from AGII.",
+        "AGII slows for the person without a line of sight; AGI is the observer.",
         {"AGI": _WATCH, "AGII": _HAUL_ON},
         (_PICKER_IN_3,),
     ),
     Scenario(
+        "nlos-field",
+        "AGII reverses along the central corridor and looks away from the aisle where "
+        "AGI faces a grower.",
+        "AGII slows for the grower without a line of sight; AGI is the observer.",
+        {"AGI": _FACES_GROWER, "AGII": _FACES_AWAY},
+        (_GROWER_IN_6,),
+        house="agroconnect",
+    ),
+    Scenario(
         "viewpoints",
         "One person, seen from all sides as AGI goes round.",
-        {"AGI": _SCOUT, "AGII": _HAUL},
+        "It stays one person at one place, seen from the south and from the north.",
+        {"AGI": _LAPS, "AGII": _HAUL},
         (_STANDER,),
     ),
     Scenario(
         "peers",
         "AGI and AGII pass each other again and again in corridor 4; nobody else.",
+        "Both slow for each other.",
         {"AGI": _BESIDE, "AGII": _HAUL_ON},
     ),
     Scenario(
         "together",
         "A person and AGII in one frame of AGI.",
+        "One look holds both; the person is an alert, AGII is known for a peer.",
         {"AGI": _OPPOSITE, "AGII": _HAUL_ON},
         ((Stop(15.1, 10.5, 10.0, 20.0), Stop(15.1, 11.5, 10.0, 20.0)),),
     ),
     Scenario(
         "occluded",
         "A person half hidden by the end of a crop row.",
-        {"AGI": _SCOUT, "AGII": _HAUL},
-        (_HALF_HIDDEN,),
+        "AGI is less sure of the person while half hidden, and slows in time.",
+        {"AGI": _PAST_THE_END, "AGII": _HAUL},
+        (_AT_THE_END,),
     ),
     Scenario(
         "many",
         "Any number of robots on one round, four people inside.",
+        "All are live and drive; none is lost.",
         {},
         _FOUR_PEOPLE,
     ),
     Scenario(
         "deaf",
-        "As demo; after 20 s AGII drives as it likes whatever the rule says.",
+        "As demo, but AGII drives as it likes whatever iVeg says.",
+        "Two seconds after AGII met a person at full speed there is a P1 alert.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
-        (Incident(20.0, FaultOrder(robot="AGII", deaf=True)),),
+        (Incident(1.0, FaultOrder(robot="AGII", deaf=True)),),
     ),
     Scenario(
         "noisy-crossing",
-        "A person crosses in front of AGI under a detector near its threshold.",
-        {"AGI": _SCOUT, "AGII": _HAUL},
+        "A person crosses in front of AGI under a detector that flickers about its "
+        "threshold.",
+        "AGI slows once and speeds up once.",
+        {"AGI": _THROUGH, "AGII": _HAUL},
         (_CROSSER,),
         detector="noisy",
     ),
     Scenario(
         "link-loss",
-        "As demo; every minute AGII is not heard for ten seconds, and stops.",
+        "As demo; each minute nothing that AGII says arrives for six seconds.",
+        "AGII is late, then lost; meanwhile it slows and stands, and later drives on.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
         (
-            Incident(20.0, FaultOrder(robot="AGII", mute=True), every_s=60.0),
-            Incident(30.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
+            Incident(4.0, FaultOrder(robot="AGII", mute=True), every_s=60.0),
+            Incident(10.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
         ),
     ),
 )

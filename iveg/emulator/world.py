@@ -35,7 +35,7 @@ from iveg.emulator.kinematics import Odometer, Vehicle
 from iveg.emulator.layout import Layout
 from iveg.emulator.lidar import LaserModel, sweep
 from iveg.emulator.people import Person
-from iveg.emulator.scenarios import RobotScript
+from iveg.emulator.scripts import RobotScript
 
 REST = Twist2D(0.0, 0.0)
 _LASER = LaserModel()

@@ -28,7 +28,8 @@ from iveg.emulator.emulated_robot import FleetSettings
 from iveg.emulator.fleet import Fleet, run_emulator
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.scenarios import Incident, scenario_named
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.scripts import Incident
 from iveg.emulator.world import World
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 

@@ -50,7 +50,8 @@ def nearest_person(world: World, robot_id: str) -> float:
 
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
-    world = world_of(scenario)
+    house = load_greenhouse(scenario_named(scenario).house)
+    world = world_of(scenario, house=house)
 
     for _ in run(world, 100.0):
         bodies = world.bodies()
@@ -96,15 +97,16 @@ def test_both_robots_of_the_demo_meet_people_in_the_first_minute_and_again() -> 
     assert met == {"AGI": {0, 1, 2}, "AGII": {0, 1, 2}}
 
 
-@pytest.mark.parametrize("scenario", ["demo", "nlos"])
+@pytest.mark.parametrize("scenario", ["demo", "nlos", "nlos-field"])
 def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
-    world = world_of(scenario)
+    house = load_greenhouse(scenario_named(scenario).house)
+    world = world_of(scenario, house=house)
     unseen = 0
 
     for now in run(world, 60.0):
         pose = world.rigs["AGII"].vehicle.pose
         close = [p for p in world.people if pose.distance_to(p.x, p.y) <= 2.0]
-        hidden = [p for p in close if not TESTBED.in_sight(pose.x, pose.y, p.x, p.y)]
+        hidden = [p for p in close if not house.in_sight(pose.x, pose.y, p.x, p.y)]
         seen_by_agi = [
             detection
             for detection in world.rigs["AGI"].look(now, world).detections
@@ -113,6 +115,35 @@ def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
         unseen += bool(hidden and seen_by_agi)
 
     assert unseen > 5
+
+
+def test_agii_of_the_field_test_never_looks_at_the_grower() -> None:
+    world = world_of("nlos-field", house=load_greenhouse("agroconnect"))
+    rig = world.rigs["AGII"]
+    passed = 0
+
+    for now in run(world, 60.0):
+        passed += nearest_person(world, "AGII") <= 2.0
+        assert PERSON not in {d.class_id for d in rig.look(now, world).detections}
+
+    assert passed > 20
+
+
+def test_a_scenario_about_one_house_is_refused_in_another() -> None:
+    with pytest.raises(DataFileError, match="is about agroconnect, not mvsim-20x20"):
+        world_of("nlos-field")
+
+
+def test_one_lap_of_viewpoints_shows_the_person_from_south_and_north() -> None:
+    world = world_of("viewpoints")
+    seen_from: set[bool] = set()
+
+    for now in run(world, 40.0):
+        rig = world.rigs["AGI"]
+        if any(d.class_id == PERSON for d in rig.look(now, world).detections):
+            seen_from.add(rig.vehicle.pose.y > world.people[0].y)
+
+    assert seen_from == {False, True}
 
 
 def test_agi_and_agii_of_peers_come_within_two_metres_and_see_each_other() -> None:
@@ -208,7 +239,7 @@ def test_a_robot_that_is_not_commanded_stands() -> None:
 
 
 def test_an_unknown_scenario_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(DataFileError, match="demo, nlos, viewpoints"):
+    with pytest.raises(DataFileError, match="demo, nlos, nlos-field, viewpoints"):
         scenario_named("nothing")
 
 

@@ -1,0 +1,73 @@
+"""What a scenario is made of: scripts of robots, rounds of people, incidents."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from iveg.domain.geometry import Pose2D
+from iveg.emulator.orders import FaultOrder
+from iveg.emulator.people import Stop
+from iveg.emulator.routes import Route, Station, route_of
+
+TESTBED = "mvsim-20x20"
+"""The house that most scenarios are written for."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotScript:
+    """Where one robot starts and drives.
+
+    Attributes:
+        corners: Of its route, rounded with ``radius`` (m).
+        closed: A round; otherwise there and back.
+        cruise: (m/s).
+        task: Its intent in a word.
+    """
+
+    start: Pose2D
+    corners: tuple[tuple[float, float], ...]
+    radius: float
+    task: str
+    closed: bool = True
+    cruise: float = 0.8
+    stations: tuple[Station, ...] = ()
+
+    def route(self) -> Route:
+        """The way as points."""
+        return route_of(self.corners, self.radius, self.closed)
+
+
+@dataclass(frozen=True, slots=True)
+class Incident:
+    """Something that goes wrong on purpose.
+
+    Attributes:
+        at_s: Seconds into the run; again every ``every_s`` where that is not 0.
+        order: What.
+    """
+
+    at_s: float
+    order: FaultOrder
+    every_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One named run.
+
+    Attributes:
+        about: What it shows, in one sentence.
+        outcome: What must be seen of it in iVeg; held by a test of the whole stack.
+        robots: Scripts by robot id; a fleet with others drives ``many``'s round.
+        people: The round of each person.
+        detector: Takes the place of the profile that was asked for.
+        house: The greenhouse that it is written for.
+    """
+
+    name: str
+    about: str
+    outcome: str
+    robots: Mapping[str, RobotScript]
+    people: tuple[tuple[Stop, ...], ...] = ()
+    incidents: tuple[Incident, ...] = ()
+    detector: str | None = None
+    house: str = TESTBED
