@@ -50,7 +50,7 @@ _HAUL = RobotScript(
 _HAUL_ON = RobotScript(Pose2D(13.2, 15.2, _SOUTH), _HAUL_CORNERS, 2.3, "hauling")
 _LAPS = RobotScript(
     Pose2D(8.9, 7.8, _NORTH),
-    ((8.9, 7.2), (8.9, 12.8), (11.1, 12.8), (11.1, 7.2)),
+    ((8.9, 6.0), (8.9, 14.0), (11.1, 14.0), (11.1, 6.0)),
     0.6,
     "scouting",
 )
