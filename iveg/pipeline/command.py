@@ -22,6 +22,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop import (
     Changed,
+    Closed,
     Command,
     Effect,
     SendOnce,
@@ -213,6 +214,8 @@ class Commander:
                     self._start(self._set_level(effect), f"level-{effect.robot_id}")
                 case Changed():
                     self._tell(machine, effect, at)
+                case Closed():
+                    self._minutes.closed(effect, at)
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         command = self._command_of(machine, changed)

@@ -22,7 +22,7 @@ from iveg.domain.records import (
     LogRecord,
     OdometryRecord,
 )
-from iveg.domain.stop import Changed, Command
+from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
@@ -188,15 +188,7 @@ class Minutes:
             )
         )
         if changed is not None:
-            self._sink.offer(
-                CommandEventRecord(
-                    command_id=command.command_id,
-                    robot_id=command.robot_id,
-                    at=at.wall,
-                    state=changed.state,
-                    why=changed.why or changed.key,
-                )
-            )
+            self._audit(command, changed.state, changed.why or changed.key, at)
         # A snapshot: what is sent later must still say what was true at this step.
         step = replace(
             command,
@@ -205,6 +197,23 @@ class Minutes:
             requesters=list(command.requesters),
         )
         self._hub.append(f"commands/{command.command_id}", step)
+
+    def closed(self, closed: Closed, at: Instant) -> None:
+        """A command is followed no more."""
+        command = closed.command
+        self.command(command, None, at)
+        self._audit(command, command.state, closed.key, at)
+
+    def _audit(self, command: Command, state: str, why: str, at: Instant) -> None:
+        self._sink.offer(
+            CommandEventRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                at=at.wall,
+                state=state,
+                why=why,
+            )
+        )
 
     def alarm(self, alarm: Alarm) -> None:
         """An alarm was raised, acknowledged or cleared."""

@@ -28,6 +28,7 @@ from iveg.domain.observations import (
 from iveg.domain.order import Order
 from iveg.domain.stop import (
     Changed,
+    Command,
     Effect,
     SendOnce,
     SendStop,
@@ -111,6 +112,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.ended: set[str] = set()
         self.reported_released: set[str] = set()
         self.episode: str | None = None
+        self.history: dict[str, Command] = {}
         self.restart()
 
     # --- both sides ---------------------------------------------------------------
@@ -124,6 +126,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
     def restart(self) -> None:
         """A new iVeg: nothing is known but the journal."""
         self.iveg = StopMachine("AGI")
+        self.history.clear()
         self.order, self.asked, self.sent_once = Order(), 0, 0
         self.samples: list[tuple[float, SafetyReport]] = []
         self.moved_at = self.last_send = float("-inf")
@@ -131,6 +134,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.episode = None
 
     def perform(self, effects: list[Effect]) -> None:
+        self._keep_the_history()
         for effect in effects:
             if isinstance(effect, SendStop):
                 assert effect.hold_id not in self.ended, "an old id was sent again"
@@ -145,8 +149,13 @@ class StopOverBadRoads(RuleBasedStateMachine):
                 self._send_once(effect)
             elif isinstance(effect, SetLevel):
                 self.level = effect.ids
-            else:
+            elif isinstance(effect, Changed):
                 self._changed(effect)
+
+    def _keep_the_history(self) -> None:
+        for command in (self.iveg.stop, self.iveg.once):
+            if command is not None:
+                self.history[command.command_id] = command
 
     def _send_once(self, effect: SendOnce) -> None:
         assert self.asking, "I2, I6: nobody asked for this"
@@ -389,6 +398,15 @@ class StopOverBadRoads(RuleBasedStateMachine):
     def i7_a_release_is_confirmed_or_a_stop(self) -> None:
         if self.releasing_since is not None:
             assert self.now - self.releasing_since <= 2.5
+
+    @invariant()
+    def i9_no_row_of_the_past_says_that_it_still_goes_on(self) -> None:
+        open_now = (self.iveg.stop, self.iveg.once)
+        for command in self.history.values():
+            if command not in open_now and command.kind != "stop":
+                assert command.state != "RELEASING"
+            if command not in open_now and command.kind == "stop":
+                assert command.state in ("RUNNING", "REPLACED")
 
     @invariant()
     def the_level_says_what_is_wanted(self) -> None:

@@ -4,7 +4,7 @@ import pytest
 
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold
-from iveg.domain.stop import Changed
+from iveg.domain.stop import Changed, Closed, Effect
 from tests.builders import at, safety_report
 from tests.unit.domain.bench import (
     BOOT_HOLD,
@@ -371,3 +371,52 @@ def test_a_boot_hold_alone_is_not_adopted() -> None:
     bench.report(BOOT_HOLD)
 
     assert bench.state == "RUNNING"
+
+
+def closed(effects: list[Effect]) -> dict[str, tuple[str, str]]:
+    return {
+        one.command.kind: (one.command.state, one.key)
+        for one in effects
+        if isinstance(one, Closed)
+    }
+
+
+def test_a_release_that_timed_out_is_expired_and_its_stop_replaced() -> None:
+    bench = IN_STATE["REQUESTED"]().stand()
+    bench.release(bench.ours.id)
+
+    effects = bench.wait(2.1)
+
+    assert closed(effects) == {
+        "release": ("EXPIRED", "release_unconfirmed"),
+        "stop": ("REPLACED", "release_unconfirmed"),
+    }
+    assert bench.machine.wants_stop
+
+
+def test_a_stop_of_a_robot_that_moved_is_replaced_by_the_new_one() -> None:
+    bench = IN_STATE["REQUESTED"]().stand()
+    before = bench.machine.stop
+
+    effects = bench.report(bench.ours, linear=0.3)
+
+    assert closed(effects) == {"stop": ("REPLACED", "moved")}
+    assert before is not None
+    assert before is not bench.machine.stop
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.state == "REQUESTED"
+
+
+def test_a_release_that_somebody_overtook_with_a_stop_is_replaced() -> None:
+    bench = IN_STATE["REQUESTED"]().stand()
+    bench.release(bench.ours.id)
+
+    effects = bench.press("ben")
+
+    assert closed(effects)["release"] == ("REPLACED", "requested")
+
+
+def test_a_stop_that_others_join_is_not_closed() -> None:
+    bench = IN_STATE["REQUESTED"]()
+
+    assert closed(bench.press("ben")) == {}

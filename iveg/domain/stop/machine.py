@@ -1,13 +1,8 @@
 """The life of a STOP, as a pure state machine (safety.md §2.3).
 
 The operator's press is one fact; that the robot stands still is another.  This module
-keeps every step between the two apart, so the page never shows a wish as a result::
-
-    RUNNING ──> REQUESTED ──> SENT ──> DELIVERED ──> STANDING <──> STALE
-       ^            │  │        │          └──> STILL_MOVING ──┘ │
-       │            │  └────────┴─> UNCONFIRMED ─────────────────┤
-       │            └<── moved, hold lost, release unconfirmed ──┤
-       └── READY <────────────── RELEASING <─────────────────────┘
+keeps every step between the two apart, so the page never shows a wish as a result; the
+steps are drawn in ``table``.
 
 STOP is a level: it is sent again until the robot reports our own hold, for ever.  A
 RELEASE is an edge: sent once, for the holds that a person saw; unconfirmed it becomes
@@ -16,7 +11,6 @@ a STOP under a new id.
 
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.errors import CommandRefusedError
@@ -28,126 +22,31 @@ from iveg.domain.observations import (
     Road,
     SafetyReport,
 )
+from iveg.domain.stop.commands import Command, Press, Times
+from iveg.domain.stop.effects import (
+    Changed,
+    Closed,
+    Effect,
+    SendOnce,
+    SendStop,
+    SetLevel,
+)
+from iveg.domain.stop.sends import Sends
+from iveg.domain.stop.standstill import Standstill
+from iveg.domain.stop.table import STEPS, SendRoad, State
 from iveg.domain.world import STANDING_SPEED
-
-State = Literal[
-    "RUNNING",
-    "REQUESTED",
-    "SENT",
-    "DELIVERED",
-    "STANDING",
-    "UNCONFIRMED",
-    "STILL_MOVING",
-    "STALE",
-    "RELEASING",
-    "READY",
-]
-SendRoad = Literal["direct", "fiware"]
-
-_STEPS: dict[State, frozenset[State]] = {
-    "RUNNING": frozenset({"REQUESTED", "DELIVERED", "RELEASING"}),
-    "REQUESTED": frozenset({"REQUESTED", "SENT", "DELIVERED", "UNCONFIRMED"}),
-    "SENT": frozenset({"REQUESTED", "DELIVERED", "UNCONFIRMED"}),
-    "DELIVERED": frozenset({"REQUESTED", "STANDING", "STILL_MOVING"}),
-    "UNCONFIRMED": frozenset({"REQUESTED", "DELIVERED", "STANDING"}),
-    "STILL_MOVING": frozenset({"REQUESTED", "STANDING"}),
-    "STANDING": frozenset({"REQUESTED", "STALE", "RELEASING"}),
-    "STALE": frozenset({"REQUESTED", "STANDING"}),
-    "RELEASING": frozenset({"REQUESTED", "READY", "STANDING", "RUNNING"}),
-    "READY": frozenset({"REQUESTED", "RUNNING", "RELEASING", "DELIVERED"}),
-}
 
 UNCONFIRMED_S = 1.0
 STALE_S = 1.5
 FRESH_S = 1.0
 RELEASE_S = 2.0
-STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
-"""So many samples at rest, over so long, none later than this after the one before."""
-MOVED_SAMPLES = 3
 ASSUMED_BRAKING = 0.5
 """Least braking that may be counted on (m/s²)."""
 BRAKING_EXTRA_S, BRAKING_CAP_S = 1.5, 5.0
-FIWARE_PAUSE_S = 2.0
-STANDING_RESEND_S = 5.0
-_EARLY_SENDS = (0.25, 0.5, 1.0)
+CRAWL_SPEED = 0.2
+"""At most this fast a robot may be stopped for a drill (m/s)."""
 _ANSWERS_REMEMBERED = 64
-
-
-@dataclass(frozen=True, slots=True)
-class SendStop:
-    """Send this hold on this road, now."""
-
-    robot_id: str
-    hold_id: str
-    road: SendRoad
-
-
-@dataclass(frozen=True, slots=True)
-class SendOnce:
-    """Send a release (with ids) or a resume (without), once, through Orion alone."""
-
-    robot_id: str
-    command_id: str
-    kind: Literal["release", "resume"]
-    challenge: str
-    ids: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class SetLevel:
-    """Publish the retained level that a reconnecting robot finds."""
-
-    robot_id: str
-    desired: Literal["stopped", "run"]
-    ids: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Changed:
-    """The state changed: one audit row, one log line.
-
-    Attributes:
-        key: Names the sentence, such as ``standing`` or ``moved``.
-    """
-
-    robot_id: str
-    command_id: str
-    state: State
-    key: str
-    why: str | None = None
-
-
-Effect = SendStop | SendOnce | SetLevel | Changed
-
-
-@dataclass(slots=True)
-class Times:
-    """When each step of a command was taken; ``requested`` on our clocks."""
-
-    requested: Instant
-    sent_direct: Instant | None = None
-    sent_fiware: Instant | None = None
-    answer_direct: Instant | None = None
-    answer_fiware: Instant | None = None
-    standing: Instant | None = None
-
-
-@dataclass(slots=True)
-class Command:
-    """One STOP, RELEASE or RESUME as people follow it."""
-
-    command_id: str
-    robot_id: str
-    kind: Literal["stop", "release", "resume"]
-    state: State
-    times: Times
-    requesters: list[str] = field(default_factory=list)
-    tries: int = 0
-    reason: str | None = None
-    standstill_ms: float | None = None
-    roads: dict[SendRoad, str] = field(
-        default_factory=lambda: {"direct": "pending", "fiware": "pending"}
-    )
+_PLAIN = Press()
 
 
 class StopMachine:
@@ -160,17 +59,10 @@ class StopMachine:
         self.once: Command | None = None
         self.report: SafetyReport | None = None
         self.report_at: Instant | None = None
-        self._direct = direct
+        self._sends = Sends(direct=direct)
+        self._standstill = Standstill()
         self._deadline = 0.0
-        self._next_direct = 0.0
-        self._next_fiware = 0.0
-        self._fiware_busy = False
-        self._standing_from: Instant | None = None
-        self._standing_count = 0
-        self._standing_newest = float("-inf")
         self._answers: deque[tuple[str, int]] = deque(maxlen=_ANSWERS_REMEMBERED)
-        self._moving_samples = 0
-        self._moved_at = float("-inf")
         self._speed = 0.0
 
     # --- what is wanted -----------------------------------------------------------
@@ -199,13 +91,34 @@ class StopMachine:
     # --- people -------------------------------------------------------------------
 
     def press(
-        self, by: str, at: Instant, new_id: str, *, key: str = "requested"
+        self,
+        by: str,
+        at: Instant,
+        new_id: str,
+        *,
+        key: str = "requested",
+        press: Press = _PLAIN,
     ) -> list[Effect]:
         """STOP: always accepted; a press during an episode joins it."""
         if self.wants_stop and self.state != "RELEASING" and self.stop is not None:
             effects = [] if self.state == "STANDING" else self._send_now(at)
             return [*effects, *self._join(self.stop, by)]
-        return self._begin(by, at, new_id, key)
+        return self._begin(by, at, new_id, key, press)
+
+    def drill(self, by: str, at: Instant, new_id: str, press: Press) -> list[Effect]:
+        """Press STOP to prove that it works, on a robot that hardly moves.
+
+        Raises:
+            CommandRefusedError: stopped already, faster than a crawl, or unheard.
+        """
+        if self.state != "RUNNING":
+            why = f"its state is {self.state}"
+            raise CommandRefusedError(self.robot_id, "Drill", why)
+        if self.report is None or self._report_age(at) > FRESH_S:
+            raise CommandRefusedError(self.robot_id, "Drill", "its report is not fresh")
+        if max(self._speed, abs(self.report.linear)) > CRAWL_SPEED:
+            raise CommandRefusedError(self.robot_id, "Drill", "it is moving")
+        return self._begin(by, at, new_id, "requested", press)
 
     def _join(self, stop: Command, by: str) -> list[Effect]:
         """One more person wants it: nothing changes but the audit."""
@@ -214,22 +127,39 @@ class StopMachine:
         stop.requesters.append(by)
         return [Changed(self.robot_id, stop.command_id, self.state, "requested")]
 
-    def _begin(self, by: str, at: Instant, new_id: str, key: str) -> list[Effect]:
+    def _begin(
+        self, by: str, at: Instant, new_id: str, key: str, press: Press = _PLAIN
+    ) -> list[Effect]:
         """A new episode under an id that was never used before."""
-        self.stop = Command(new_id, self.robot_id, "stop", "REQUESTED", Times(at), [by])
+        closed = self._close(key)
+        times = Times.of(at, press)
+        self.stop = Command(new_id, self.robot_id, "stop", "REQUESTED", times, [by])
+        self.stop.drill = press.drill
         if key != "requested":
             self.stop.reason = key
-        if not self._direct:
+        if not self._sends.has_direct:
             self.stop.roads["direct"] = "off"
         self.once = None
-        self._forget_standing()
+        self._standstill.forget()
         self._deadline = at.mono + UNCONFIRMED_S
-        # What is still on its way belongs to an earlier episode and holds up nothing.
-        self._fiware_busy = False
+        self._sends.begin()
         # First, because sends to a standing robot are planned five seconds apart.
         changed = self._enter("REQUESTED", key)
         level = SetLevel(self.robot_id, "stopped", (new_id,))
-        return [*self._send_now(at), level, changed]
+        return [*self._send_now(at), level, *closed, changed]
+
+    def _close(self, key: str) -> list[Closed]:
+        """What is followed no more says so in its own row."""
+        closed = []
+        if self.once is not None:
+            late = key == "release_unconfirmed"
+            self.once.state = "EXPIRED" if late else "REPLACED"
+            self.once.reason = key
+            closed.append(Closed(self.robot_id, self.once, key))
+        if self.stop is not None:
+            self.stop.state = "REPLACED"
+            closed.append(Closed(self.robot_id, self.stop, key))
+        return closed
 
     def release(
         self, by: str, seen: Iterable[str], at: Instant, new_id: str
@@ -306,8 +236,7 @@ class StopMachine:
         if command is None:
             return []
         if road == "fiware" and command is self.stop:
-            self._fiware_busy = False
-            self._next_fiware = at.mono + FIWARE_PAUSE_S
+            self._sends.came_back(at)
         command.roads[road] = "ok" if ok else "failed"
         if not ok:
             return []
@@ -327,45 +256,17 @@ class StopMachine:
 
     def _send_now(self, at: Instant) -> list[Effect]:
         """On both roads at once, whatever was due when."""
-        self._next_direct = self._next_fiware = at.mono
+        self._sends.now(at)
         return self._send_due(at)
 
     def _send_due(self, at: Instant) -> list[Effect]:
         assert self.stop is not None  # noqa: S101 - callers have begun an episode
-        roads: list[SendRoad] = []
-        if self._direct and at.mono >= self._next_direct:
-            self._next_direct = at.mono + self._pause(at)
-            roads.append("direct")
-        if self._fiware_is_due(at):
-            self._fiware_busy = True
-            roads.append("fiware")
-        if roads and self.state != "STANDING":
-            self.stop.tries += 1
-        hold_id = self.stop.command_id
-        return [SendStop(self.robot_id, hold_id, road) for road in roads]
-
-    def _fiware_is_due(self, at: Instant) -> bool:
-        """One request in flight, the next two seconds after it came back.
-
-        A robot that stands is reminded on the direct road alone, where there is one.
-        """
-        if self._fiware_busy:
-            return False
-        if self.state != "STANDING":
-            return at.mono >= self._next_fiware
-        rest = STANDING_RESEND_S - FIWARE_PAUSE_S
-        return not self._direct and at.mono >= self._next_fiware + rest
-
-    def _pause(self, at: Instant) -> float:
-        """Direct at 0, 250, 500, 1000 ms, then 0.5 s, after 10 s every second."""
-        assert self.stop is not None  # noqa: S101 - as above
-        if self.state == "STANDING":
-            return STANDING_RESEND_S
-        age = at.mono - self.stop.times.requested.mono
-        for early in _EARLY_SENDS:
-            if age < early - 1e-3:
-                return early - age
-        return 0.5 if age < 10.0 else 1.0
+        stop, standing = self.stop, self.state == "STANDING"
+        age_s = at.mono - stop.times.requested.mono
+        roads = self._sends.due(at, age_s, standing=standing)
+        if roads and not standing:
+            stop.tries += 1
+        return [SendStop(self.robot_id, stop.command_id, road) for road in roads]
 
     # --- what comes back ----------------------------------------------------------
 
@@ -436,7 +337,7 @@ class StopMachine:
             return self._reported_releasing(report)
         assert self.stop is not None  # noqa: S101 - every other state has an episode
         if self.hold_id not in {hold.id for hold in report.holds}:
-            self._forget_standing()
+            self._standstill.forget()
             # A name that was released never holds again: only a new one can.
             released = self.hold_id in report.released
             if released or self.state in ("STANDING", "STALE"):
@@ -445,7 +346,7 @@ class StopMachine:
         _note_answer(self.stop.times, at, road)
         effects = self._delivered(at)
         if not _stands(report):
-            self._forget_standing()
+            self._standstill.forget()
             if self.state in ("STANDING", "STALE"):
                 return [*effects, *self._begin("iveg", at, new_id, "moved")]
             return effects
@@ -454,27 +355,14 @@ class StopMachine:
     def _stood(self, at: Instant) -> list[Effect]:
         """One more sample at rest; five over a second are a standstill."""
         assert self.stop is not None  # noqa: S101 - called with an episode
-        if at.mono - self._standing_newest > STANDING_FRESH_S:
-            # Nobody knows what it did in the gap.
-            self._forget_standing()
-        if self._standing_from is None:
-            self._standing_from = at
-        self._standing_newest = at.mono
-        self._standing_count += 1
-        if self.state == "STANDING":
-            return []
-        long_enough = at.mono - self._standing_from.mono >= STANDING_S
-        contradicted = at.mono - self._moved_at < STANDING_FRESH_S
-        if self._standing_count < STANDING_SAMPLES or not long_enough or contradicted:
+        measured = self._standstill.rested(at)
+        if not measured or self.state == "STANDING":
             return []
         if self.stop.times.standing is None:
-            self.stop.times.standing = self._standing_from
-            took = self._standing_from.mono - self.stop.times.requested.mono
-            self.stop.standstill_ms = max(0.0, 1000.0 * took)
+            self.stop.times.standing = first = self._standstill.since
+            assert first is not None  # noqa: S101 - a rest has a first sample
+            self.stop.standstill_ms = self.stop.times.ms_from_press(first)
         return [self._enter("STANDING", "standing")]
-
-    def _forget_standing(self) -> None:
-        self._standing_from, self._standing_count = None, 0
 
     def _reported_free(self, report: SafetyReport, at: Instant) -> list[Effect]:
         if self.state == "READY" and not report.holds and report.speed_factor > 0:
@@ -483,15 +371,16 @@ class StopMachine:
         if not ours:
             return []
         # A hold of iVeg that this process did not ask for: adopt it, never drop it.
+        closed = self._close("adopted")
         self.stop = Command(
             ours[-1], self.robot_id, "stop", "DELIVERED", Times(at), ["iveg"]
         )
-        self._forget_standing()
-        self._fiware_busy = False
+        self._standstill.forget()
+        self._sends.begin()
+        self._sends.now(at)
         self._deadline = at.mono + BRAKING_CAP_S
-        self._next_direct = self._next_fiware = at.mono
         level = SetLevel(self.robot_id, "stopped", (ours[-1],))
-        return [level, self._enter("DELIVERED", "adopted")]
+        return [level, *closed, self._enter("DELIVERED", "adopted")]
 
     def _reported_releasing(self, report: SafetyReport) -> list[Effect]:
         assert self.once is not None  # noqa: S101 - RELEASING has one
@@ -518,10 +407,9 @@ class StopMachine:
     ) -> list[Effect]:
         """A fresh speed; three moving ones in a row contradict a standstill."""
         moves = max(abs(linear), abs(angular)) >= STANDING_SPEED
-        self._moving_samples = self._moving_samples + 1 if moves else 0
-        self._moved_at = at.mono if moves else self._moved_at
+        contradicted = self._standstill.odometry(at, moves=moves)
         self._speed = abs(linear)
-        if self.state == "STANDING" and self._moving_samples >= MOVED_SAMPLES:
+        if self.state == "STANDING" and contradicted:
             return self._begin("iveg", at, new_id, "moved")
         return []
 
@@ -542,8 +430,8 @@ class StopMachine:
             case "DELIVERED" if late:
                 return [self._enter("STILL_MOVING", "still_moving")]
             case "STANDING" if self._report_age(now) > STALE_S:
-                self._forget_standing()
-                self._next_direct = now.mono
+                self._standstill.forget()
+                self._sends.direct_now(now)
                 return [self._enter("STALE", "stale")]
             case "RELEASING" if late:
                 return self._begin("iveg", now, new_id, "release_unconfirmed")
@@ -555,7 +443,7 @@ class StopMachine:
         return now.mono - self.report_at.mono
 
     def _enter(self, state: State, key: str, why: str | None = None) -> Changed:
-        if state not in _STEPS[self.state]:
+        if state not in STEPS[self.state]:
             raise CommandRefusedError(
                 self.robot_id, state, f"no step leads there from {self.state}"
             )

@@ -1,0 +1,60 @@
+"""STOP, from a person's hand to a measured standstill (safety.md §2.3)."""
+
+from iveg.domain.stop.commands import (
+    Command,
+    CommandState,
+    Press,
+    Times,
+    believe,
+)
+from iveg.domain.stop.effects import (
+    Changed,
+    Closed,
+    Effect,
+    SendOnce,
+    SendStop,
+    SetLevel,
+)
+from iveg.domain.stop.machine import (
+    CRAWL_SPEED,
+    FRESH_S,
+    RELEASE_S,
+    STALE_S,
+    UNCONFIRMED_S,
+    StopMachine,
+)
+from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
+from iveg.domain.stop.standstill import (
+    STANDING_FRESH_S,
+    STANDING_S,
+    STANDING_SAMPLES,
+)
+from iveg.domain.stop.table import STEPS, SendRoad, State
+
+__all__ = [
+    "CRAWL_SPEED",
+    "FIWARE_PAUSE_S",
+    "FRESH_S",
+    "RELEASE_S",
+    "STALE_S",
+    "STANDING_FRESH_S",
+    "STANDING_RESEND_S",
+    "STANDING_S",
+    "STANDING_SAMPLES",
+    "STEPS",
+    "UNCONFIRMED_S",
+    "Changed",
+    "Closed",
+    "Command",
+    "CommandState",
+    "Effect",
+    "Press",
+    "SendOnce",
+    "SendRoad",
+    "SendStop",
+    "SetLevel",
+    "State",
+    "StopMachine",
+    "Times",
+    "believe",
+]
