@@ -99,7 +99,7 @@ class Mandates:
         new_id: str,
     ) -> tuple[dict[str, Mandate], list[Change]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
-        hazards = list(_hazards(world, people, rule, now))
+        hazards = list(hazards_of(world, people, rule, now))
         changes: list[Change] = []
         for robot in world.robots.values():
             changes += self._cross(robot, hazards, now, f"{new_id}-{len(changes)}")
@@ -211,9 +211,10 @@ class Mandates:
         return CLEAR
 
 
-def _hazards(
+def hazards_of(
     world: World, people: People, rule: Rule, now: Instant
 ) -> Iterator[Hazard]:
+    """Every circle that slows somebody now."""
     for person in people.known.values():
         for sighting, radius in person.rings(rule, now):
             yield Hazard(

@@ -1,0 +1,265 @@
+"""The costmap that all robots share: what their lasers found, and whom to keep off.
+
+Every scan says of each cell in its reach: free, if the beam that looks that way went
+further; taken, if it ended there (Moravec and Elfes' occupancy grid, in log-odds with
+the clamps of OctoMap, so that a crate that is carried away is soon forgotten).  What
+nobody looks at any more fades to unknown.  People and peers are laid over it with
+their ring at the moment of asking.  Left out: beams are lines without width.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.observations import LaserScan
+
+RESOLUTION_M = 0.1
+MAX_CELLS = 400_000
+"""A larger house gets coarser cells, so that no house costs more than this."""
+UNKNOWN = -1
+_HIT, _MISS = 0.85, -0.4
+_LEAST, _MOST = -2.0, 3.5
+_HALF_LIFE_S = 20.0
+_KNOWN = 0.05
+"""Log-odds nearer to zero than this say nothing."""
+_REACH_M = 15.0
+_WINDOW_M, _WINDOW_MARGIN_M, _WINDOW_EDGE_M = 60.0, 20.0, 8.0
+_RING_EDGE, _RING_CENTRE = 50, 99
+
+_Log = NDArray[np.float32]
+_Cells = tuple[slice, slice]
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """Where the cells lie in ``map``; row 0 is the southernmost.
+
+    Attributes:
+        resolution: Side of a cell (m).
+        xmin: West edge (m); ``ymin`` south edge (m).
+        width: Cells from west to east; ``height`` from south to north.
+    """
+
+    resolution: float
+    xmin: float
+    ymin: float
+    width: int
+    height: int
+
+    @classmethod
+    def over(cls, area: Rectangle, resolution: float = RESOLUTION_M) -> "Grid":
+        """The grid that covers an area with at most ``MAX_CELLS``."""
+        wide, high = area.xmax - area.xmin, area.ymax - area.ymin
+        coarse = math.ceil(math.sqrt(wide * high / MAX_CELLS) / resolution)
+        side = resolution * max(1, coarse)
+        width, height = (max(1, math.floor(s / side + 1e-9)) for s in (wide, high))
+        return cls(side, area.xmin, area.ymin, width, height)
+
+    def window(self, x: float, y: float, reach: float) -> _Cells:
+        """The cells within ``reach`` (m) of a point along both axes."""
+        low = self.index(x - reach, y - reach)
+        high = self.index(x + reach, y + reach)
+        return (
+            slice(max(0, low[0]), max(0, min(self.height, high[0] + 1))),
+            slice(max(0, low[1]), max(0, min(self.width, high[1] + 1))),
+        )
+
+    def index(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of a point, which may lie outside."""
+        return (
+            math.floor((y - self.ymin) / self.resolution),
+            math.floor((x - self.xmin) / self.resolution),
+        )
+
+    def offsets(self, cells: _Cells, x: float, y: float) -> tuple[_Log, _Log]:
+        """From a point to the centres of cells: dx shape (1, n), dy (m, 1), (m)."""
+        rows, columns = cells
+        across = np.arange(columns.start, columns.stop, dtype=np.float32)
+        up = np.arange(rows.start, rows.stop, dtype=np.float32)
+        dx = (across + 0.5) * self.resolution + (self.xmin - x)
+        dy = (up + 0.5) * self.resolution + (self.ymin - y)
+        return dx.astype(np.float32)[None, :], dy.astype(np.float32)[:, None]
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """What one scan says of the cells in its reach.
+
+    Attributes:
+        cells: Rows and columns that it speaks of.
+        change: Shape of ``cells``; log-odds to add.
+    """
+
+    cells: _Cells
+    change: _Log
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Costmap:
+    """Costs at one moment: ``nav_msgs/OccupancyGrid`` with its rings inflated.
+
+    Attributes:
+        data: Shape (height, width), int8; 0 free to 100 taken, -1 unknown.
+    """
+
+    grid: Grid
+    data: NDArray[np.int8]
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """Somebody to keep off: centre in ``map`` and radius (m)."""
+
+    x: float
+    y: float
+    radius_m: float
+
+
+class Occupancy:
+    """Log-odds of one grid: 0 unknown, below free, above taken."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+        self._log: _Log = np.zeros((grid.height, grid.width), np.float32)
+        self._faded: float | None = None
+
+    def add(self, sweep: Sweep) -> None:
+        """Take one scan in."""
+        part = self._log[sweep.cells]
+        part += sweep.change
+        np.clip(part, _LEAST, _MOST, out=part)
+
+    def fade(self, mono: float) -> None:
+        """Let what was known at the last call grow old until ``mono`` (s)."""
+        if self._faded is not None:
+            passed = max(0.0, mono - self._faded)
+            self._log *= np.float32(0.5 ** (passed / _HALF_LIFE_S))
+        self._faded = mono
+
+    def moved_to(self, grid: Grid) -> "Occupancy":
+        """The same knowledge on a grid of the same resolution that lies elsewhere."""
+        other = Occupancy(grid)
+        other._faded = self._faded
+        old = self.grid
+        down, left = old.index(
+            grid.xmin + old.resolution / 2, grid.ymin + old.resolution / 2
+        )
+        rows = _overlap(down, grid.height, old.height)
+        columns = _overlap(left, grid.width, old.width)
+        there = self._log[rows, columns]
+        row, column = rows.start - down, columns.start - left
+        other._log[row : row + there.shape[0], column : column + there.shape[1]] = there
+        return other
+
+    def costs(self, rings: Iterable[Ring] = ()) -> Costmap:
+        """What each cell costs, rings laid over it."""
+        cost = np.clip(self._log * (100.0 / _MOST), 0.0, 100.0).astype(np.int8)
+        cost[np.abs(self._log) < _KNOWN] = UNKNOWN
+        for ring in rings:
+            _inflate(cost, self.grid, ring)
+        return Costmap(self.grid, cost)
+
+
+def window_round(poses: Iterable[Pose2D], before: Grid | None) -> Grid | None:
+    """Where to map when there are no walls: round the robots, at most 60 m wide.
+
+    The window stays where it was while every robot is well inside; None without robots.
+    """
+    places = [(pose.x, pose.y) for pose in poses]
+    if not places:
+        return before
+    x, y = zip(*places, strict=True)
+    box = Rectangle(min(x), min(y), max(x), max(y))
+    if before is not None and _holds(before, box):
+        return before
+    sides = (box.xmin, box.xmax), (box.ymin, box.ymax)
+    (west, east), (south, north) = (_stretch(*side) for side in sides)
+    return Grid.over(Rectangle(west, south, east, north))
+
+
+def _holds(grid: Grid, box: Rectangle) -> bool:
+    xmax = grid.xmin + grid.width * grid.resolution
+    ymax = grid.ymin + grid.height * grid.resolution
+    return (
+        grid.xmin + _WINDOW_EDGE_M <= box.xmin
+        and grid.ymin + _WINDOW_EDGE_M <= box.ymin
+        and box.xmax <= xmax - _WINDOW_EDGE_M
+        and box.ymax <= ymax - _WINDOW_EDGE_M
+    )
+
+
+def _stretch(low: float, high: float) -> tuple[float, float]:
+    """One side of the window (m), on whole metres so that cells meet cells."""
+    half = min(_WINDOW_M, high - low + 2 * _WINDOW_MARGIN_M) / 2
+    middle, half = round((low + high) / 2), math.ceil(half)
+    return middle - half, middle + half
+
+
+def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
+    """Read one scan, taken at ``pose`` in ``map``, cell by cell.
+
+    Asking every cell for its beam, rather than every beam for its cells, leaves no
+    holes between beams that are far apart.
+    """
+    sensor = pose.compose(scan.mount)
+    reach = min(scan.range_max, _REACH_M)
+    cells = grid.window(sensor.x, sensor.y, reach)
+    dx, dy = grid.offsets(cells, sensor.x, sensor.y)
+    change = np.zeros((dy.shape[0], dx.shape[1]), np.float32)
+    if change.size and scan.ranges.size:
+        distance = np.hypot(dx, dy)
+        free = distance < _free_to(scan, sensor.yaw, dx, dy, reach) - grid.resolution
+        change[free] = _MISS
+        row, column = _hits(scan, pose, sensor, grid, reach)
+        inside = (row >= cells[0].start) & (row < cells[0].stop)
+        inside &= (column >= cells[1].start) & (column < cells[1].stop)
+        change[row[inside] - cells[0].start, column[inside] - cells[1].start] = _HIT
+    return Sweep(cells, change)
+
+
+def _free_to(scan: LaserScan, yaw: float, dx: _Log, dy: _Log, reach: float) -> _Log:
+    """How far the beam that looks at each cell went (m); 0 where none looks."""
+    count = scan.ranges.size
+    step = scan.angle_increment
+    bearing = np.arctan2(dy, dx) - np.float32(yaw + scan.angle_min)
+    # A scan may turn either way; whole turns are taken out in its own direction.
+    beam = np.mod(bearing, math.copysign(math.tau, step)) * np.float32(1.0 / step)
+    index = np.rint(beam).astype(np.int32)
+    if abs(count * step) >= math.tau - 1.5 * abs(step):
+        index %= count
+    ranges = scan.ranges
+    usable = (ranges >= scan.range_min) | np.isinf(ranges)
+    went = np.where(usable, np.minimum(ranges, reach), 0.0).astype(np.float32)
+    looked = index < count
+    return np.where(looked, went[np.minimum(index, count - 1)], np.float32(0.0))
+
+
+def _hits(
+    scan: LaserScan, pose: Pose2D, sensor: Pose2D, grid: Grid, reach: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    points = scan.points(pose).astype(np.float64)
+    near = np.hypot(points[:, 0] - sensor.x, points[:, 1] - sensor.y) <= reach
+    points = points[near]
+    column = np.floor((points[:, 0] - grid.xmin) / grid.resolution).astype(np.int64)
+    row = np.floor((points[:, 1] - grid.ymin) / grid.resolution).astype(np.int64)
+    return row, column
+
+
+def _inflate(cost: NDArray[np.int8], grid: Grid, ring: Ring) -> None:
+    """Lay one ring over the costs: dear at its edge, dearest at its centre."""
+    cells = grid.window(ring.x, ring.y, ring.radius_m)
+    dx, dy = grid.offsets(cells, ring.x, ring.y)
+    inward = 1.0 - np.hypot(dx, dy) / np.float32(ring.radius_m)
+    added = _RING_EDGE + (_RING_CENTRE - _RING_EDGE) * inward
+    laid = np.where(inward >= 0.0, added, UNKNOWN).astype(np.int8)
+    cost[cells] = np.maximum(cost[cells], laid)
+
+
+def _overlap(start: int, size: int, limit: int) -> slice:
+    """Where ``size`` cells from ``start`` on meet the cells 0 to ``limit``."""
+    low = min(max(start, 0), limit)
+    return slice(low, max(low, min(start + size, limit)))

@@ -1,0 +1,122 @@
+"""Keeps the costmaps up to date: one scan at a time, never one per message.
+
+A scan costs about as much as a hundred decisions, and nobody stops for the costmap; so
+it is drawn beside the rule loop, from the newest scan of the robot that has waited
+longest, and a fleet that sends more is simply drawn less often.
+"""
+
+import asyncio
+from collections.abc import Iterable
+
+from iveg.domain.costmap import (
+    Costmap,
+    Grid,
+    Occupancy,
+    Ring,
+    Sweep,
+    sweep_of,
+    window_round,
+)
+from iveg.domain.geometry import Rectangle
+from iveg.domain.mandates import Hazard
+from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.world import RobotState, World
+from iveg.pipeline.ports import Clock
+
+TICK_S = 0.05
+_PERIOD_S = 0.25
+_WIDEST_M = 1000.0
+"""Longer than any house: an open field, mapped in a window round the robots."""
+
+
+class Mapper:
+    """One grid that the fleet shares, and one a robot.
+
+    Args:
+        bounds: The outer wall of the house.
+    """
+
+    def __init__(self, world: World, bounds: Rectangle) -> None:
+        self._world = world
+        wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
+        self._is_open = wide > _WIDEST_M
+        self._grid = None if self._is_open else Grid.over(bounds)
+        self._shared: Occupancy | None = None
+        self._own: dict[str, Occupancy] = {}
+        self._read: dict[str, LaserScan] = {}
+        self._read_at: dict[str, float] = {}
+
+    async def run(self, clock: Clock) -> None:
+        """Until cancelled."""
+        while True:
+            self.tick(clock())
+            await asyncio.sleep(TICK_S)
+
+    def tick(self, now: Instant) -> None:
+        """Take the scan in that has waited longest, if one is due."""
+        due = [robot for robot in self._world.live_robots() if self._is_due(robot, now)]
+        if due:
+            self._draw(min(due, key=self._last_drawn), now)
+
+    def shared(self, hazards: Iterable[Hazard], now: Instant) -> Costmap | None:
+        """What the fleet knows together; None while nobody has swept."""
+        return _costs(self._shared, hazards, now)
+
+    def of(
+        self, robot_id: str, hazards: Iterable[Hazard], now: Instant
+    ) -> Costmap | None:
+        """What one robot believes: its own scans, and whom feedback told it of."""
+        others = [hazard for hazard in hazards if hazard.cause != robot_id]
+        return _costs(self._own.get(robot_id), others, now)
+
+    def _is_due(self, robot: RobotState, now: Instant) -> bool:
+        scan = robot.scan
+        if scan is None or robot.scan_pose is None:
+            return False
+        fresh = scan is not self._read.get(robot.robot_id)
+        return fresh and now.mono - self._last_drawn(robot) >= _PERIOD_S
+
+    def _last_drawn(self, robot: RobotState) -> float:
+        return self._read_at.get(robot.robot_id, float("-inf"))
+
+    def _draw(self, robot: RobotState, now: Instant) -> None:
+        scan, pose = robot.scan, robot.scan_pose
+        self._place()
+        if scan is None or pose is None or self._grid is None:
+            return
+        self._read[robot.robot_id], self._read_at[robot.robot_id] = scan, now.mono
+        sweep = sweep_of(scan, pose, self._grid)
+        self._shared = _added(self._shared, self._grid, sweep, now)
+        own = self._own.get(robot.robot_id)
+        self._own[robot.robot_id] = _added(own, self._grid, sweep, now)
+
+    def _place(self) -> None:
+        """In an open field the grids go where the robots go."""
+        if self._is_open:
+            robots = self._world.live_robots()
+            poses = [robot.scan_pose for robot in robots if robot.scan_pose is not None]
+            self._grid = window_round(poses, self._grid)
+
+
+def _added(
+    known: Occupancy | None, grid: Grid, sweep: Sweep, now: Instant
+) -> Occupancy:
+    occupancy = Occupancy(grid) if known is None else known
+    if occupancy.grid != grid:
+        occupancy = occupancy.moved_to(grid)
+    occupancy.fade(now.mono)
+    occupancy.add(sweep)
+    return occupancy
+
+
+def _costs(
+    occupancy: Occupancy | None, hazards: Iterable[Hazard], now: Instant
+) -> Costmap | None:
+    if occupancy is None:
+        return None
+    occupancy.fade(now.mono)
+    return occupancy.costs(
+        Ring(hazard.x, hazard.y, hazard.radius_m)
+        for hazard in hazards
+        if not hazard.recorded
+    )
