@@ -31,6 +31,7 @@ from iveg.adapters.upkeep import Upkeep
 from iveg.domain.alerts import Rule
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
+from iveg.domain.stop import Press
 from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
@@ -38,12 +39,14 @@ from iveg.pipeline.chain import Chain
 from iveg.pipeline.command import Commander
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
 from iveg.settings import Settings
 from iveg.web import (
     alerts,
     commands,
+    costmap,
     health,
     history,
     live,
@@ -177,6 +180,7 @@ class Dss:
             boot=self._boot,
             read_clock=clock.now,
         )
+        self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
         self.views = Views(self.assessor, self.commander)
         self.door = Door(
             sign_in_token=self.sign_in_token,
@@ -208,6 +212,7 @@ class Dss:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.link.run(), name="mqtt")
             tasks.create_task(self.loop.run(), name="rule-loop")
+            tasks.create_task(self.mapper.run(clock.now), name="costmap")
             tasks.create_task(self.upkeep.run(), name="upkeep")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())
@@ -270,10 +275,10 @@ class Dss:
             "climate": views.climate(now),
         }
 
-    async def stop(self, robot_id: str | None, by: str) -> None:
+    async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
         """STOP one robot, or all."""
         targets = self.commander.machines if robot_id is None else [robot_id]
-        await self.commander.stop(targets, by, clock.now())
+        await self.commander.stop(targets, by, clock.now(), press)
 
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a subscription is one that this DSS keeps."""
@@ -319,6 +324,7 @@ def create_app(dss: Dss) -> FastAPI:
     )
     app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))
     app.include_router(robots.router(dss.views, clock.now, dss.health))
+    app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.assessor, clock.now))
     app.include_router(

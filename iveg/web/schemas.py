@@ -86,8 +86,9 @@ class ProfileJson(TypedDict):
 
 
 class TimesJson(TypedDict):
-    """When each step of a command was taken."""
+    """When each step of a command was taken; ``pressed`` if a page told and can be."""
 
+    pressed: str | None
     requested: str
     sent_fiware: str | None
     sent_direct: str | None
@@ -110,10 +111,12 @@ class CommandJson(TypedDict):
     command_id: str
     robot_id: str
     kind: str
+    drill: bool
     state: str
     requested_by: str
     requesters: list[str]
     times: TimesJson
+    pressed_doubted: bool
     standstill_ms: float | None
     age_s: float
     tries: int
@@ -273,6 +276,16 @@ class ScanJson(TypedDict):
     stamp: str | None
     frame_id: str
     points: list[list[float]]
+
+
+class CostmapJson(TypedDict):
+    """Cells from the south-western corner, row by row: 0-100, -1 unknown."""
+
+    resolution: float
+    width: int
+    height: int
+    origin: Point
+    data: list[int]
 
 
 class PressedJson(TypedDict):

@@ -11,10 +11,13 @@ import uvicorn
 from fastapi import FastAPI
 
 from iveg.domain.observations import Instant
+from iveg.domain.stop import Press
 from iveg.ngsi.codec import format_stamp
+from iveg.pipeline.mapping import Mapper
 from iveg.web import (
     alerts,
     commands,
+    costmap,
     health,
     live,
     notifications,
@@ -43,6 +46,7 @@ class WebDesk(Desk):
             api_token=API_TOKEN,
             now=lambda: self.clock().mono,
         )
+        self.mapper = Mapper(self.world, self.assessor.greenhouse.bounds)
         self.views = Views(self.assessor, self.commander)
         self.encoder = live.Encoder(self.views, self.hub, self.clock, self.health)
         self.app = FastAPI()
@@ -64,6 +68,7 @@ class WebDesk(Desk):
             ),
             live.router(self.hub, self.encoder, self.snapshot, self.clock, self.stop),
             robots.router(self.views, self.clock, self.health),
+            costmap.router(self.mapper, self.assessor, self.clock),
             commands.router(self.commander, self.clock),
             alerts.router(self.assessor, self.clock),
             health.router(self.clock, self.health),
@@ -82,9 +87,9 @@ class WebDesk(Desk):
             "commands": self.views.open_commands(now),
         }
 
-    async def stop(self, robot_id: str | None, by: str) -> None:
+    async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
         targets = self.commander.machines if robot_id is None else [robot_id]
-        await self.commander.stop(targets, by, self.clock())
+        await self.commander.stop(targets, by, self.clock(), press)
 
     # --- who asks -----------------------------------------------------------------
 

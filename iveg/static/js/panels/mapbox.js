@@ -4,6 +4,7 @@
  * Picking a person opens the decision behind its ring; picking a robot goes to its card.
  */
 
+import { followCostmap } from "../costmap.js";
 import { TRAIL_SPANS_S } from "../layers/trail.js";
 import { createMap } from "../map.js";
 import { all, make, need, setHidden, setText } from "./dom.js";
@@ -82,6 +83,9 @@ export function createMapbox(app, decision) {
     map.follow(/** @type {CustomEvent<string>} */ (event).detail);
   });
   map.onPick(onPick);
+  followCostmap(store, () =>
+    map.layers().some(({ name, on }) => name === "costmap" && on),
+  );
   onThemeChange(() => map.setTheme());
   store.subscribe("people", drawFacts);
   store.subscribe("climate", drawClimate);
