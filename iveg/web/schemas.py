@@ -126,6 +126,30 @@ class CommandJson(TypedDict):
     challenge_fresh: bool
 
 
+class MarginPartsJson(TypedDict):
+    """What stopping takes, term by term (m)."""
+
+    person_walks_m: float
+    reaction_m: float
+    braking_m: float
+    uncertainty_m: float
+
+
+class MarginJson(TypedDict):
+    """The gap to a person less what stopping takes; shown, never acted on."""
+
+    robot_id: str
+    person_id: str
+    gap_m: float
+    needs_m: float
+    margin_m: float
+    band: Literal["clear", "tight", "inside", "unknown"]
+    parts: MarginPartsJson
+    age_s: float
+    braking: float
+    walking_speed: float
+
+
 class RobotJson(TypedDict):
     """One robot with the age of what is said of it."""
 
@@ -148,6 +172,7 @@ class RobotJson(TypedDict):
     clock_offset_s: float | None
     road: str
     profile: ProfileJson
+    margin: MarginJson | None
     cmd_status: str | None
 
 
@@ -176,6 +201,7 @@ PersonJson = TypedDict(
         "decision_id": str,
         "lane": str | None,
         "acting": list[ActingJson],
+        "margin": MarginJson | None,
     },
 )
 """A person, or a robot that is none of the fleet."""

@@ -1,6 +1,7 @@
 """What is known, in the shapes of ``schemas``: built when somebody asks, never kept."""
 
 import json
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -9,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.alarms import Alarm
+from iveg.domain.alerts import WALKING_SPEED
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.margins import UNCERTAINTY_M, Margin, least, margin_of
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.people import Person, Placed
 from iveg.domain.profiles import profile_of
@@ -103,6 +106,7 @@ class Views:
             "clock_offset_s": _round(robot.clock.offset_s),
             "road": robot.frame_road,
             "profile": _profile(robot_id),
+            "margin": _margin(least(self._margins([robot], now))),
             "cmd_status": robot.command_status,
         }
 
@@ -183,7 +187,25 @@ class Views:
                 }
                 for one in crossings
             ],
+            "margin": _margin(least(self._margins(self._fleet(), now, [person]))),
         }
+
+    def _fleet(self) -> list[RobotState]:
+        return list(self._world.live_robots())
+
+    def _margins(
+        self,
+        robots: Iterable[RobotState],
+        now: Instant,
+        people: Iterable[Person] | None = None,
+    ) -> Iterator[Margin]:
+        """Of every robot with every person, as far as they are known."""
+        among = self._assessor.people.known.values() if people is None else people
+        for robot in robots:
+            for person in among:
+                margin = margin_of(robot, person, now)
+                if margin is not None:
+                    yield margin
 
     def frame(self, robot_id: str, now: Instant) -> schemas.FrameJson | None:
         """One robot's newest look, faint detections included."""
@@ -214,10 +236,12 @@ class Views:
             "command_id": command.command_id,
             "robot_id": command.robot_id,
             "kind": command.kind,
+            "drill": command.drill,
             "state": command.state,
             "requested_by": command.requesters[0],
             "requesters": list(command.requesters),
             "times": {
+                "pressed": None if times.pressed is None else _iso(times.pressed),
                 "requested": _iso(times.requested.wall),
                 "sent_fiware": _moment(times.sent_fiware),
                 "sent_direct": _moment(times.sent_direct),
@@ -225,6 +249,7 @@ class Views:
                 "answer_direct": _moment(times.answer_direct),
                 "standing": _moment(times.standing),
             },
+            "pressed_doubted": times.pressed_doubted,
             "standstill_ms": _round(command.standstill_ms),
             "age_s": round(now.mono - times.requested.mono, 3),
             "tries": command.tries,
@@ -375,6 +400,28 @@ def _profile(robot_id: str) -> schemas.ProfileJson:
         "width": profile.width,
         "max_speed": profile.max_speed,
         "turning_radius": profile.turning_radius,
+    }
+
+
+def _margin(margin: Margin | None) -> schemas.MarginJson | None:
+    if margin is None:
+        return None
+    return {
+        "robot_id": margin.robot_id,
+        "person_id": margin.person_id,
+        "gap_m": round(margin.gap_m, 2),
+        "needs_m": round(margin.needs_m, 2),
+        "margin_m": round(margin.margin_m, 2),
+        "band": margin.band,
+        "parts": {
+            "person_walks_m": round(margin.walks_m, 2),
+            "reaction_m": round(margin.reaction_m, 2),
+            "braking_m": round(margin.braking_m, 2),
+            "uncertainty_m": UNCERTAINTY_M,
+        },
+        "age_s": round(margin.age_s, 3),
+        "braking": margin.braking,
+        "walking_speed": WALKING_SPEED,
     }
 
 

@@ -219,3 +219,35 @@ async def test_a_stranger_is_told_nothing(path: str) -> None:
         answer = await stranger.get(f"/api/v1{path}")
 
     assert answer.status_code == 401
+
+
+async def test_the_margin_to_a_person_is_told_with_its_parts() -> None:
+    desk = WebDesk()
+    desk.drive("AGI", 0.0, linear=1.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGII", detection("farmer", 3.8))
+
+    robot = await get(desk, "/robots/AGI")
+    people = await get(desk, "/people")
+
+    assert isinstance(robot, dict)
+    assert isinstance(people, dict)
+    margin = robot["margin"]
+    assert (margin["person_id"], margin["band"]) == ("P1", "inside")
+    assert margin["gap_m"] == pytest.approx(3.0, abs=0.01)
+    assert sum(margin["parts"].values()) == pytest.approx(margin["needs_m"], abs=0.02)
+    assert margin["margin_m"] == pytest.approx(
+        margin["gap_m"] - margin["needs_m"], abs=0.02
+    )
+    (person,) = people["items"]
+    assert person["margin"] == margin
+
+
+async def test_a_robot_alone_has_no_margin() -> None:
+    desk = WebDesk()
+    desk.drive("AGI", 0.0)
+
+    robot = await get(desk, "/robots/AGI")
+
+    assert isinstance(robot, dict)
+    assert robot["margin"] is None

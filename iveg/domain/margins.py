@@ -1,0 +1,121 @@
+"""The safety margin of a robot and a person: the gap, less what stopping takes.
+
+The protective separation distance of ISO 13855 and ISO/TS 15066 with constant speeds
+and a constant deceleration (safety.md §6.1)::
+
+    S_p = v_h (T + v/a)  +  v T    +  v²/2a   +  Z
+          person walks     reaction   braking    uncertainty
+
+It is shown beside the paper's ring and decides nothing.  T grows with the age of the
+data: a distance is as old as the older of both positions.  Left out: the intrusion
+distance C, since nobody reaches through a light curtain here.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.domain.alerts import WALKING_SPEED
+from iveg.domain.observations import Instant
+from iveg.domain.people import RING_S, Person, Sighting
+from iveg.domain.profiles import profile_of
+from iveg.domain.world import RobotState
+
+Band = Literal["clear", "tight", "inside", "unknown"]
+
+REACTION_S = 0.79
+"""Camera to brakes on the other robot, every step at its P95 (safety.md §6.1)."""
+ONWARD_S = 0.29
+"""The part of it that follows iVeg's knowledge: rule, downlink, ticks, drive."""
+UNCERTAINTY_M = 0.40
+"""Of a detection (0.30 m) and of a pose (0.10 m)."""
+PERSON_RADIUS_M = 0.30
+POSE_LOST_S = 1.5
+"""An older pose says nothing of where a robot is (safety.md §3.3)."""
+CLEAR_M = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """What is left between one robot and one person, surface to surface (m).
+
+    Attributes:
+        gap_m: Centre distance less both footprints.
+        walks_m: How far the person may walk until the robot stands.
+        reaction_m: How far the robot drives before its brakes act.
+        braking_m: How far it drives after.
+        age_s: Of the older of both positions (s).
+        speed: Of the robot (m/s); ``braking`` what the margin counts on (m/s²).
+        known: False where an age is above its limit.
+    """
+
+    robot_id: str
+    person_id: str
+    gap_m: float
+    walks_m: float
+    reaction_m: float
+    braking_m: float
+    age_s: float
+    speed: float
+    braking: float
+    known: bool = True
+
+    @property
+    def needs_m(self) -> float:
+        """S_p (m)."""
+        return self.walks_m + self.reaction_m + self.braking_m + UNCERTAINTY_M
+
+    @property
+    def margin_m(self) -> float:
+        """What is left (m); below zero the robot could not stop in time."""
+        return self.gap_m - self.needs_m
+
+    @property
+    def band(self) -> Band:
+        """In a word, which is never "safe"."""
+        if not self.known:
+            return "unknown"
+        if self.margin_m < 0.0:
+            return "inside"
+        return "tight" if self.margin_m < CLEAR_M else "clear"
+
+
+def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
+    """The least margin to any look that still protects this person.
+
+    None where there is no pair: the robot was never seen, or nobody has seen the
+    person for ten seconds.
+    """
+    looks = [look for look in person.sightings.values() if look.age_s(now) <= RING_S]
+    margins = [_to_look(robot, person, look, now) for look in looks]
+    return least(one for one in margins if one is not None)
+
+
+def least(margins: Iterable[Margin]) -> Margin | None:
+    """The one to show: what is not known comes before what is small."""
+    return min(margins, key=lambda one: (one.known, one.margin_m), default=None)
+
+
+def _to_look(
+    robot: RobotState, person: Person, look: Sighting, now: Instant
+) -> Margin | None:
+    odometry, pose_age = robot.odometry, robot.age_s(now)
+    if odometry is None or pose_age is None:
+        return None
+    profile = profile_of(robot.robot_id)
+    braking, speed = profile.assumed_braking, abs(odometry.twist.linear_x)
+    age = max(pose_age, look.age_s(now))
+    reaction = max(REACTION_S, age + ONWARD_S)
+    footprints = profile.length / 2 + PERSON_RADIUS_M
+    return Margin(
+        robot.robot_id,
+        person.person_id,
+        gap_m=odometry.pose.distance_to(look.x, look.y) - footprints,
+        walks_m=WALKING_SPEED * (reaction + speed / braking),
+        reaction_m=speed * reaction,
+        braking_m=speed * speed / (2 * braking),
+        age_s=age,
+        speed=speed,
+        braking=braking,
+        known=pose_age <= POSE_LOST_S,
+    )
