@@ -13,6 +13,14 @@
  * @typedef {"RUNNING" | "SLOW" | "STOPPED"} Mode
  * @typedef {{id: string, source: string, ack: string}} Hold
  *
+ * @typedef {{
+ *   robot_id: string, person_id: string, gap_m: number, needs_m: number,
+ *   margin_m: number, band: "clear" | "tight" | "inside" | "unknown",
+ *   parts: {person_walks_m: number, reaction_m: number, braking_m: number,
+ *     uncertainty_m: number},
+ *   age_s: number, braking: number, walking_speed: number,
+ * }} Margin what is left between a robot and a person, surface to surface (m)
+ *
  * @typedef {Aged & {
  *   robot_id: string, link: Link, mode: Mode, pose: Pose | null,
  *   twist: {linear: number, angular: number} | null,
@@ -26,7 +34,7 @@
  *   replay: boolean, clock_offset_s: number | null, road: string | null,
  *   profile: {drive: string, length: number, width: number, max_speed: number,
  *     turning_radius: number} | null,
- *   cmd_status: string | null,
+ *   margin?: Margin | null, cmd_status: string | null,
  * }} Robot
  *
  * @typedef {Aged & {
@@ -35,6 +43,7 @@
  *   confidence: number, first_seen: string, last_seen: string, observers: string[],
  *   decision_id: string | null, lane: string | null,
  *   acting: {robot_id: string, distance_m: number, in_sight: boolean}[],
+ *   margin?: Margin | null,
  * }} Person
  *
  * @typedef {{

@@ -10,6 +10,7 @@ import { createGauge } from "./gauge.js";
 import { createRelease } from "./release.js";
 
 /** @typedef {import("../main.js").App} App */
+/** @typedef {import("../protocol.js").Margin} Margin */
 /** @typedef {import("../protocol.js").Robot} Robot */
 
 const TICK_MS = 200;
@@ -109,6 +110,7 @@ function createCard(app, card) {
     drawReadouts(robot, ageS);
     drawGauge(robot);
     setText(needPart("certainty", card), certaintyOf(robotId));
+    drawMargin(robot?.margin ?? null);
     drawTask(robot);
     release.draw(robot);
   }
@@ -200,6 +202,21 @@ function createCard(app, card) {
     const key = best.confident ? "robot.certainty_value" : "robot.certainty_faint";
     const slots = { class: best.class ?? best.class_id, confidence: best.probability };
     return words.t(key, slots);
+  }
+
+  /** The least margin to a person, and what it is made of. @param {Margin | null} margin */
+  function drawMargin(margin) {
+    const line = needPart("margin-line", card);
+    const parts = needPart("margin-parts", card);
+    setHidden(line, margin === null);
+    setHidden(parts, margin === null);
+    if (!margin) return;
+    setAttribute(line, "data-band", margin.band);
+    const key = margin.band === "unknown" ? "margin_unknown" : "margin_value";
+    const slots = { ...margin, ...margin.parts };
+    const band = words.t(`robot.margin_band.${margin.band}`);
+    setText(needPart("margin", card), words.t(`robot.${key}`, { ...slots, band }));
+    setText(parts, words.t("robot.margin_parts", slots));
   }
 
   /** @param {Robot | undefined} robot */
