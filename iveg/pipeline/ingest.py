@@ -51,7 +51,9 @@ class Ingest:
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
         kind = type(received.observation).__name__
-        self.counters[f"{received.road}.{kind}"] += 1
+        # What we asked for is no message: it would hide that one was lost.
+        way = "asked" if received.asked else received.road
+        self.counters[f"{way}.{kind}"] += 1
         if len(self._queue) >= MAX_QUEUED:
             self._make_room()
         self._queue.append(received)

@@ -1,6 +1,7 @@
 """The door of the pipeline: bounded, and never at the cost of safety."""
 
 import logging
+from dataclasses import replace
 
 import pytest
 
@@ -136,3 +137,12 @@ async def test_who_waits_is_woken_by_what_arrives() -> None:
 
 async def test_who_waits_in_vain_goes_on_after_a_while() -> None:
     await ingest().wait(timeout_s=0.01)
+
+
+def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
+    queue = ingest()
+
+    queue.offer(replace(received(odometry()), asked=True))
+    queue.offer(received(odometry()))
+
+    assert queue.counters == {"asked.Odometry": 1, "orion.Odometry": 1}
