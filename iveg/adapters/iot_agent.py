@@ -8,14 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
-from iveg.adapters.orion import FiwareHttp
+from iveg.adapters.orion import PROBE_TIMEOUT_S, Document, FiwareHttp
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
 RESOURCE = "/iot/json"
-_PAGE = 100
-
-Document = dict[str, Any]
+_PAGE, _MOST_PAGES = 100, 100
 
 
 class IotAgentClient:
@@ -46,8 +44,11 @@ class IotAgentClient:
         Raises:
             HopError: the agent does not answer.
         """
-        told = self.http.read(await self.http.ask("GET", "/iot/about"))
-        return str(told.get("version", "unknown") if isinstance(told, dict) else "")
+        response = await self.http.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
+        told = self.http.read(response)
+        if not isinstance(told, dict):
+            raise HopError("iot_agent", "answered JSON that means nothing here")
+        return str(told.get("version", "unknown"))
 
     async def read_groups(self) -> list[Document]:
         """The groups of our tenant.
@@ -106,13 +107,15 @@ class IotAgentClient:
 
     async def _all(self, path: str, part: str) -> list[Document]:
         found: list[Document] = []
-        while True:
+        for _ in range(_MOST_PAGES):
             query = {"limit": str(_PAGE), "offset": str(len(found))}
-            told = self.http.read(await self.http.ask("GET", path, query=query))
-            page = told.get(part, []) if isinstance(told, dict) else []
+            response = await self.http.ask("GET", path, query=query)
+            page = self.http.read_list(response, part)
             found += page
-            if not page or len(found) >= int(told.get("count", 0)):
-                return found
+            total = self.http.read_count(self.http.read(response).get("count", 0))
+            if not page or len(found) >= total:
+                break
+        return found
 
 
 class CommandRoads(Protocol):
@@ -164,7 +167,7 @@ async def provision(
         HopError: a neighbour does not answer or does not take something.
     """
     mended = await _ensure_group(agent, apikey, cbroker_url)
-    known = {one["device_id"]: one for one in await agent.read_devices()}
+    known = {str(one.get("device_id")): one for one in await agent.read_devices()}
     for device in (_climate_device(apikey), _canary_device(apikey)):
         mended += await _ensure_device(agent, known, device)
     problems = []

@@ -4,12 +4,14 @@ Orion's 204 to a command proves nothing: it also answers so when the command wen
 nowhere (fiware.md §4).  Who wants to know waits for the robot's own answer.
 """
 
+import asyncio
 import socket
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Self
 
 import httpx
+import orjson
 
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
@@ -18,6 +20,9 @@ _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _PAGE = 100
 _TIMEOUT_S = 6.0
 """A little more than the five seconds that Orion waits for a hung agent."""
+PROBE_TIMEOUT_S = 3.0
+"""For a question that a healthy neighbour answers in milliseconds."""
+_MOST_PAGES = 100
 ROBOT_ATTRIBUTES = (
     names.ODOMETRY,
     names.LIDAR,
@@ -31,6 +36,8 @@ ROBOT_ATTRIBUTES = (
     *names.ALGORITHM_1,
 )
 """What is read of a robot.  Never ``cmd``: Orion would go and ask the agent for it."""
+
+Document = dict[str, Any]
 
 
 class FiwareHttp:
@@ -73,22 +80,23 @@ class FiwareHttp:
             path: With a leading slash.
             query: Parameters.
             body: Sent as JSON unless None.
-            timeout_s: For each step of the exchange (s).
+            timeout_s: For the whole exchange (s), however slowly it trickles.
             also: Statuses beside 2xx that the caller understands.
 
         Raises:
             HopError: no connection, no answer in time, or another status.
         """
         try:
-            response = await self._client.request(
-                method,
-                path,
-                params=dict(query or {}),
-                json=body,
-                headers={"Accept": "application/json"},
-                timeout=timeout_s,
-            )
-        except httpx.TimeoutException as error:
+            async with asyncio.timeout(timeout_s):
+                response = await self._client.request(
+                    method,
+                    path,
+                    params=dict(query or {}),
+                    json=body,
+                    headers={"Accept": "application/json"},
+                    timeout=timeout_s,
+                )
+        except (TimeoutError, httpx.TimeoutException) as error:
             raise HopError(
                 self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
             ) from error
@@ -107,16 +115,40 @@ class FiwareHttp:
             HopError: it is not JSON.
         """
         try:
-            return response.json()
+            return orjson.loads(response.content)
         except ValueError as error:
             raise HopError(self._hop, "answered something that is not JSON") from error
+
+    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
+        """The list of objects in an answer, or in one part of it.
+
+        Raises:
+            HopError: it is anything else.
+        """
+        told = self.read(response)
+        if part:
+            told = told.get(part) if isinstance(told, dict) else None
+        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
+            raise HopError(self._hop, "answered JSON that means nothing here")
+        return told
+
+    def read_count(self, text: Any) -> int:
+        """How many there are in all, as the neighbour says it.
+
+        Raises:
+            HopError: it does not.
+        """
+        try:
+            return int(text)
+        except (TypeError, ValueError) as error:
+            raise HopError(self._hop, f"counted {text!r} of something") from error
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:
     """What a refusal says, short; Orion and the agent use different words."""
     said = ""
     try:
-        told = response.json()
+        told = orjson.loads(response.content)
     except ValueError:
         told = None
     if isinstance(told, dict):
@@ -200,18 +232,27 @@ class OrionClient:
         Raises:
             HopError: Orion does not answer.
         """
-        found: list[dict[str, Any]] = []
-        query = {"type": entity_type, "attrs": ",".join(attributes)}
-        query["options"] = ",".join(part for part in (options, "count") if part)
-        query["orderBy"] = "id"
-        while True:
-            page = {**query, "limit": str(_PAGE), "offset": str(len(found))}
-            response = await self.http.ask("GET", "/v2/entities", query=page)
-            entities = self.http.read(response)
-            found += [one for one in entities if isinstance(one, dict)]
-            total = int(response.headers.get("Fiware-Total-Count", 0))
-            if not entities or len(found) >= total:
-                return found
+        asked = ",".join(part for part in (options, "count") if part)
+        query = {"type": entity_type, "attrs": ",".join(attributes), "orderBy": "id"}
+        return await self._all("/v2/entities", {**query, "options": asked})
+
+    async def read_canary(self) -> Document | None:
+        """The canary as Orion has it; None where none ever came through the agent.
+
+        Raises:
+            HopError: Orion does not answer at once.
+        """
+        response = await self.http.ask(
+            "GET",
+            f"/v2/entities/{names.CANARY_ID}",
+            query={"type": names.CANARY_TYPE, "attrs": "probe"},
+            timeout_s=PROBE_TIMEOUT_S,
+            also=(404,),
+        )
+        told = self.http.read(response)
+        if not isinstance(told, dict):
+            raise HopError("orion", "answered JSON that means nothing here")
+        return None if response.status_code == 404 else told
 
     async def modified_at(self, robot_id: str) -> float | None:
         """When Orion last changed a robot's odometry.
@@ -267,7 +308,10 @@ class OrionClient:
             },
             also=(404,),
         )
-        return response.status_code != 404 and name in self.http.read(response)
+        if response.status_code == 404:
+            return False
+        told = self.http.read(response)
+        return isinstance(told, dict) and name in told
 
     async def read_registrations(self) -> list[dict[str, Any]]:
         """Every registration of our tenant.
@@ -301,7 +345,10 @@ class OrionClient:
             HopError: Orion does not take it.
         """
         response = await self.http.ask("POST", "/v2/subscriptions", body=dict(document))
-        return str(response.headers.get("Location", "").rpartition("/")[2])
+        made = str(response.headers.get("Location", "").rpartition("/")[2])
+        if not made:
+            raise HopError("orion", "took a subscription and did not say where it is")
+        return made
 
     async def update_subscription(
         self, subscription_id: str, changes: Mapping[str, Any]
@@ -323,16 +370,21 @@ class OrionClient:
         path = f"/v2/subscriptions/{subscription_id}"
         await self.http.ask("DELETE", path, also=(404,))
 
-    async def _all(self, path: str) -> list[dict[str, Any]]:
-        found: list[dict[str, Any]] = []
-        while True:
-            query = {"limit": str(_PAGE), "offset": str(len(found)), "options": "count"}
-            response = await self.http.ask("GET", path, query=query)
-            page = self.http.read(response)
-            found += page
-            total = int(response.headers.get("Fiware-Total-Count", 0))
-            if not page or len(found) >= total:
-                return found
+    async def _all(
+        self, path: str, query: Mapping[str, str] | None = None
+    ) -> list[Document]:
+        """Page by page; a neighbour that never comes to an end is left."""
+        found: list[Document] = []
+        query = query or {"options": "count"}
+        for _ in range(_MOST_PAGES):
+            page = {**query, "limit": str(_PAGE), "offset": str(len(found))}
+            response = await self.http.ask("GET", path, query=page)
+            told = self.http.read_list(response)
+            found += told
+            total = self.http.read_count(response.headers.get("Fiware-Total-Count", 0))
+            if not told or len(found) >= total:
+                break
+        return found
 
 
 def _date_modified(entity: Any) -> float | None:
