@@ -57,10 +57,12 @@ class Ensured:
     Attributes:
         ids: The subscriptions that are ours.
         mended: What had to be done, as sentences; empty when all was well.
+        failing: Why Orion cannot deliver, in its words; empty when it can.
     """
 
     ids: frozenset[str]
     mended: tuple[str, ...]
+    failing: str = ""
 
 
 _ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
@@ -117,6 +119,7 @@ async def ensure_subscriptions(
         description = str(one.get("description", ""))
         if description.startswith(PREFIX):
             ours.setdefault(description, []).append(one)
+    failing = _failing(ours)
     ids, mended = [], []
     for want in wanted:
         document = write_subscription(want, notify_url, token)
@@ -128,7 +131,20 @@ async def ensure_subscriptions(
         for one in leftover:
             await orion.delete_subscription(one["id"])
             mended.append(f"Removed {one['description']!r}: it is not wanted any more.")
-    return Ensured(frozenset(ids), tuple(mended))
+    return Ensured(frozenset(ids), tuple(mended), failing)
+
+
+def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """What Orion says of the deliveries that fail now; one sentence for all."""
+    deliveries = [
+        one.get("notification", {}) for known in ours.values() for one in known
+    ]
+    reasons = {
+        str(one.get("lastFailureReason", "no reason given"))
+        for one in deliveries
+        if one.get("failsCounter", 0) > 0
+    }
+    return f"Orion cannot deliver: {', '.join(sorted(reasons))}." if reasons else ""
 
 
 async def _ensure(

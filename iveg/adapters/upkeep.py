@@ -3,26 +3,34 @@
 Devices and subscriptions are made at the start and looked after for ever; after a gap
 one read of all robots brings the world up to date; a canary measure goes out every two
 seconds, because only what comes back proves that the chain is alive.
+
+Three things go on beside each other, so that none of them waits for a slow neighbour:
+the canary, a short question to Orion and to the agent, and the repairs.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable, Sequence
+import random
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from typing import TypeVar
 
-from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.iot_agent import IotAgentClient, Provisioned, provision
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
 from iveg.domain.errors import HopError
-from iveg.domain.observations import Instant, Origin, Received
+from iveg.domain.observations import Canary, Instant, Origin, Received
 from iveg.ngsi import codec, names
-from iveg.pipeline.chain import CANARY_PERIOD_S, Chain
+from iveg.pipeline.chain import CANARY_PERIOD_S, SLOW_S, Chain
 from iveg.pipeline.ingest import Ingest
 
 _log = logging.getLogger(__name__)
-_CHECK_PERIOD_S, _RETRY_S = 5.0, 1.0
-_HOUSEKEEPING_EVERY = 2
-"""Devices and subscriptions are looked at every second check."""
+_PROBE_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
+_FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
+_DEVICES_EVERY = 3
+"""While all is well, devices are looked at every third time."""
+
+T = TypeVar("T")
 
 
 class Upkeep:
@@ -62,102 +70,218 @@ class Upkeep:
         self._clock = read_clock
         self._canary_seq = 0
         self._broken: set[str] = set()
+        self._warned: frozenset[str] = frozenset()
+        self._gap = asyncio.Event()
         self.subscription_ids: frozenset[str] = frozenset()
 
     async def run(self) -> None:
         """Until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._sing(), name="canary")
+            tasks.create_task(self._watch(self._ask_orion), name="watch-orion")
+            tasks.create_task(self._watch(self._ask_agent), name="watch-agent")
             tasks.create_task(self._look_after(), name="look-after")
 
     # --- the canary ---------------------------------------------------------------
 
     async def _sing(self) -> None:
+        """At QoS 1: a broker that is there and does nothing says nothing either."""
         topic = names.measure_topic(self._apikey, names.CANARY_ID)
         while True:
+            if not self._link.connected:
+                self._chain.mqtt_error = ""
+                await asyncio.sleep(0.1)
+                continue
             self._canary_seq += 1
-            stamp = codec.format_stamp(self._clock().wall)
+            now = self._clock()
+            stamp = codec.format_stamp(now.wall)
             origin = Origin(self._boot, self._canary_seq, stamp)
-            self._link.offer(topic, codec.write_canary(origin))
-            await asyncio.sleep(CANARY_PERIOD_S)
+            self._chain.sing(origin, now)
+            self._chain.mqtt_error = await self._publish(topic, origin)
+            spent = self._clock().mono - now.mono
+            await asyncio.sleep(max(0.1, CANARY_PERIOD_S - spent))
 
-    # --- devices, subscriptions, reads --------------------------------------------
-
-    async def _look_after(self) -> None:
-        """Check all along; while something is broken check more often."""
-        checks = 0
-        while True:
-            whole = await self._check_orion()
-            if not self._chain_whole() or checks % _HOUSEKEEPING_EVERY == 0:
-                whole = await self._check_agent() and whole
-                whole = await self._check_subscriptions() and whole
-            checks += 1
-            await asyncio.sleep(_CHECK_PERIOD_S if whole else _RETRY_S)
-
-    def _chain_whole(self) -> bool:
-        return all(
-            hop.state == "ok"
-            for hop in self._chain.hops(self._clock())
-            if hop.name != "database"
-        )
-
-    async def _check_orion(self) -> bool:
-        """Read all robots: proves Orion and mends what a gap has lost."""
+    async def _publish(self, topic: str, origin: Origin) -> str:
+        """What the broker says to a canary; empty when it takes it."""
         try:
-            entities = await self._orion.read_robots()
+            await self._link.publish(topic, codec.write_canary(origin))
+        except HopError:
+            return "takes messages and does not confirm them"
+        return ""
+
+    # --- short questions ----------------------------------------------------------
+
+    async def _watch(self, ask: Callable[[], Awaitable[bool]]) -> None:
+        pause = _FIRST_PAUSE_S
+        while True:
+            if await ask():
+                pause = _FIRST_PAUSE_S
+                await asyncio.sleep(_PROBE_PERIOD_S)
+            else:
+                await asyncio.sleep(_jittered(pause))
+                pause = min(_LONGEST_PAUSE_S, 2 * pause)
+
+    async def _ask_orion(self) -> bool:
+        """Proves Orion, and how far the canary came."""
+        before = self._clock()
+        try:
+            entity = await self._orion.read_canary()
         except HopError as error:
             self._chain.orion_error = error.detail
             return self._tell("orion", error)
         at = self._clock()
-        self._chain.orion_error = ""
         self._chain.orion_ok_at = at.mono
+        self._chain.orion_slow = self._slow("orion", at.mono - before.mono)
+        for observation in codec.read_entity(entity).observations if entity else ():
+            if isinstance(observation, Canary):
+                self._chain.find(observation.origin)
+        if self._chain.orion_error:
+            self._chain.orion_error = ""
+            self._gap.set()
+        return self._tell("orion", None)
+
+    async def _ask_agent(self) -> bool:
+        before = self._clock()
+        try:
+            await self._agent.version()
+        except HopError as error:
+            self._chain.agent_error = error.detail
+            return self._tell("iot_agent", error)
+        spent = self._clock().mono - before.mono
+        self._chain.agent_slow = self._slow("iot_agent", spent)
+        if self._chain.agent_error:
+            self._chain.agent_error = ""
+            self._gap.set()
+        return self._tell("iot_agent", None)
+
+    def _slow(self, hop: str, spent_s: float) -> str:
+        if spent_s <= SLOW_S:
+            self._tell(f"{hop}'s speed", None)
+            return ""
+        detail = f"answers take {spent_s:.1f} s"
+        self._tell(f"{hop}'s speed", HopError(hop, detail))
+        return detail
+
+    # --- devices, subscriptions, reads --------------------------------------------
+
+    async def _look_after(self) -> None:
+        """For ever; sooner after a gap, ever later while it does not succeed."""
+        rounds, pause = 0, _FIRST_PAUSE_S
+        while True:
+            self._gap.clear()
+            devices = rounds % _DEVICES_EVERY == 0 or not self._chain.whole(
+                self._clock()
+            )
+            rounds += 1
+            if await self._repair(devices=devices):
+                pause = _FIRST_PAUSE_S
+                await self._rest(_REPAIR_PERIOD_S)
+            else:
+                await self._rest(_jittered(pause))
+                pause = min(_LONGEST_PAUSE_S, 2 * pause)
+
+    async def _rest(self, seconds: float) -> None:
+        """Sleep, unless a neighbour comes back meanwhile."""
+        try:
+            async with asyncio.timeout(seconds):
+                await self._gap.wait()
+        except TimeoutError:
+            return
+
+    async def _repair(self, *, devices: bool) -> bool:
+        """Devices, then subscriptions, then the read that fills what was missed.
+
+        Orion sends nothing when a subscription is made, so the read comes last.
+        """
+        whole = not devices or await self._check_agent()
+        whole = await self._check_subscriptions() and whole
+        return await self._reconcile() and whole
+
+    async def _check_agent(self) -> bool:
+        work = provision(
+            self._agent,
+            self._orion,
+            robots=self._robots,
+            apikey=self._apikey,
+            cbroker_url=self._context_broker_url,
+        )
+        try:
+            done: Provisioned = await _made_sense("iot_agent", work)
+        except HopError as error:
+            return self._tell("devices", error)
+        self._explain(done.mended)
+        self._warn(done.problems)
+        return self._tell("devices", None)
+
+    async def _check_subscriptions(self) -> bool:
+        work = ensure_subscriptions(self._orion, self._notify_url, self._notify_token)
+        try:
+            done: Ensured = await _made_sense("orion", work)
+        except HopError as error:
+            return self._tell("subscriptions", error)
+        first = not self.subscription_ids
+        self.subscription_ids = done.ids
+        self._explain(done.mended)
+        self._chain.notify_detail = done.failing
+        # What is made at the start was never missed.
+        missed = "" if first else _in_short(done.mended)
+        self._chain.notify_error = missed
+        trouble = HopError("notifications", missed) if missed else None
+        return self._tell("subscriptions", trouble)
+
+    async def _reconcile(self) -> bool:
+        """Read all robots: mends what a gap has lost."""
+        try:
+            await _made_sense("orion", self._read_robots())
+        except HopError as error:
+            return self._tell("reading", error)
+        return self._tell("reading", None)
+
+    async def _read_robots(self) -> None:
+        entities = await self._orion.read_robots()
+        at = self._clock()
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
                 if getattr(observation, "robot_id", None) in self._robots:
                     self._ingest.offer(Received(observation, at, "orion", asked=True))
-        return self._tell("orion", None)
 
-    async def _check_agent(self) -> bool:
-        try:
-            done = await provision(
-                self._agent,
-                self._orion,
-                robots=self._robots,
-                apikey=self._apikey,
-                cbroker_url=self._context_broker_url,
-            )
-        except HopError as error:
-            self._chain.agent_error = error.detail
-            return self._tell("iot_agent", error)
-        self._chain.agent_error = ""
-        self._explain(done.mended, done.problems)
-        return self._tell("iot_agent", None)
+    # --- telling ------------------------------------------------------------------
 
-    async def _check_subscriptions(self) -> bool:
-        try:
-            done = await ensure_subscriptions(
-                self._orion, self._notify_url, self._notify_token
-            )
-        except HopError as error:
-            return self._tell("subscriptions", error)
-        self.subscription_ids = frozenset(done.ids)
-        self._explain(done.mended)
-        return self._tell("subscriptions", None)
-
-    def _explain(self, mended: Iterable[str], problems: Iterable[str] = ()) -> None:
+    def _explain(self, mended: Iterable[str]) -> None:
         for sentence in mended:
             _log.info("%s", sentence)
-        for sentence in problems:
-            if sentence not in self._broken:
-                self._broken.add(sentence)
-                _log.warning("%s", sentence)
 
-    def _tell(self, hop: str, error: HopError | None) -> bool:
+    def _warn(self, problems: Sequence[str]) -> None:
+        """What only a person can put right: on the health page while it lasts."""
+        self._chain.agent_warning = _in_short(problems)
+        for sentence in problems:
+            if sentence not in self._warned:
+                _log.warning("%s", sentence)
+        self._warned = frozenset(problems)
+
+    def _tell(self, what: str, error: HopError | None) -> bool:
         """Log a loss once and a return once; says whether all is well."""
-        if error is not None and hop not in self._broken:
-            self._broken.add(hop)
-            _log.warning("%s is not as it should be: %s", hop, error)
-        elif error is None and hop in self._broken:
-            self._broken.discard(hop)
-            _log.info("%s is back", hop)
+        if error is not None and what not in self._broken:
+            self._broken.add(what)
+            _log.warning("%s: not as it should be: %s", what, error)
+        elif error is None and what in self._broken:
+            self._broken.discard(what)
+            _log.info("%s: well again", what)
         return error is None
+
+
+async def _made_sense(hop: str, work: Awaitable[T]) -> T:
+    """Carry out what reads a neighbour's JSON; its shape is known only by using it."""
+    try:
+        return await work
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise HopError(hop, "answered JSON that means nothing here") from error
+
+
+def _in_short(sentences: Sequence[str]) -> str:
+    more = f" And {len(sentences) - 1} more." if len(sentences) > 1 else ""
+    return sentences[0] + more if sentences else ""
+
+
+def _jittered(pause_s: float) -> float:
+    return pause_s * random.uniform(0.5, 1.0)  # noqa: S311 - jitter, no secret

@@ -2,13 +2,19 @@
 
 Each hop is judged by what went through it, never by what it says of itself: a canary
 measure goes out over MQTT every two seconds and must come back as a notification
-(safety.md §0.3, fault F4).
+(safety.md §0.3, fault F4).  Where it was seen last tells which hop lost it::
+
+    broker says "taken"  →  the broker lives
+    it is stored at Orion →  the agent hears and Orion takes
+    it came back          →  notifications arrive
+
+A hop behind a broken one is not accused: nobody knows how it does.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Origin
 
 HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
@@ -17,6 +23,9 @@ CANARY_PERIOD_S = 2.0
 LATE_S, DOWN_S = 4.0, 5.5
 GRACE_S = 6.0
 """After the start nobody is accused for this long."""
+SLOW_S = 1.0
+"""A canary or an answer that takes longer is late."""
+_REMEMBERED = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +43,17 @@ class Chain:
 
     Attributes:
         mqtt_connected: Whether our own connection to the broker stands.
+        mqtt_error: Why the broker did not confirm the last canary.
         orion_error: What the last question to Orion came to; empty when well.
+        orion_slow: That it answers, and how late.
+        agent_error: The same of the IoT Agent; ``agent_slow`` too.
+        agent_warning: What a person should look at though all seems well.
+        notify_error: What was wrong with the subscriptions when last looked at.
+        notify_detail: Why Orion could not deliver, as it remembers; may be long past.
+        canary_at: When the newest canary came back (s, monotonic).
+        stored_at: When the newest canary that Orion has was sent (s, monotonic).
+        notified_at: When the newest notification of any kind came (s, monotonic).
+        lag_s: How long the newest canary took (s).
         database: The recorder's state.
     """
 
@@ -42,64 +61,122 @@ class Chain:
         self._start = start
         self.mqtt_connected = False
         self._was_connected = False
-        self.orion_error = ""
+        self.mqtt_error = ""
+        self.orion_error = self.orion_slow = ""
         self.orion_ok_at: float | None = None
-        self.agent_error = ""
+        self.agent_error = self.agent_slow = self.agent_warning = ""
+        self.notify_error = self.notify_detail = ""
         self.canary_at: float | None = None
+        self.stored_at: float | None = None
         self.notified_at: float | None = None
+        self.lag_s: float | None = None
         self.database: HopState = "unknown"
+        self._sung: dict[Origin, float] = {}
+
+    # --- the canary ---------------------------------------------------------------
+
+    def sing(self, origin: Origin, now: Instant) -> None:
+        """A canary leaves."""
+        self._sung[_count(origin)] = now.mono
+        if len(self._sung) > _REMEMBERED:
+            del self._sung[next(iter(self._sung))]
+
+    def hear(self, origin: Origin, now: Instant) -> None:
+        """A canary has come back as a notification."""
+        left = self._sung.get(_count(origin))
+        if left is not None:
+            self.lag_s = now.mono - left
+
+    def find(self, origin: Origin) -> None:
+        """Orion has this canary; one of an earlier life of iVeg proves nothing."""
+        left = self._sung.get(_count(origin))
+        if left is not None:
+            self.stored_at = left
+
+    # --- the verdict --------------------------------------------------------------
 
     def hops(self, now: Instant) -> list[Hop]:
         """Every hop, in the order in which a datum passes them."""
+        mqtt, orion = self._mqtt(now), self._orion(now)
+        agent = self._agent(now, broken=mqtt.state == "down" or orion.state == "down")
+        blind = orion.state == "down" or agent.state != "ok"
         return [
-            self._mqtt(now),
-            self._agent(now),
-            self._orion(now),
-            self._notifications(now),
+            mqtt,
+            agent,
+            orion,
+            self._notifications(now, blind=blind or mqtt.state == "down"),
             Hop("database", self.database),
         ]
+
+    def whole(self, now: Instant) -> bool:
+        """Whether every hop of FIWARE is well."""
+        return all(
+            hop.state == "ok" for hop in self.hops(now) if hop.name != "database"
+        )
 
     def _mqtt(self, now: Instant) -> Hop:
         if self.mqtt_connected:
             self._was_connected = True
-            return Hop("mqtt", "ok")
-        starting = now.mono - self._start.mono < GRACE_S
-        return Hop(
-            "mqtt", "unknown" if starting and not self._was_connected else "down"
-        )
+            state: HopState = "down" if self.mqtt_error else "ok"
+            return Hop("mqtt", state, detail=self.mqtt_error)
+        if not self._was_connected and self._starting(now):
+            return Hop("mqtt", "unknown")
+        return Hop("mqtt", "down", detail="not connected")
 
     def _orion(self, now: Instant) -> Hop:
         age = _age(self.orion_ok_at, now)
         if self.orion_error:
             return Hop("orion", "down", age, self.orion_error)
-        if age is None:
-            return Hop("orion", "unknown")
-        return Hop("orion", "ok", age)
+        if self.orion_slow:
+            return Hop("orion", "late", age, self.orion_slow)
+        return Hop("orion", "unknown" if age is None else "ok", age)
 
-    def _agent(self, now: Instant) -> Hop:
+    def _agent(self, now: Instant, *, broken: bool) -> Hop:
         """Deaf or healthy: the canary knows, if the hops round it are well."""
-        age = _age(self.canary_at, now)
+        age = _age(_newest(self.canary_at, self.stored_at), now)
         if self.agent_error:
             return Hop("iot_agent", "down", age, self.agent_error)
         state = self._by_age(age, now)
-        if state != "ok" and (not self.mqtt_connected or self.orion_error):
-            return Hop("iot_agent", "unknown", age)
-        return Hop("iot_agent", state, age)
+        if state != "ok":
+            known: HopState = "unknown" if broken else state
+            lost = "" if known == "unknown" else "measures do not reach Orion"
+            return Hop("iot_agent", known, age, lost)
+        if self.agent_slow or self.agent_warning:
+            return Hop("iot_agent", "late", age, self.agent_slow or self.agent_warning)
+        if self.lag_s is not None and self.lag_s > SLOW_S:
+            detail = f"a measure takes {self.lag_s:.1f} s to come back"
+            return Hop("iot_agent", "late", age, detail)
+        return Hop("iot_agent", "ok", age)
 
-    def _notifications(self, now: Instant) -> Hop:
+    def _notifications(self, now: Instant, *, blind: bool) -> Hop:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
-        if state != "ok" and self.orion_error:
+        if state == "ok":
+            missed: HopState = "down" if self.notify_error else "ok"
+            return Hop("notifications", missed, age, self.notify_error)
+        if blind:
             return Hop("notifications", "unknown", age)
-        return Hop("notifications", state, age)
+        return Hop("notifications", state, age, self.notify_error or self.notify_detail)
 
     def _by_age(self, age: float | None, now: Instant) -> HopState:
         if age is None:
-            waited = now.mono - self._start.mono
-            return "unknown" if waited < GRACE_S else "down"
+            return "unknown" if self._starting(now) else "down"
         if age <= LATE_S:
             return "ok"
         return "late" if age <= DOWN_S else "down"
+
+    def _starting(self, now: Instant) -> bool:
+        return now.mono - self._start.mono < GRACE_S
+
+
+def _count(origin: Origin) -> Origin:
+    """What names a canary; stamps may be reprinted on the way."""
+    return Origin(origin.boot, origin.seq)
+
+
+def _newest(one: float | None, other: float | None) -> float | None:
+    known = [at for at in (one, other) if at is not None]
+    return max(known, default=None)
 
 
 def _age(at: float | None, now: Instant) -> float | None:

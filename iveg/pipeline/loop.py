@@ -6,9 +6,9 @@ If this loop hangs, feedback stops and every robot slows down by itself (fault F
 from collections.abc import Callable, Iterable
 
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import CommandAnswer, Instant, Received
+from iveg.domain.observations import Canary, CommandAnswer, Instant, Received
 from iveg.pipeline.assess import Assessor
-from iveg.pipeline.chain import Chain, HopState
+from iveg.pipeline.chain import Chain, Hop, HopState
 from iveg.pipeline.command import Commander
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.minutes import Minutes
@@ -44,6 +44,7 @@ class RuleLoop:
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._states: dict[str, HopState] = {}
+        self._broken: set[str] = set()
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -55,6 +56,8 @@ class RuleLoop:
         """Take everything that arrived, then let time pass if it is due."""
         for received in arrived:
             fresh = self._assessor.take(received)
+            if isinstance(received.observation, Canary):
+                self._chain.hear(received.observation.origin, received.at)
             if received.asked:
                 continue
             # The second road's answer is no news, but its time is kept.
@@ -71,21 +74,24 @@ class RuleLoop:
         self._chain.database = self._database_state()
         changed = False
         for hop in self._chain.hops(now):
-            before = self._states.get(hop.name)
-            if hop.state == before:
+            if hop.state == self._states.get(hop.name):
                 continue
             self._states[hop.name] = hop.state
             changed = True
-            key = _HOP_KEYS.get((before in ("down", "late"), hop.state))
-            if key is not None:
-                slots = {"hop": hop.name, "detail": hop.detail}
-                self._minutes.log(LogEvent("system", key, slots), now)
+            self._tell(hop, now)
         if changed or now.mono - self._health_at >= _HEALTH_PERIOD_S:
             self._health_at = now.mono
             self._hub.changed("health")
 
-
-_HOP_KEYS: dict[tuple[bool, HopState], str] = {
-    (False, "down"): "log.hop.down",
-    (True, "ok"): "log.hop.back",
-}
+    def _tell(self, hop: Hop, now: Instant) -> None:
+        """A loss once, and its end once; what is merely late or unknown is neither."""
+        if hop.state == "down" and hop.name not in self._broken:
+            self._broken.add(hop.name)
+            key = "log.hop.down"
+        elif hop.state == "ok" and hop.name in self._broken:
+            self._broken.remove(hop.name)
+            key = "log.hop.back"
+        else:
+            return
+        slots = {"hop": hop.name, "detail": hop.detail}
+        self._minutes.log(LogEvent("system", key, slots), now)

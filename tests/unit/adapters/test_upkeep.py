@@ -11,6 +11,7 @@ from iveg.adapters import clock
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.subscriptions import WANTED
 from iveg.adapters.upkeep import Upkeep
 from iveg.domain.observations import Odometry, Received
 from iveg.embedded.server import Running, embedded_fiware
@@ -26,6 +27,11 @@ async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
     async with asyncio.timeout(within_s):
         while not true():  # noqa: ASYNC110 - what is waited for has no event
             await asyncio.sleep(0.02)
+
+
+async def first_ids(site: "Site") -> frozenset[str]:
+    await until(lambda: site.upkeep.subscription_ids)
+    return site.upkeep.subscription_ids
 
 
 class Site:
@@ -126,12 +132,65 @@ async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
     down = Site(fiware, orion_url="http://127.0.0.1:9")
     async with down.running() as site:
         await until(lambda: site.chain.orion_error)
-        await until(lambda: len(_warnings(caplog)) >= 2)
-        site.upkeep._tell("orion", None)
+        await until(lambda: len(_warnings(caplog)) >= 4)
 
-    told = [line for line in _warnings(caplog) if line.startswith("orion ")]
+    told = [line for line in _warnings(caplog) if line.startswith("orion: ")]
     assert len(told) == 1
     assert "cannot be reached" in site.chain.orion_error
+
+
+async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
+    fiware: Running,
+) -> None:
+    async with Site(fiware).running() as site:
+        await until(lambda: site.upkeep.subscription_ids)
+        lost = next(iter(site.upkeep.subscription_ids))
+        await site.orion.delete_subscription(lost)
+        await until(lambda: site.chain.notify_error)
+        await until(lambda: not site.chain.notify_error)
+        kept = await site.orion.read_subscriptions()
+
+    assert {one["id"] for one in kept} == site.upkeep.subscription_ids
+    assert len(kept) == len(WANTED)
+
+
+async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
+    fiware: Running,
+) -> None:
+    seen = set()
+    for _ in range(20):
+        async with Site(fiware).running() as site:
+            seen.add(await first_ids(site))
+    async with OrionClient(fiware.orion_url, *SERVICE) as orion:
+        kept = await orion.read_subscriptions()
+
+    assert len(kept) == len(WANTED)
+    assert seen == {frozenset(one["id"] for one in kept)}
+
+
+async def test_a_canary_that_reached_orion_is_found_there(fiware: Running) -> None:
+    async with Site(fiware).running() as site:
+        await until(lambda: site.chain.stored_at is not None)
+
+
+async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
+    fiware: Running, caplog: pytest.LogCaptureFixture
+) -> None:
+    device = {
+        "device_id": "AAA_gps",
+        "apikey": "iveg",
+        "entity_name": "AGI",
+        "entity_type": "Robot",
+    }
+    async with Site(fiware).running() as site:
+        await until(lambda: site.upkeep.subscription_ids)
+        await site.agent.create_device(device)
+        await until(lambda: site.chain.agent_warning, within_s=20.0)
+        await site.agent.delete_device("AAA_gps")
+        await until(lambda: not site.chain.agent_warning, within_s=20.0)
+
+    told = [line for line in _warnings(caplog) if line.startswith("Device AAA_gps")]
+    assert len(told) == 1
 
 
 def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:

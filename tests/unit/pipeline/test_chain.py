@@ -2,12 +2,17 @@
 
 import pytest
 
-from iveg.pipeline.chain import Chain
+from iveg.domain.observations import Origin
+from iveg.pipeline.chain import Chain, Hop
 from tests.builders import START, at
 
 
 def states(chain: Chain, now: float) -> dict[str, str]:
     return {hop.name: hop.state for hop in chain.hops(at(now))}
+
+
+def hop(chain: Chain, name: str, now: float) -> Hop:
+    return next(one for one in chain.hops(at(now)) if one.name == name)
 
 
 def healthy(now: float) -> Chain:
@@ -72,12 +77,93 @@ def test_f1_while_the_broker_is_away_the_agent_is_not_accused() -> None:
 
 def test_f8_notifications_that_stopped_are_found_while_orion_answers() -> None:
     chain = healthy(10.0)
+    chain.orion_ok_at = chain.stored_at = at(20.0).mono
+    chain.notify_detail = "Orion cannot deliver: Timeout was reached."
+
+    found = states(chain, 20.0)
+
+    assert (found["orion"], found["iot_agent"]) == ("ok", "ok")
+    assert found["notifications"] == "down"
+    assert hop(chain, "notifications", 20.0).detail == chain.notify_detail
+
+
+def test_f8_a_subscription_that_had_to_be_mended_is_told_while_others_arrive() -> None:
+    chain = healthy(10.0)
+    chain.notify_error = "Subscribed to odometry."
+
+    assert hop(chain, "notifications", 10.0) == Hop(
+        "notifications", "down", 0.0, "Subscribed to odometry."
+    )
+
+
+def test_f4_behind_a_deaf_agent_notifications_are_not_accused() -> None:
+    chain = healthy(10.0)
     chain.orion_ok_at = at(20.0).mono
 
     found = states(chain, 20.0)
 
-    assert (found["orion"], found["notifications"]) == ("ok", "down")
+    assert (found["iot_agent"], found["notifications"]) == ("down", "unknown")
+
+
+def test_f2_a_broker_that_confirms_nothing_is_down_though_connected() -> None:
+    chain = healthy(10.0)
+    chain.mqtt_error = "does not confirm"
+
+    found = states(chain, 20.0)
+
+    assert found["mqtt"] == "down"
+    assert (found["iot_agent"], found["notifications"]) == ("unknown", "unknown")
+
+
+def test_a_canary_that_takes_long_makes_the_agent_late() -> None:
+    chain = healthy(10.0)
+    chain.sing(Origin("b", 1, "now"), at(7.0))
+    chain.hear(Origin("b", 1), at(10.0))
+
+    late = hop(chain, "iot_agent", 10.0)
+
+    assert (late.state, late.detail) == ("late", "a measure takes 3.0 s to come back")
+
+
+def test_a_canary_of_an_earlier_life_proves_nothing() -> None:
+    chain = Chain(START)
+    chain.sing(Origin("new", 1), START)
+    chain.find(Origin("old", 1))
+    chain.hear(Origin("old", 1), START)
+
+    assert (chain.stored_at, chain.lag_s) == (None, None)
+
+
+def test_only_the_newest_canaries_are_remembered() -> None:
+    chain = Chain(START)
+    for seq in range(100):
+        chain.sing(Origin("b", seq), at(float(seq)))
+    chain.find(Origin("b", 0))
+
+    assert chain.stored_at is None
+
+
+@pytest.mark.parametrize("hop_name", ["orion", "iot_agent"])
+def test_f7_a_neighbour_that_answers_slowly_is_late(hop_name: str) -> None:
+    chain = healthy(10.0)
+    chain.orion_slow = chain.agent_slow = "answers take 2.1 s"
+
+    slow = hop(chain, hop_name, 10.0)
+
+    assert (slow.state, slow.detail) == ("late", "answers take 2.1 s")
+
+
+def test_a_device_that_may_swallow_commands_is_shown_though_measures_pass() -> None:
+    chain = healthy(10.0)
+    chain.agent_warning = "Device AAA_gps also feeds AGI."
+
+    assert hop(chain, "iot_agent", 10.0).detail == chain.agent_warning
+    assert not chain.whole(at(10.0))
 
 
 def test_what_never_came_is_down_after_the_first_seconds() -> None:
-    assert states(Chain(START), 6.1)["notifications"] == "down"
+    chain = Chain(START)
+    chain.mqtt_connected = True
+    chain.orion_ok_at = at(6.0).mono
+
+    assert states(chain, 6.1)["iot_agent"] == "down"
