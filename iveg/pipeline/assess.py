@@ -12,7 +12,7 @@ from iveg.domain.alarms import Alarm, AlarmBook, Condition
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import CLEAR, Mandate
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Change, Crossing, Mandates
 from iveg.domain.observations import (
@@ -24,17 +24,17 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
-from iveg.domain.order import Verdict
-from iveg.domain.people import RING_S, People, Person, Placed
-from iveg.domain.sight import AllClear
-from iveg.domain.world import Link, RobotState, World
+from iveg.domain.people import People, Placed
+from iveg.domain.world import World
+from iveg.pipeline.ageing import Ageing
+from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.telling import Teller
 from iveg.pipeline.wording import alarm_line, evidence_of, speed_line
 
 HEARTBEAT_S = 0.1
-_LOOK_LOGGED_S = 2.0
 
 
 class Assessor:
@@ -43,6 +43,9 @@ class Assessor:
     Args:
         stamp: Writes a wall-clock moment the way the wire does.
         boot: Random, new at each start: identity of our feedback.
+
+    Attributes:
+        rule: The version in force; a new one counts from the next judgement on.
     """
 
     def __init__(
@@ -64,29 +67,27 @@ class Assessor:
         self.decisions = Decisions()
         self.alarms = AlarmBook()
         self.mandates: dict[str, Mandate] = dict.fromkeys(world.robots, CLEAR)
-        self.placed: dict[str, list[Placed]] = {}
         self.protected_unseen = 0
         """How often a robot slowed for somebody whom it could not see itself."""
         self._mandates = Mandates(greenhouse)
-        self._all_clear = AllClear()
-        self._fleet = fleet
+        self.looks = Looks(world, self.people, minutes, hub, new_id, stamp)
+        self._ageing = Ageing(world, self.people, greenhouse, minutes, hub)
+        other = self.looks.other
+        self._teller = Teller(world, self.people, other, fleet, stamp, boot)
         self._minutes = minutes
         self._hub = hub
         self._new_id = new_id
-        self._stamp = stamp
-        self._boot = boot
-        self._seq = 0
-        self._told_at = float("-inf")
-        self._links: dict[str, Link] = {}
         self._applied: dict[str, tuple[float, str]] = {}
-        self._stages: dict[str, str] = {}
-        self._looks: dict[tuple[str, str], float] = {}
-        self._other: dict[str, FeedbackAlert] = {}
 
     @property
     def crossings(self) -> Iterable[Crossing]:
         """Who is inside whose ring now."""
         return self._mandates.crossings
+
+    @property
+    def placed(self) -> Mapping[str, list[Placed]]:
+        """What each robot's newest look found, faint ones included."""
+        return self.looks.placed
 
     # --- one observation ----------------------------------------------------------
 
@@ -95,7 +96,7 @@ class Assessor:
         verdict = self.world.apply(received)
         observation = received.observation
         if isinstance(observation, DetectionFrame):
-            self._look_if_it_counts(observation, received, verdict)
+            self.looks.take(observation, received, verdict, self.rule)
         if verdict != "new":
             return False
         match observation:
@@ -134,68 +135,6 @@ class Assessor:
             self.decisions.put(after)
             self._minutes.decision(after, at)
 
-    # --- looks --------------------------------------------------------------------
-
-    def _look_if_it_counts(
-        self, frame: DetectionFrame, received: Received, verdict: Verdict
-    ) -> None:
-        """A late look still saw somebody; a late answer of Orion's is yesterday's."""
-        if verdict == "new" or (verdict == "late" and not received.asked):
-            placed = self._look(frame, received)
-            if verdict == "new":
-                self.placed[frame.robot_id] = placed
-                self._hub.changed(f"detections/{frame.robot_id}")
-
-    def _look(self, frame: DetectionFrame, received: Received) -> list[Placed]:
-        delay = 0.0
-        robot = self.world.robot(frame.robot_id)
-        if robot.detections_at is not None:
-            delay = max(0.0, received.at.mono - robot.detections_at)
-        seen_at = received.at.later(-delay)
-        placed = self.people.sight(
-            frame, self.world, self.rule, seen_at, self._new_id()
-        )
-        for one in placed:
-            self._describe(one, frame, received)
-        if any(one.person is not None for one in placed):
-            self._hub.changed("people")
-        return placed
-
-    def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
-        """Log a sighting at its start and write it down once in two seconds."""
-        at, robot_id = received.at, frame.robot_id
-        subject = one.peer or (one.person.person_id if one.person else "")
-        subject = subject or f"{one.kind}:{one.detection.class_id}"
-        last = self._looks.get((robot_id, subject))
-        self._looks[robot_id, subject] = at.mono
-        if one.kind == "other":
-            self._other[robot_id] = FeedbackAlert("", self._stamp(at.wall))
-        if last is not None and at.mono - last < _LOOK_LOGGED_S:
-            # Keep the first moment, so that a long sighting gets a row every so often.
-            self._looks[robot_id, subject] = last
-            return
-        self._minutes.detection(one, robot_id, frame.origin.stamp, at, received.road)
-        key = {
-            "alert": "log.detection",
-            "faint": "log.detection_faint",
-            "other": "log.detection_unmapped",
-        }[one.kind]
-        if last is not None and at.mono - last < 2 * _LOOK_LOGGED_S:
-            return
-        x, y, _ = one.position
-        slots: dict[str, Slot] = {
-            "robot": robot_id,
-            "class": one.class_ or one.detection.class_id,
-            "class_id": one.detection.class_id,
-            "confidence": one.detection.probability,
-            "x": round(x, 2),
-            "y": round(y, 2),
-            "person": subject,
-        }
-        self._minutes.log(LogEvent("detection", key, slots, robot_id, one.class_), at)
-        if one.appeared and one.person is not None:
-            self._stages[one.person.person_id] = "seen"
-
     # --- judgement ----------------------------------------------------------------
 
     def _judge(self, now: Instant) -> None:
@@ -233,72 +172,31 @@ class Assessor:
 
     def tell(self, now: Instant) -> None:
         """Send every robot what the fleet must know (Algorithm 2, line 13)."""
-        self._told_at = now.mono
-        alerts = tuple(self._alerts(now))
-        seen = {
-            robot.robot_id: robot.safety.origin.seq
-            for robot in self.world.robots.values()
-            if robot.safety is not None and robot.safety.origin.seq is not None
-        }
-        for robot in self.world.robots.values():
-            self._seq += 1
-            self._fleet.tell(self._feedback(robot, alerts, seen, now))
+        self._teller.tell(self.mandates, self.rule, now)
         for decision in self.decisions.every_open():
             self._advance(decision, decision.published(now), now)
-
-    def _feedback(
-        self,
-        robot: RobotState,
-        alerts: tuple[FeedbackAlert, ...],
-        seen: Mapping[str, int],
-        now: Instant,
-    ) -> Feedback:
-        mine = [one for one in alerts if one.observer == robot.robot_id]
-        newest = max(mine, key=lambda one: one.stamp, default=None)
-        odometry = None if robot.is_replay else robot.odometry
-        return Feedback(
-            robot.robot_id,
-            Origin(self._boot, self._seq, self._stamp(now.wall)),
-            newest or self._other.get(robot.robot_id),
-            alerts,
-            None if odometry is None else odometry.pose,
-            None if odometry is None else odometry.twist,
-            None if odometry is None else odometry.origin.stamp,
-            self.mandates,
-            seen,
-        )
-
-    def _alerts(self, now: Instant) -> Iterable[FeedbackAlert]:
-        for person in self.people.known.values():
-            for sighting, radius in person.rings(self.rule, now):
-                # What a recording saw long ago must not slow a robot of today.
-                if self.world.robots[sighting.observer].is_replay:
-                    continue
-                yield FeedbackAlert(
-                    person.decision_id,
-                    self._stamp(sighting.at.wall),
-                    person.class_,
-                    sighting.class_id,
-                    sighting.confidence,
-                    (sighting.x, sighting.y, sighting.z),
-                    radius,
-                    sighting.observer,
-                )
 
     # --- time ---------------------------------------------------------------------
 
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Let time pass: silence, ages, overdue links, alarms, heartbeat."""
-        for robot in self.world.robots.values():
-            self._watch_link(robot, now)
-        self._age_people(now)
+        self._ageing.tick(now)
+        self.looks.forget(now)
         self._judge(now)
-        if now.mono - self._told_at >= HEARTBEAT_S - 1e-3:
+        if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
         wrong = [*self._conditions(now), *more]
         for alarm in self.alarms.sync(wrong, now, self._new_id()):
             self._minutes.alarm(alarm)
             self._log_alarm(alarm, now)
+
+    def _conditions(self, now: Instant) -> Iterable[Condition]:
+        for decision in self.decisions.every_open():
+            yield from conditions.of_decision(decision, now)
+        for robot in self.world.live_robots():
+            yield from conditions.of_robot(robot, now)
+
+    # --- people -------------------------------------------------------------------
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
@@ -314,77 +212,6 @@ class Assessor:
             }
             self._minutes.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
         return alarm
-
-    def _watch_link(self, robot: RobotState, now: Instant) -> None:
-        link = robot.link(now)
-        before = self._links.get(robot.robot_id, "UNKNOWN")
-        if link == before:
-            return
-        self._links[robot.robot_id] = link
-        self._hub.changed(f"robots/{robot.robot_id}")
-        slots: dict[str, Slot] = {
-            "robot": robot.robot_id,
-            "age": round(robot.age_s(now) or 0.0, 1),
-        }
-        self._minutes.log(
-            LogEvent("link", f"log.link.{link.lower()}", slots, robot.robot_id), now
-        )
-
-    def _age_people(self, now: Instant) -> None:
-        for person in self.people.known.values():
-            self._log_stage(person, now)
-        for person in self._all_clear.sweep(
-            self.people, self.world, self.greenhouse, now
-        ):
-            self._log_clear(person, now)
-        for person in self.people.forget(now):
-            self._stages.pop(person.person_id, None)
-            self._hub.changed("people")
-        if len(self._looks) > _MAX_LOOKS:
-            self._looks = {
-                key: at for key, at in self._looks.items() if now.mono - at < RING_S
-            }
-
-    def _log_stage(self, person: Person, now: Instant) -> None:
-        stage = person.stage(now)
-        before = self._stages.get(person.person_id)
-        if stage == before:
-            return
-        self._stages[person.person_id] = stage
-        self._hub.changed("people")
-        key = _STAGE_KEYS.get(stage)
-        if key is None or before is None:
-            return
-        newest = person.newest
-        slots: dict[str, Slot] = {
-            "person": person.person_id,
-            "observer": newest.observer,
-            "class": person.class_,
-            "lane": self.greenhouse.lane_at(newest.x, newest.y) or "",
-        }
-        self._minutes.log(
-            LogEvent("detection", key, slots, newest.observer, person.class_), now
-        )
-
-    def _log_clear(self, person: Person, now: Instant) -> None:
-        self._hub.changed("people")
-        newest = person.newest
-        if person.sightings or person.stage(now) != "remembered":
-            return
-        slots: dict[str, Slot] = {
-            "person": person.person_id,
-            "lane": self.greenhouse.lane_at(newest.x, newest.y) or "",
-        }
-        self._minutes.log(
-            LogEvent("detection", "log.person_cleared", slots, None, person.class_),
-            now,
-        )
-
-    def _conditions(self, now: Instant) -> Iterable[Condition]:
-        for decision in self.decisions.every_open():
-            yield from conditions.of_decision(decision, now)
-        for robot in self.world.live_robots():
-            yield from conditions.of_robot(robot, now)
 
     # --- words --------------------------------------------------------------------
 
@@ -414,11 +241,3 @@ class Assessor:
         line = alarm_line(alarm)
         if line is not None:
             self._minutes.log(line, at)
-
-
-_MAX_LOOKS = 1000
-_STAGE_KEYS = {
-    "seen": "log.person_seen",
-    "remembered": "log.person_remembered",
-    "last_seen": "log.person_expired",
-}

@@ -334,7 +334,7 @@ def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
 
     desk.loop.step([], desk.clock())
 
-    assert desk.assessor._looks == {}
+    assert desk.assessor.looks.subjects == 0
 
 
 # --- what counts ------------------------------------------------------------------

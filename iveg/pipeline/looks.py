@@ -1,0 +1,121 @@
+"""From a look of one robot to people on the map, and the lines that tell of it.
+
+A sighting is logged at its start and written down once in two seconds, so that a
+person who stands before a camera for an hour does not fill the log.
+"""
+
+from collections.abc import Callable
+
+from iveg.domain.alerts import Rule
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.feedback import FeedbackAlert
+from iveg.domain.observations import DetectionFrame, Instant, Received
+from iveg.domain.order import Verdict
+from iveg.domain.people import RING_S, People, Placed
+from iveg.domain.world import World
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.ports import Ids
+from iveg.pipeline.publish import Hub
+
+_LOGGED_S = 2.0
+_MAX_SUBJECTS = 1000
+_KEYS = {
+    "alert": "log.detection",
+    "faint": "log.detection_faint",
+    "other": "log.detection_unmapped",
+}
+
+
+class Looks:
+    """Takes the looks of the fleet.
+
+    Attributes:
+        placed: What each robot's newest look found, faint ones included.
+        other: The stamp of the newest confident object of another class, by robot.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        minutes: Minutes,
+        hub: Hub,
+        new_id: Ids,
+        stamp: Callable[[float], str],
+    ) -> None:
+        self.placed: dict[str, list[Placed]] = {}
+        self.other: dict[str, FeedbackAlert] = {}
+        self._world = world
+        self._people = people
+        self._minutes = minutes
+        self._hub = hub
+        self._new_id = new_id
+        self._stamp = stamp
+        self._told: dict[tuple[str, str], float] = {}
+
+    @property
+    def subjects(self) -> int:
+        """Of how many it is remembered when they were last told."""
+        return len(self._told)
+
+    def take(
+        self, frame: DetectionFrame, received: Received, verdict: Verdict, rule: Rule
+    ) -> None:
+        """A late look still saw somebody; a late answer of Orion's is yesterday's."""
+        if verdict == "new" or (verdict == "late" and not received.asked):
+            placed = self._look(frame, received, rule)
+            if verdict == "new":
+                self.placed[frame.robot_id] = placed
+                self._hub.changed(f"detections/{frame.robot_id}")
+
+    def _look(
+        self, frame: DetectionFrame, received: Received, rule: Rule
+    ) -> list[Placed]:
+        delay = 0.0
+        robot = self._world.robot(frame.robot_id)
+        if robot.detections_at is not None:
+            delay = max(0.0, received.at.mono - robot.detections_at)
+        seen_at = received.at.later(-delay)
+        placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
+        for one in placed:
+            self._describe(one, frame, received)
+        if any(one.person is not None for one in placed):
+            self._hub.changed("people")
+        return placed
+
+    def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        at, robot_id = received.at, frame.robot_id
+        subject = one.peer or (one.person.person_id if one.person else "")
+        subject = subject or f"{one.kind}:{one.detection.class_id}"
+        last = self._told.get((robot_id, subject))
+        self._told[robot_id, subject] = at.mono
+        if one.kind == "other":
+            self.other[robot_id] = FeedbackAlert("", self._stamp(at.wall))
+        if last is not None and at.mono - last < _LOGGED_S:
+            # Keep the first moment, so that a long sighting gets a row every so often.
+            self._told[robot_id, subject] = last
+            return
+        self._minutes.detection(one, robot_id, frame.origin.stamp, at, received.road)
+        if last is None or at.mono - last >= 2 * _LOGGED_S:
+            self._minutes.log(_line(one, robot_id, subject), at)
+
+    def forget(self, now: Instant) -> None:
+        """Do not remember for ever what was told of whom."""
+        if len(self._told) > _MAX_SUBJECTS:
+            self._told = {
+                key: at for key, at in self._told.items() if now.mono - at < RING_S
+            }
+
+
+def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
+    x, y, _ = one.position
+    slots: dict[str, Slot] = {
+        "robot": robot_id,
+        "class": one.class_ or one.detection.class_id,
+        "class_id": one.detection.class_id,
+        "confidence": one.detection.probability,
+        "x": round(x, 2),
+        "y": round(y, 2),
+        "person": subject,
+    }
+    return LogEvent("detection", _KEYS[one.kind], slots, robot_id, one.class_)

@@ -1,0 +1,91 @@
+"""What the fleet is told (Algorithm 2, line 13): one feedback for each observer."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from iveg.domain.alerts import Rule
+from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.observations import Instant, Origin
+from iveg.domain.people import People
+from iveg.domain.world import RobotState, World
+from iveg.pipeline.ports import Fleet
+
+
+class Teller:
+    """Writes the feedback and hands it to the fleet.
+
+    Args:
+        other: The stamp of each robot's newest confident object of another class.
+        stamp: Writes a wall-clock moment the way the wire does.
+        boot: Random, new at each start: identity of our feedback.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        other: Mapping[str, FeedbackAlert],
+        fleet: Fleet,
+        stamp: Callable[[float], str],
+        boot: str,
+    ) -> None:
+        self.told_at = float("-inf")
+        self._world = world
+        self._people = people
+        self._other = other
+        self._fleet = fleet
+        self._stamp = stamp
+        self._boot = boot
+        self._seq = 0
+
+    def tell(self, mandates: Mapping[str, Mandate], rule: Rule, now: Instant) -> None:
+        """Send every robot what the fleet must know."""
+        self.told_at = now.mono
+        alerts = tuple(self._alerts(rule, now))
+        seen = {
+            robot.robot_id: robot.safety.origin.seq
+            for robot in self._world.robots.values()
+            if robot.safety is not None and robot.safety.origin.seq is not None
+        }
+        for robot in self._world.robots.values():
+            self._seq += 1
+            self._fleet.tell(self._feedback(robot, alerts, mandates, seen, now))
+
+    def _feedback(
+        self,
+        robot: RobotState,
+        alerts: tuple[FeedbackAlert, ...],
+        mandates: Mapping[str, Mandate],
+        seen: Mapping[str, int],
+        now: Instant,
+    ) -> Feedback:
+        mine = [one for one in alerts if one.observer == robot.robot_id]
+        newest = max(mine, key=lambda one: one.stamp, default=None)
+        odometry = None if robot.is_replay else robot.odometry
+        return Feedback(
+            robot.robot_id,
+            Origin(self._boot, self._seq, self._stamp(now.wall)),
+            newest or self._other.get(robot.robot_id),
+            alerts,
+            None if odometry is None else odometry.pose,
+            None if odometry is None else odometry.twist,
+            None if odometry is None else odometry.origin.stamp,
+            mandates,
+            seen,
+        )
+
+    def _alerts(self, rule: Rule, now: Instant) -> Iterable[FeedbackAlert]:
+        for person in self._people.known.values():
+            for sighting, radius in person.rings(rule, now):
+                # What a recording saw long ago must not slow a robot of today.
+                if self._world.robots[sighting.observer].is_replay:
+                    continue
+                yield FeedbackAlert(
+                    person.decision_id,
+                    self._stamp(sighting.at.wall),
+                    person.class_,
+                    sighting.class_id,
+                    sighting.confidence,
+                    (sighting.x, sighting.y, sighting.z),
+                    radius,
+                    sighting.observer,
+                )
