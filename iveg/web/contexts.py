@@ -77,6 +77,64 @@ class HistoryPage:
 
 
 @dataclass(frozen=True, slots=True)
+class AlertsPage:
+    """``alerts.html``: what is active, the sound, and what was."""
+
+    template: ClassVar[str] = "alerts.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class CommandsPage:
+    """``commands.html``: every STOP, release and resume with its times."""
+
+    template: ClassVar[str] = "commands.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class FleetPage:
+    """``fleet.html``: the chain from robot to screen, the robots, their devices.
+
+    Attributes:
+        devices: What follows the robot's id in the name of each of its devices.
+    """
+
+    template: ClassVar[str] = "fleet.html"
+    frame: Frame
+    devices: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ClimatePage:
+    """``climate.html``: the air in the greenhouse."""
+
+    template: ClassVar[str] = "climate.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsPage:
+    """``settings.html``: the rule in force, and what this device remembers."""
+
+    template: ClassVar[str] = "settings.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionPage:
+    """``decision.html``: one decision by its own address, to share and to print.
+
+    Attributes:
+        decision_id: As asked for; whether it exists is said by the API.
+    """
+
+    template: ClassVar[str] = "decision.html"
+    frame: Frame
+    decision_id: str
+
+
+@dataclass(frozen=True, slots=True)
 class DocsPage:
     """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
 
@@ -121,4 +179,17 @@ class ErrorPage:
     sentence: str
 
 
-Page = LivePage | HistoryPage | DocsPage | AboutPage | SignInPage | ErrorPage
+Page = (
+    LivePage
+    | HistoryPage
+    | AlertsPage
+    | CommandsPage
+    | FleetPage
+    | ClimatePage
+    | SettingsPage
+    | DecisionPage
+    | DocsPage
+    | AboutPage
+    | SignInPage
+    | ErrorPage
+)

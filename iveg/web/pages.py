@@ -9,22 +9,29 @@ from collections.abc import Callable
 from importlib.resources import files
 from typing import Annotated, Any, Protocol
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
+from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.contexts import (
     THEMES,
     AboutPage,
+    AlertsPage,
+    ClimatePage,
+    CommandsPage,
+    DecisionPage,
     DocsPage,
     ErrorPage,
+    FleetPage,
     Frame,
     HistoryPage,
     LivePage,
     Look,
     Page,
+    SettingsPage,
     SignInPage,
     Site,
     Theme,
@@ -38,6 +45,8 @@ LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
 PALETTE_COOKIE = "iveg_palette"
 
+_DEVICES = tuple(device.suffix for device in ROBOT_DEVICES)
+_DECISION_ID = r"^[ -~]{1,64}$"
 _EXPLAINED = (400, 401, 403, 404, 405, 500, 503)
 
 
@@ -142,6 +151,8 @@ def router(
         page = HistoryPage(pages.frame(request, "history", visitor))
         return pages.draw(page, policy=PLOTLY_CONTENT_SECURITY_POLICY)
 
+    _add_supervision(routes, pages, who)
+
     @routes.get("/docs", response_model=None)
     async def docs(request: Request, visitor: Annotated[Any, who]) -> Response:
         return pages.draw(DocsPage(pages.frame(request, "docs", visitor), document()))
@@ -154,7 +165,45 @@ def router(
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
 
+    @routes.post("/signout", response_model=None, dependencies=[who])
+    async def sign_out(request: Request) -> Response:
+        left: Response = request.app.state.door.sign_out(request)
+        return left
+
     return routes
+
+
+def _add_supervision(routes: APIRouter, pages: Pages, who: Any) -> None:
+    """The pages beside the map: what was, what is connected, what is in force."""
+
+    @routes.get("/alerts", response_model=None)
+    async def alerts(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(AlertsPage(pages.frame(request, "alerts", visitor)))
+
+    @routes.get("/commands", response_model=None)
+    async def commands(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(CommandsPage(pages.frame(request, "commands", visitor)))
+
+    @routes.get("/fleet", response_model=None)
+    async def fleet(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(FleetPage(pages.frame(request, "fleet", visitor), _DEVICES))
+
+    @routes.get("/climate", response_model=None)
+    async def climate(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(ClimatePage(pages.frame(request, "climate", visitor)))
+
+    @routes.get("/settings", response_model=None)
+    async def settings(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(SettingsPage(pages.frame(request, "settings", visitor)))
+
+    @routes.get("/decisions/{decision_id}", response_model=None)
+    async def decision(
+        request: Request,
+        visitor: Annotated[Any, who],
+        decision_id: Annotated[str, Path(pattern=_DECISION_ID)],
+    ) -> Response:
+        frame = pages.frame(request, "decision", visitor)
+        return pages.draw(DecisionPage(frame, decision_id))
 
 
 def _identified(request: Request) -> Visitor | None:

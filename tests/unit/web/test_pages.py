@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import httpx
 import pytest
 from fastapi import FastAPI
+from starlette.responses import RedirectResponse, Response
 
+from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.auth import Principal, require
 from iveg.web.contexts import Site
 from iveg.web.openapi import AnswerDoc, ApiDoc, CallDoc, FieldDoc, GroupDoc, ShapeDoc
@@ -16,6 +18,18 @@ from iveg.web.problems import NotSignedInError, install
 from iveg.web.security import CONTENT_SECURITY_POLICY, SecurityHeaders
 from iveg.web.words import read_words
 
+ROUTES = (
+    "/",
+    "/alerts",
+    "/commands",
+    "/history",
+    "/fleet",
+    "/climate",
+    "/settings",
+    "/decisions/d-1",
+    "/docs",
+    "/about",
+)
 SITE = Site(
     greenhouse="Almería <b>1</b>",
     robots=("AGI", "AGII"),
@@ -55,6 +69,11 @@ class FakeDoor:
     """Lets in whom it is told to."""
 
     visitor: Principal | None = None
+    left: int = 0
+
+    def sign_out(self, _: object) -> Response:
+        self.left += 1
+        return RedirectResponse("/", 303)
 
     def reader(self) -> Principal:
         if self.visitor is None:
@@ -96,7 +115,7 @@ def stops(html: str) -> list[str]:
     return re.findall(r'data-stop="([^"]+)"', html)
 
 
-@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about", "/nowhere"])
+@pytest.mark.parametrize("path", [*ROUTES, "/nowhere"])
 async def test_every_page_of_somebody_signed_in_has_each_stop_once(
     browser: httpx.AsyncClient, path: str
 ) -> None:
@@ -104,7 +123,7 @@ async def test_every_page_of_somebody_signed_in_has_each_stop_once(
     assert stops(answer.text) == ["AGI", "AGII", "fleet"]
 
 
-@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about"])
+@pytest.mark.parametrize("path", ROUTES)
 async def test_a_stranger_is_told_how_to_get_in(
     browser: httpx.AsyncClient, door: FakeDoor, path: str
 ) -> None:
@@ -168,7 +187,7 @@ async def test_a_made_up_look_is_ignored(browser: httpx.AsyncClient) -> None:
     assert '<html lang="es" data-theme="auto" data-palette="iveg">' in answer.text
 
 
-@pytest.mark.parametrize("path", ["/", "/history", "/docs", "/about", "/signin"])
+@pytest.mark.parametrize("path", [*ROUTES, "/signin"])
 async def test_no_page_holds_inline_script_or_style(
     browser: httpx.AsyncClient, path: str
 ) -> None:
@@ -219,3 +238,48 @@ async def test_release_and_resume_stand_apart_from_stop(
     assert "data-release" not in strip
     assert re.findall(r'data-release="(\w+)"', html) == ["AGI", "AGII"]
     assert re.findall(r'data-resume="(\w+)"', html) == ["AGI", "AGII"]
+
+
+async def test_every_page_can_be_reached_from_every_other(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/about")).text
+    menu = html[html.index('id="menu"') :]
+    linked = set(re.findall(r'href="(/\w*)"', menu))
+    assert linked >= {path for path in ROUTES if "decisions" not in path}
+
+
+async def test_a_decision_has_an_address_and_its_id_is_text(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get('/decisions/"><img src=x>')).text
+    assert 'data-decision="&#34;&gt;&lt;img src=x&gt;"' in html
+
+
+async def test_an_address_that_is_no_decision_is_refused(
+    browser: httpx.AsyncClient,
+) -> None:
+    assert (await browser.get("/decisions/" + "x" * 65)).status_code == 422
+
+
+async def test_signing_out_ends_the_session_and_goes_to_the_way_in(
+    browser: httpx.AsyncClient, door: FakeDoor
+) -> None:
+    answer = await browser.post("/signout")
+    assert (answer.status_code, answer.headers["location"], door.left) == (303, "/", 1)
+
+
+async def test_a_stranger_has_nothing_to_sign_out_of(
+    browser: httpx.AsyncClient, door: FakeDoor
+) -> None:
+    door.visitor = None
+    assert (await browser.post("/signout")).status_code == 401
+    assert door.left == 0
+
+
+async def test_every_device_of_a_robot_stands_on_the_fleet_page(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/fleet")).text
+    wanted = " ".join(device.suffix for device in ROBOT_DEVICES)
+    assert f'data-suffixes="{wanted}"' in html

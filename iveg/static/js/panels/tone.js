@@ -1,51 +1,91 @@
 /**
- * The sound of an unacknowledged P1: two short tones, again and again.
+ * The sound of alarms: a P1 again and again until acknowledged, the others once.
  *
  * Browsers are mute until somebody has touched the page; the tone then begins by itself.
+ * Only the single chime can be switched off, and that is remembered; a P1 cannot.
+ *
+ * @typedef {ReturnType<typeof createTone>} Tone
+ * @typedef {(hertz: number, afterS: number) => void} Beep
  */
+
+import { browserStorage } from "../layers/memory.js";
 
 const EVERY_MS = 1600;
 const TONES_HZ = [880, 660];
+const CHIME_HZ = [520];
 const LENGTH_S = 0.18;
 const VOLUME = 0.12;
+const KEY = "iveg.chime";
 
-export function createTone() {
-  /** @type {AudioContext | null} */
-  let context = null;
+/**
+ * @param {{beep?: Beep, canSound?: () => boolean, storage?: Storage | null}} [options]
+ *   tests hand in their own
+ */
+export function createTone(options = {}) {
+  const { canSound = wasTouched, storage = browserStorage() } = options;
+  const beep = options.beep ?? createBeep();
   /** @type {ReturnType<typeof setInterval> | undefined} */
   let timer;
+  let chimes = storage?.getItem(KEY) !== "off";
 
-  function play() {
-    if (!navigator.userActivation?.hasBeenActive) return;
-    context ??= new AudioContext();
-    TONES_HZ.forEach((hertz, i) => {
-      beep(/** @type {AudioContext} */ (context), hertz, i * LENGTH_S * 1.3);
+  /** @param {number[]} tones */
+  function play(tones) {
+    if (!canSound()) return false;
+    tones.forEach((hertz, i) => {
+      beep(hertz, i * LENGTH_S * 1.3);
     });
+    return true;
   }
 
   return {
-    /** @param {boolean} isOn */
+    /** Whether a P1 waits for somebody. @param {boolean} isOn */
     sound(isOn) {
       if (isOn && timer === undefined) {
-        play();
-        timer = setInterval(play, EVERY_MS);
+        play(TONES_HZ);
+        timer = setInterval(() => play(TONES_HZ), EVERY_MS);
       } else if (!isOn) {
         clearInterval(timer);
         timer = undefined;
       }
     },
+    isSounding: () => timer !== undefined,
+    /** One alarm of lower priority has come. */
+    chime: () => chimes && play(CHIME_HZ),
+    /** As a P1 sounds, once; tells whether the browser let it. */
+    test: () => play(TONES_HZ),
+    canSound,
+    hasChimes: () => chimes,
+    /** @param {boolean} isOn */
+    setChimes(isOn) {
+      chimes = isOn;
+      try {
+        storage?.setItem(KEY, isOn ? "on" : "off");
+      } catch {
+        // A full or forbidden store costs the memory of a switch, never the switch.
+      }
+    },
   };
 }
 
-/** @param {AudioContext} context @param {number} hertz @param {number} afterS */
-function beep(context, hertz, afterS) {
-  const oscillator = context.createOscillator();
-  const gain = context.createGain();
-  const start = context.currentTime + afterS;
-  oscillator.frequency.value = hertz;
-  gain.gain.setValueAtTime(VOLUME, start);
-  gain.gain.linearRampToValueAtTime(0, start + LENGTH_S);
-  oscillator.connect(gain).connect(context.destination);
-  oscillator.start(start);
-  oscillator.stop(start + LENGTH_S);
+function wasTouched() {
+  return navigator.userActivation?.hasBeenActive ?? true;
+}
+
+/** @returns {Beep} */
+function createBeep() {
+  /** @type {AudioContext | null} */
+  let context = null;
+  return (hertz, afterS) => {
+    context ??= new AudioContext();
+    context.resume();
+    const oscillator = context.createOscillator();
+    const gain = context.createGain();
+    const start = context.currentTime + afterS;
+    oscillator.frequency.value = hertz;
+    gain.gain.setValueAtTime(VOLUME, start);
+    gain.gain.linearRampToValueAtTime(0, start + LENGTH_S);
+    oscillator.connect(gain).connect(context.destination);
+    oscillator.start(start);
+    oscillator.stop(start + LENGTH_S);
+  };
 }

@@ -1,0 +1,118 @@
+/**
+ * A list of the API as a table that says when it is loading, empty or out of reach.
+ *
+ * @typedef {{items: any[], next: string | null}} Listing
+ */
+
+import { readApi } from "../api.js";
+import { make, need, setHidden, setText } from "../panels/dom.js";
+
+const ROWS = 50;
+
+/**
+ * @param {{name: string, path: string, words: import("../i18n.js").Words,
+ *   cells: (item: any) => Node[], admits?: (item: any) => boolean,
+ *   onItems?: (items: any[]) => void}} options `name` of `_rows.html`; `path` below
+ *   `/api/v1/`
+ */
+export function createRows({ name, path, words, cells, admits = () => true, onItems }) {
+  const body = need(`#${name}-rows tbody`);
+  const more = /** @type {HTMLButtonElement} */ (need(`#${name}-more`));
+  /** @type {any[]} */
+  let items = [];
+  /** @type {string | null} */
+  let next = null;
+  let status = 200;
+  let isLoaded = false;
+
+  function draw() {
+    const shown = items.filter(admits);
+    body.replaceChildren(...shown.map(makeRow));
+    const failed = need(`#${name}-error`);
+    setHidden(failed, status === 200);
+    setText(failed, words.t(status ? "rows.failed" : "rows.offline", { status }));
+    setHidden(need(`#${name}-loading`), isLoaded);
+    setHidden(need(`#${name}-scroll`), shown.length === 0);
+    const empty = need(`#${name}-empty`);
+    setHidden(empty, !isLoaded || shown.length > 0 || status !== 200);
+    const why = items.length ? "logpanel.empty_filter" : `rows.empty.${name}`;
+    setText(empty, words.t(why));
+    setHidden(more, next === null);
+    onItems?.(items);
+  }
+
+  /** @param {any} item */
+  function makeRow(item) {
+    const row = make("tr");
+    row.append(...cells(item));
+    return row;
+  }
+
+  /** @param {string} query */
+  async function read(query) {
+    const answer = await readApi(`${path}?limit=${ROWS}${query}`);
+    status = answer.status;
+    isLoaded = true;
+    return /** @type {Listing | null} */ (status === 200 ? answer.body : null);
+  }
+
+  async function load() {
+    const page = await read("");
+    // What was read stays when the server is gone: it is the past, and stays true.
+    if (page) ({ items, next } = page);
+    draw();
+  }
+
+  async function loadMore() {
+    if (next === null) return;
+    more.disabled = true;
+    const page = await read(`&cursor=${encodeURIComponent(next)}`);
+    if (page) {
+      items = items.concat(page.items);
+      next = page.next;
+    }
+    more.disabled = false;
+    draw();
+  }
+
+  more.addEventListener("click", loadMore);
+  words.onChange(draw);
+  return { load, draw };
+}
+
+/**
+ * Calls `fn` once, a while after the last of several events: the history is written in
+ * batches, so what has just happened is in it a moment later.
+ *
+ * @param {() => void} fn
+ * @param {number} [afterMs]
+ */
+export function soon(fn, afterMs = 1200) {
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let timer;
+  return () => {
+    clearTimeout(timer);
+    timer = setTimeout(fn, afterMs);
+  };
+}
+
+/**
+ * Chips of which any number may be pressed; none pressed admits everything.
+ *
+ * @param {string} attribute `data-…` that names what a chip admits
+ * @param {() => void} onChange
+ * @returns {(value: string) => boolean}
+ */
+export function createChips(attribute, onChange) {
+  /** @type {Set<string>} */
+  const pressed = new Set();
+  for (const chip of document.querySelectorAll(`[${attribute}]`)) {
+    const value = String(chip.getAttribute(attribute));
+    chip.addEventListener("click", () => {
+      if (!pressed.delete(value)) pressed.add(value);
+      chip.setAttribute("aria-pressed", String(pressed.has(value)));
+      onChange();
+    });
+  }
+  return (value) => pressed.size === 0 || pressed.has(value);
+}

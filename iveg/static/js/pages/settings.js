@@ -1,0 +1,68 @@
+/**
+ * The Settings page: the rule in force, and what this device remembers.
+ */
+
+import { readApi } from "../api.js";
+import { need, setHidden, setText } from "../panels/dom.js";
+import { createSoundPanel } from "../panels/sound.js";
+import { createRuleForm } from "./rule.js";
+
+/** @typedef {NonNullable<import("../protocol.js").Snapshot["rule"]>} Rule */
+
+/** @param {import("../page.js").Page} page */
+export function start({ store, words, tone, wake }) {
+  createSoundPanel(words, tone);
+  wireWake(wake, words);
+  const form = createRuleForm(words, draw);
+
+  function draw() {
+    const rule = form.newest() ?? store.get("snapshot")?.rule ?? null;
+    if (rule) drawRule(rule, words);
+  }
+
+  store.subscribe("snapshot", () => {
+    draw();
+    form.look();
+  });
+  words.onChange(draw);
+  draw();
+  findRoutes().then(form.open);
+}
+
+/** @param {Rule} rule @param {import("../i18n.js").Words} words */
+function drawRule(rule, words) {
+  const share = (/** @type {number} */ value) => words.t("rule.percent", { value });
+  setText(need("#rule-version"), String(rule.version));
+  setText(need("#rule-threshold"), share(rule.confidence_threshold));
+  setText(need("#rule-radius"), words.t("rule.metres", { value: rule.radius_m }));
+  setText(need("#rule-factor"), share(rule.factor));
+}
+
+/**
+ * Which verbs this server knows for the rule, from its own document.
+ *
+ * @returns {Promise<Set<string>>} `get`, `put`
+ */
+async function findRoutes() {
+  const { body } = await readApi("/openapi.json");
+  return new Set(Object.keys(body?.paths?.["/api/v1/rule"] ?? {}));
+}
+
+/** @param {import("../wakelock.js").WakeLock} wake
+ * @param {import("../i18n.js").Words} words */
+function wireWake(wake, words) {
+  const box = /** @type {HTMLInputElement} */ (need("#wake-on"));
+  box.checked = wake.isWanted();
+  box.disabled = !wake.isPossible();
+  box.addEventListener("change", () => {
+    wake.setWanted(box.checked);
+    draw();
+  });
+  function draw() {
+    const said = wake.isPossible() ? (box.checked ? "on" : "off") : "none";
+    setText(need("#wake-state"), words.t(`device.wake_${said}`));
+  }
+  setHidden(need("#wake-state"), false);
+  words.onChange(draw);
+  draw();
+}

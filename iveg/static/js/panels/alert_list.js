@@ -1,0 +1,142 @@
+/**
+ * A list of alarms that can be acknowledged: shape, colour and words say how urgent.
+ *
+ * The bell's panel and the Alarms page show the same list; a note that is being written
+ * keeps its focus while alarms come and go around it.
+ */
+
+import { sendApi } from "../api.js";
+import { make, need, setAttribute, setHidden, setText } from "./dom.js";
+
+/** @typedef {import("../protocol.js").Alert} Alert */
+
+/** Roles that may acknowledge (safety: the table of roles). */
+const ACKNOWLEDGERS = new Set(["operator", "admin"]);
+
+/**
+ * @param {HTMLElement} list
+ * @param {import("../i18n.js").Words} words
+ * @param {(alertId: string, note: string) => Promise<number>} [send] tests hand in
+ *   their own
+ */
+export function createAlertList(list, words, send = acknowledge) {
+  /** @type {Map<string, HTMLLIElement>} */
+  const items = new Map();
+  /** @type {Map<string, number>} HTTP status of acknowledgements that failed */
+  const failures = new Map();
+  /** @type {Alert[]} */
+  let shown = [];
+
+  /** @param {Alert[]} alerts */
+  function draw(alerts) {
+    shown = [...alerts].sort(byUrgency);
+    for (const id of items.keys()) {
+      if (!shown.some(({ alert_id }) => alert_id === id)) drop(id);
+    }
+    shown.forEach((alert, i) => {
+      const item = itemOf(alert);
+      // Moving an element takes the focus out of the note that is being written.
+      if (list.children[i] !== item) list.insertBefore(item, list.children[i] ?? null);
+      drawItem(item, alert);
+    });
+  }
+
+  /** @param {string} id */
+  function drop(id) {
+    items.get(id)?.remove();
+    items.delete(id);
+    failures.delete(id);
+  }
+
+  /** @param {Alert} alert */
+  function itemOf(alert) {
+    const known = items.get(alert.alert_id);
+    if (known) return known;
+    const item = makeItem(async (note) => {
+      const status = await send(alert.alert_id, note);
+      if (status >= 200 && status < 300) failures.delete(alert.alert_id);
+      else failures.set(alert.alert_id, status);
+      draw(shown);
+    });
+    items.set(alert.alert_id, item);
+    return item;
+  }
+
+  /** @param {HTMLElement} item @param {Alert} alert */
+  function drawItem(item, alert) {
+    setAttribute(item, "data-priority", alert.priority);
+    setAttribute(item, "data-alert", alert.key);
+    const priority = words.t(`alert.priority.${alert.priority}`);
+    setText(need("b", item), `${priority}: ${sentenceOf(alert, words)}`);
+    setText(need("small", item), factsOf(alert, words));
+    const may = ACKNOWLEDGERS.has(document.body.dataset.role ?? "");
+    setHidden(need("form", item), alert.acknowledged_at !== null || !may);
+    const input = /** @type {HTMLInputElement} */ (need("input", item));
+    input.placeholder = words.t("alert.note");
+    input.setAttribute("aria-label", words.t("alert.note"));
+    setText(need("button", item), words.t("alert.acknowledge"));
+    const status = failures.get(alert.alert_id);
+    setText(
+      need("p", item),
+      status === undefined ? "" : words.t("alert.failed", { status }),
+    );
+  }
+
+  return { draw };
+}
+
+/** What an alarm says. @param {Alert} alert @param {import("../i18n.js").Words} words */
+export function sentenceOf({ key, slots }, words) {
+  return words.t(key.startsWith("alert.") ? key : `alert.${key}`, slots);
+}
+
+/** @param {Alert} alert @param {import("../i18n.js").Words} words */
+function factsOf(alert, words) {
+  return [
+    words.t("alert.since", { at: alert.raised_at }),
+    alert.count > 1 && words.t("alert.times", { count: alert.count }),
+    alert.cleared_at && words.t("alert.cleared", { at: alert.cleared_at }),
+    alert.acknowledged_at &&
+      words.t("alert.acknowledged", {
+        who: alert.acknowledged_by,
+        at: alert.acknowledged_at,
+      }),
+    alert.note,
+  ]
+    .filter(Boolean)
+    .join(" · ");
+}
+
+/** @param {(note: string) => void} onAcknowledge */
+function makeItem(onAcknowledge) {
+  const item = make("li");
+  const body = make("div");
+  const form = make("form");
+  const input = make("input");
+  const submit = make("button", "button");
+  submit.type = "submit";
+  input.maxLength = 200;
+  form.append(input, submit);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    onAcknowledge(input.value);
+  });
+  body.append(make("b"), make("small"), form, make("p"));
+  item.append(make("span", "shape"), body);
+  return item;
+}
+
+/** Open before cleared, urgent before others, new before old. @param {Alert} a @param {Alert} b */
+export function byUrgency(a, b) {
+  return (
+    Number(Boolean(a.cleared_at)) - Number(Boolean(b.cleared_at)) ||
+    a.priority.localeCompare(b.priority) ||
+    b.raised_at.localeCompare(a.raised_at)
+  );
+}
+
+/** @param {string} id @param {string} note @returns {Promise<number>} 0: no answer */
+async function acknowledge(id, note) {
+  const path = `alerts/${encodeURIComponent(id)}/acknowledge`;
+  return (await sendApi("POST", path, { note })).status;
+}

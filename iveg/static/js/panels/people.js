@@ -1,0 +1,84 @@
+/**
+ * Who is on the map, in words: for readers of the screen, and for whoever asks why.
+ */
+
+import { ageOf } from "../clock.js";
+import { readPerson } from "../scene.js";
+import { make, need, setHidden, setText } from "./dom.js";
+
+/** @typedef {import("../protocol.js").Person} Person */
+
+/** A list that changes faster cannot be read aloud. */
+const TICK_MS = 1000;
+
+/** @param {import("../main.js").App} app */
+export function createPeoplePanel({ store, words }) {
+  const list = need("#people-list");
+
+  function draw() {
+    if (!(/** @type {HTMLDialogElement} */ (need("#people-panel")).open)) return;
+    const people = store.people();
+    while (list.children.length > people.length) list.lastElementChild?.remove();
+    while (list.children.length < people.length) list.append(makeItem());
+    people.forEach((person, i) => {
+      const item = list.children[i];
+      const [who, where, ...rest] = linesOf(person, words);
+      setText(need("b", item), who);
+      setText(need("small", item), where);
+      setText(need("p", item), rest.join(". "));
+    });
+    setHidden(need("#people-none"), people.length > 0);
+    const acting = people.flatMap((person) => person.acting);
+    const slots = {
+      now: acting.filter(({ in_sight }) => !in_sight).length,
+      total: store.log().filter(({ key }) => /^log\.speed_down\..*_nlos$/.test(key))
+        .length,
+    };
+    setText(need("#people-nlos"), words.t("people.nlos", slots));
+  }
+
+  document.addEventListener("iveg:panel", draw);
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+}
+
+function makeItem() {
+  const item = make("li");
+  item.append(make("b"), make("small"), make("p"));
+  return item;
+}
+
+/**
+ * One person in sentences: who and where, since when, who acts on it.
+ *
+ * @param {Person} person
+ * @param {import("../i18n.js").Words} words
+ * @returns {string[]}
+ */
+export function linesOf(person, words) {
+  const { stage, ringM } = readPerson(person, performance.now());
+  const { x, y } = person.position;
+  const slots = {
+    person: person.class,
+    lane: person.lane,
+    observers: person.observers.join(", "),
+    age: ageOf(person),
+    confidence: person.confidence,
+    radius: ringM,
+    x,
+    y,
+  };
+  const acts = person.acting.map(({ robot_id, distance_m, in_sight }) =>
+    words.t(in_sight ? "people.acts" : "people.acts_blind", {
+      robot: robot_id,
+      distance: distance_m,
+    }),
+  );
+  return [
+    words.t(person.lane ? "people.who" : "people.who_free", slots),
+    words.t("people.where", slots),
+    words.t(`people.${stage}`, slots),
+    ...acts,
+  ];
+}

@@ -1,0 +1,27 @@
+/**
+ * Leaving: ends the session on the server, then shows the way in.
+ */
+
+import { need, setText } from "./dom.js";
+
+/** @param {import("../main.js").App} app */
+export function createSignOut({ words }) {
+  need("#sign-out").addEventListener("click", async () => {
+    if (await signOut()) location.assign("/signin");
+    else setText(need("#sign-out-note"), words.t("signout.failed"));
+  });
+}
+
+async function signOut() {
+  try {
+    // The answer sends the browser to a page that it may no longer see.
+    const answer = await fetch("/signout", {
+      method: "POST",
+      headers: { "X-IVEG": "1" },
+      redirect: "manual",
+    });
+    return answer.type === "opaqueredirect" || answer.ok || answer.status === 401;
+  } catch {
+    return false;
+  }
+}

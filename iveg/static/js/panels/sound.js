@@ -1,0 +1,30 @@
+/**
+ * The switches of the sound: hear it before it matters, and quiet what may be quiet.
+ */
+
+import { need, setText } from "./dom.js";
+
+/**
+ * @param {import("../i18n.js").Words} words
+ * @param {import("./tone.js").Tone} tone
+ */
+export function createSoundPanel(words, tone) {
+  const others = /** @type {HTMLInputElement} */ (need("#sound-others"));
+  let said = tone.canSound() ? "ready" : "blocked";
+  others.checked = tone.hasChimes();
+  others.addEventListener("change", () => {
+    tone.setChimes(others.checked);
+    if (others.checked) tone.chime();
+  });
+  need("#sound-test").addEventListener("click", () => {
+    said = tone.test() ? "played" : "blocked";
+    draw();
+  });
+
+  function draw() {
+    setText(need("#sound-state"), words.t(`sound.${said}`));
+  }
+
+  words.onChange(draw);
+  draw();
+}
