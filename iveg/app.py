@@ -29,9 +29,11 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.upkeep import Upkeep
 from iveg.domain.alerts import Rule
+from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
+from iveg.domain.stop.drills import Drills
 from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
@@ -56,12 +58,14 @@ from iveg.web import (
     problems,
     robots,
     security,
+    stop_records,
 )
 from iveg.web.auth import Door, NotifySecret, Principal, SignInLink, require
 from iveg.web.contexts import Site
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
+_HISTORY_AGAIN_S = 5.0
 
 
 def new_id() -> str:
@@ -155,6 +159,7 @@ class Dss:
             new_id,
             clock.now,
             direct=settings.stop_direct,
+            drills=Drills(settings.drill_days),
         )
         self.loop = RuleLoop(
             self.ingest,
@@ -216,6 +221,17 @@ class Dss:
             tasks.create_task(self.upkeep.run(), name="upkeep")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())
+            tasks.create_task(self._remember_drills(), name="drills")
+
+    async def _remember_drills(self) -> None:
+        """Look when each robot was last drilled, as soon as the history answers."""
+        while True:
+            try:
+                self.commander.drills.remember(await self.queries.last_drills())
+            except HopError:
+                await asyncio.sleep(_HISTORY_AGAIN_S)
+            else:
+                return
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A part that must live has died: say so and stop; the robots slow down."""
@@ -323,6 +339,10 @@ def create_app(dss: Dss) -> FastAPI:
         )
     )
     app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))
+    # Before the routes that would take ``latency`` for the name of a command.
+    app.include_router(
+        stop_records.router(dss.queries, clock.now, dss.views.find_command)
+    )
     app.include_router(robots.router(dss.views, clock.now, dss.health))
     app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))

@@ -231,6 +231,13 @@ class Settings:
         3.0,
         "Age of feedback at which a robot stands (s).",
     )
+    drill_days: float = setting(
+        "IVEG_DRILL_DAYS",
+        _number(0.0, 3650.0),
+        30.0,
+        "Remind of a STOP drill when a robot's last one is older than this (days); "
+        "0: never. A robot that was never drilled is not reminded of.",
+    )
     uplink: Literal["per-topic", "single"] = setting(
         "IVEG_UPLINK",
         _choice("per-topic", "single"),

@@ -89,11 +89,14 @@ class CommandRecord:
     """One STOP, release or resume as it stands now.
 
     Attributes:
-        state: One of the nine states of the STOP machine.
+        state: One of the nine states of the STOP machine, RUNNING at the end of a
+            STOP, REPLACED or EXPIRED where another command took over.
         standing_at: First standing sample.
-        standstill_ms: ``standing_at`` − ``requested_at`` (ms).
+        standstill_ms: ``standing_at`` − the press, or ``requested_at`` without (ms).
         tries: How often it was sent.
         reason: A code for what is shown beside the state.
+        pressed_at: When a finger pressed, by the browser's corrected clock (Unix s).
+        drill: Whether it was pressed to prove that STOP works.
     """
 
     command_id: str
@@ -110,6 +113,8 @@ class CommandRecord:
     standstill_ms: float | None = None
     tries: int = 0
     reason: str | None = None
+    pressed_at: float | None = None
+    drill: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

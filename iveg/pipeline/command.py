@@ -8,6 +8,7 @@ that fails on one road holds up the other.
 import asyncio
 import logging
 from collections.abc import Coroutine, Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Literal
 
 from iveg.domain.alarms import Condition
@@ -25,18 +26,22 @@ from iveg.domain.stop import (
     Closed,
     Command,
     Effect,
+    Press,
     SendOnce,
     SendRoad,
     SendStop,
     SetLevel,
     StopMachine,
 )
+from iveg.domain.stop.drills import Drills
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Ids, Journal
+from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
 
 _log = logging.getLogger(__name__)
 _KEPT = 200
+_PLAIN = Press()
 
 _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
     "ready": "run",
@@ -67,11 +72,14 @@ class Commander:
         clock: Clock,
         *,
         direct: bool = True,
+        drills: Drills | None = None,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, direct=direct) for robot_id in robots
         }
         self.commands: dict[str, Command] = {}
+        self.drills = drills or Drills()
+        self._presses = Presses()
         self._levels: dict[str, SetLevel] = {}
         self._fleet = fleet
         self._broker = broker
@@ -95,21 +103,57 @@ class Commander:
 
     # --- people -------------------------------------------------------------------
 
-    async def stop(self, robots: Iterable[str], by: str, at: Instant) -> list[Command]:
+    async def stop(
+        self, robots: Iterable[str], by: str, at: Instant, press: Press = _PLAIN
+    ) -> list[Command]:
         """STOP these robots, in parallel; returns when it is sent and on disk."""
         machines = [self.machine(robot_id) for robot_id in robots]
-        pressed = []
-        for machine in machines:
-            self._perform(machine, machine.press(by, at, self._new_id()), at)
-            assert machine.stop is not None  # noqa: S101 - a press begins an episode
-            pressed.append(machine.stop)
+        pressed = [self._press(machine, by, at, press) for machine in machines]
         # Let every send reach its socket before the disk is asked for anything.
         await asyncio.sleep(0)
-        for command in pressed:
-            await self._journal.wanted(
-                command.robot_id, "stopped", command.command_id, by, at
-            )
+        await self._write_down(pressed, by, at)
         return pressed
+
+    def _press(
+        self, machine: StopMachine, by: str, at: Instant, press: Press
+    ) -> Command:
+        """Begin or join an episode; a press that came before is the same press."""
+        known = self._presses.find(by, press, machine.robot_id, at)
+        earlier = None if known is None else self.commands.get(known)
+        if earlier is not None and not machine.follows(earlier):
+            # That press has had its life: a late copy of it is no new wish.
+            return earlier
+        self._perform(machine, machine.press(by, at, self._new_id(), press=press), at)
+        assert machine.stop is not None  # noqa: S101 - a press begins an episode
+        command_id = machine.stop.command_id
+        self._presses.note(by, press, machine.robot_id, command_id, at)
+        return machine.stop
+
+    async def _write_down(
+        self, pressed: Iterable[Command], by: str, at: Instant
+    ) -> None:
+        for command in pressed:
+            if self.machine(command.robot_id).follows(command):
+                await self._journal.wanted(
+                    command.robot_id, "stopped", command.command_id, by, at
+                )
+
+    async def drill(
+        self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
+    ) -> Command:
+        """Prove that STOP works: a real STOP, of a robot that hardly moves.
+
+        Raises:
+            CommandRefusedError: stopped already, faster than a crawl, or unheard.
+        """
+        machine = self.machine(robot_id)
+        press = replace(press, drill=True)
+        self._perform(machine, machine.drill(by, at, self._new_id(), press), at)
+        assert machine.stop is not None  # noqa: S101 - a drill begins an episode
+        drilled = machine.stop
+        await asyncio.sleep(0)
+        await self._write_down([drilled], by, at)
+        return drilled
 
     async def release(
         self, robot_id: str, seen: Iterable[str], by: str, at: Instant
@@ -183,6 +227,7 @@ class Commander:
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """What is wrong with STOP."""
+        yield from self.drills.conditions(now)
         for robot_id, machine in self.machines.items():
             key = _ALARMS.get(machine.state)
             if key is not None:
@@ -224,6 +269,8 @@ class Commander:
             while len(self.commands) > _KEPT:
                 del self.commands[next(iter(self.commands))]
             self._minutes.command(command, changed, at)
+            if command.drill and changed.key == "standing":
+                self.drills.passed(command.robot_id, command.times.requested.wall)
             if changed.key in ("ready", "running"):
                 self._note_end(command, at)
         desired = _JOURNALLED.get(changed.key)

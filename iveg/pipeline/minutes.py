@@ -185,6 +185,8 @@ class Minutes:
                 standstill_ms=command.standstill_ms,
                 tries=command.tries,
                 reason=command.reason,
+                pressed_at=times.pressed,
+                drill=command.drill,
             )
         )
         if changed is not None:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends
 from pydantic import BaseModel, ConfigDict, Field
+from starlette.requests import Request
 from starlette.responses import Response
 
 from iveg.domain.observations import Instant
@@ -16,6 +17,7 @@ from iveg.domain.stop import Command
 from iveg.pipeline.command import Commander
 from iveg.web import schemas
 from iveg.web.auth import Principal, require
+from iveg.web.presses import DESCRIBED, press_of
 from iveg.web.robots import Json
 
 Pressing = Annotated[Principal, Depends(require("stop"))]
@@ -39,19 +41,37 @@ def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
         "/robots/{robot_id}/stop",
         status_code=202,
         response_model=schemas.PressedJson,
+        openapi_extra=DESCRIBED,
     )
-    async def stop(robot_id: str, who: Pressing) -> Response:
+    async def stop(request: Request, robot_id: str, who: Pressing) -> Response:
         """STOP one robot, on both roads at once."""
-        pressed = await commander.stop([robot_id], who.name, clock())
+        press = await press_of(request)
+        pressed = await commander.stop([robot_id], who.name, clock(), press)
         return Json(_pressed(pressed[0]), 202)
 
     @routes.post(
-        "/fleet/stop", status_code=202, response_model=schemas.FleetPressedJson
+        "/fleet/stop",
+        status_code=202,
+        response_model=schemas.FleetPressedJson,
+        openapi_extra=DESCRIBED,
     )
-    async def stop_fleet(who: Pressing) -> Response:
+    async def stop_fleet(request: Request, who: Pressing) -> Response:
         """STOP every robot, in parallel."""
-        pressed = await commander.stop(commander.machines, who.name, clock())
+        press = await press_of(request)
+        pressed = await commander.stop(commander.machines, who.name, clock(), press)
         return Json({"commands": [_pressed(command) for command in pressed]}, 202)
+
+    @routes.post(
+        "/robots/{robot_id}/drill",
+        status_code=202,
+        response_model=schemas.PressedJson,
+        openapi_extra=DESCRIBED,
+    )
+    async def drill(request: Request, robot_id: str, who: Releasing) -> Response:
+        """STOP a robot that stands or crawls, to prove that STOP works; 409 else."""
+        press = await press_of(request)
+        command = await commander.drill(robot_id, who.name, clock(), press)
+        return Json(_pressed(command), 202)
 
     @routes.post(
         "/robots/{robot_id}/release",

@@ -58,6 +58,7 @@ class DetectionView(View):
 class CommandTimes(View):
     """When each step of a command came to be known; null where it has not yet."""
 
+    pressed: str | None
     requested: str
     sent_fiware: str | None
     sent_direct: str | None
@@ -72,6 +73,7 @@ class CommandView(View):
     command_id: str
     robot_id: str
     kind: str
+    drill: bool
     state: str
     requested_by: str
     times: CommandTimes
@@ -184,9 +186,11 @@ def view_command(record: CommandRecord) -> CommandView:
         command_id=record.command_id,
         robot_id=record.robot_id,
         kind=record.kind,
+        drill=record.drill,
         state=record.state,
         requested_by=record.requested_by,
         times=CommandTimes(
+            pressed=_time(record.pressed_at),
             requested=format_stamp(record.requested_at),
             sent_fiware=_time(record.sent_fiware_at),
             sent_direct=_time(record.sent_direct_at),

@@ -16,10 +16,11 @@ from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
-from iveg.domain.stop import Command
+from iveg.domain.stop import Command, Press
 from iveg.ngsi.codec import load_json
 from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
+from iveg.web.presses import read_press
 from iveg.web.views import Views, log_line
 
 _log = logging.getLogger(__name__)
@@ -30,7 +31,7 @@ _MAX_MESSAGE = 65536
 _SNAPSHOT_LINES = 200
 _CACHE = 512
 
-Stop = Callable[[str | None, str], Awaitable[object]]
+Stop = Callable[[str | None, str, Press], Awaitable[object]]
 
 
 class Encoder:
@@ -241,7 +242,7 @@ async def _answer(
         allowed = _may_still(websocket, principal, "stop")
         if allowed and (robot_id is None or isinstance(robot_id, str)):
             try:
-                await stop(robot_id, principal.name)
+                await stop(robot_id, principal.name, read_press(message))
             except UnknownRobotError as error:
                 problem = text("problem", {"reason": str(error)})
                 await websocket.send_text(problem.decode())

@@ -131,6 +131,7 @@ GOOD = {
     "IVEG_DIRECT_READ": "OFF",
     "IVEG_FEEDBACK_SLOW_S": "0.5",
     "IVEG_FEEDBACK_STAND_S": "2.0",
+    "IVEG_DRILL_DAYS": "7",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
 }

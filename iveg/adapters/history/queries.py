@@ -86,6 +86,48 @@ class Queries:
 
         return await self._ask(read)
 
+    async def command(self, command_id: str) -> CommandRecord | None:
+        """One command; None when it is not known."""
+        wanted = select(commands).where(commands.c.command_id == command_id)
+
+        def read(connection: Connection) -> CommandRecord | None:
+            row = connection.execute(wanted).mappings().first()
+            return None if row is None else record_of(CommandRecord, row)
+
+        return await self._ask(read)
+
+    async def drills(
+        self, robot: str | None = None, most: int = 100
+    ) -> tuple[CommandRecord, ...]:
+        """The newest STOP drills, newest first."""
+        c = commands.c
+        wanted = (
+            select(commands)
+            .where(c.drill)
+            .order_by(c.requested_at.desc(), c.command_id.desc())
+            .limit(most)
+        )
+        if robot is not None:
+            wanted = wanted.where(c.robot_id == robot)
+
+        def read(connection: Connection) -> tuple[CommandRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(CommandRecord, row) for row in rows)
+
+        return await self._ask(read)
+
+    async def last_drills(self) -> dict[str, float]:
+        """Robot → when its last drill that ended in a standstill was asked (Unix s)."""
+        c = commands.c
+        newest = (
+            select(c.robot_id, func.max(c.requested_at))
+            .where(c.drill, c.standing_at.is_not(None))
+            .group_by(c.robot_id)
+        )
+        return await self._ask(
+            lambda connection: {row[0]: row[1] for row in connection.execute(newest)}
+        )
+
     async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
         """The audit trail of a command, oldest first."""
         events = command_events.c

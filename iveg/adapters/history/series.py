@@ -65,9 +65,13 @@ class ConfidenceCount:
 class CommandLatency:
     """How long one STOP took from the press (ms); None where it never came.
 
+    Where nobody told when it was pressed, the press is when it was accepted.
+
     Attributes:
         direct_ms: To the answer on the direct road; ``fiware_ms`` on the other.
         standstill_ms: To the first standing sample.
+        accepted_ms: To this server, where the page told when it was pressed.
+        sent_direct_ms: To the broker's word; ``sent_fiware_ms`` to Orion's.
     """
 
     command_id: str
@@ -76,6 +80,9 @@ class CommandLatency:
     direct_ms: float | None
     fiware_ms: float | None
     standstill_ms: float | None
+    accepted_ms: float | None = None
+    sent_direct_ms: float | None = None
+    sent_fiware_ms: float | None = None
 
 
 def speed_series(
@@ -133,14 +140,18 @@ def command_latencies(
 
 
 def _latency(record: CommandRecord) -> CommandLatency:
-    asked = record.requested_at
+    told = record.pressed_at
+    asked = record.requested_at if told is None else told
     return CommandLatency(
         record.command_id,
         record.robot_id,
-        asked,
+        record.requested_at,
         _ms(asked, record.answer_direct_at),
         _ms(asked, record.answer_fiware_at),
         record.standstill_ms,
+        None if told is None else _ms(told, record.requested_at),
+        _ms(asked, record.sent_direct_at),
+        _ms(asked, record.sent_fiware_at),
     )
 
 

@@ -19,6 +19,7 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
+    false,
 )
 from sqlalchemy.types import TypeEngine
 
@@ -132,6 +133,8 @@ commands = Table(
     _number("standstill_ms"),
     Column("tries", Integer, nullable=False),
     _text("reason"),
+    _number("pressed_at"),
+    Column("drill", Boolean, nullable=False, server_default=false()),
     _revision(),
     Index(None, "requested_at", "command_id"),
     Index(None, "robot_id", "requested_at"),

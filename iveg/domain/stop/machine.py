@@ -72,6 +72,10 @@ class StopMachine:
         """Whether a STOP stands that no reported release has ended."""
         return self.stop is not None and self.state not in ("RUNNING", "READY")
 
+    def follows(self, command: Command) -> bool:
+        """Whether this is the STOP that stands now."""
+        return self.wants_stop and command is self.stop
+
     @property
     def hold_id(self) -> str | None:
         """Our hold of this episode."""

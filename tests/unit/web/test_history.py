@@ -120,9 +120,11 @@ async def test_a_command_reads_as_the_contract_says(
         "command_id": "C1",
         "robot_id": "AGI",
         "kind": "stop",
+        "drill": False,
         "state": "REQUESTED",
         "requested_by": "ana",
         "times": {
+            "pressed": None,
             "requested": "2023-11-14T22:13:20.000Z",
             "sent_fiware": None,
             "sent_direct": "2023-11-14T22:13:20.003Z",

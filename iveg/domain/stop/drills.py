@@ -1,0 +1,42 @@
+"""When each robot's STOP was last proved by a drill, and when that is too long ago.
+
+A robot that was never drilled is not reminded of: a site begins the habit with its
+first drill, and from then on silence is a fact.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from iveg.domain.alarms import Condition
+from iveg.domain.events import Slot
+from iveg.domain.observations import Instant
+
+_DAY_S = 86_400.0
+
+
+class Drills:
+    """The last drill of each robot that ended in a measured standstill.
+
+    Args:
+        days: A drill is due after so many days; 0 reminds nobody.
+    """
+
+    def __init__(self, days: float = 0.0) -> None:
+        self._days = days
+        self.last: dict[str, float] = {}
+
+    def remember(self, drilled: Mapping[str, float]) -> None:
+        """Drills of earlier runs: robot → Unix time (s)."""
+        for robot_id, at in drilled.items():
+            self.passed(robot_id, at)
+
+    def passed(self, robot_id: str, at: float) -> None:
+        """A drill has ended well."""
+        self.last[robot_id] = max(at, self.last.get(robot_id, at))
+
+    def conditions(self, now: Instant) -> Iterable[Condition]:
+        """Robots whose last drill is older than the configured days."""
+        for robot_id, at in self.last.items():
+            age_days = (now.wall - at) / _DAY_S
+            if 0 < self._days < age_days:
+                slots: dict[str, Slot] = {"robot": robot_id, "days": int(age_days)}
+                yield Condition("P3", "alert.drill_due", robot_id, robot_id, slots)

@@ -1,0 +1,33 @@
+"""How long STOP takes, over many STOPs: half of them, nearly all, and the longest."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import ceil
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Times of one step (ms); None where nothing was measured.
+
+    Attributes:
+        count: How many were measured.
+        p50: That half of them did not exceed (nearest rank); ``p95`` likewise.
+        longest: The maximum.
+    """
+
+    count: int
+    p50: float | None
+    p95: float | None
+    longest: float | None
+
+
+def spread(values: Iterable[float | None]) -> Spread:
+    """Summarise what was measured; what never came is left out and not counted."""
+    known = sorted(value for value in values if value is not None)
+    if not known:
+        return Spread(0, None, None, None)
+    return Spread(len(known), _rank(known, 0.50), _rank(known, 0.95), known[-1])
+
+
+def _rank(known: list[float], share: float) -> float:
+    return known[max(0, ceil(share * len(known)) - 1)]

@@ -1,0 +1,73 @@
+"""What a page says of a press, read so that nothing it says can refuse a STOP.
+
+The same three words come over HTTP and over the socket (docs/interfaces.md §5, §8).
+"""
+
+import asyncio
+import math
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.stop import Press
+from iveg.ngsi.codec import load_json
+
+_LONGEST_ID = 64
+_BODY_WITHIN_S = 0.25
+_LARGEST_BODY = 4096
+
+DESCRIBED: dict[str, Any] = {
+    "requestBody": {
+        "required": False,
+        "description": "What the page knows of the press; never a reason to refuse.",
+        "content": {
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "properties": {
+                        "press_id": {
+                            "type": "string",
+                            "maxLength": _LONGEST_ID,
+                            "description": "The same at every repetition.",
+                        },
+                        "pressed_at": {
+                            "type": "number",
+                            "description": "Unix time (s), offset-corrected.",
+                        },
+                    },
+                }
+            }
+        },
+    }
+}
+
+
+async def press_of(request: Request) -> Press:
+    """The press in a request's body; a body that is late or junk says nothing."""
+    try:
+        async with asyncio.timeout(_BODY_WITHIN_S):
+            body = await request.body()
+        return read_press(load_json(body) if 0 < len(body) <= _LARGEST_BODY else None)
+    except (TimeoutError, ClientDisconnect, UnreadableError):
+        return Press()
+
+
+def read_press(value: object) -> Press:
+    """The press in what was sent; a word that cannot be is left out."""
+    if not isinstance(value, dict):
+        return Press()
+    press_id = value.get("press_id")
+    named = isinstance(press_id, str) and 0 < len(press_id) <= _LONGEST_ID
+    return Press(press_id if named else None, _moment(value.get("pressed_at")))
+
+
+def _moment(value: object) -> float | None:
+    # True is a number to Python, and not to anybody else.
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        moment = float(value)
+    except OverflowError:
+        return None
+    return moment if math.isfinite(moment) else None

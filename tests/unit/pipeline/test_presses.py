@@ -1,0 +1,213 @@
+"""One press is one STOP, and a drill is a STOP."""
+
+import pytest
+
+from iveg.domain.errors import CommandRefusedError
+from iveg.domain.observations import Hold
+from iveg.domain.records import CommandRecord
+from iveg.domain.stop import Command, Press
+from iveg.domain.stop.drills import Drills
+from iveg.pipeline.presses import REMEMBERED_S
+from tests.builders import START
+from tests.unit.pipeline.desk import Desk, settle
+
+
+async def press(desk: Desk, by: str = "ana", **words: object) -> Command:
+    said = Press(**({"press_id": "p1"} | words))  # type: ignore[arg-type]
+    (command,) = await desk.commander.stop(["AGI"], by, desk.clock(), said)
+    await settle()
+    return command
+
+
+async def released(desk: Desk) -> None:
+    """The robot stood and has reported the release."""
+    await desk.stand()
+    hold = desk.commander.machine("AGI").hold_id or ""
+    await desk.commander.release("AGI", [hold], "ana", desk.clock())
+    desk.report(released=(hold,))
+    await settle()
+
+
+async def test_the_same_press_on_both_transports_is_one_command() -> None:
+    desk = Desk()
+
+    first, second = await press(desk), await press(desk)
+
+    assert first is second
+    assert first.requesters == ["ana"]
+
+
+async def test_a_copy_that_comes_after_the_release_stops_nothing() -> None:
+    desk = Desk()
+    first = await press(desk)
+    await released(desk)
+    lines = len(desk.journal.lines)
+
+    again = await press(desk)
+
+    assert again is first
+    assert not desk.commander.machine("AGI").wants_stop
+    assert len(desk.journal.lines) == lines
+
+
+async def test_a_new_press_after_the_release_stops_again() -> None:
+    desk = Desk()
+    first = await press(desk)
+    await released(desk)
+
+    again = await press(desk, press_id="p2")
+
+    assert again is not first
+    assert desk.commander.machine("AGI").wants_stop
+
+
+async def test_another_persons_press_of_the_same_name_is_another_press() -> None:
+    desk = Desk()
+    await press(desk)
+    await released(desk)
+
+    await press(desk, "ben")
+
+    assert desk.commander.machine("AGI").wants_stop
+
+
+async def test_a_name_that_comes_back_after_a_minute_is_a_new_press() -> None:
+    desk = Desk()
+    await press(desk)
+    await released(desk)
+    desk.clock.now += REMEMBERED_S + 0.1
+
+    await press(desk)
+
+    assert desk.commander.machine("AGI").wants_stop
+
+
+@pytest.mark.parametrize(
+    ("before_s", "believed", "doubted"),
+    [
+        (0.18, True, False),
+        (59.9, True, False),
+        (60.1, False, True),
+        (-0.2, True, False),
+        (-0.3, False, True),
+    ],
+)
+async def test_a_press_is_dated_by_the_page_within_reason(
+    before_s: float, believed: bool, doubted: bool
+) -> None:
+    desk = Desk()
+
+    times = (await press(desk, pressed_at=START.wall - before_s)).times
+
+    assert (times.pressed is not None, times.pressed_doubted) == (believed, doubted)
+    assert times.pressed is None or times.pressed <= times.requested.wall
+
+
+async def test_standstill_counts_from_the_finger_and_the_history_knows_it() -> None:
+    desk = Desk()
+    command = await press(desk, pressed_at=START.wall - 0.5)
+
+    await desk.stand()
+
+    rows = [
+        one for one in desk.records(CommandRecord) if isinstance(one, CommandRecord)
+    ]
+    assert command.standstill_ms == pytest.approx(500.0, abs=1.0)
+    assert rows[-1].pressed_at == pytest.approx(START.wall - 0.5)
+
+
+# --- drills -----------------------------------------------------------------------
+
+
+async def drill(desk: Desk, linear: float) -> Command:
+    desk.report(factor=1.0, reason="clear", linear=linear)
+    return await desk.commander.drill("AGI", "ana", desk.clock())
+
+
+@pytest.mark.parametrize("linear", [0.0, 0.2, -0.2])
+async def test_a_drill_is_a_stop_that_holds_until_somebody_releases(
+    linear: float,
+) -> None:
+    desk = Desk()
+
+    command = await drill(desk, linear)
+    await desk.stand()
+
+    assert command.drill
+    assert desk.commander.machine("AGI").state == "STANDING"
+    assert "AGI" in desk.commander.drills.last
+    assert ("AGI", "stopped", command.command_id, "ana") in desk.journal.lines
+
+
+async def test_a_robot_that_drives_is_not_drilled() -> None:
+    desk = Desk()
+
+    with pytest.raises(CommandRefusedError, match="moving"):
+        await drill(desk, 0.21)
+
+    assert desk.fleet.stops == []
+
+
+async def test_odometry_alone_shows_that_a_robot_drives() -> None:
+    desk = Desk()
+    desk.report(factor=1.0, reason="clear")
+    desk.drive("AGI", linear=0.5)
+
+    with pytest.raises(CommandRefusedError, match="moving"):
+        await desk.commander.drill("AGI", "ana", desk.clock())
+
+
+async def test_a_robot_that_nobody_hears_is_not_drilled() -> None:
+    desk = Desk()
+    desk.report(factor=1.0, reason="clear")
+    desk.clock.now += 1.1
+
+    with pytest.raises(CommandRefusedError, match="not fresh"):
+        await desk.commander.drill("AGI", "ana", desk.clock())
+
+
+async def test_a_stopped_robot_is_not_drilled() -> None:
+    desk = Desk()
+    await press(desk)
+
+    with pytest.raises(CommandRefusedError, match="its state is"):
+        await drill(desk, 0.0)
+
+
+async def test_a_plain_stop_is_no_drill() -> None:
+    desk = Desk()
+    await press(desk)
+    desk.report("AGI", Hold("x", "hw", "local"))
+
+    await desk.stand()
+
+    assert desk.commander.drills.last == {}
+
+
+DAY = 86_400.0
+
+
+@pytest.mark.parametrize(
+    ("days", "age_days", "due"),
+    [(30.0, 29.9, []), (30.0, 31.0, ["AGI"]), (0.0, 400.0, [])],
+)
+def test_a_drill_is_due_after_the_days_that_were_set(
+    days: float, age_days: float, due: list[str]
+) -> None:
+    drills = Drills(days)
+    drills.remember({"AGI": START.wall - age_days * DAY})
+
+    assert [one.robot_id for one in drills.conditions(START)] == due
+
+
+def test_a_robot_that_was_never_drilled_is_not_reminded_of() -> None:
+    assert list(Drills(30.0).conditions(START)) == []
+
+
+def test_an_old_drill_from_the_history_does_not_hide_a_new_one() -> None:
+    drills = Drills(30.0)
+    drills.passed("AGI", START.wall)
+
+    drills.remember({"AGI": START.wall - 40 * DAY})
+
+    assert drills.last == {"AGI": START.wall}
