@@ -116,7 +116,9 @@ function laidOut(layout, asked, words) {
     gridcolor: token("--line"),
     zerolinecolor: token("--line-strong"),
     linecolor: token("--line-strong"),
-    automargin: true,
+    // Margins that follow their labels may chase each other (Plotly gives up with a
+    // warning); these hold the widest label of either language.
+    automargin: false,
     fixedrange: name === "y",
     ...(layout.meta[name] === "time"
       ? {
@@ -137,7 +139,7 @@ function laidOut(layout, asked, words) {
     font: { family: token("--font"), size: 12, color: token("--text-2") },
     hoverlabel: { bgcolor: token("--raised"), font: { color: token("--text") } },
     separators: words.language() === "es" ? ",." : ".,",
-    margin: { l: 48, r: 12, t: 8, b: 40 },
+    margin: { l: 60, r: 16, t: 36, b: 60 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
     showlegend: true,
     hovermode: "closest",
