@@ -11,16 +11,21 @@ const EVERY_MS = 2000;
 /**
  * @param {Store} store
  * @param {() => boolean} isWanted whether the layer is on
- * @param {string} [url]
+ * @param {() => string | null} [believer] the robot whose own map is shown; null for the
+ *   shared one
  * @returns {() => void} ends it
  */
-export function followCostmap(store, isWanted, url = "/api/v1/costmap") {
+export function followCostmap(store, isWanted, believer = () => null) {
   const timer = setInterval(bring, EVERY_MS);
 
   async function bring() {
     if (document.hidden || store.connection.state !== "open" || !isWanted()) return;
     try {
-      const answer = await fetch(url, { headers: { Accept: "application/json" } });
+      const robot = believer();
+      const query = robot === null ? "" : `?robot=${encodeURIComponent(robot)}`;
+      const headers = { Accept: "application/json" };
+      const answer = await fetch(`/api/v1/costmap${query}`, { headers });
+      if (robot !== believer()) return;
       if (answer.ok) store.apply("costmap", await answer.json());
     } catch {
       // The line's own banner tells that the server is gone; the next round asks again.

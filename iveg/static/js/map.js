@@ -12,11 +12,14 @@
  * @typedef {{
  *   now?: () => number, storage?: Storage | null,
  *   onFollow?: (robotId: string | null) => void,
+ *   onMeasure?: (measure: {on: boolean, points: number, metres: number | null}) => void,
  * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's
  */
 
 import { createCamera } from "./camera.js";
 import { listen } from "./gestures.js";
+import { believedBy, hears } from "./layers/belief.js";
+import { laidTo, lengthOf } from "./layers/measure.js";
 import { browserStorage, createChoices } from "./layers/memory.js";
 import { pick } from "./layers/pick.js";
 import { readTheme } from "./layers/theme.js";
@@ -26,6 +29,7 @@ import { createPaintHook } from "./painthook.js";
 import { createPicture, LAYERS } from "./picture.js";
 import { readScene } from "./scene.js";
 import { followShortcuts } from "./shortcuts.js";
+import { worldX, worldY } from "./viewport.js";
 
 export { LAYERS };
 
@@ -50,6 +54,9 @@ export function createMap(canvas, store, options = {}) {
   let theme = readTheme(canvas);
   let words = createWords();
   let scene = readScene(store, now());
+  /** @type {import("./layers/measure.js").Tape} */
+  let tape = { points: [] };
+  let isMeasuring = false;
   let frame = 0;
   const camera = redrawing(
     createCamera(() => scene, options.onFollow),
@@ -62,12 +69,39 @@ export function createMap(canvas, store, options = {}) {
 
   function draw() {
     frame = 0;
-    scene = readScene(store, now());
+    scene = seen(readScene(store, now()));
     camera.settle();
     const view = camera.view();
     if (!view.width || !view.height) return;
-    picture.draw({ view, theme, scene, words, followed: camera.followed() });
+    picture.draw({ view, theme, scene, words, followed: camera.followed(), tape });
     hook.painted();
+  }
+
+  /** @param {import("./scene.js").Scene} whole */
+  function seen(whole) {
+    const robot = store.robots().get(choices.believer() ?? "");
+    return robot ? believedBy(whole, robot.robot_id, hears(robot)) : whole;
+  }
+
+  /** @param {boolean} on */
+  function setMeasuring(on) {
+    isMeasuring = on;
+    layTape({ points: [] });
+  }
+
+  /** @param {import("./layers/measure.js").Tape} next */
+  function layTape(next) {
+    tape = next;
+    const [points, metres] = [tape.points.length, lengthOf(tape)];
+    options.onMeasure?.({ on: isMeasuring, points, metres });
+    invalidate();
+  }
+
+  /** @param {number} px @param {number} py */
+  function mark(px, py) {
+    if (!isMeasuring) return;
+    const view = camera.view();
+    layTape(laidTo(tape, { x: worldX(view, px), y: worldY(view, py) }));
   }
 
   function resize() {
@@ -83,10 +117,19 @@ export function createMap(canvas, store, options = {}) {
   const tell = (picked) => {
     for (const fn of pickers) fn(picked);
   };
+  /** @param {number} px @param {number} py */
+  function tap(px, py) {
+    if (isMeasuring) return mark(px, py);
+    const picked = pickAt(px, py);
+    if (picked) tell(picked);
+  }
 
   const endings = [
-    wireGestures(canvas, camera, pickAt, tell),
-    wireKeys(canvas, camera, store, choices.hasShortcuts),
+    wireGestures(canvas, camera, pickAt, tap, () => isMeasuring),
+    wireKeys(canvas, camera, store, choices.hasShortcuts, {
+      measure: () => setMeasuring(!isMeasuring),
+      mark: () => mark(camera.view().width / 2, camera.view().height / 2),
+    }),
     store.watch((data, topic) => {
       hook.arrived(topic, data);
       leaveTrail(trails, store, topic, data);
@@ -108,6 +151,11 @@ export function createMap(canvas, store, options = {}) {
     setLayer: choices.setLayer,
     /** @returns {{name: string, on: boolean}[]} from the ground up */
     layers: () => LAYERS.map((name) => ({ name, on: choices.isOn(name) })),
+    /** Whose belief is drawn; null draws what all robots know together. */
+    setBeliever: choices.setBeliever,
+    believer: choices.believer,
+    setMeasuring,
+    isMeasuring: () => isMeasuring,
     setTrail: choices.setTrail,
     trailSeconds: choices.trailSeconds,
     setShortcuts: choices.setShortcuts,
@@ -174,24 +222,23 @@ function redrawing(camera, invalidate) {
  * @param {HTMLCanvasElement} canvas
  * @param {Camera} camera
  * @param {(px: number, py: number) => Picked | null} pickAt
- * @param {Picker} tell
+ * @param {(px: number, py: number) => void} tap
+ * @param {() => boolean} isMeasuring
  */
-function wireGestures(canvas, camera, pickAt, tell) {
+function wireGestures(canvas, camera, pickAt, tap, isMeasuring) {
   return listen(canvas, {
     pan: camera.pan,
     zoom: camera.zoom,
     pinch: camera.pinch,
-    tap(px, py) {
-      const picked = pickAt(px, py);
-      if (picked) tell(picked);
-    },
+    tap,
     doubleTap(px, py) {
       const picked = pickAt(px, py);
       if (picked?.kind === "robot") camera.follow(picked.id);
       else camera.zoom(px, py, DOUBLE_TAP_ZOOM);
     },
     hover(px, py) {
-      canvas.style.cursor = pickAt(px, py) ? "pointer" : "grab";
+      const idle = pickAt(px, py) ? "pointer" : "grab";
+      canvas.style.cursor = isMeasuring() ? "crosshair" : idle;
     },
   });
 }
@@ -201,9 +248,11 @@ function wireGestures(canvas, camera, pickAt, tell) {
  * @param {Camera} camera
  * @param {Store} store
  * @param {() => boolean} isEnabled
+ * @param {Pick<import("./shortcuts.js").Actions, "measure" | "mark">} measuring
  */
-function wireKeys(canvas, camera, store, isEnabled) {
+function wireKeys(canvas, camera, store, isEnabled, measuring) {
   return followShortcuts(canvas, isEnabled, {
+    ...measuring,
     fit: camera.fit,
     fitFleet: camera.fitFleet,
     robot: (n) => {

@@ -13,6 +13,7 @@ import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
 import * as intent from "./layers/intent.js";
 import * as links from "./layers/links.js";
+import * as measure from "./layers/measure.js";
 import * as people from "./layers/people.js";
 import * as robot from "./layers/robot.js";
 import * as scalebar from "./layers/scalebar.js";
@@ -55,6 +56,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
   ]);
   /** @type {Record<string, (paint: Paint) => void>} */
   const moving = {
+    measure: (paint) => measure.draw(paint, paint.tape),
     costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, trailSeconds()),
     scan: scan.draw,
@@ -94,6 +96,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
       ctx.drawImage(still.image(paint, devicePixelRatio, isOn), 0, 0);
       ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
       for (const layer of LAYERS) if (isOn(layer)) drawLayer(layer, paint);
+      if (paint.tape.points.length) drawLayer("measure", paint);
       if (paint.scene.isVeiled) drawVeil(paint);
     },
   };

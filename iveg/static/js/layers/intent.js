@@ -40,7 +40,7 @@ function drawPath({ ctx, view }, robot) {
  * @param {{x: number, y: number}} goal
  */
 function drawGoal(paint, robot, goal) {
-  const { ctx, view } = paint;
+  const { ctx, view, words } = paint;
   const [x, y] = [screenX(view, goal.x), screenY(view, goal.y)];
   ctx.globalAlpha = 0.8;
   ctx.lineWidth = 2;
@@ -58,5 +58,5 @@ function drawGoal(paint, robot, goal) {
   }
   ctx.stroke();
   if (!robot.task || view.scale < 18) return;
-  label(paint, robot.task, x, y + 18, { size: 11, weight: 500 });
+  label(paint, words.task(robot.task), x, y + 18, { size: 11, weight: 500 });
 }

@@ -1,25 +1,27 @@
 /**
  * What a person chose for the map (layers, length of trails, keys), kept by the browser.
  *
- * @typedef {{off: string[], trailS: number, shortcuts: boolean}} Kept
+ * @typedef {{off: string[], trailS: number, shortcuts: boolean,
+ *   believer: string | null}} Kept `believer`: whose belief the map shows; null is
+ *   everybody's
  */
 
 import { TRAIL_SPANS_S } from "./trail.js";
 
 const KEY = "iveg.map";
 /** @type {Kept} */
-const FIRST = { off: [], trailS: TRAIL_SPANS_S[1], shortcuts: true };
+const FIRST = { off: [], trailS: TRAIL_SPANS_S[1], shortcuts: true, believer: null };
 
 /**
  * @param {Storage | null} storage null where the browser keeps nothing
  * @param {() => void} onChange
  */
 export function createChoices(storage, onChange) {
-  let { trailS, shortcuts, ...kept } = read(storage);
+  let { trailS, shortcuts, believer, ...kept } = read(storage);
   const off = new Set(kept.off);
 
   function changed() {
-    write(storage, { off: [...off], trailS, shortcuts });
+    write(storage, { off: [...off], trailS, shortcuts, believer });
     onChange();
   }
 
@@ -36,6 +38,12 @@ export function createChoices(storage, onChange) {
     /** @param {number} seconds one of TRAIL_SPANS_S */
     setTrail(seconds) {
       trailS = seconds;
+      changed();
+    },
+    believer: () => believer,
+    /** @param {string | null} robotId */
+    setBeliever(robotId) {
+      believer = robotId;
       changed();
     },
     hasShortcuts: () => shortcuts,
@@ -64,6 +72,7 @@ function read(storage) {
       off: Array.isArray(kept.off) ? kept.off.map(String) : FIRST.off,
       trailS: TRAIL_SPANS_S.includes(kept.trailS) ? kept.trailS : FIRST.trailS,
       shortcuts: kept.shortcuts !== false,
+      believer: typeof kept.believer === "string" ? kept.believer : null,
     };
   } catch {
     return FIRST;

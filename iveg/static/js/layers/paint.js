@@ -11,7 +11,7 @@
  * @typedef {CanvasRenderingContext2D} Context
  * @typedef {{
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, words: Words,
- *   followed: string | null,
+ *   followed: string | null, tape: import("./measure.js").Tape,
  * }} Paint
  */
 

@@ -17,6 +17,10 @@ export function createWords(t = wordless, locale = document.documentElement.lang
     minimumFractionDigits: 1,
     maximumFractionDigits: 1,
   });
+  const hundredths = new Intl.NumberFormat(tongue, {
+    minimumFractionDigits: 2,
+    maximumFractionDigits: 2,
+  });
   const percents = new Intl.NumberFormat(tongue, { style: "percent" });
   return {
     /** @param {string} lane */
@@ -25,6 +29,15 @@ export function createWords(t = wordless, locale = document.documentElement.lang
     metres: (m) => `${plain.format(m)} m`,
     /** A measured distance. @param {number} m */
     distance: (m) => `${tenths.format(m)} m`,
+    /** A length that a person measured. @param {number} m */
+    measured: (m) => `${hundredths.format(m)} m`,
+    /** A task in the reader's words; one of another fleet as it was sent.
+     * @param {string} task */
+    task: (task) => {
+      const key = `task.${task}`;
+      const said = t(key);
+      return said === key || said === task.toUpperCase() ? task : said;
+    },
     /** @param {number} share 0–1 */
     percent: (share) => percents.format(share),
     /** An age short enough for a tag; tenths while they matter. @param {number} s */

@@ -60,7 +60,7 @@ function wireWake(wake, words) {
   });
   function draw() {
     const said = wake.isPossible() ? (box.checked ? "on" : "off") : "none";
-    setText(need("#wake-state"), words.t(`device.wake_${said}`));
+    setText(need("#wake-state"), words.t(`device.wake_state.${said}`));
   }
   setHidden(need("#wake-state"), false);
   words.onChange(draw);

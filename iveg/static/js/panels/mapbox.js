@@ -5,9 +5,10 @@
  */
 
 import { followCostmap } from "../costmap.js";
+import { hears } from "../layers/belief.js";
 import { TRAIL_SPANS_S } from "../layers/trail.js";
 import { createMap } from "../map.js";
-import { all, make, need, setHidden, setText } from "./dom.js";
+import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { onThemeChange } from "./theme.js";
 
 /** @typedef {import("../main.js").App} App */
@@ -21,13 +22,33 @@ import { onThemeChange } from "./theme.js";
 export function createMapbox(app, decision) {
   const { store, words } = app;
   const canvas = /** @type {HTMLCanvasElement} */ (need("#map"));
-  const map = createMap(canvas, store, { onFollow: showFollowed });
+  const map = createMap(canvas, store, {
+    onFollow: showFollowed,
+    onMeasure: showMeasure,
+  });
 
   /** @param {string | null} robotId */
   function showFollowed(robotId) {
     const following = need("#following");
     setHidden(following, robotId === null);
     setText(following, robotId ? words.t("map.following", { robot: robotId }) : "");
+  }
+
+  /** @param {{on: boolean, points: number, metres: number | null}} measure */
+  function showMeasure({ on, points, metres }) {
+    setAttribute(need("#map-measure"), "aria-pressed", String(on));
+    const asks = points === 1 ? "map.measure_second" : "map.measure_first";
+    const said = metres === null ? words.t(asks) : words.t("map.measured", { metres });
+    setHidden(need("#measured"), !on);
+    setText(need("#measured"), on ? said : "");
+  }
+
+  function showBeliever() {
+    const robot = map.believer();
+    const known = robot === null ? undefined : store.robots().get(robot);
+    const key = known && !hears(known) ? "map.believing_deaf" : "map.believing";
+    setHidden(need("#believing"), !known);
+    setText(need("#believing"), known ? words.t(key, { robot }) : "");
   }
 
   /** @param {{kind: string, id: string}} picked */
@@ -70,12 +91,19 @@ export function createMapbox(app, decision) {
 
   function drawWords() {
     map.setLanguage(words.t);
-    drawLayers(map, words);
+    drawLayers(app, map, showBeliever);
+    showBeliever();
     drawFacts();
     drawClimate();
     showFollowed(map.followed());
   }
 
+  need("#map-measure").addEventListener("click", () =>
+    map.setMeasuring(!map.isMeasuring()),
+  );
+  canvas.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") map.setMeasuring(false);
+  });
   need("#map-fit").addEventListener("click", () => map.fit());
   need("#map-in").addEventListener("click", () => map.zoomBy(1));
   need("#map-out").addEventListener("click", () => map.zoomBy(-1));
@@ -83,10 +111,14 @@ export function createMapbox(app, decision) {
     map.follow(/** @type {CustomEvent<string>} */ (event).detail);
   });
   map.onPick(onPick);
-  followCostmap(store, () =>
-    map.layers().some(({ name, on }) => name === "costmap" && on),
+  followCostmap(
+    store,
+    () => map.layers().some(({ name, on }) => name === "costmap" && on),
+    map.believer,
   );
   onThemeChange(() => map.setTheme());
+  store.subscribe("robots/", showBeliever);
+  store.subscribe("snapshot", drawWords);
   store.subscribe("people", drawFacts);
   store.subscribe("climate", drawClimate);
   words.onChange(drawWords);
@@ -107,10 +139,11 @@ function goToCard(robotId) {
 }
 
 /**
+ * @param {App} app
  * @param {LiveMap} map
- * @param {import("../i18n.js").Words} words
+ * @param {() => void} onBeliever
  */
-function drawLayers(map, words) {
+function drawLayers({ store, words }, map, onBeliever) {
   const switches = map.layers().map(({ name, on }) => {
     const [choice, input] = makeChoice("checkbox", words.t(`map.layer.${name}`), on);
     input.addEventListener("change", () => map.setLayer(name, input.checked));
@@ -129,8 +162,22 @@ function drawLayers(map, words) {
     map.hasShortcuts(),
   );
   keys.addEventListener("change", () => map.setShortcuts(keys.checked));
+  const ids = [null, ...store.robots().keys()];
+  const beliefs = ids.map((robot) => {
+    const key = robot === null ? "map.belief_all" : "map.belief_one";
+    const isOn = map.believer() === robot;
+    const [choice, input] = makeChoice("radio", words.t(key, { robot }), isOn);
+    input.name = "belief";
+    input.addEventListener("change", () => {
+      map.setBeliever(robot);
+      onBeliever();
+    });
+    return choice;
+  });
   need("#layers").replaceChildren(
     ...switches,
+    make("h3", "choices__head", words.t("map.belief")),
+    ...beliefs,
     make("h3", "choices__head", words.t("map.trail_length")),
     ...spans,
     make("h3", "choices__head", words.t("map.keyboard")),

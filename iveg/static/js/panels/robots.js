@@ -223,7 +223,8 @@ function createCard(app, card) {
   function drawTask(robot) {
     const task = robot?.navigation?.task;
     setHidden(needPart("task-line", card), !task);
-    setText(needPart("task", card), task ?? "");
+    const key = `task.${task}`;
+    setText(needPart("task", card), words.has(key) ? words.t(key) : (task ?? ""));
   }
 
   return { draw };

@@ -1,0 +1,86 @@
+import { judgeChain, ORDER } from "../../iveg/static/js/pages/chain.js";
+import { statOf, summaryOf, tookOf } from "../../iveg/static/js/pages/latency.js";
+import { equal, test } from "./harness.js";
+
+/** @param {Record<string, "ok" | "late" | "down" | "unknown">} states */
+const hops = (states) =>
+  ORDER.map((hop) => ({ hop, state: states[hop] ?? /** @type {const} */ ("ok") }));
+
+/** @param {object} [differs] */
+const order = (differs = {}) => ({
+  command_id: "1",
+  robot_id: "AGI",
+  kind: "stop",
+  state: "STANDING",
+  requested_by: "Ana",
+  tries: 1,
+  standstill_ms: 412,
+  times: {
+    requested: "2026-11-20T12:00:00.000Z",
+    sent_fiware: "2026-11-20T12:00:00.004Z",
+    sent_direct: "2026-11-20T12:00:00.002Z",
+    answer_fiware: "2026-11-20T12:00:00.050Z",
+    answer_direct: null,
+    standing: "2026-11-20T12:00:00.412Z",
+  },
+  ...differs,
+});
+
+test("a whole chain is said to work", () => {
+  equal(judgeChain(hops({}), [], true).key, "fleet.whole");
+});
+
+test("of several broken hops the one nearest to the robots is named", () => {
+  const found = judgeChain(
+    hops({ notifications: "down", iot_agent: "down" }),
+    [],
+    true,
+  );
+  equal(found.key, "health.hop.iot_agent.down");
+  equal(found.hop, "iot_agent");
+});
+
+test("a hop that is down is worse news than a late one before it", () => {
+  const found = judgeChain(hops({ mqtt: "late", orion: "down" }), [], true);
+  equal(found.hop, "orion");
+});
+
+test("a silent robot before a merely late chain is named with its id", () => {
+  const found = judgeChain(hops({ mqtt: "late" }), ["AGI", "AGII"], true);
+  equal([found.key, found.slots.robots], ["fleet.silent_robots", "AGI, AGII"]);
+});
+
+test("a dead broker explains silent robots", () => {
+  equal(judgeChain(hops({ mqtt: "down" }), ["AGI"], true).hop, "mqtt");
+});
+
+test("without the server nothing else is known", () => {
+  equal(judgeChain(hops({}), [], false).key, "fleet.silent_server");
+});
+
+test("each road is measured from the press on, and silence is no number", () => {
+  equal(tookOf(order()), {
+    sentDirect: 2,
+    direct: null,
+    sentFiware: 4,
+    fiware: 50,
+    standing: 412,
+  });
+});
+
+test("release and resume are left out of what a STOP takes", () => {
+  const found = summaryOf([order(), order({ kind: "release", standstill_ms: 9000 })]);
+  equal([found.count, found.standing], [1, { median: 412, worst: 412 }]);
+});
+
+test("a STOP that nobody confirmed is counted", () => {
+  equal(
+    summaryOf([order({ state: "UNCONFIRMED", standstill_ms: null })]).unconfirmed,
+    1,
+  );
+});
+
+test("the median is a number that was measured", () => {
+  equal(statOf([30, 10, null, 20, 40]), { median: 30, worst: 40 });
+  equal(statOf([null]), null);
+});

@@ -1,0 +1,191 @@
+import { believedBy, hears } from "../../iveg/static/js/layers/belief.js";
+import { laidTo, lengthOf } from "../../iveg/static/js/layers/measure.js";
+import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
+import { createTone } from "../../iveg/static/js/panels/tone.js";
+import { createWakeLock } from "../../iveg/static/js/wakelock.js";
+import { equal, near, test } from "./harness.js";
+
+const PROBE = "<img src=x onerror=window.probed=true>";
+
+/** A store that forgets nothing while the test lasts. */
+function memory() {
+  /** @type {Map<string, string>} */
+  const kept = new Map();
+  return /** @type {Storage} */ (
+    /** @type {unknown} */ ({
+      getItem: (/** @type {string} */ key) => kept.get(key) ?? null,
+      setItem: (/** @type {string} */ key, /** @type {string} */ value) =>
+        kept.set(key, value),
+    })
+  );
+}
+
+/** @param {object} [differs] */
+function alarm(differs = {}) {
+  return /** @type {import("../../iveg/static/js/protocol.js").Alert} */ ({
+    alert_id: "a",
+    priority: "P1",
+    key: "robot_lost",
+    slots: { robot: "AGI" },
+    robot_id: "AGI",
+    raised_at: "2026-11-20T12:00:00Z",
+    cleared_at: null,
+    acknowledged_at: null,
+    acknowledged_by: null,
+    note: null,
+    count: 1,
+    ...differs,
+  });
+}
+
+const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+  /** @type {unknown} */ ({
+    t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
+      [key, ...Object.values(slots)].join(" "),
+  })
+);
+
+test("a tape is laid with two taps, and a third begins anew", () => {
+  const first = laidTo({ points: [] }, { x: 1, y: 1 });
+  equal(lengthOf(first), null);
+  const second = laidTo(first, { x: 4, y: 5 });
+  near(lengthOf(second) ?? 0, 5);
+  equal(laidTo(second, { x: 9, y: 9 }).points, [{ x: 9, y: 9 }]);
+});
+
+const SCENE = /** @type {import("../../iveg/static/js/scene.js").Scene} */ (
+  /** @type {unknown} */ ({
+    robots: [{ id: "AGI" }, { id: "AGII" }],
+    scans: [{ robotId: "AGI" }, { robotId: "AGII" }],
+    detections: [{ robotId: "AGI" }, { robotId: "AGII" }],
+    people: [{ observers: ["AGI"] }, { observers: ["AGII"] }],
+  })
+);
+
+test("a robot knows its own scan and, by the server, everybody's people", () => {
+  const { scans, detections, people, robots } = believedBy(SCENE, "AGII", true);
+  equal([scans.length, detections.length], [1, 1]);
+  equal([people.length, robots.length], [2, 2]);
+});
+
+test("a robot that hears no server counts on its own eyes alone", () => {
+  const { people, robots } = believedBy(SCENE, "AGII", false);
+  equal(people, [{ observers: ["AGII"] }]);
+  equal(robots, [{ id: "AGII" }]);
+});
+
+test("whether a robot hears is what it says of its newest feedback", () => {
+  const robot = (/** @type {number | null} */ feedback_age_s) =>
+    /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+      /** @type {unknown} */ ({ applied: { feedback_age_s } })
+    );
+  equal(
+    [0.2, 3.1, null].map((age) => hears(robot(age))),
+    [true, false, false],
+  );
+  equal(hears(undefined), false);
+});
+
+test("a P1 sounds at once and until it is acknowledged", () => {
+  /** @type {number[]} */
+  const heard = [];
+  const beep = (/** @type {number} */ hertz) => heard.push(hertz);
+  const tone = createTone({ beep, canSound: () => true, storage: memory() });
+  tone.sound(true);
+  equal([heard.length, tone.isSounding()], [2, true]);
+  tone.sound(false);
+  equal(tone.isSounding(), false);
+});
+
+test("a chime can be silenced and that is remembered; a P1 cannot", () => {
+  /** @type {number[]} */
+  const heard = [];
+  const beep = (/** @type {number} */ hertz) => heard.push(hertz);
+  const storage = memory();
+  createTone({ beep, canSound: () => true, storage }).setChimes(false);
+  const tone = createTone({ beep, canSound: () => true, storage });
+  tone.chime();
+  equal(heard.length, 0);
+  tone.sound(true);
+  tone.sound(false);
+  equal(heard.length, 2);
+});
+
+test("a browser that may not sound yet is told apart from one that did", () => {
+  const tone = createTone({ beep: () => {}, canSound: () => false, storage: memory() });
+  equal(tone.test(), false);
+});
+
+test("the screen stays on while somebody supervises, and not longer", async () => {
+  let released = 0;
+  const sentinel = {
+    released: false,
+    release: async () => {
+      released += 1;
+    },
+  };
+  const locker = { request: async () => sentinel };
+  const lock = createWakeLock({ locker, storage: memory() });
+  equal(lock.isHeld(), false);
+  await lock.supervise();
+  equal(lock.isHeld(), true);
+  await lock.setWanted(false);
+  equal([lock.isHeld(), released], [false, 1]);
+});
+
+test("a browser that refuses the lock is asked again, not complained of", async () => {
+  let asked = 0;
+  const locker = {
+    request: async () => {
+      asked += 1;
+      throw new DOMException("low battery", "NotAllowedError");
+    },
+  };
+  const lock = createWakeLock({ locker, storage: memory() });
+  await lock.supervise();
+  await lock.supervise();
+  equal([asked, lock.isHeld()], [2, false]);
+});
+
+test("notes and names in alarms are text, whatever they hold", () => {
+  const list = document.createElement("ul");
+  const draw = createAlertList(list, words).draw;
+  draw([alarm({ note: PROBE, acknowledged_by: PROBE, slots: { robot: PROBE } })]);
+  equal(list.querySelectorAll("img").length, 0);
+  equal(list.textContent?.includes(PROBE), true);
+});
+
+test("only who may acknowledge is asked to", () => {
+  const list = document.createElement("ul");
+  const { draw } = createAlertList(list, words);
+  document.body.dataset.role = "viewer";
+  draw([alarm()]);
+  equal(list.querySelector("form")?.hidden, true);
+  document.body.dataset.role = "operator";
+  draw([alarm()]);
+  equal(list.querySelector("form")?.hidden, false);
+});
+
+test("an acknowledgement that failed says so and can be tried again", async () => {
+  document.body.dataset.role = "operator";
+  const list = document.body.appendChild(document.createElement("ul"));
+  createAlertList(list, words, async () => 503).draw([alarm()]);
+  list.querySelector("form")?.requestSubmit();
+  // The list redraws a microtask or two after the answer.
+  for (let i = 0; i < 5; i += 1) await Promise.resolve();
+  equal(list.querySelector("p")?.textContent, "alert.failed 503");
+  equal(list.querySelector("form")?.hidden, false);
+  list.remove();
+});
+
+test("what is open and urgent stands first", () => {
+  document.body.dataset.role = "operator";
+  const list = document.createElement("ul");
+  createAlertList(list, words).draw([
+    alarm({ alert_id: "over", cleared_at: "2026-11-20T12:01:00Z" }),
+    alarm({ alert_id: "p2", priority: "P2" }),
+    alarm({ alert_id: "p1" }),
+  ]);
+  const shown = [...list.children].map((item) => item.getAttribute("data-priority"));
+  equal(shown, ["P1", "P2", "P1"]);
+});
