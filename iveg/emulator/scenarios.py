@@ -47,16 +47,16 @@ _HAUL = RobotScript(
     "hauling",
     stations=(Station(13.2, 15.0, dwell_s=1.0, period_s=80.0),),
 )
-_HAUL_ON = RobotScript(Pose2D(13.2, 15.2, _SOUTH), _HAUL_CORNERS, 2.3, "hauling")
+_HAUL_ON = RobotScript(Pose2D(13.2, 13.0, _SOUTH), _HAUL_CORNERS, 2.3, "hauling")
 _LAPS = RobotScript(
     Pose2D(8.9, 7.8, _NORTH),
     ((8.9, 6.0), (8.9, 14.0), (11.1, 14.0), (11.1, 6.0)),
     0.6,
     "scouting",
 )
-_THROUGH = RobotScript(Pose2D(10.0, 6.0, _NORTH), _SCOUT_CORNERS, 0.6, "scouting")
+_THROUGH = RobotScript(Pose2D(10.0, 7.0, _NORTH), _SCOUT_CORNERS, 0.6, "scouting")
 _PAST_THE_END = RobotScript(
-    Pose2D(10.4, 9.0, _NORTH),
+    Pose2D(10.4, 11.0, _NORTH),
     ((10.4, 2.2), (10.4, 17.8), (6.0, 17.8), (6.0, 2.2)),
     0.6,
     "scouting",
@@ -193,10 +193,10 @@ _SCENARIOS = (
     ),
     Scenario(
         "deaf",
-        "As demo, but AGII drives as it likes whatever iVeg says.",
+        "As nlos, but AGII drives as it likes whatever iVeg says.",
         "Two seconds after AGII met a person at full speed there is a P1 alert.",
-        {"AGI": _SCOUT, "AGII": _HAUL},
-        _FOUR_PEOPLE,
+        {"AGI": _WATCH, "AGII": _HAUL_ON},
+        (_PICKER_IN_3,),
         (Incident(1.0, FaultOrder(robot="AGII", deaf=True)),),
     ),
     Scenario(
@@ -210,13 +210,13 @@ _SCENARIOS = (
     ),
     Scenario(
         "link-loss",
-        "As demo; each minute nothing that AGII says arrives for six seconds.",
+        "As demo; each minute nothing that AGII says arrives for five seconds.",
         "AGII is late, then lost; meanwhile it slows and stands, and later drives on.",
         {"AGI": _SCOUT, "AGII": _HAUL},
         _FOUR_PEOPLE,
         (
             Incident(4.0, FaultOrder(robot="AGII", mute=True), every_s=60.0),
-            Incident(10.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
+            Incident(9.0, FaultOrder(robot="AGII", mute=False), every_s=60.0),
         ),
     ),
 )
