@@ -27,6 +27,7 @@ from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.roads import MqttRoad, OrionRoad
+from iveg.adapters.rules import FileRules
 from iveg.adapters.upkeep import Upkeep
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import HopError
@@ -44,6 +45,7 @@ from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.rules import Rules
 from iveg.settings import Settings
 from iveg.web import (
     alerts,
@@ -57,6 +59,7 @@ from iveg.web import (
     pages,
     problems,
     robots,
+    rule,
     security,
     stop_records,
 )
@@ -135,13 +138,18 @@ class Dss:
             settings.iota_url, settings.fiware_service, settings.fiware_servicepath
         )
         road = MqttRoad(self.link, settings.apikey)
-        self.assessor = Assessor(
-            world,
-            load_greenhouse(settings.greenhouse),
+        rule_store = FileRules(directory / "rules.jsonl")
+        versions = rule_store.load(
             Rule(
                 threshold=settings.confidence_threshold,
                 radius_m=settings.safety_radius_m,
             ),
+            start,
+        )
+        self.assessor = Assessor(
+            world,
+            load_greenhouse(settings.greenhouse),
+            versions[-1],
             road,
             self.minutes,
             self.hub,
@@ -149,6 +157,7 @@ class Dss:
             format_stamp,
             self._boot,
         )
+        self.rules = Rules(self.assessor, rule_store, self.minutes, versions)
         self.commander = Commander(
             settings.robots,
             road,
@@ -347,6 +356,7 @@ def create_app(dss: Dss) -> FastAPI:
     app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.assessor, clock.now))
+    app.include_router(rule.router(dss.rules, clock.now))
     app.include_router(
         history.router(
             dss.queries,

@@ -53,6 +53,8 @@ class Rule:
         threshold: Least confidence, inclusive; ``class_thresholds`` by canonical class.
         radius_m: Ring of a fresh sighting, inclusive (m).
         aliases: Class as a detector names it, in lower case → canonical class.
+        possible_people: Whether a faint person who is seen again and again counts.
+        author: Who made this version; ``since`` when (Unix s), None for the first.
     """
 
     id: str = "fleet-alert"
@@ -61,6 +63,15 @@ class Rule:
     class_thresholds: Mapping[Class, float] = field(default_factory=dict)
     radius_m: float = PAPER_RADIUS_M
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
+    possible_people: bool = False
+    author: str = "settings"
+    since: float | None = None
+
+    def threshold_of(self, class_: Class | None) -> float:
+        """Least confidence of a canonical class; None is any other."""
+        if class_ is None:
+            return self.threshold
+        return self.class_thresholds.get(class_, self.threshold)
 
     def canonical(self, class_id: str) -> Class | None:
         """The class that a detector's word stands for."""
@@ -69,10 +80,7 @@ class Rule:
     def judge(self, class_id: str, confidence: float) -> Verdict:
         """Judge one detection (Algorithm 2, lines 4-10)."""
         class_ = self.canonical(class_id)
-        threshold = self.threshold
-        if class_ is not None:
-            threshold = self.class_thresholds.get(class_, threshold)
-        if confidence < threshold:
+        if confidence < self.threshold_of(class_):
             return Verdict("faint", class_)
         return Verdict("other" if class_ is None else "alert", class_)
 

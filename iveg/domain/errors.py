@@ -6,6 +6,7 @@ IvegError
 ├── UnreadableError         bytes that the contract does not describe (HTTP 400)
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
+├── OutdatedError           a change of something that has changed since (HTTP 409)
 ├── NotAllowedError         somebody without the role (HTTP 403)
 └── HopError                a neighbour that cannot be reached or answered wrongly
 """
@@ -57,6 +58,14 @@ class CommandRefusedError(IvegError):
     def __init__(self, robot_id: str, asked: str, why: str) -> None:
         super().__init__(f"{asked} of {robot_id} refused: {why}.")
         self.why = why
+
+
+class OutdatedError(IvegError):
+    """Somebody changes what they saw, and it is no longer so."""
+
+    def __init__(self, what: str, seen: int, now: int) -> None:
+        super().__init__(f"{what} is at version {now}; you have seen version {seen}.")
+        self.now = now
 
 
 class NotAllowedError(IvegError):

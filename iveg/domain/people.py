@@ -15,8 +15,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from iveg.domain.alerts import Class, Rule
+from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.profiles import profile_of
+from iveg.domain.suspicions import POSSIBLE_FROM, Suspicions
 from iveg.domain.world import RobotState, World
 
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
@@ -25,6 +27,7 @@ SEEN_S, RING_S, LAST_SEEN_S = 1.0, 10.0, 600.0
 _GATE_M, _GATE_SPEED, _GATE_CAP_M = 1.0, 1.6, 2.0
 _PEER_GATE_M = 1.0
 _MAX_PEOPLE = 256
+_BEYOND_WALL_M = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,9 @@ class Sighting:
 
     Attributes:
         at: Source moment on our clocks.
+        possible: It was below the threshold, but seen again and again.
+        reach_m: Where the position is doubtful, x and y are the observer's own, and
+            this is how far its camera reaches (m); else 0.
     """
 
     observer: str
@@ -42,6 +48,8 @@ class Sighting:
     at: Instant
     class_id: str
     confidence: float
+    possible: bool = False
+    reach_m: float = 0.0
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the look."""
@@ -81,7 +89,7 @@ class Person:
         for sighting in self.sightings.values():
             age = sighting.age_s(now)
             if age <= RING_S:
-                yield sighting, rule.radius_at(age)
+                yield sighting, max(sighting.reach_m, rule.radius_at(age))
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,9 @@ class Placed:
         peer: The fleet member that it is a sighting of.
         peer_residual_m: How far from that member's own odometry (m).
         appeared: Whether it made a new person.
+        possible: Below the threshold, but seen again and again.
+        doubtful: Outside the greenhouse, so nobody knows where it is: where its
+            observer stood, and how far that one sees (m).
     """
 
     detection: Detection
@@ -103,12 +114,20 @@ class Placed:
     peer: str | None = None
     peer_residual_m: float | None = None
     appeared: bool = False
+    possible: bool = False
+    doubtful: tuple[Pose2D, float] | None = None
 
 
 class People:
-    """Everyone who is known, in the order of their appearance."""
+    """Everyone who is known, in the order of their appearance.
 
-    def __init__(self) -> None:
+    Args:
+        bounds: The outer wall; what is seen beyond it is of doubtful position.
+    """
+
+    def __init__(self, bounds: Rectangle | None = None) -> None:
+        self._bounds = bounds
+        self._suspicions = Suspicions()
         self.known: dict[str, Person] = {}
         self._count = 0
         self._faint: dict[str, list[Placed]] = {}
@@ -135,9 +154,37 @@ class People:
             for detection in frame.detections
             if (judged := _place(detection, frame, observer, rule)) is not None
         ]
+        if rule.possible_people:
+            placed = self._suspect(placed, frame.robot_id, at)
         placed = [_match_peer(one, observer, world, at) for one in placed]
+        placed = [self._doubt(one, frame, observer) for one in placed]
         self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
         return self._assign(placed, frame.robot_id, at, new_id)
+
+    def _suspect(
+        self, placed: Sequence[Placed], observer: str, at: Instant
+    ) -> list[Placed]:
+        """Raise faint people who are seen again and again to possible ones."""
+        spots = [one.position[:2] for one in placed if _is_suspect(one)]
+        again = set(self._suspicions.seen_again(spots, observer, at))
+        return [
+            replace(one, kind="alert", possible=True)
+            if one.kind == "faint" and _is_suspect(one) and one.position[:2] in again
+            else one
+            for one in placed
+        ]
+
+    def _doubt(
+        self, one: Placed, frame: DetectionFrame, observer: RobotState
+    ) -> Placed:
+        """Mark what cannot be where it was said to be (safety.md §3.4)."""
+        x, y, _ = one.position
+        if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
+            return one
+        pose = observer.pose_at_stamp(frame.origin.stamp_s)
+        if one.kind != "alert" or one.peer is not None or pose is None:
+            return one
+        return replace(one, doubtful=(pose, profile_of(observer.robot_id).camera_range))
 
     def _assign(
         self, placed: Sequence[Placed], observer: str, at: Instant, new_id: str
@@ -154,7 +201,7 @@ class People:
             for index in wanting
             for person_id, person in self.known.items()
             if person.class_ == out[index].class_
-            and (distance := _distance(person, out[index], at)) < math.inf
+            and (distance := _distance(person, out[index], observer, at)) < math.inf
         )
         taken: set[str] = set()
         for _, index, person_id in pairs:
@@ -257,22 +304,33 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
 
 def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
     x, y, z = one.position
-    detection = one.detection
-    return Sighting(observer, x, y, z, at, detection.class_id, detection.probability)
+    reach = 0.0
+    if one.doubtful is not None:
+        pose, reach = one.doubtful
+        x, y = pose.x, pose.y
+    said = one.detection
+    return Sighting(
+        observer, x, y, z, at, said.class_id, said.probability, one.possible, reach
+    )
 
 
-def _distance(person: Person, one: Placed, at: Instant) -> float:
+def _distance(person: Person, one: Placed, observer: str, at: Instant) -> float:
     """To the nearest look that the detection may continue (m); inf when to none.
 
     Beside the newest look every fresh one counts: where two robots see one person with
     noise, a detection that lies far from the one look seldom lies far from both.
+    A doubtful position continues only the same robot's doubtful one.
     """
+    if one.doubtful is not None:
+        same = person.newest.reach_m > 0.0 and person.newest.observer == observer
+        return 0.0 if same else math.inf
     x, y, _ = one.position
     return min(
         (
             distance
             for look in (person.newest, *person.sightings.values())
-            if (look is person.newest or look.age_s(at) <= SEEN_S)
+            if look.reach_m == 0.0
+            and (look is person.newest or look.age_s(at) <= SEEN_S)
             and (distance := math.hypot(look.x - x, look.y - y)) <= _gate(look, at)
         ),
         default=math.inf,
@@ -282,3 +340,7 @@ def _distance(person: Person, one: Placed, at: Instant) -> float:
 def _gate(look: Sighting, at: Instant) -> float:
     """How far one may have walked since a look (m, capped)."""
     return min(_GATE_CAP_M, _GATE_M + _GATE_SPEED * abs(at.mono - look.at.mono))
+
+
+def _is_suspect(one: Placed) -> bool:
+    return one.class_ == "person" and one.detection.probability >= POSSIBLE_FROM

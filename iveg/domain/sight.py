@@ -38,6 +38,8 @@ class AllClear:
             for sighting in list(person.sightings.values()):
                 if not SEEN_S < sighting.age_s(now) <= RING_S:
                     continue
+                if sighting.reach_m > 0.0:  # nobody knows where to look
+                    continue
                 lookers = [
                     robot.robot_id
                     for robot in world.live_robots()

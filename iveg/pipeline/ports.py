@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from typing import Literal, Protocol
 
+from iveg.domain.alerts import Rule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant
 
@@ -55,6 +56,13 @@ class Journal(Protocol):
         at: Instant,
     ) -> None:
         """Write down what is wanted of a robot; returns when it is on disk."""
+
+
+class RuleStore(Protocol):
+    """Every version of the rule that ever was in force."""
+
+    async def append(self, rule: Rule) -> None:
+        """Write a new version down; returns when it is on disk. Raises HopError."""
 
 
 class Ids(Protocol):

@@ -27,6 +27,7 @@ from iveg.domain.errors import (
     HopError,
     IvegError,
     NotAllowedError,
+    OutdatedError,
     UnknownRobotError,
     UnreadableError,
 )
@@ -147,6 +148,7 @@ def problem_of(error: Exception) -> Problem:
 _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (UnknownRobotError, 404, "unknown-robot"),
     (NotAllowedError, 403, "not-allowed"),
+    (OutdatedError, 409, "outdated"),
     (ForeignOriginError, 403, "foreign-origin"),
     (NotJsonError, 415, "not-json"),
 )

@@ -198,6 +198,8 @@ PersonJson = TypedDict(
         "last_seen": str,
         "age_s": float,
         "observers": list[str],
+        "possible": bool,
+        "doubtful": bool,
         "decision_id": str,
         "lane": str | None,
         "acting": list[ActingJson],
@@ -302,6 +304,21 @@ class ScanJson(TypedDict):
     stamp: str | None
     frame_id: str
     points: list[list[float]]
+
+
+class RuleJson(TypedDict):
+    """One version of the alert rule."""
+
+    id: str
+    version: int
+    confidence_threshold: float
+    class_thresholds: dict[str, float]
+    radius_m: float
+    factor: float
+    aliases: dict[str, str]
+    possible_people: bool
+    author: str
+    since: str | None
 
 
 class CostmapJson(TypedDict):

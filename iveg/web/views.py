@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.alarms import Alarm
-from iveg.domain.alerts import WALKING_SPEED
+from iveg.domain.alerts import WALKING_SPEED, Rule
+from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import UNCERTAINTY_M, Margin, least, margin_of
 from iveg.domain.observations import Instant, LaserScan
@@ -177,6 +178,8 @@ class Views:
                 for name, look in person.sightings.items()
                 if look.age_s(now) <= 1.0
             ],
+            "possible": newest.possible,
+            "doubtful": newest.reach_m > 0.0,
             "decision_id": person.decision_id,
             "lane": self.greenhouse.lane_at(newest.x, newest.y),
             "acting": [
@@ -316,16 +319,25 @@ class Views:
             ],
         }
 
-    def rule(self) -> dict[str, Any]:
+    def rule(self) -> schemas.RuleJson:
         """The version of the rule that is in force."""
-        rule = self._assessor.rule
-        return {
-            "id": rule.id,
-            "version": rule.version,
-            "confidence_threshold": rule.threshold,
-            "radius_m": rule.radius_m,
-            "factor": 0.5,
-        }
+        return rule_of(self._assessor.rule)
+
+
+def rule_of(rule: Rule) -> schemas.RuleJson:
+    """One version of the rule."""
+    return {
+        "id": rule.id,
+        "version": rule.version,
+        "confidence_threshold": rule.threshold,
+        "class_thresholds": {str(k): v for k, v in rule.class_thresholds.items()},
+        "radius_m": rule.radius_m,
+        "factor": HALF_SPEED,
+        "aliases": {name: str(class_) for name, class_ in rule.aliases.items()},
+        "possible_people": rule.possible_people,
+        "author": rule.author,
+        "since": iso(rule.since),
+    }
 
 
 def alert(alarm: Alarm) -> schemas.AlertJson:

@@ -43,7 +43,7 @@
  *   confidence: number, first_seen: string, last_seen: string, observers: string[],
  *   decision_id: string | null, lane: string | null,
  *   acting: {robot_id: string, distance_m: number, in_sight: boolean}[],
- *   margin?: Margin | null,
+ *   margin?: Margin | null, possible?: boolean, doubtful?: boolean,
  * }} Person
  *
  * @typedef {{

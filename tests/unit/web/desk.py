@@ -14,6 +14,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.rules import Rules
 from iveg.web import (
     alerts,
     commands,
@@ -23,10 +24,12 @@ from iveg.web import (
     notifications,
     problems,
     robots,
+    rule,
     security,
 )
 from iveg.web.auth import Door, NotifySecret, Principal, Role
 from iveg.web.views import Views
+from tests.fakes.rule_store import FakeRuleStore
 from tests.unit.pipeline.desk import Desk
 
 HOST = "iveg.test"
@@ -47,6 +50,8 @@ class WebDesk(Desk):
             now=lambda: self.clock().mono,
         )
         self.mapper = Mapper(self.world, self.assessor.greenhouse.bounds)
+        self.rule_store = FakeRuleStore()
+        self.rules = Rules(self.assessor, self.rule_store, self.minutes, [])
         self.views = Views(self.assessor, self.commander)
         self.encoder = live.Encoder(self.views, self.hub, self.clock, self.health)
         self.app = FastAPI()
@@ -71,6 +76,7 @@ class WebDesk(Desk):
             costmap.router(self.mapper, self.assessor, self.clock),
             commands.router(self.commander, self.clock),
             alerts.router(self.assessor, self.clock),
+            rule.router(self.rules, self.clock),
             health.router(self.clock, self.health),
         ]
 

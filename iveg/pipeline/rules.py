@@ -1,0 +1,85 @@
+"""Changing the rule: a new version, on disk first, in force at once, and in the log."""
+
+import asyncio
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Protocol
+
+from iveg.domain.alerts import Rule
+from iveg.domain.errors import OutdatedError
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.observations import Instant
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.ports import RuleStore
+
+
+class Judge(Protocol):
+    """Who applies the rule: the assessor."""
+
+    rule: Rule
+
+
+class Rules:
+    """The versions of the rule; the newest is the one in force.
+
+    Attributes:
+        versions: All of them, oldest first.
+    """
+
+    def __init__(
+        self, judge: Judge, store: RuleStore, minutes: Minutes, past: Iterable[Rule]
+    ) -> None:
+        self._judge = judge
+        self._store = store
+        self._minutes = minutes
+        self._one_by_one = asyncio.Lock()
+        self.versions = [*past] or [judge.rule]
+
+    @property
+    def current(self) -> Rule:
+        """The version in force."""
+        return self._judge.rule
+
+    async def change(
+        self, wanted: Rule, by: str, at: Instant, seen: int | None = None
+    ) -> Rule:
+        """Put new parameters in force under the next version.
+
+        Args:
+            wanted: The parameters; its version, author and time are not looked at.
+            by: Who wants it.
+            at: When.
+            seen: The version that they have changed; None does not ask.
+
+        Raises:
+            OutdatedError: somebody else was faster.
+            HopError: it could not be written down; the old version stays in force.
+        """
+        async with self._one_by_one:
+            before = self.current
+            if seen is not None and seen != before.version:
+                raise OutdatedError("The rule", seen, before.version)
+            rule = replace(
+                wanted,
+                id=before.id,
+                version=before.version + 1,
+                author=by,
+                since=at.wall,
+            )
+            await self._store.append(rule)
+            self._judge.rule = rule
+            self.versions.append(rule)
+        self._minutes.log(_line(before, rule), at)
+        return rule
+
+
+def _line(before: Rule, rule: Rule) -> LogEvent:
+    slots: dict[str, Slot] = {
+        "by": rule.author,
+        "version": rule.version,
+        "threshold": rule.threshold,
+        "radius": rule.radius_m,
+        "threshold_before": before.threshold,
+        "radius_before": before.radius_m,
+    }
+    return LogEvent("system", "log.rule_changed", slots)

@@ -1,0 +1,108 @@
+"""The alert rule over HTTP: the version in force, every earlier one, and a new one."""
+
+from collections.abc import Callable
+from typing import Annotated, Literal, TypeVar
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from iveg.domain.alerts import Class, Rule
+from iveg.domain.observations import Instant
+from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.rules import Rules
+from iveg.web import schemas
+from iveg.web.auth import Principal, require
+from iveg.web.robots import Json
+from iveg.web.views import rule_of
+
+T = TypeVar("T")
+_Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+_MOST_ALIASES = 200
+
+
+class RuleChange(BaseModel):
+    """What is to be different; what is not named stays as it is.
+
+    A class that a detector may name must stand for `person` or `robot`; both names
+    always stand for themselves.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    version: int | None = None
+    """The version that the person saw; 409 when it is no longer in force."""
+    confidence_threshold: _Share | None = None
+    class_thresholds: dict[Literal["person", "robot"], _Share] | None = None
+    radius_m: Annotated[float, Field(ge=0.5, le=6.0, allow_inf_nan=False)] | None = None
+    aliases: (
+        Annotated[
+            dict[str, Literal["person", "robot"]], Field(max_length=_MOST_ALIASES)
+        ]
+        | None
+    ) = None
+    possible_people: bool | None = None
+
+    @field_validator("aliases")
+    @classmethod
+    def _readable(cls, aliases: dict[str, Class] | None) -> dict[str, Class] | None:
+        if aliases is None:
+            return None
+        cleaned = {clean_text(name).strip().lower(): aliases[name] for name in aliases}
+        own: dict[str, Class] = {"person": "person", "robot": "robot"}
+        if "" in cleaned or any(cleaned.get(n, c) != c for n, c in own.items()):
+            raise ValueError("names must not be empty; person and robot are themselves")
+        return {**cleaned, **own}
+
+    def applied_to(self, rule: Rule) -> Rule:
+        """The rule with these parameters."""
+        return Rule(
+            rule.id,
+            rule.version,
+            _new(self.confidence_threshold, rule.threshold),
+            _new(self.class_thresholds, dict(rule.class_thresholds)),
+            _new(self.radius_m, rule.radius_m),
+            _new(self.aliases, dict(rule.aliases)),
+            _new(self.possible_people, rule.possible_people),
+        )
+
+
+def _new(wanted: T | None, old: T) -> T:
+    return old if wanted is None else wanted
+
+
+class RuleList(TypedDict):
+    """Every version, newest first."""
+
+    items: list[schemas.RuleJson]
+    next: str | None
+
+
+def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
+    """Read by all, changed by operators; every version keeps its author and time."""
+    routes = APIRouter(prefix="/api/v1", tags=["rule"])
+    reader = [Depends(require("read"))]
+
+    @routes.get("/rule", response_model=schemas.RuleJson, dependencies=reader)
+    async def rule() -> Response:
+        """The version in force."""
+        return Json(rule_of(rules.current))
+
+    @routes.get("/rule/versions", response_model=RuleList, dependencies=reader)
+    async def versions() -> Response:
+        """Every version with its author and time, newest first."""
+        items = [rule_of(one) for one in reversed(rules.versions)]
+        return Json({"items": items, "next": None})
+
+    @routes.put("/rule", response_model=schemas.RuleJson)
+    async def change(
+        body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
+    ) -> Response:
+        """Put a new version in force at once; what is not named stays as it is."""
+        wanted = body.applied_to(rules.current)
+        return Json(
+            rule_of(await rules.change(wanted, who.name, clock(), body.version))
+        )
+
+    return routes

@@ -1,0 +1,17 @@
+"""A store of rule versions in memory, whose disk may be full."""
+
+from iveg.domain.alerts import Rule
+from iveg.domain.errors import HopError
+
+
+class FakeRuleStore:
+    """Keeps what is written; ``full`` refuses."""
+
+    def __init__(self) -> None:
+        self.written: list[Rule] = []
+        self.full = False
+
+    async def append(self, rule: Rule) -> None:
+        if self.full:
+            raise HopError("disk", "no space left")
+        self.written.append(rule)

@@ -1,0 +1,96 @@
+"""The file of rule versions over restarts, changed settings and broken lines."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.rules import FileRules
+from iveg.domain.alerts import Rule
+from iveg.domain.errors import DataFileError, HopError
+from tests.builders import START
+
+FIRST = Rule()
+CHANGED = Rule(
+    version=2,
+    threshold=0.7,
+    class_thresholds={"robot": 0.9},
+    radius_m=3.0,
+    aliases={"person": "person", "robot": "robot", "abuela": "person"},
+    possible_people=True,
+    author="ana",
+    since=START.wall,
+)
+
+
+def test_without_a_file_the_settings_are_the_first_version(tmp_path: Path) -> None:
+    rules = FileRules(tmp_path / "rules.jsonl")
+
+    assert list(rules.load(FIRST, START)) == [FIRST]
+
+
+async def test_a_changed_rule_outlives_a_restart(tmp_path: Path) -> None:
+    rules = FileRules(tmp_path / "rules.jsonl")
+    rules.load(FIRST, START)
+    await rules.append(CHANGED)
+
+    again = FileRules(tmp_path / "rules.jsonl").load(FIRST, START)
+
+    assert list(again) == [FIRST, CHANGED]
+
+
+async def test_changed_settings_are_a_newer_version(tmp_path: Path) -> None:
+    rules = FileRules(tmp_path / "rules.jsonl")
+    rules.load(FIRST, START)
+    await rules.append(CHANGED)
+    strict = replace(FIRST, threshold=0.6)
+
+    again = FileRules(tmp_path / "rules.jsonl").load(strict, START)
+
+    newest = again[-1]
+    assert (newest.version, newest.author) == (3, "settings")
+    assert (newest.threshold, newest.radius_m) == (0.6, 2.0)
+    assert newest.aliases == CHANGED.aliases
+    assert newest.possible_people
+
+
+async def test_the_same_settings_twice_are_no_new_version(tmp_path: Path) -> None:
+    rules = FileRules(tmp_path / "rules.jsonl")
+    rules.load(FIRST, START)
+    await rules.append(CHANGED)
+    strict = replace(FIRST, threshold=0.6)
+    first = FileRules(tmp_path / "rules.jsonl").load(strict, START)
+
+    again = FileRules(tmp_path / "rules.jsonl").load(strict, START)
+
+    assert list(again) == list(first)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["nonsense", "[1]", '{"unheard": 1}', '{"threshold": "x"}', '{"threshold": 2}'],
+)
+def test_a_line_that_is_no_rule_is_named_with_its_file(
+    tmp_path: Path, line: str
+) -> None:
+    path = tmp_path / "rules.jsonl"
+    path.write_text(line + "\n")
+
+    with pytest.raises(DataFileError, match=r"rules\.jsonl, line 1"):
+        FileRules(path).load(FIRST, START)
+
+
+async def test_a_disk_that_fails_is_told_and_keeps_the_old_versions(
+    tmp_path: Path,
+) -> None:
+    directory = tmp_path / "gone"
+    rules = FileRules(directory / "rules.jsonl")
+    rules.load(FIRST, START)
+
+    with pytest.raises(HopError):
+        await rules.append(CHANGED)
+    directory.mkdir()
+    await rules.append(replace(CHANGED, threshold=0.75))
+
+    again = FileRules(directory / "rules.jsonl").load(FIRST, START)
+    assert [rule.threshold for rule in again] == [0.8, 0.75]
