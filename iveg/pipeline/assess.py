@@ -63,7 +63,7 @@ class Assessor:
         self.world = world
         self.greenhouse = greenhouse
         self.rule = rule
-        self.people = People()
+        self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
         self.alarms = AlarmBook()
         self.mandates: dict[str, Mandate] = dict.fromkeys(world.robots, CLEAR)

@@ -118,4 +118,9 @@ def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
         "y": round(y, 2),
         "person": subject,
     }
-    return LogEvent("detection", _KEYS[one.kind], slots, robot_id, one.class_)
+    key = _KEYS[one.kind]
+    if one.doubtful is not None:
+        key = "log.detection_doubtful"
+    elif one.possible:
+        key = "log.detection_possible"
+    return LogEvent("detection", key, slots, robot_id, one.class_)

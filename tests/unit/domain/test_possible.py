@@ -1,0 +1,163 @@
+"""Faint people who are seen again and again, and people beyond the walls."""
+
+from dataclasses import dataclass
+
+import pytest
+
+from iveg.domain.alerts import Rule
+from iveg.domain.geometry import Rectangle
+from iveg.domain.observations import Instant
+from iveg.domain.people import People
+from tests.builders import detection
+from tests.unit.domain.scene import Scene, person
+
+ON = Rule(possible_people=True)
+
+
+def looked(scene: Scene, *chances: float, every_s: float = 0.1, x: float = 5.0) -> None:
+    """AGI looks at somebody, each time this sure."""
+    for chance in chances:
+        scene.now += every_s
+        scene.drive("AGI", 0.0)
+        scene.look("AGI", person(x, probability=chance))
+
+
+def test_the_possible_person_is_off_by_default() -> None:
+    scene = Scene()
+    looked(scene, 0.7, 0.7, 0.7, 0.7)
+
+    assert scene.everyone == []
+
+
+def test_three_faint_looks_of_five_make_a_possible_person() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.7, 0.3, 0.7)
+    assert scene.everyone == []
+
+    looked(scene, 0.5)
+
+    (somebody,) = scene.everyone
+    assert somebody.newest.possible
+    assert somebody.newest.confidence == 0.5
+
+
+@pytest.mark.parametrize(
+    ("chances", "every_s"),
+    [
+        ((0.49, 0.7, 0.7), 0.1),
+        ((0.7, 0.3, 0.3, 0.3, 0.7, 0.7), 0.1),
+        ((0.7, 0.7, 0.7), 0.6),
+    ],
+    ids=["too faint", "three of six", "too slow"],
+)
+def test_less_is_nobody(chances: tuple[float, ...], every_s: float) -> None:
+    scene = Scene(rule=ON)
+    looked(scene, *chances, every_s=every_s)
+
+    assert scene.everyone == []
+
+
+def test_faint_looks_at_different_places_are_nobody() -> None:
+    scene = Scene(rule=ON)
+    for x in (5.0, 6.5, 8.0):
+        looked(scene, 0.7, x=x)
+
+    assert scene.everyone == []
+
+
+def test_only_people_are_possible() -> None:
+    scene = Scene(rule=ON)
+    for _ in range(4):
+        scene.look("AGI", detection("husky", 5.0, probability=0.7))
+
+    assert scene.everyone == []
+
+
+def test_a_sure_look_is_possible_no_more() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.7, 0.7, 0.7, 0.9)
+
+    (somebody,) = scene.everyone
+    assert not somebody.newest.possible
+
+
+def test_a_possible_person_slows_like_any_other() -> None:
+    scene = Scene(rule=ON)
+    looked(scene, 0.7, 0.7, 0.7, x=1.5)
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+# --- beyond the walls -------------------------------------------------------------
+
+
+@dataclass
+class Walled(Scene):
+    """A house of 20 × 20 m."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.people = People(Rectangle(0, 0, 20, 20))
+        self.drive("AGI", 10.0, 10.0)
+        self.drive("AGII", 17.0, 10.0)
+
+
+@pytest.mark.parametrize(("x", "is_doubtful"), [(-2.0, False), (-2.1, True)])
+def test_two_metres_beyond_the_wall_a_position_is_doubtful(
+    x: float, is_doubtful: bool
+) -> None:
+    scene = Walled()
+    scene.look("AGI", person(x, 10.0))
+
+    (somebody,) = scene.everyone
+    assert (somebody.newest.reach_m > 0.0) is is_doubtful
+
+
+def test_the_zone_of_a_doubtful_person_lies_round_who_saw_them() -> None:
+    scene = Walled()
+    scene.look("AGI", person(40.0, 10.0))
+
+    mandates = scene.judge()
+
+    assert mandates["AGI"].reason == "person"
+    assert mandates["AGII"].reason == "person"
+    ((look, radius),) = scene.everyone[0].rings(scene.rule, look_now(scene))
+    assert (look.x, look.y, radius) == (10.0, 10.0, 8.0)
+
+
+def test_who_is_out_of_the_camera_s_reach_is_not_slowed_by_it() -> None:
+    scene = Walled()
+    scene.drive("AGII", 19.0, 10.0)
+    scene.look("AGI", person(40.0, 10.0))
+
+    assert scene.judge()["AGII"].reason != "person"
+
+
+def test_a_doubtful_look_again_is_the_same_doubtful_person() -> None:
+    scene = Walled()
+    scene.look("AGI", person(40.0, 10.0))
+    scene.look("AGI", person(70.0, 30.0))
+
+    assert len(scene.everyone) == 1
+
+
+def test_a_doubtful_person_takes_nobody_s_place() -> None:
+    scene = Walled()
+    scene.look("AGI", person(10.5, 10.0))
+    scene.look("AGI", person(40.0, 10.0))
+    scene.now = 0.1
+    scene.look("AGI", person(10.6, 10.0))
+
+    places = sorted((one.newest.reach_m > 0.0, one.newest.x) for one in scene.everyone)
+    assert places == [(False, 10.6), (True, 10.0)]
+
+
+def test_a_faint_look_beyond_the_wall_is_faint() -> None:
+    scene = Walled()
+    scene.look("AGI", person(40.0, 10.0, probability=0.5))
+
+    assert scene.everyone == []
+
+
+def look_now(scene: Scene) -> Instant:
+    return scene.everyone[0].newest.at
