@@ -1,6 +1,6 @@
 import itertools
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -35,8 +35,9 @@ def looks(
     scenery: Scenery = OPEN,
     pose: Pose2D = HERE,
     every_s: float = EVERY_S,
+    seed: int = 1,
 ) -> list[tuple[Detection, ...]]:
-    detector = Detector(AGI, model, np.random.default_rng(1))
+    detector = Detector(AGI, model, np.random.default_rng(seed))
     return [detector.look(n * every_s, pose, [target], scenery) for n in range(count)]
 
 
@@ -94,21 +95,81 @@ def test_a_robot_is_named_as_the_papers_detector_names_it() -> None:
     assert found.box.ymax - found.box.ymin == pytest.approx(1.4)
 
 
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What one encounter after the other came to."""
+
+    encounters: int
+    true_positives: int
+    false_positives: int
+
+
+def tally(class_id: str, encounters: int) -> Tally:
+    """Let a detector of the field meet a target of a class, again and again."""
+    target = replace(person(4.0, 0.0), class_id=class_id)
+    frames = looks(target, encounters, model=DETECTORS["field"])
+    boxes = [box for frame in frames for box in frame]
+    true = sum(math.dist(box.box.centre[:2], (4.0, 0.0)) < 0.4 for box in boxes)
+    assert {box.class_id for box in boxes} == {class_id}
+    return Tally(encounters, true, len(boxes) - true)
+
+
+def interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
+    """Wilson's score interval of a binomial share (95 % for ``z`` = 1.96)."""
+    share, weight = successes / trials, z * z / trials
+    middle = share + weight / 2
+    half = z * math.sqrt(share * (1 - share) / trials + weight / trials / 4)
+    return (middle - half) / (1 + weight), (middle + half) / (1 + weight)
+
+
+@pytest.mark.parametrize(
+    ("class_id", "true_positives", "false_positives", "false_negatives"),
+    [("farmer", 36, 6, 3), ("AGI", 34, 8, 5), ("AGII", 28, 12, 8)],
+)
+def test_rates_lie_within_the_binomial_interval_of_the_papers_field_counts(
+    class_id: str, true_positives: int, false_positives: int, false_negatives: int
+) -> None:
+    told = true_positives + false_negatives
+    found = tally(class_id, 4_000)
+
+    recall = found.true_positives / found.encounters
+    ghosts = found.false_positives / found.encounters
+    precision = found.true_positives / (found.true_positives + found.false_positives)
+
+    low, high = interval(true_positives, told)
+    assert low < recall < high
+    low, high = interval(false_positives, told)
+    assert low < ghosts < high
+    low, high = interval(true_positives, true_positives + false_positives)
+    assert low < precision < high
+
+
 @pytest.mark.parametrize("class_id", ["farmer", "AGI", "AGII"])
-def test_misses_and_false_boxes_come_as_often_as_the_paper_counted(
+def test_the_papers_counts_lie_within_the_binomial_interval_of_a_long_run(
     class_id: str,
 ) -> None:
-    target = replace(person(4.0, 0.0), class_id=class_id)
-    counts, count = FIELD_COUNTS[class_id], 4_000
+    """The stricter way round: four thousand encounters leave little room."""
+    counts, found = FIELD_COUNTS[class_id], tally(class_id, 4_000)
 
-    frames = looks(target, count, model=DETECTORS["field"])
-    boxes = [box for frame in frames for box in frame]
-    near = [b for b in boxes if math.dist(b.box.centre[:2], (4.0, 0.0)) < 0.4]
+    low, high = interval(found.true_positives, found.encounters, z=3.29)
+    assert low < counts.true_positives / counts.encounters < high
+    low, high = interval(found.false_positives, found.encounters, z=3.29)
+    assert low < counts.false_positives / counts.encounters < high
 
-    recall = counts.true_positives / counts.encounters
-    false_share = counts.false_positives / counts.encounters
-    assert len(near) / count == pytest.approx(recall, abs=0.03)
-    assert (len(boxes) - len(near)) / count == pytest.approx(false_share, abs=0.03)
+
+def test_a_run_of_paper_length_misses_and_invents_no_fixed_number() -> None:
+    """Chance is per encounter: runs of 39 differ as binomial draws do."""
+    target = person(4.0, 0.0)
+    missed = [
+        sum(
+            not any(math.dist(b.box.centre[:2], (4.0, 0.0)) < 0.4 for b in frame)
+            for frame in looks(target, 39, model=DETECTORS["field"], seed=seed)
+        )
+        for seed in range(200)
+    ]
+
+    assert np.mean(missed) == pytest.approx(3.0, abs=0.5)
+    assert np.var(missed) == pytest.approx(39 * (3 / 39) * (36 / 39), rel=0.4)
 
 
 @pytest.mark.parametrize(("profile", "mean"), [("field", 0.72), ("simulation", 0.85)])
