@@ -361,7 +361,8 @@ def create_app(dss: Dss) -> FastAPI:
         history.router(
             dss.queries,
             reader=require("read"),
-            threshold=dss.assessor.rule.threshold,
+            threshold=lambda: dss.assessor.rule.threshold,
+            present=lambda name: dss.assessor.decision_record(name, clock.now()),
         )
     )
     app.include_router(health.router(clock.now, dss.health))

@@ -25,8 +25,10 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.people import People, Placed
+from iveg.domain.records import DecisionRecord
 from iveg.domain.world import World
 from iveg.pipeline.ageing import Ageing
+from iveg.pipeline.evidence import record_of
 from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
@@ -88,6 +90,11 @@ class Assessor:
     def placed(self) -> Mapping[str, list[Placed]]:
         """What each robot's newest look found, faint ones included."""
         return self.looks.placed
+
+    def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
+        """A decision that is still in memory, with the verdicts of now."""
+        decision = self.decisions.get(decision_id)
+        return None if decision is None else record_of(decision, now)
 
     # --- one observation ----------------------------------------------------------
 

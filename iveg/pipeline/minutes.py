@@ -17,13 +17,13 @@ from iveg.domain.records import (
     AlertRecord,
     CommandEventRecord,
     CommandRecord,
-    DecisionRecord,
     DetectionRecord,
     LogRecord,
     OdometryRecord,
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
+from iveg.pipeline.evidence import record_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 
@@ -64,53 +64,7 @@ class Minutes:
 
     def decision(self, decision: Decision, now: Instant) -> None:
         """A decision is new or has grown a link."""
-        crossing, rule = decision.crossing, decision.rule
-        hazard, sighting = crossing.hazard, crossing.hazard.sighting
-        parameters = {
-            "threshold": rule.threshold,
-            "radius_m": rule.radius_m,
-            "ring_m": round(hazard.radius_m, 3),
-        }
-        self._sink.offer(
-            DecisionRecord(
-                decision_id=decision.decision_id,
-                kind="mandate",
-                robot_id=crossing.robot_id,
-                started_at=crossing.entered.wall,
-                person_id=hazard.cause,
-                observer=hazard.observer,
-                class_=hazard.reason,
-                class_id=None if sighting is None else sighting.class_id,
-                confidence=None if sighting is None else sighting.confidence,
-                x=hazard.x,
-                y=hazard.y,
-                z=None if sighting is None else sighting.z,
-                distance_m=crossing.entered_m,
-                speed_factor=0.5,
-                reason=hazard.reason,
-                rule_id=rule.id,
-                rule_version=str(rule.version),
-                rule_parameters=json.dumps(parameters),
-                in_sight=crossing.in_sight,
-                feedback_at=_wall(decision.feedback),
-                applied_at=_wall(decision.applied),
-                observed_at=_wall(decision.observed),
-                ended_at=_wall(decision.ended),
-                speed_before=crossing.speed_before,
-                speed_after=decision.speed_after,
-                links=json.dumps(
-                    [
-                        {
-                            "link": link.name,
-                            "at": link.at,
-                            "value": link.value,
-                            "verdict": link.verdict,
-                        }
-                        for link in decision.links(now)
-                    ]
-                ),
-            )
-        )
+        self._sink.offer(record_of(decision, now))
 
     def detection(
         self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: Road

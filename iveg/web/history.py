@@ -17,7 +17,7 @@ from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
 from iveg.domain.observations import Instant
-from iveg.domain.records import Record
+from iveg.domain.records import DecisionRecord, Record
 from iveg.web import charts, exports
 from iveg.web.exports import MEDIA_TYPES, Form
 from iveg.web.history_filters import Filters, Range, filter_of, range_of
@@ -59,7 +59,8 @@ def router(
     queries: Queries,
     *,
     reader: Callable[..., Any],
-    threshold: float | None = None,
+    threshold: Callable[[], float | None] = lambda: None,
+    present: Callable[[str], DecisionRecord | None] = lambda _: None,
     read_clock: Callable[[], Instant] = clock.now,
 ) -> APIRouter:
     """The routes of the history.
@@ -67,7 +68,8 @@ def router(
     Args:
         queries: Where the past is asked for.
         reader: Dependency that refuses whoever may not read.
-        threshold: Least confidence of the rule, marked in the chart.
+        threshold: Least confidence of the rule in force, marked in the chart.
+        present: A decision that is still in memory; its links are those of now.
         read_clock: What "the last 15 minutes" end at.
     """
     routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
@@ -78,7 +80,7 @@ def router(
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
     ) -> DecisionView:
-        found = await queries.decision(decision_id)
+        found = present(decision_id) or await queries.decision(decision_id)
         if found is None:
             raise HTTPException(404, "There is no such decision.")
         return view_decision(found)
@@ -93,7 +95,7 @@ def router(
     )
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
-        return await _charts(queries, since, until, asked.robot, threshold)
+        return await _charts(queries, since, until, asked.robot, threshold())
 
     @routes.get("/vendor/{name}", include_in_schema=False)
     async def vendor(name: str) -> Response:

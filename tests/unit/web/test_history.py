@@ -13,7 +13,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import NotAllowedError
 from iveg.domain.observations import Instant
-from iveg.domain.records import Record
+from iveg.domain.records import DecisionRecord, Record
 from iveg.pipeline.record import Waiting
 from iveg.web import problems
 from iveg.web.history import router
@@ -38,12 +38,14 @@ class Past:
         self._store = Store(url)
         self._queries = Queries(url)
         self._open = open_
+        self.present: dict[str, DecisionRecord] = {}
         self.app = FastAPI()
         self.app.include_router(
             router(
                 self._queries,
                 reader=self._reader,
-                threshold=0.8,
+                threshold=lambda: 0.8,
+                present=self.present.get,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
             )
         )
@@ -220,6 +222,17 @@ async def test_a_decision_whose_texts_were_spoilt_is_still_shown(
     assert decision["links"] == []
     assert decision["rule"]["parameters"] is None
     assert decision["position"] is None
+
+
+async def test_a_decision_in_memory_is_told_as_it_stands_now(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(decision_record(decision_id="D1", feedback_at=None))
+    past.present["D1"] = decision_record(decision_id="D1", feedback_at=NOON)
+
+    decision = (await client.get("/api/v1/decisions/D1")).json()
+
+    assert decision["feedback_at"] is not None
 
 
 async def test_a_decision_that_never_was_is_not_found(

@@ -1,0 +1,67 @@
+"""A decision as it is written down and read: each link with time, value and verdict."""
+
+import json
+
+from iveg.domain.alerts import Rule
+from iveg.domain.decisions import Decision, Link
+from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.mandates import Hazard
+from iveg.domain.observations import Instant
+from iveg.domain.records import DecisionRecord
+
+
+def record_of(decision: Decision, now: Instant) -> DecisionRecord:
+    """The whole chain as it stands at ``now``; open links may yet come."""
+    crossing = decision.crossing
+    hazard, sighting = crossing.hazard, crossing.hazard.sighting
+    return DecisionRecord(
+        decision_id=decision.decision_id,
+        kind="mandate",
+        robot_id=crossing.robot_id,
+        started_at=crossing.entered.wall,
+        person_id=hazard.cause,
+        observer=hazard.observer,
+        class_=hazard.reason,
+        class_id=None if sighting is None else sighting.class_id,
+        confidence=None if sighting is None else sighting.confidence,
+        x=hazard.x,
+        y=hazard.y,
+        z=None if sighting is None else sighting.z,
+        distance_m=crossing.entered_m,
+        speed_factor=HALF_SPEED,
+        reason=hazard.reason,
+        rule_id=decision.rule.id,
+        rule_version=str(decision.rule.version),
+        rule_parameters=json.dumps(_parameters(decision.rule, hazard)),
+        in_sight=crossing.in_sight,
+        feedback_at=_wall(decision.feedback),
+        applied_at=_wall(decision.applied),
+        observed_at=_wall(decision.observed),
+        ended_at=_wall(decision.ended),
+        speed_before=crossing.speed_before,
+        speed_after=decision.speed_after,
+        links=json.dumps([_link(link) for link in decision.links(now)]),
+    )
+
+
+def _parameters(rule: Rule, hazard: Hazard) -> dict[str, object]:
+    return {
+        "threshold": rule.threshold_of(hazard.reason),
+        "radius_m": rule.radius_m,
+        "ring_m": round(hazard.radius_m, 3),
+        "author": rule.author,
+        "possible": hazard.sighting is not None and hazard.sighting.possible,
+    }
+
+
+def _link(link: Link) -> dict[str, object]:
+    return {
+        "link": link.name,
+        "at": link.at,
+        "value": link.value,
+        "verdict": link.verdict,
+    }
+
+
+def _wall(at: Instant | None) -> float | None:
+    return None if at is None else at.wall
