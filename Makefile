@@ -6,7 +6,7 @@ RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 export PYTHONPATH := $(CURDIR)
 
-.PHONY: demo test setup format check bench soak migration lock clean
+.PHONY: demo test setup format check bench deep chaos soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 test: $(DEV) ; $(BIN)/python -m pytest
@@ -14,6 +14,8 @@ setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
 bench: $(DEV) ; $(BIN)/python -m benchmarks
+deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
+chaos: $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) $(BIN)/python -m pytest tests/chaos/test_kills.py
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
 lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock

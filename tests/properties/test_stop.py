@@ -6,11 +6,13 @@ names of safety.md §2.6.
 """
 
 import itertools
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from random import Random
 from typing import Literal
 
+import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -418,5 +420,12 @@ def _rests(report: SafetyReport) -> bool:
     return max(abs(report.linear), abs(report.angular)) < 0.02
 
 
-StopOverBadRoads.TestCase.settings = settings(max_examples=40, stateful_step_count=40)
+EXAMPLES = int(os.environ.get("IVEG_STOP_EXAMPLES", "200"))
+"""More by ``make deep``."""
+# A busy machine may be slow without being wrong; a deep search takes hours.
+pytestmark = pytest.mark.timeout(600 if EXAMPLES <= 200 else 100_000)
+
+StopOverBadRoads.TestCase.settings = settings(
+    max_examples=EXAMPLES, stateful_step_count=25
+)
 TestStopOverBadRoads = StopOverBadRoads.TestCase

@@ -40,6 +40,9 @@ UNCONFIRMED_S = 1.0
 STALE_S = 1.5
 FRESH_S = 1.0
 RELEASE_S = 2.0
+UNSEEN_S = 2.0
+"""A release is confirmed by holding a control this long; a STOP that joined in that
+time was not seen by whoever releases."""
 ASSUMED_BRAKING = 0.5
 """Least braking that may be counted on (m/s²)."""
 BRAKING_EXTRA_S, BRAKING_CAP_S = 1.5, 5.0
@@ -62,6 +65,7 @@ class StopMachine:
         self._sends = Sends(direct=direct)
         self._standstill = Standstill()
         self._deadline = 0.0
+        self._joined_at = float("-inf")
         self._answers: deque[tuple[str, int]] = deque(maxlen=_ANSWERS_REMEMBERED)
         self._speed = 0.0
 
@@ -105,6 +109,7 @@ class StopMachine:
     ) -> list[Effect]:
         """STOP: always accepted; a press during an episode joins it."""
         if self.wants_stop and self.state != "RELEASING" and self.stop is not None:
+            self._joined_at = at.mono
             effects = [] if self.state == "STANDING" else self._send_now(at)
             return [*effects, *self._join(self.stop, by)]
         return self._begin(by, at, new_id, key, press)
@@ -171,8 +176,12 @@ class StopMachine:
         """Lift exactly the holds that a person saw.
 
         Raises:
-            CommandRefusedError: not standing, no fresh report, or the set has changed.
+            CommandRefusedError: not standing, no fresh report, the set has changed, or
+                somebody has just joined the STOP.
         """
+        if at.mono - self._joined_at < UNSEEN_S:
+            why = "somebody has pressed STOP just now"
+            raise CommandRefusedError(self.robot_id, "Release", why)
         report = self._may_release("release", at, allowed=("STANDING", "RUNNING"))
         remote = [hold.id for hold in report.holds if hold.ack == "remote"]
         asked = set(seen)

@@ -420,3 +420,17 @@ def test_a_stop_that_others_join_is_not_closed() -> None:
     bench = IN_STATE["REQUESTED"]()
 
     assert closed(bench.press("ben")) == {}
+
+
+def test_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> None:
+    bench = IN_STATE["REQUESTED"]().stand()
+    bench.press("ben")
+
+    with pytest.raises(CommandRefusedError, match="just now"):
+        bench.release(bench.ours.id)
+
+    for _ in range(20):
+        bench.report(bench.ours)
+        bench.wait(0.1)
+    bench.release(bench.ours.id)
+    assert bench.state == "RELEASING"

@@ -1,0 +1,98 @@
+"""A field broker that is a real Mosquitto, bridged to the embedded FIWARE behind it.
+
+Robots and iVeg meet on Mosquitto; measures and answers go through the bridge to the
+embedded agent, its commands come back.  Each direction has its own topics, so nothing
+goes round in circles.
+"""
+
+import shutil
+import signal
+import socket
+import subprocess
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from tests.processes import Program, Site, free_ports, until
+
+MOSQUITTO = shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin")
+_CONF = """listener {port} 127.0.0.1
+allow_anonymous true
+set_tcp_nodelay true
+log_type none
+connection fiware
+address 127.0.0.1:{south}
+bridge_protocol_version mqttv311
+try_private false
+notifications false
+bridge_attempt_unsubscribe false
+cleansession true
+restart_timeout 1
+topic +/+/attrs out 0 / /
+topic +/+/cmdexe out 1 / /
+topic +/+/cmd in 1 / /
+"""
+
+
+class Field:
+    """Every part a process of its own: broker, FIWARE, iVeg and robots."""
+
+    def __init__(self, place: Site) -> None:
+        self.place = place
+        (self._south,) = free_ports(1)
+        self.port = int(urlsplit(place.settings["IVEG_MQTT_URL"]).port or 0)
+        self._broker: subprocess.Popen[bytes] | None = None
+        self._running: dict[str, Program] = {}
+
+    def start_all(self) -> None:
+        for part in ("broker", "fiware", "serve", "emulator"):
+            self.start(part)
+        self.place.wait_until_live(deadline_s=60.0)
+
+    def start(self, part: str) -> None:
+        """Start one part; it may take its time."""
+        if part == "broker":
+            self._start_broker()
+        elif part == "fiware":
+            field = self.place.settings["IVEG_MQTT_URL"]
+            # FIWARE has a broker of its own, behind the bridge.
+            self.place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{self._south}"
+            self._running[part] = self.place.start(part)
+            self.place.settings["IVEG_MQTT_URL"] = field
+        else:
+            held = ("--held",) if part == "emulator" else ()
+            self._running[part] = self.place.start(part, *held)
+
+    def kill(self, part: str) -> None:
+        """What a power cut does."""
+        if part == "broker":
+            assert self._broker is not None
+            self._broker.kill()
+            self._broker.wait(10)
+        else:
+            self._running[part].kill()
+
+    def freeze(self, part: str) -> None:
+        self._running[part].process.send_signal(signal.SIGSTOP)
+
+    def thaw(self, part: str) -> None:
+        self._running[part].process.send_signal(signal.SIGCONT)
+
+    def close(self) -> None:
+        """End the broker; the programs are ended by their place."""
+        if self._broker is not None:
+            self._broker.kill()
+            self._broker.wait(10)
+
+    def _start_broker(self) -> None:
+        assert MOSQUITTO is not None
+        conf = Path(self.place.directory) / "field.conf"
+        conf.write_text(_CONF.format(port=self.port, south=self._south))
+        self._broker = subprocess.Popen([MOSQUITTO, "-c", str(conf)])
+        until(self._listens, 10.0, "mosquitto listens")
+
+    def _listens(self) -> bool:
+        try:
+            socket.create_connection(("127.0.0.1", self.port), 1.0).close()
+        except OSError:
+            return False
+        return True

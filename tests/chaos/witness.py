@@ -1,0 +1,95 @@
+"""A witness on the field broker: what robots do, beside what people allowed them."""
+
+import asyncio
+import threading
+from dataclasses import dataclass, field
+
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.observations import Odometry, SafetyReport
+from iveg.domain.world import STANDING_SPEED
+from iveg.ngsi import codec
+
+
+@dataclass
+class Seen:
+    """One robot, as the witness knows it.
+
+    Attributes:
+        allowed: Whether a person has resumed it since it last reported a hold.
+        starts: Times it began to move; ``unlicensed`` those that nobody allowed.
+    """
+
+    speed: float = 0.0
+    held: bool = False
+    allowed: bool = False
+    starts: int = 0
+    unlicensed: int = 0
+    factor: float = 0.0
+    words: int = 0
+
+
+@dataclass
+class Witness:
+    """Listens in a thread of its own, so that no test's pause is its own."""
+
+    port: int
+    robots: dict[str, Seen] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        topics = {"/iveg/+/attrs": 0}
+        address = BrokerAddress("127.0.0.1", self.port)
+        self._link = MqttLink(address, "witness", topics, self._take)
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._run, name="witness")
+
+    def __enter__(self) -> "Witness":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._task.cancel)
+        self._thread.join(10)
+        self._loop.close()
+
+    def of(self, robot_id: str) -> Seen:
+        return self.robots.setdefault(robot_id, Seen())
+
+    def allow(self, robot_id: str) -> None:
+        """A person is about to resume this robot."""
+        self.of(robot_id).allowed = True
+
+    @property
+    def unlicensed(self) -> int:
+        """Motions that nobody allowed."""
+        return sum(one.unlicensed for one in self.robots.values())
+
+    @property
+    def starts(self) -> int:
+        return sum(one.starts for one in self.robots.values())
+
+    def _run(self) -> None:
+        self._task = self._loop.create_task(self._link.run())
+        with_end = asyncio.gather(self._task, return_exceptions=True)
+        self._loop.run_until_complete(with_end)
+
+    def _take(self, topic: str, payload: bytes) -> None:
+        device = topic.split("/")[2]
+        if not device.endswith(("_odom", "_safety")):
+            return
+        for word in codec.read_measure(device, payload).observations:
+            if isinstance(word, Odometry):
+                self._moves(self.of(word.robot_id), abs(word.twist.linear_x))
+            elif isinstance(word, SafetyReport):
+                seen = self.of(word.robot_id)
+                seen.words += 1
+                seen.factor = word.speed_factor
+                seen.held = any(hold.ack != "auto" for hold in word.holds)
+                # Only a robot at rest: one that brakes has not been stopped yet.
+                if seen.held and seen.speed < STANDING_SPEED:
+                    seen.allowed = False
+
+    def _moves(self, seen: Seen, speed: float) -> None:
+        begins = seen.speed < STANDING_SPEED <= speed
+        seen.starts += begins
+        seen.unlicensed += begins and not seen.allowed
+        seen.speed = speed
