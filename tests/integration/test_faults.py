@@ -1,0 +1,405 @@
+"""FIWARE breaks, part by part, and iVeg says which part, stops robots, and mends.
+
+Everything runs for real: Mosquitto in front, ``iveg fiware`` bridged behind it (its
+agent is a call away from its own broker), the dashboard and two robots.  Gates
+before Orion, the agent and the dashboard break what cannot be broken alone.  One stack
+serves all tests, so each leaves it whole; the numbers are those of safety.md §4.4.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.subscriptions import WANTED
+from tests.integration.gate import Gate, Mood, bridge, gate
+from tests.processes import Program, Site, free_ports, site, until
+
+_MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(_MOSQUITTO is None, reason="Mosquitto is not installed"),
+]
+_CONF = """listener {port} 127.0.0.1
+allow_anonymous true
+set_tcp_nodelay true
+log_type none
+"""
+SAID_WITHIN_S, WHOLE_WITHIN_S = 6.0, 10.0
+TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
+Json = dict[str, Any]
+
+
+@dataclass
+class Stack:
+    """The whole of it, and how to break its parts."""
+
+    place: Site
+    orion: Gate
+    agent: Gate
+    page: Gate
+    behind: dict[str, str]
+    conf: Path
+    api: httpx.Client = field(init=False)
+    fiware: Program = field(init=False)
+    dashboard: Program = field(init=False)
+    broker: "subprocess.Popen[bytes]" = field(init=False)
+
+    # --- parts ----------------------------------------------------------------------
+
+    def start_broker(self) -> None:
+        command = [str(_MOSQUITTO), "-c", str(self.conf)]
+        self.broker = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+
+    def start_fiware(self) -> None:
+        front = dict(self.place.settings)
+        self.place.settings.update(self.behind)
+        self.fiware = self.place.start("fiware")
+        self.place.settings.update(front)
+        self.fiware.wait_until_ready()
+
+    def start_dashboard(self) -> None:
+        self.dashboard = self.place.start("serve")
+        self.place.wait_until_served()
+
+    def tell_agent(self, **faults: object) -> None:
+        url = f"{self.behind['IVEG_IOTA_URL']}/test/faults"
+        httpx.post(url, json=faults, trust_env=False).raise_for_status()
+
+    def ask_orion(self, method: str, path: str, **more: Any) -> httpx.Response:
+        url = self.behind["IVEG_ORION_URL"] + path
+        answer = httpx.request(method, url, headers=TENANT, trust_env=False, **more)
+        return answer.raise_for_status()
+
+    # --- what iVeg says ---------------------------------------------------------------
+
+    def hops(self) -> dict[str, Json]:
+        told = self.api.get("health").raise_for_status().json()
+        return {hop["hop"]: hop for hop in told["hops"]}
+
+    def blames(self, hop: str, state: str = "down") -> Json:
+        """The hop, as soon as iVeg says that of it; the page is served all the time."""
+
+        def found() -> Json | None:
+            told = self.hops()[hop]
+            return told if told["state"] == state else None
+
+        return until(found, SAID_WITHIN_S, f"{hop} is {state}")
+
+    def wait_whole(self, within_s: float = WHOLE_WITHIN_S) -> None:
+        def is_whole() -> bool:
+            return all(hop["state"] == "ok" for hop in self.hops().values())
+
+        try:
+            until(is_whole, within_s, "every hop is well")
+        except AssertionError as error:
+            raise AssertionError(f"{error}: {self.hops()}") from None
+
+    def said(self, words: str, since: int) -> int:
+        """How often the dashboard has logged a warning with these words."""
+        lines = self.dashboard.text()[since:].splitlines()
+        return sum("WARNING" in line and words in line for line in lines)
+
+    # --- robots -----------------------------------------------------------------------
+
+    def robot(self, robot_id: str) -> Json:
+        return dict(self.api.get(f"robots/{robot_id}").raise_for_status().json())
+
+    def stop_latches_directly(self, robot_id: str) -> Json:
+        """STOP; the robot's answer to what came straight over MQTT."""
+        pressed = self.api.post(f"robots/{robot_id}/stop").raise_for_status().json()
+
+        def answered() -> Json | None:
+            url = f"commands/{pressed['command_id']}"
+            command = self.api.get(url).raise_for_status().json()
+            return command if command["times"]["answer_direct"] else None
+
+        command = until(answered, 3.0, "the robot answered the direct STOP")
+        until(lambda: self.robot(robot_id)["holds"] != [], 2.0, "it is held")
+        return dict(command)
+
+    def drives_again(self, robot_id: str) -> None:
+        """Released and resumed by a person, which goes through FIWARE alone."""
+        with operator(self.place) as person:
+            until(lambda: self._released(person, robot_id), 15.0, "release is taken")
+            until(lambda: self.robot(robot_id)["holds"] == [], 5.0, "it is released")
+            until(
+                lambda: person.post(f"robots/{robot_id}/resume").is_success,
+                5.0,
+                "resume is taken",
+            )
+        until(lambda: self.robot(robot_id)["mode"] != "STOPPED", 8.0, "it drives")
+
+    def _released(self, person: httpx.Client, robot_id: str) -> bool:
+        holds = [hold["id"] for hold in self.robot(robot_id)["holds"]]
+        answer = person.post(f"robots/{robot_id}/release", json={"holds": holds})
+        return answer.is_success
+
+
+@contextmanager
+def operator(place: Site) -> Iterator[httpx.Client]:
+    """Somebody who came by the sign-in link."""
+    with httpx.Client(
+        base_url=f"{place.url}/api/v1/", timeout=5.0, trust_env=False
+    ) as person:
+        person.get(place.sign_in_link, follow_redirects=True).raise_for_status()
+        person.headers["Origin"] = place.url
+        person.headers["X-IVEG"] = "1"
+        person.headers["Content-Type"] = "application/json"
+        yield person
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+    with ExitStack() as stack:
+        place = stack.enter_context(site(tmp_path_factory.mktemp("faults")))
+        made = _wire(stack, place)
+        made.start_broker()
+        stack.callback(lambda: end(made.broker))
+        made.start_fiware()
+        made.start_dashboard()
+        made.api = stack.enter_context(place.api())
+        place.start("emulator")
+        place.wait_until_live()
+        yield made
+        assert "Traceback" not in made.dashboard.text()
+
+
+def _wire(stack: ExitStack, place: Site) -> Stack:
+    front, behind = free_ports(2)
+    ports = {
+        name: int(place.settings[name].rpartition(":")[2])
+        for name in ("IVEG_ORION_URL", "IVEG_IOTA_URL")
+    }
+    orion, agent, page = (
+        stack.enter_context(gate(port))
+        for port in (*ports.values(), int(place.settings["IVEG_PORT"]))
+    )
+    own = {name: place.settings[name] for name in ports}
+    own["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{behind}"
+    place.settings |= {
+        "IVEG_MQTT_URL": f"mqtt://127.0.0.1:{front}",
+        "IVEG_ORION_URL": f"http://127.0.0.1:{orion.port}",
+        "IVEG_IOTA_URL": f"http://127.0.0.1:{agent.port}",
+        "IVEG_NOTIFY_URL": f"http://127.0.0.1:{page.port}/ngsi/notifications",
+    }
+    conf = place.directory / "mosquitto.conf"
+    root = "user root\n" if os.geteuid() == 0 else ""
+    conf.write_text(_CONF.format(port=front) + root)
+    here, there = BrokerAddress("127.0.0.1", front), BrokerAddress("127.0.0.1", behind)
+    stack.enter_context(bridge(here, there))
+    return Stack(place, orion, agent, page, own, conf)
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    process.send_signal(signal.SIGCONT)
+    process.kill()
+    process.wait(10.0)
+
+
+@pytest.fixture
+def stack(running: Stack) -> Iterator[Stack]:
+    """Whole at the start; what a test has broken is mended whatever became of it."""
+    running.wait_whole(20.0)
+    yield running
+    for door in (running.orion, running.agent, running.page):
+        door.be("open")
+    running.tell_agent(deaf=False, slow_s=0.0, stuck=False)
+
+
+# --- one part is broken, the rest goes on -------------------------------------------
+
+
+@pytest.mark.parametrize("mood", ["shut", "hanging", "angry", "mad", "odd"])
+def test_f6_an_orion_that_fails_in_any_way_is_named_once_and_forgiven(
+    stack: Stack, mood: Mood
+) -> None:
+    since = len(stack.dashboard.text())
+    stack.orion.be(mood)
+
+    told = stack.blames("orion")
+    assert told["detail"]
+    stack.orion.be("open")
+    stack.wait_whole()
+    assert stack.said("orion: not as it should be", since) == 1
+
+
+@pytest.mark.parametrize("mood", ["shut", "angry", "odd"])
+def test_f3_an_agent_that_fails_in_any_way_is_named_once_and_forgiven(
+    stack: Stack, mood: Mood
+) -> None:
+    since = len(stack.dashboard.text())
+    stack.agent.be(mood)
+
+    told = stack.blames("iot_agent")
+    assert told["detail"]
+    assert stack.hops()["orion"]["state"] == "ok"
+    stack.agent.be("open")
+    stack.wait_whole()
+    assert stack.said("iot_agent: not as it should be", since) == 1
+
+
+def test_f7_a_slow_orion_is_called_slow_and_delays_no_stop(stack: Stack) -> None:
+    stack.orion.be("slow")
+
+    told = stack.blames("orion", "late")
+    assert told["detail"].startswith("answers take 2")
+    pressed = time.monotonic()
+    stack.stop_latches_directly("AGII")
+    assert time.monotonic() - pressed < 2.0
+    stack.orion.be("open")
+    stack.wait_whole()
+    stack.drives_again("AGII")
+
+
+def test_f4_a_deaf_agent_is_found_by_the_canary_and_a_stop_passes_it_by(
+    stack: Stack,
+) -> None:
+    stack.tell_agent(deaf=True)
+
+    told = stack.blames("iot_agent")
+    assert told["detail"] == "measures do not reach Orion"
+    stack.blames("notifications", "unknown")
+    assert stack.hops()["orion"]["state"] == "ok"
+    command = stack.stop_latches_directly("AGI")
+    assert command["times"]["answer_fiware"] is None
+    stack.tell_agent(deaf=False)
+    stack.wait_whole()
+    stack.drives_again("AGI")
+
+
+def test_an_agent_that_falls_behind_is_called_late(stack: Stack) -> None:
+    stack.tell_agent(slow_s=2.0)
+
+    stack.blames("iot_agent", "late")
+    until(
+        lambda: stack.hops()["iot_agent"]["detail"].startswith("a measure takes 2"),
+        SAID_WITHIN_S,
+        "iVeg says how late",
+    )
+    stack.tell_agent(slow_s=0.0)
+    stack.wait_whole()
+
+
+def test_f9_a_dashboard_that_orion_cannot_reach_blames_the_notifications(
+    stack: Stack,
+) -> None:
+    stack.page.be("shut")
+
+    told = stack.blames("notifications")
+    assert "Couldn't connect to server" in told["detail"]
+    assert stack.hops()["iot_agent"]["state"] == "ok"
+    stack.page.be("open")
+    stack.wait_whole()
+
+
+# --- subscriptions -------------------------------------------------------------------
+
+
+def ours(stack: Stack) -> list[Json]:
+    found = stack.ask_orion("GET", "/v2/subscriptions", params={"limit": 100}).json()
+    return [one for one in found if one["description"].startswith("iVeg: ")]
+
+
+def _delete(stack: Stack, path: str) -> None:
+    stack.ask_orion("DELETE", path)
+
+
+def _deactivate(stack: Stack, path: str) -> None:
+    stack.ask_orion("PATCH", path, json={"status": "inactive"})
+
+
+def _expire(stack: Stack, path: str) -> None:
+    stack.ask_orion("PATCH", path, json={"expires": "2020-01-01T00:00:00.000Z"})
+
+
+@pytest.mark.parametrize("spoil", [_delete, _deactivate, _expire])
+def test_f8_a_spoilt_subscription_is_told_and_mended(
+    stack: Stack, spoil: Callable[[Stack, str], None]
+) -> None:
+    odometry = next(o for o in ours(stack) if o["description"] == "iVeg: odometry")
+    spoil(stack, f"/v2/subscriptions/{odometry['id']}")
+
+    told = stack.blames("notifications")
+    assert "odometry" in told["detail"]
+    stack.wait_whole()
+    assert [one["status"] for one in ours(stack)] == ["active"] * len(WANTED)
+
+
+# --- whole processes ------------------------------------------------------------------
+
+
+def test_f2_a_broker_that_is_paused_is_named_and_comes_back(stack: Stack) -> None:
+    stack.broker.send_signal(signal.SIGSTOP)
+
+    told = stack.blames("mqtt")
+    assert told["detail"]
+    stack.broker.send_signal(signal.SIGCONT)
+    stack.wait_whole()
+
+
+def test_f1_a_broker_that_is_killed_is_named_and_comes_back(stack: Stack) -> None:
+    since = len(stack.dashboard.text())
+    end(stack.broker)
+
+    stack.blames("mqtt")
+    stack.start_broker()
+    stack.wait_whole()
+    assert stack.said("broker lost", since) == 1
+
+
+def test_f6_fiware_that_is_killed_forgets_all_and_is_made_whole(stack: Stack) -> None:
+    stack.fiware.kill()
+
+    stack.blames("orion")
+    stack.blames("iot_agent")
+    stack.stop_latches_directly("AGII")
+    stack.start_fiware()
+    stack.wait_whole()
+    assert len(ours(stack)) == len(WANTED)
+    stack.drives_again("AGII")
+
+
+def test_f13_a_dashboard_that_is_killed_finds_its_subscriptions_again(
+    stack: Stack,
+) -> None:
+    before = {one["id"] for one in ours(stack)}
+    stack.dashboard.kill()
+    stack.start_dashboard()
+
+    stack.wait_whole()
+    assert {one["id"] for one in ours(stack)} == before
+
+
+@pytest.mark.parametrize(
+    "order",
+    [("fiware", "dashboard", "broker"), ("dashboard", "broker", "fiware")],
+    ids="-".join,
+)
+def test_all_may_go_at_once_and_come_back_in_any_order(
+    stack: Stack, order: tuple[str, ...]
+) -> None:
+    end(stack.broker)
+    stack.fiware.kill()
+    stack.dashboard.kill()
+    start = {
+        "broker": stack.start_broker,
+        "fiware": stack.start_fiware,
+        "dashboard": stack.start_dashboard,
+    }
+    for part in order:
+        start[part]()
+
+    stack.wait_whole(WHOLE_WITHIN_S)
+    stack.place.wait_until_live()
+    assert len(ours(stack)) == len(WANTED)
