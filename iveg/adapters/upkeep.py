@@ -193,11 +193,15 @@ class Upkeep:
 
         Orion sends nothing when a subscription is made, so the read comes last.
         """
-        whole = not devices or await self._check_agent()
+        if self._chain.orion_error:
+            return False
+        whole = True
+        if devices and not self._chain.agent_error:
+            whole = await self._check_devices()
         whole = await self._check_subscriptions() and whole
-        return await self._reconcile() and whole
+        return await self._reconcile() and whole and not self._chain.agent_error
 
-    async def _check_agent(self) -> bool:
+    async def _check_devices(self) -> bool:
         work = provision(
             self._agent,
             self._orion,
@@ -208,7 +212,8 @@ class Upkeep:
         try:
             done: Provisioned = await _made_sense("iot_agent", work)
         except HopError as error:
-            return self._tell("devices", error)
+            self._chain.agent_warning = error.detail
+            return await self._blame("devices", error)
         self._explain(done.mended)
         self._warn(done.problems)
         return self._tell("devices", None)
@@ -218,7 +223,8 @@ class Upkeep:
         try:
             done: Ensured = await _made_sense("orion", work)
         except HopError as error:
-            return self._tell("subscriptions", error)
+            self._chain.notify_error = error.detail
+            return await self._blame("subscriptions", error)
         first = not self.subscription_ids
         self.subscription_ids = done.ids
         self._explain(done.mended)
@@ -234,8 +240,13 @@ class Upkeep:
         try:
             await _made_sense("orion", self._read_robots())
         except HopError as error:
-            return self._tell("reading", error)
+            return await self._blame("reading", error)
         return self._tell("reading", None)
+
+    async def _blame(self, what: str, error: HopError) -> bool:
+        """A neighbour that is down has been told of already; anything else is news."""
+        ask = self._ask_agent if error.hop == "iot_agent" else self._ask_orion
+        return await ask() and self._tell(what, error)
 
     async def _read_robots(self) -> None:
         entities = await self._orion.read_robots()
