@@ -12,7 +12,6 @@ from typing import Literal
 
 from iveg.domain.alerts import Rule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
-from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.people import RING_S, People, Sighting
@@ -20,6 +19,8 @@ from iveg.domain.world import RobotState, World
 
 RELEASE_M, RELEASE_S = 0.3, 1.0
 SILENCE_S = 1.0
+_NOT_FAR_M = 0.01
+"""So far outside a ring nobody can be inside, whatever rounding does."""
 OBSERVER_FORGOTTEN_S = 600.0
 """A robot that has not looked for ten minutes is no longer one of the fleet's eyes."""
 
@@ -112,53 +113,56 @@ class Mandates:
     def _cross(
         self, robot: RobotState, hazards: list[Hazard], now: Instant, new_id: str
     ) -> Iterator[Change]:
-        odometry = robot.odometry
-        nearest: dict[str, tuple[float, float, Hazard]] = {}
-        for hazard in hazards if odometry is not None else ():
-            if hazard.cause == robot.robot_id:
-                continue
-            if hazard.recorded and not robot.is_replay:
-                continue
-            assert odometry is not None  # noqa: S101 - hazards are empty without it
-            distance = odometry.pose.distance_to(hazard.x, hazard.y)
-            depth = distance - hazard.radius_m
-            if hazard.cause not in nearest or depth < nearest[hazard.cause][0]:
-                nearest[hazard.cause] = (depth, distance, hazard)
+        nearest = self._nearest(robot, hazards)
         for number, (cause, (depth, distance, hazard)) in enumerate(nearest.items()):
             key = robot.robot_id, cause
             crossing = self._open.get(key)
-            if crossing is None:
-                if depth <= 0.0 and odometry is not None:
-                    crossing = self._enter(
-                        robot,
-                        odometry.pose,
-                        hazard,
-                        distance,
-                        now,
-                        f"{new_id}-{number}",
-                    )
-                    self._open[key] = crossing
-                    yield Change(crossing, began=True)
-                continue
-            outside = depth > RELEASE_M
-            since = crossing.outside_since or now.mono
-            self._open[key] = replace(
-                crossing,
-                distance_m=distance,
-                outside_since=since if outside else None,
-            )
+            if crossing is not None:
+                self._open[key] = _still(crossing, depth, distance, now)
+            elif depth <= 0.0:
+                name = f"{new_id}-{number}"
+                crossing = self._enter(robot, hazard, distance, now, name)
+                self._open[key] = crossing
+                yield Change(crossing, began=True)
         yield from self._leave(robot.robot_id, nearest, now)
+
+    def _nearest(
+        self, robot: RobotState, hazards: Iterable[Hazard]
+    ) -> dict[str, tuple[float, float, Hazard]]:
+        """Of each cause the deepest circle: how far outside (m), distance (m), it.
+
+        Causes that the robot is far from and was not near to are left out: with a
+        fleet of ten they are nearly all, and this runs at every odometry.
+        """
+        nearest: dict[str, tuple[float, float, Hazard]] = {}
+        if robot.odometry is None:
+            return nearest
+        pose, robot_id = robot.odometry.pose, robot.robot_id
+        for hazard in hazards:
+            cause, reach = hazard.cause, hazard.radius_m + _NOT_FAR_M
+            dx, dy = hazard.x - pose.x, hazard.y - pose.y
+            is_far = dx * dx + dy * dy > reach * reach
+            if is_far and (robot_id, cause) not in self._open:
+                continue
+            if cause == robot_id or (hazard.recorded and not robot.is_replay):
+                continue
+            distance = pose.distance_to(hazard.x, hazard.y)
+            depth = distance - hazard.radius_m
+            if cause not in nearest or depth < nearest[cause][0]:
+                nearest[cause] = depth, distance, hazard
+        return nearest
 
     def _enter(
         self,
         robot: RobotState,
-        pose: Pose2D,
         hazard: Hazard,
         distance: float,
         now: Instant,
         decision_id: str,
     ) -> Crossing:
-        speed = 0.0 if robot.odometry is None else abs(robot.odometry.twist.linear_x)
+        odometry = robot.odometry
+        assert odometry is not None  # noqa: S101 - nothing is near without it
+        pose, speed = odometry.pose, abs(odometry.twist.linear_x)
         return Crossing(
             decision_id,
             robot.robot_id,
@@ -209,6 +213,16 @@ class Mandates:
         if silent is not None and not robot.is_replay:
             return Mandate(HALF_SPEED, "stale", silent or None)
         return CLEAR
+
+
+def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
+    """A crossing that goes on, or whose robot is outside since now."""
+    since = None
+    if depth > RELEASE_M:
+        since = crossing.outside_since or now.mono
+    if distance == crossing.distance_m and since == crossing.outside_since:
+        return crossing
+    return replace(crossing, distance_m=distance, outside_since=since)
 
 
 def hazards_of(
