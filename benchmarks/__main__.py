@@ -5,7 +5,7 @@
 
 import runpy
 
-BENCHMARKS = ("lidar_cost", "fiware_road", "paint")
+BENCHMARKS = ("decision_cost", "lidar_cost", "fiware_road", "paint")
 
 
 def main() -> None:

@@ -1,0 +1,270 @@
+"""What a decision costs, and how late feedback is.
+
+Run ``python -m benchmarks.decision_cost``; ``--robots``, ``--seconds`` and ``--fleets``
+choose what is measured.
+
+*Cost*: notifications of Orion as they arrive in a greenhouse with people (odometry,
+720-beam scans, looks of a fleet that drives), recorded once as bytes, then read and
+judged one after the other on one core: bytes → codec → world → rule → feedback.
+
+*Latency*: the same fleet at its rates on the wall clock; from the arrival of a
+notification to the moment the feedback that answers it is handed to MQTT.  The knee is
+the largest fleet whose P95 stays below 5 ms.
+"""
+
+import argparse
+import asyncio
+import itertools
+import math
+import random
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import orjson
+
+from iveg.adapters import clock
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.alerts import Rule
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Instant, Received
+from iveg.domain.records import Record
+from iveg.domain.world import World
+from iveg.ngsi import codec
+from iveg.pipeline.assess import Assessor
+from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.publish import Hub
+
+BEAMS = 720
+ODOMETRY_HZ, SCAN_HZ, LOOK_HZ, SAFETY_HZ = 20, 10, 10, 2
+TICK_S = 0.05
+GOAL_MS, LATENCY_GOAL_MS = 0.3, 5.0
+WALL = 1_800_000_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """One notification: when it comes (s from the start), of what, and its bytes."""
+
+    at: float
+    kind: str
+    body: bytes
+
+
+class Sink:
+    """Takes records and keeps none."""
+
+    def offer(self, record: Record) -> None:
+        """Take one."""
+        self.last = record
+
+
+class Telling:
+    """Stands where MQTT stands: writes the feedback and keeps when it left."""
+
+    def __init__(self) -> None:
+        self.left: float | None = None
+
+    def tell(self, feedback: Feedback) -> None:
+        """Write one feedback."""
+        codec.write_feedback(feedback)
+        self.left = time.perf_counter()
+
+    async def stop(self, *_: object) -> None:
+        """Nobody is stopped here."""
+
+    async def set_level(self, *_: object) -> None:
+        """Nor held."""
+
+
+def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Assessor:
+    """The rule with everything round it but the network and the disk."""
+    hub, numbers = Hub(), itertools.count()
+    start = Instant(0.0, WALL)
+    return Assessor(
+        World(robots),
+        load_greenhouse("agroconnect"),
+        Rule(),
+        fleet,
+        Minutes(hub, Sink(), start),
+        hub,
+        lambda: f"{next(numbers):026d}",
+        codec.format_stamp,
+        "bench",
+    )
+
+
+def record(robots: tuple[str, ...], seconds: float) -> list[Recorded]:
+    """What Orion sends while the robots drive up and down and people cross."""
+    draw = random.Random(7)  # noqa: S311 - the same fleet each time
+    seqs: itertools.count[int] = itertools.count(1)
+    found = [
+        Recorded(number / hz + draw.uniform(0, 1 / hz), kind, b"")
+        for robot in range(len(robots))
+        for kind, hz in (
+            (f"odometry {robot}", ODOMETRY_HZ),
+            (f"scan {robot}", SCAN_HZ),
+            (f"look {robot}", LOOK_HZ),
+            (f"safety {robot}", SAFETY_HZ),
+        )
+        for number in range(int(seconds * hz))
+    ]
+    found.sort(key=lambda one: one.at)
+    return [
+        Recorded(one.at, kind, _body(robots[int(robot)], int(robot), kind, one.at, seq))
+        for one, seq in zip(found, seqs, strict=False)
+        for kind, robot in [one.kind.split()]
+    ]
+
+
+def _body(robot_id: str, number: int, kind: str, at: float, seq: int) -> bytes:
+    stamp = codec.format_stamp(WALL + at)
+    origin = {"boot": "b", "seq": seq, "stamp": stamp}
+    x, y = _place(number, at)
+    if kind == "odometry":
+        pose = {"x": x, "y": y, "yaw": 0.0, "angular_velocity": 0.0}
+        value: dict[str, object] = {
+            "base_pose_ground_truth": {**pose, "linear_velocity": 0.8, **origin}
+        }
+    elif kind == "scan":
+        angles = np.linspace(0, 40, BEAMS) + at
+        header = {"angle_min": -math.pi, "angle_increment": math.tau / BEAMS}
+        reach = {"range_min": 0.1, "range_max": 12.0, "x": 0.0, "y": 0.0, "yaw": 0.0}
+        value = {
+            "lidar_points": np.round(4 + 3 * np.sin(angles), 3).tolist(),
+            "lidar_header": {**header, **reach, **origin},
+        }
+    elif kind == "look":
+        value = {"bounding_boxes": _boxes(x, y, at), "detection_header": origin}
+    else:
+        said = {"speed_factor": 1.0, "reason": "clear", "holds": [], "ch": "c"}
+        value = {"safety_state": {**said, "v": 0.8, "w": 0.0, **origin}}
+    entity: dict[str, object] = {"id": robot_id, "type": "Robot"}
+    for name, content in value.items():
+        entity[name] = {"type": "object", "value": content, "metadata": {}}
+    return orjson.dumps({"subscriptionId": "s", "data": [entity]})
+
+
+def _place(number: int, at: float) -> tuple[float, float]:
+    """Robots go up and down lanes that are 4 m apart (m)."""
+    return 4.0 + 4.0 * number, 15.0 + 10.0 * math.sin(at * 0.08 + number)
+
+
+def _boxes(x: float, y: float, at: float) -> list[dict[str, object]]:
+    """A person who comes and goes across the ring, and a faint one."""
+    away = 2.0 + 1.9 * math.sin(2.0 * at)
+    return [
+        {
+            "class_id": "farmer",
+            "probability": sure,
+            "frame_id": "map",
+            "position": {
+                "xmin": x - 0.25,
+                "xmax": x + 0.25,
+                "ymin": y + distance - 0.25,
+                "ymax": y + distance + 0.25,
+                "zmin": 0.0,
+                "zmax": 1.8,
+            },
+        }
+        for distance, sure in ((away, 0.94), (5.0, 0.6))
+    ]
+
+
+def read(body: bytes, at: Instant) -> Iterator[Received]:
+    """One notification as observations."""
+    _, reading = codec.read_notification(body)
+    for observation in reading.observations:
+        yield Received(observation, at)
+
+
+def cost(robots: int, seconds: float) -> dict[str, list[float]]:
+    """How long each notification took, by kind (ms of CPU), one after the other."""
+    names = tuple(f"R{number}" for number in range(robots))
+    assessor = assessor_of(names, Telling())
+    took: dict[str, list[float]] = {}
+    ticked = 0.0
+    for one in record(names, seconds):
+        now = Instant(one.at, WALL + one.at)
+        begin = time.thread_time()
+        for received in read(one.body, now):
+            assessor.take(received)
+        took.setdefault(one.kind, []).append((time.thread_time() - begin) * 1e3)
+        if one.at - ticked >= TICK_S:
+            ticked = one.at
+            begin = time.thread_time()
+            assessor.tick(now)
+            took.setdefault("(tick)", []).append((time.thread_time() - begin) * 1e3)
+    return took
+
+
+async def latency(robots: int, seconds: float) -> list[float]:
+    """From a notification that changed a mandate to the feedback of it (ms).
+
+    On the wall clock, with the heartbeat and the costmap beside it as in iVeg.
+    """
+    names = tuple(f"R{number}" for number in range(robots))
+    fleet = Telling()
+    assessor = assessor_of(names, fleet)
+    mapper = Mapper(assessor.world, assessor.greenhouse.bounds)
+    drawing = asyncio.create_task(mapper.run(clock.now))
+    recorded, took = record(names, seconds), []
+    start = time.perf_counter()
+    ticked = float("-inf")
+    for one in recorded:
+        wait = start + one.at - time.perf_counter()
+        await asyncio.sleep(max(0.0, wait))
+        # A notification that had to wait for its turn has waited since it was due.
+        now, fleet.left = clock.now(), None
+        for received in read(one.body, now):
+            assessor.take(received)
+        if fleet.left is not None:
+            took.append((fleet.left - start - one.at) * 1e3)
+        if now.mono - ticked >= TICK_S:
+            ticked = now.mono
+            assessor.tick(now)
+    drawing.cancel()
+    await asyncio.gather(drawing, return_exceptions=True)
+    return took
+
+
+def share(values: list[float], percent: int) -> float:
+    """A percentile."""
+    return statistics.quantiles(values, n=100)[percent - 1]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--fleets", type=int, nargs="*", default=[5, 10, 20, 40])
+    asked = parser.parse_args()
+    took = cost(asked.robots, asked.seconds)
+    print(
+        f"cost, {asked.robots} robots x {BEAMS} beams (ms of CPU): median, P95, P99, count"
+    )
+    every = [
+        value for kind, values in took.items() if kind[0] != "(" for value in values
+    ]
+    for kind, values in [*sorted(took.items()), ("all notifications", every)]:
+        numbers = [statistics.median(values), share(values, 95), share(values, 99)]
+        told = " ".join(f"{number:8.3f}" for number in numbers)
+        print(f"  {kind:18} {told} {len(values):7d}")
+    print(f"  goal: median {GOAL_MS} ms, measured {statistics.median(every):.3f} ms")
+    knee = 0
+    if asked.fleets:
+        print("latency, notification → feedback (ms): P50, P95, P99")
+    for robots in asked.fleets:
+        late = asyncio.run(latency(robots, asked.seconds))
+        numbers = [share(late, percent) for percent in (50, 95, 99)]
+        print(f"  {robots:3d} robots " + " ".join(f"{n:8.2f}" for n in numbers))
+        knee = robots if numbers[1] < LATENCY_GOAL_MS else knee
+    if asked.fleets:
+        print(f"  goal: P95 below {LATENCY_GOAL_MS:g} ms; the knee is at {knee} robots")
+
+
+if __name__ == "__main__":
+    main()
