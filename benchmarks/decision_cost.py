@@ -244,7 +244,8 @@ def main() -> None:
     asked = parser.parse_args()
     took = cost(asked.robots, asked.seconds)
     print(
-        f"cost, {asked.robots} robots x {BEAMS} beams (ms of CPU): median, P95, P99, count"
+        f"cost, {asked.robots} robots x {BEAMS} beams (ms of CPU): "
+        "median, P95, P99, count"
     )
     every = [
         value for kind, values in took.items() if kind[0] != "(" for value in values
