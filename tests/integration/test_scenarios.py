@@ -21,6 +21,7 @@ import orjson
 import pytest
 from websockets.sync.client import connect
 
+from iveg.emulator.scenarios import SCENARIOS
 from tests.processes import Site, site, until
 
 pytestmark = pytest.mark.slow
@@ -28,10 +29,11 @@ Row = dict[str, Any]
 T = TypeVar("T")
 Plays = dict[str, dict[str, str]]
 """Scenarios, each with the settings of its stack."""
-CROWD = ("AGI", "AGII", "AG3", "AG4")
+CROWD = ("AGI", "AGII", "AG3")
 SILENCE_S = 5.0
 """How long nobody hears AGII in ``link-loss``."""
-
+CRUISE = 0.8
+"""Of AGI and AGII where nobody slows them (m/s)."""
 SOON_S = 45.0
 """Nothing here takes longer, on a machine that has other things to do."""
 
@@ -138,11 +140,11 @@ def slowed_unseen(stage: Stage) -> None:
         lambda: [d for d in stage.decisions("AGII", "person") if d["applied_at"]],
         "AGII says that it slows for a person",
     )
-    stage.wait(
-        lambda: stage.speed("AGII") <= 0.55 * decision["speed_before"], "it slows"
-    )
     line = stage.first(
         lambda: stage.log("AGII", "log.speed_down.person"), "the log says so"
+    )
+    stage.wait(
+        lambda: 0.0 < stage.speed("AGII") <= 0.55 * CRUISE, "its odometry shows it"
     )
     assert (decision["observer"], decision["in_sight"]) == ("AGI", False)
     assert line["key"] == "log.speed_down.person_nlos"
@@ -325,5 +327,14 @@ class TestCompany:
         for robot_id in CROWD:
             stage.wait(partial(drives, stage, robot_id), f"{robot_id} drives")
 
-        stage.wait(partial(everybody_live, stage), "all are live")
+        assert [one for one in stage.rows("log") if one["key"] == "log.link.lost"] == []
         assert [a for a in stage.rows("alerts") if a["priority"] == "P1"] == []
+
+
+def test_every_scenario_is_held_to_its_outcome() -> None:
+    acts = (TestUnseen, TestDisobedient, TestManyLooks, TestMeetings, TestCompany)
+
+    played = {name for act in acts for name in act.plays}
+
+    # What ``demo`` shows is what ``nlos`` shows, and all browser tests run on it.
+    assert played == set(SCENARIOS) - {"demo"}
