@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from iveg.domain.alerts import Rule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Hold, Origin
@@ -324,6 +325,31 @@ async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
         desk.look("AGI")
 
     assert "log.person_cleared" in desk.sentences()
+
+
+def test_a_person_beyond_the_walls_slows_who_saw_them_and_is_told_as_doubtful() -> None:
+    desk = watched(Desk())
+
+    desk.look("AGI", detection("farmer", 150.0))
+
+    assert "log.detection_doubtful" in desk.sentences()
+    assert desk.assessor.mandates["AGI"].reason == "person"
+    alert = desk.fleet.told[-1].alerts[0]
+    assert alert.position is not None
+    assert alert.position[:2] == (0.0, 0.0)
+    assert alert.radius_m == 8.0
+
+
+def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
+    desk = watched(Desk())
+    desk.assessor.rule = Rule(possible_people=True)
+    # Faint looks at one spot are told once; the possible one is another line.
+    for _ in range(3):
+        desk.clock.now += 0.1
+        desk.look("AGI", detection("farmer", 5.0, probability=0.7))
+
+    assert desk.sentences().count("log.detection_faint") == 1
+    assert desk.sentences().count("log.detection_possible") == 1
 
 
 def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
