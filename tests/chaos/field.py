@@ -36,8 +36,9 @@ topic +/+/cmd in 1 / /
 class Field:
     """Every part a process of its own: broker, FIWARE, iVeg and robots."""
 
-    def __init__(self, place: Site) -> None:
+    def __init__(self, place: Site, *emulator: str) -> None:
         self.place = place
+        self._emulator = emulator or ("--held",)
         (self._south,) = free_ports(1)
         self.port = int(urlsplit(place.settings["IVEG_MQTT_URL"]).port or 0)
         self._broker: subprocess.Popen[bytes] | None = None
@@ -59,8 +60,8 @@ class Field:
             self._running[part] = self.place.start(part)
             self.place.settings["IVEG_MQTT_URL"] = field
         else:
-            held = ("--held",) if part == "emulator" else ()
-            self._running[part] = self.place.start(part, *held)
+            words = self._emulator if part == "emulator" else ()
+            self._running[part] = self.place.start(part, *words)
 
     def kill(self, part: str) -> None:
         """What a power cut does."""
