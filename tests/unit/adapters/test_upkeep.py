@@ -5,6 +5,7 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable
 
+import orjson
 import pytest
 
 from iveg.adapters import clock
@@ -14,6 +15,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import WANTED
 from iveg.adapters.upkeep import Upkeep
 from iveg.domain.observations import Odometry, Received
+from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
 from iveg.pipeline.chain import Chain
@@ -194,6 +196,32 @@ async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
 
     told = [line for line in _warnings(caplog) if line.startswith("Device AAA_gps")]
     assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        [{"id": 5, "description": "iVeg: odometry", "notification": 7}],
+        [{"description": "iVeg: odometry", "notification": {}}],
+        {"subscriptions": []},
+        [7],
+        "text",
+    ],
+)
+async def test_json_that_nobody_can_use_is_orions_fault_and_kills_nothing(
+    fiware: Running, body: object
+) -> None:
+    async def answer(request: Request) -> Response:
+        # Alive by its probe, mad in all else.
+        known = request.path.startswith("/v2/entities/")
+        return Response(404 if known else 200, b"{}" if known else orjson.dumps(body))
+
+    async with http_server(answer, "127.0.0.1", 0) as port:
+        mad = Site(fiware, orion_url=f"http://127.0.0.1:{port}")
+        async with mad.running() as site:
+            await until(lambda: site.chain.notify_error)
+
+    assert site.chain.notify_error == "answered JSON that means nothing here"
 
 
 def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
