@@ -35,6 +35,7 @@ class Hazard:
         x: Centre in ``map`` (m); ``y`` likewise.
         sighting: What was seen; None for a peer's own odometry.
         recorded: A recording saw it; it slows recordings alone.
+        alert_id: Of the alert that robots hear of it.
     """
 
     reason: Literal["person", "robot"]
@@ -45,6 +46,7 @@ class Hazard:
     radius_m: float
     sighting: Sighting | None = None
     recorded: bool = False
+    alert_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +174,7 @@ class Mandates:
             speed_before=speed,
             in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
             distance_m=distance,
-            already_slow=robot.safety is not None
-            and robot.safety.speed_factor <= HALF_SPEED,
+            already_slow=_is_slow_for_another(robot, hazard),
         )
 
     def _leave(
@@ -240,6 +241,7 @@ def hazards_of(
                 radius,
                 sighting,
                 world.robot(sighting.observer).is_replay,
+                person.decision_id,
             )
     for peer in world.robots.values():
         age = peer.age_s(now)
@@ -257,6 +259,19 @@ def hazards_of(
             pose.y,
             rule.radius_at(age),
         )
+
+
+def _is_slow_for_another(robot: RobotState, hazard: Hazard) -> bool:
+    """Whether a robot's slow-down has another cause.
+
+    A robot judges alerts by its own pose, too, and may report this very hazard a few
+    milliseconds before it is found here: its slow-down is still to be seen.
+    """
+    report = robot.safety
+    if report is None or report.speed_factor > HALF_SPEED:
+        return False
+    ours = (hazard.alert_id, hazard.cause)
+    return report.decision_id not in ours and report.cause not in ours
 
 
 def _silent_observer(world: World, now: Instant) -> str | None:

@@ -86,10 +86,17 @@ class Scene:
             frame, self.world, self.rule, at(self.now), f"look{self._seq}"
         )
 
-    def report(self, robot_id: str, *, factor: float) -> None:
-        """A robot says what it applies."""
+    def report(
+        self, robot_id: str, *, factor: float, decision_id: str | None = None
+    ) -> None:
+        """A robot says what it applies, and for which decision."""
         self._seq += 1
-        said = safety_report(robot_id, speed_factor=factor, origin=self._origin())
+        said = safety_report(
+            robot_id,
+            speed_factor=factor,
+            decision_id=decision_id,
+            origin=self._origin(),
+        )
         self._apply(received(said, after=self.now))
 
     def play_back(self, robot_id: str) -> None:

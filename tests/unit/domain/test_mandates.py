@@ -368,3 +368,27 @@ def test_a_recordings_silence_shuts_nobodys_eyes() -> None:
     scene.look("AGI")
 
     assert scene.judge()["AGI"] == CLEAR
+
+
+# --- a robot that is slow already -------------------------------------------------
+
+
+def test_a_robot_that_is_slow_for_another_reason_will_show_no_slow_down() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5, decision_id="another")
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.already_slow
+
+
+def test_a_robot_that_judged_this_very_alert_first_is_still_to_slow_down() -> None:
+    scene = watching(Scene())
+    scene.look("AGII", person(1.5))
+    (somebody,) = scene.everyone
+    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
+    scene.judge()
+
+    (change,) = scene.changes
+    assert not change.crossing.already_slow
