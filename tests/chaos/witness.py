@@ -1,6 +1,7 @@
 """A witness on the field broker: what robots do, beside what people allowed them."""
 
 import asyncio
+import contextlib
 import threading
 from dataclasses import dataclass, field
 
@@ -38,11 +39,12 @@ class Witness:
     def __post_init__(self) -> None:
         topics = {"/iveg/+/attrs": 0}
         address = BrokerAddress("127.0.0.1", self.port)
-        self._link = MqttLink(address, "witness", topics, self._take)
-        self._loop = asyncio.new_event_loop()
+        self._link = MqttLink(address, "witness", topics, self.take)
         self._thread = threading.Thread(target=self._run, name="witness")
 
     def __enter__(self) -> "Witness":
+        self._loop = asyncio.new_event_loop()
+        self._task = self._loop.create_task(self._link.run())
         self._thread.start()
         return self
 
@@ -68,11 +70,11 @@ class Witness:
         return sum(one.starts for one in self.robots.values())
 
     def _run(self) -> None:
-        self._task = self._loop.create_task(self._link.run())
-        with_end = asyncio.gather(self._task, return_exceptions=True)
-        self._loop.run_until_complete(with_end)
+        with contextlib.suppress(asyncio.CancelledError):
+            self._loop.run_until_complete(self._task)
 
-    def _take(self, topic: str, payload: bytes) -> None:
+    def take(self, topic: str, payload: bytes) -> None:
+        """One message of the field broker."""
         device = topic.split("/")[2]
         if not device.endswith(("_odom", "_safety")):
             return

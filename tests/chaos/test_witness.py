@@ -1,0 +1,48 @@
+"""The witness of the chaos tests sees what it is there to see."""
+
+from iveg.domain.observations import Hold
+from iveg.ngsi import codec
+from tests.builders import odometry, safety_report
+from tests.chaos.witness import Witness
+
+
+def tell(witness: Witness, *speeds: float) -> None:
+    for speed in speeds:
+        payload = codec.write_odometry(odometry("AGI", linear=speed))
+        witness.take("/iveg/AGI_odom/attrs", payload)
+
+
+def hold(witness: Witness) -> None:
+    report = safety_report("AGI", Hold("01A", "iveg", "remote"))
+    witness.take("/iveg/AGI_safety/attrs", codec.write_safety(report))
+
+
+def test_a_motion_that_nobody_allowed_is_counted_once() -> None:
+    witness = Witness(0)
+    hold(witness)
+
+    tell(witness, 0.0, 0.3, 0.5, 0.5)
+
+    assert (witness.starts, witness.unlicensed) == (1, 1)
+
+
+def test_a_resume_allows_motions_until_the_robot_is_held_again() -> None:
+    witness = Witness(0)
+    hold(witness)
+    witness.allow("AGI")
+    tell(witness, 0.0, 0.3, 0.0, 0.3, 0.0)
+    hold(witness)
+
+    tell(witness, 0.3)
+
+    assert (witness.starts, witness.unlicensed) == (3, 1)
+
+
+def test_a_robot_that_still_brakes_keeps_its_allowance() -> None:
+    witness = Witness(0)
+    witness.allow("AGI")
+    tell(witness, 0.4)
+
+    hold(witness)
+
+    assert witness.of("AGI").allowed
