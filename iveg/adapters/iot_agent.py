@@ -168,12 +168,13 @@ async def provision(
     """
     mended = await _ensure_group(agent, apikey, cbroker_url)
     known = {str(one.get("device_id")): one for one in await agent.read_devices()}
-    for device in (_climate_device(apikey), _canary_device(apikey)):
-        mended += await _ensure_device(agent, known, device)
+    mended += await _ensure_device(agent, known, _climate_device(apikey))
     problems = []
     for robot_id in robots:
         mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
         problems += _thieves(known.values(), robot_id)
+    # Last, so that the canary's return says that all the others are there again.
+    mended += await _ensure_device(agent, known, _canary_device(apikey))
     return Provisioned(tuple(mended), tuple(problems))
 
 
