@@ -18,6 +18,8 @@ import time
 import orjson
 import uvloop
 
+from benchmarks.process import pause
+
 RATE_HZ = 30
 TOPICS = 3
 BEAMS = 720
@@ -96,7 +98,7 @@ def send(port: int, robots: int, seconds: float) -> None:
         line.recv(4)
         told = _drive(line, packets, places, seconds)
         # A broker may forget what a client that has left said last.
-        time.sleep(_LINGER_S)
+        pause(_LINGER_S)
         line.sendall(b"\xe0\x00")
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps({**told, "cpu_s": used.ru_utime + used.ru_stime}))
@@ -113,9 +115,9 @@ def _drive(
     step = 1.0 / (RATE_HZ * len(packets) * TOPICS)
     while (due := count * step) < seconds:
         robot, topic = divmod(count % (len(packets) * TOPICS), TOPICS)
-        pause = start + due - time.perf_counter()
-        if pause > 0:
-            time.sleep(pause)
+        early = start + due - time.perf_counter()
+        if early > 0:
+            pause(early)
         latest = max(latest, time.perf_counter() - start - due)
         packet, place = packets[robot][topic], places[robot][topic]
         packet[place : place + _WIDTH] = b"%d" % (_BASE + _moment_us())

@@ -12,7 +12,6 @@ import cProfile
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -20,7 +19,7 @@ import httpx
 import uvloop
 
 from benchmarks.fiware_ends import HOST
-from benchmarks.process import Usage, machine, percentile, print_table
+from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import ensure_subscriptions
@@ -98,7 +97,7 @@ def _run(
         check=True,
     )
     sent = json.loads(ended.stdout)
-    time.sleep(_DRAIN_S)
+    pause(_DRAIN_S)
     after = Usage.of(fiware), Usage.of(receiver)
     used = [now.cpu_s - then.cpu_s for now, then in zip(after, before, strict=True)]
     url = f"http://{HOST}:{ports[1]}/"

@@ -1,6 +1,7 @@
 """What a process costs, read from ``/proc``, and numbers laid out as a table."""
 
 import os
+import select
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,3 +48,8 @@ def print_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) 
         first, *others = zip(line, widths, strict=True)
         cells = [first[0].ljust(first[1]), *(text.rjust(w) for text, w in others)]
         print("  ".join(cells).rstrip())
+
+
+def pause(seconds: float) -> None:
+    """Pace what a benchmark sends; for a process of its own, never for a loop."""
+    select.select((), (), (), seconds)

@@ -136,10 +136,8 @@ def _report_messages(
     failures = []
     rows = []
     numbered = heard.numbered()
-    # iVeg also reads the whole of Orion now and then: one of each kind a robot.
-    reads = counters.get("orion.SafetyReport", 0) - heard.messages["_safety"]
     for suffix, (_, counter) in KINDS.items():
-        sent, taken = heard.messages[suffix], counters.get(counter, 0) - reads
+        sent, taken = heard.messages[suffix], counters.get(counter, 0)
         overtaken = numbered[suffix] - sent
         counts = (numbered[suffix], overtaken, sent, taken)
         rows.append([suffix[1:], *map(str, counts)])
