@@ -1,0 +1,85 @@
+"""Fault F9: notifications are lost, doubled and shuffled; the picture is right."""
+
+import random
+from collections import Counter
+
+import pytest
+
+from iveg.domain.observations import Observation, Received
+from tests.builders import detection, detection_frame, odometry, origin, safety_report
+from tests.fakes.clock import FakeClock
+from tests.unit.pipeline.desk import Desk
+
+TICK_S = 1 / 30
+LAST_TICK = 300
+
+
+def story() -> list[tuple[float, Observation]]:
+    """Ten seconds of two robots; AGI drives past somebody whom AGII sees."""
+    told: list[tuple[float, Observation]] = []
+    for tick in range(LAST_TICK + 1):
+        now, named = tick * TICK_S, origin(tick, after=tick * TICK_S)
+        somebody = (detection(x=0.0, y=0.5),)
+        told += [
+            (now, odometry("AGI", -4.0 + 0.02 * tick, linear=0.6, origin=named)),
+            (now, odometry("AGII", 0.0, 30.0, linear=0.6, origin=named)),
+            (now, detection_frame("AGI", origin=named)),
+            (now, detection_frame("AGII", *somebody, origin=named)),
+        ]
+        if tick % 15 == 0:
+            told.append((now, safety_report("AGI", origin=named)))
+    return told
+
+
+def spoilt(
+    told: list[tuple[float, Observation]], rng: random.Random
+) -> list[tuple[float, Observation]]:
+    """10 % lost, 30 % doubled, all shuffled within 0.2 s; the last tick arrives."""
+    end = LAST_TICK * TICK_S
+    arrived = []
+    for sent, observation in told:
+        if sent < end and rng.random() < 0.1:
+            continue
+        for _ in range(1 + (rng.random() < 0.3)):
+            arrived.append((sent + rng.uniform(0.0, 0.2), observation))
+    return sorted(arrived, key=lambda one: one[0])
+
+
+def play(told: list[tuple[float, Observation]]) -> Desk:
+    desk = Desk()
+    assert isinstance(desk.clock, FakeClock)
+    for now, observation in told:
+        desk.clock.now = now
+        desk.loop.step([Received(observation, desk.clock())], desk.clock())
+    desk.clock.now = LAST_TICK * TICK_S + 0.25
+    desk.loop.step([], desk.clock())
+    return desk
+
+
+def events(desk: Desk) -> Counter[tuple[str, str | None, str | None]]:
+    return Counter(
+        (line.key, line.robot_id, line.decision_id) for line in desk.minutes.lines
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_f9_the_state_is_right_at_the_end_and_no_event_is_told_twice(
+    seed: int,
+) -> None:
+    clean, bad = play(story()), play(spoilt(story(), random.Random(seed)))
+
+    for robot_id, robot in clean.world.robots.items():
+        found = bad.world.robots[robot_id]
+        assert found.odometry == robot.odometry
+        assert found.frame == robot.frame
+        assert found.safety == robot.safety
+    assert {
+        robot_id: (mandate.speed_factor, mandate.reason)
+        for robot_id, mandate in bad.assessor.mandates.items()
+    } == {
+        robot_id: (mandate.speed_factor, mandate.reason)
+        for robot_id, mandate in clean.assessor.mandates.items()
+    }
+    assert len(bad.assessor.people.known) == len(clean.assessor.people.known) == 1
+    assert events(bad) == events(clean)
+    assert len(list(bad.assessor.crossings)) == len(list(clean.assessor.crossings)) == 1
