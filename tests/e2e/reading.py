@@ -1,7 +1,9 @@
 """What a person reads off the page."""
 
+import re
 from typing import Any
 
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Locator, Page
 
 
@@ -31,6 +33,27 @@ def wait_for_mode(page: Page, robot: str, *modes: str, seconds: float = 15.0) ->
 def evaluate(page: Page, script: str, *arguments: object) -> Any:
     """The result of a function in the page."""
     return page.evaluate(script, list(arguments))
+
+
+def serious(page: Page, *rules: str) -> list[str]:
+    """What stands in the way of assistive technology, one sentence each.
+
+    Args:
+        page: As it is now.
+        rules: Of axe; none asks for all of them.
+    """
+    options = {"runOnly": {"type": "rule", "values": list(rules)}} if rules else None
+    return [
+        f"{violation['id']}: {violation['nodes'][0]['html']}"
+        for violation in Axe().run(page, options=options).response["violations"]
+        if violation["impact"] in ("serious", "critical")
+    ]
+
+
+def visit(page: Page, route: str) -> None:
+    """Another page of the same house, until it hears the server."""
+    page.goto(re.sub(r"(://[^/]+).*", rf"\1{route}", page.url))
+    page.wait_for_selector('#mark[data-state="open"]', state="attached")
 
 
 COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]

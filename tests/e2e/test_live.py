@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, number
+from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, number, serious
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -155,7 +154,7 @@ def test_nothing_serious_stands_in_the_way_of_assistive_technology(
     found: list[str] = []
 
     def has_settled() -> bool:
-        found[:] = _serious(page)
+        found[:] = serious(page)
         return found == []
 
     try:
@@ -188,14 +187,6 @@ def test_no_log_holds_a_secret(stack: Site) -> None:
     without_link = re.sub(r"^iVeg: http://\S+$", "", said, flags=re.MULTILINE)
 
     assert [name for name in names if stack.settings[name] in without_link] == []
-
-
-def _serious(page: Page) -> list[str]:
-    return [
-        f"{violation['id']}: {violation['nodes'][0]['html']}"
-        for violation in Axe().run(page).response["violations"]
-        if violation["impact"] in ("serious", "critical")
-    ]
 
 
 def _slow_robot(robots: Mapping[str, list[Json]]) -> Json | None:

@@ -1,0 +1,201 @@
+"""The pages beside the map: complete, reachable, readable, and never over a STOP."""
+
+import re
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    OVERFLOW,
+    evaluate,
+    serious,
+    strip_stop,
+    visit,
+)
+from tests.processes import Site, until
+
+pytestmark = pytest.mark.e2e
+
+ROUTES = ("/alerts", "/commands", "/fleet", "/climate", "/settings")
+SIZES = ((390, 844), (768, 1024), (1280, 800), (1440, 900))
+THEMES = ("dark", "sunlight")
+STANDING = re.compile(r"PARADO")
+
+
+@pytest.fixture(scope="module")
+def shown(stack: Site) -> Site:
+    """A house in which something has happened: AGI was stopped once."""
+    with stack.api() as api:
+        command_id = api.post("robots/AGI/stop").json()["command_id"]
+
+        def is_standing() -> bool:
+            answer = api.get(f"commands/{command_id}")
+            return bool(answer.json().get("state") == "STANDING")
+
+        until(is_standing, 10.0, "AGI stands")
+    return stack
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
+def test_no_page_is_too_wide_and_none_covers_a_stop(
+    open_page: OpenPage, size: tuple[int, int]
+) -> None:
+    page = open_page(*size, route="/about")
+
+    found = {route: _layout(page, route) for route in ROUTES}
+
+    assert found == dict.fromkeys(ROUTES, (0, []))
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
+def test_no_dialog_on_any_page_covers_a_stop(
+    open_page: OpenPage, size: tuple[int, int]
+) -> None:
+    page = open_page(*size, route="/fleet")
+    covered = []
+
+    for opener in page.locator("[data-opens]:visible").all():
+        opener.click()
+        page.wait_for_selector("dialog[open]")
+        covered += evaluate(page, COVERED_STOPS)
+        page.keyboard.press("Escape")
+        page.wait_for_selector("dialog[open]", state="hidden")
+
+    assert covered == []
+
+
+def test_every_page_is_accessible_in_every_theme(
+    open_page: OpenPage, shown: Site
+) -> None:
+    page = open_page()
+
+    found = {route: _violations(page, route) for route in ("/", *ROUTES)}
+
+    assert found == {route: [] for route in found}
+
+
+def test_the_commands_page_shows_a_stop_with_the_time_of_each_road(
+    open_page: OpenPage, shown: Site
+) -> None:
+    page = open_page(route="/commands")
+
+    row = page.locator("#orders-rows tbody tr").first
+    expect(row).to_contain_text("AGI")
+    expect(row).to_contain_text("program")
+    times = row.locator("td.number").all_inner_texts()
+    # sent and answered on both roads, standing, tries
+    assert [text for text in times if not text.strip().isdigit()] == []
+    expect(page.locator("#took-standing")).to_contain_text("ms")
+
+
+def test_a_new_stop_appears_on_the_commands_page_by_itself(
+    open_page: OpenPage, shown: Site
+) -> None:
+    page = open_page(390, 844, route="/commands")
+    rows = page.locator("#orders-rows tbody tr")
+    expect(rows.first).to_be_visible()
+    before = rows.count()
+
+    strip_stop(page, "fleet").click()
+
+    expect(rows.first).to_contain_text("operator", timeout=8000)
+    assert rows.count() > before
+
+
+def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> None:
+    page = open_page(route="/commands")
+    expect(page.locator("#orders-rows tbody tr").first).to_be_visible()
+
+    page.emulate_media(media="print")
+
+    expect(page.locator("#orders-rows tbody tr").first).to_be_visible()
+    assert page.locator("[data-stop]:visible").count() == 0
+    assert page.locator("button:visible").count() == 0
+
+
+def test_the_fleet_page_draws_the_whole_chain_and_each_device(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(route="/fleet")
+
+    for hop in ("robots", "mqtt", "iot_agent", "orion", "notifications", "screen"):
+        box = page.locator(f'.hop-box[data-hop="{hop}"]')
+        expect(box).to_have_attribute("data-state", "ok", timeout=15_000)
+    expect(page.locator("#chain-sentence")).to_have_text(re.compile("Todo funciona"))
+    expect(page.locator("#machines tbody tr")).to_have_count(2)
+    lidar = page.locator("#devices tr", has_text="AGI_lidar2D")
+    expect(lidar).to_contain_text("hace 0,")
+
+
+def test_the_climate_page_shows_what_the_house_measures(open_page: OpenPage) -> None:
+    page = open_page(route="/climate")
+
+    expect(page.locator("#climate-temperature")).to_have_text(
+        re.compile(r"^\d+,\d °C$"), timeout=15_000
+    )
+    expect(page.locator("#climate-sentence")).to_contain_text("Leído hace")
+
+    page.click('[data-language="en"]')
+    expect(page.locator("#climate-temperature")).to_have_text(
+        re.compile(r"^\d+\.\d °C$")
+    )
+
+
+def test_the_settings_page_shows_the_rule_in_force(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(route="/settings")
+
+    expect(page.locator("#rule-threshold")).to_have_text(re.compile(r"80\W%"))
+    expect(page.locator("#rule-radius")).to_have_text("2,0 m")
+    expect(page.locator("#rule-version")).not_to_have_text("—")
+
+
+def test_every_entry_of_the_menu_leads_to_its_page(open_page: OpenPage) -> None:
+    page = open_page(390, 844)
+    links = page.locator("#menu nav a")
+    places = [str(link.get_attribute("href")) for link in links.all()]
+    assert {"/alerts", "/commands", "/fleet", "/climate", "/settings"} < set(places)
+
+    for place in places:
+        page.wait_for_selector('#mark[data-state="open"]', state="attached")
+        page.locator(".tabbar [data-opens=menu]").click()
+        page.locator(f'#menu nav a[href="{place}"]').click()
+        expect(page.locator("main h1").first).not_to_be_empty()
+        assert page.url.removeprefix("http://").partition("/")[2] == place[1:]
+
+
+def test_a_page_says_when_its_list_cannot_be_read(open_page: OpenPage) -> None:
+    page = open_page(route="/about", alone=True)
+    page.route("**/api/v1/alerts*", lambda route: route.abort())
+
+    page.goto(page.url.replace("/about", "/alerts"))
+
+    expect(page.locator("#past-error")).to_contain_text("Sin conexión")
+    expect(page.locator("#past-empty")).to_be_hidden()
+
+
+def _layout(page: Page, route: str) -> tuple[int, Any]:
+    visit(page, route)
+    return max(0, int(evaluate(page, OVERFLOW))), evaluate(page, COVERED_STOPS)
+
+
+def _violations(page: Page, route: str) -> list[str]:
+    """All rules in the first theme; in the others those on colour, which differ."""
+    visit(page, route)
+    page.wait_for_function(_LABELLED)
+    found = serious(page)
+    for theme in THEMES:
+        evaluate(page, _WEAR, theme)
+        found += serious(page, "color-contrast")
+    return found
+
+
+_WEAR = "([theme]) => { document.documentElement.dataset.theme = theme; }"
+_LABELLED = """() => document.querySelector('[aria-busy=true]') === null
+  && !document.querySelector('#time-strip:not([aria-label])')
+  && !document.querySelector('.card__menu:not([aria-label])')"""
+"""What is named in the reader's words has its name."""

@@ -1,0 +1,155 @@
+"""What somebody does beside watching: acknowledge, measure, share, leave."""
+
+import json
+import re
+from typing import Any
+
+import pytest
+from paho.mqtt import publish
+from playwright.sync_api import Page, expect
+
+from iveg.adapters.mqtt import BrokerAddress
+from tests.e2e.conftest import OpenPage
+from tests.e2e.reading import evaluate, serious, strip_stop, visit
+from tests.processes import Site, until
+
+pytestmark = pytest.mark.e2e
+
+PROBE = "<img src=x onerror=window.probed=1>"
+
+
+def test_a_distance_is_measured_with_two_taps_and_with_keys(page: Page) -> None:
+    page.locator("#map-measure").click()
+    expect(page.locator("#measured")).to_contain_text("primer punto")
+    canvas = page.locator("#map")
+
+    canvas.click(position={"x": 200, "y": 300})
+    expect(page.locator("#measured")).to_contain_text("segundo punto")
+    canvas.click(position={"x": 400, "y": 300})
+    expect(page.locator("#measured")).to_have_text(re.compile(r"^\d+,\d\d m$"))
+
+    canvas.focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#measured")).to_contain_text("segundo punto")
+    page.keyboard.press("Escape")
+    expect(page.locator("#measured")).to_be_hidden()
+
+
+def test_what_a_robot_believes_is_shown_named_and_remembered(page: Page) -> None:
+    page.locator("[data-opens=layers-panel]").click()
+    page.get_by_role("radio", name="AGII").check()
+    expect(page.locator("#believing")).to_contain_text("Lo que cree AGII")
+
+    page.reload()
+
+    expect(page.locator("#believing")).to_contain_text("Lo que cree AGII")
+
+
+def test_a_layer_that_was_switched_off_stays_off(page: Page) -> None:
+    page.locator("[data-opens=layers-panel]").click()
+    page.get_by_role("checkbox", name="Puntos LiDAR").uncheck()
+
+    page.reload()
+
+    page.locator('[data-robot="AGI"][data-link="LIVE"]').wait_for()
+    page.locator("[data-opens=layers-panel]").click()
+    expect(page.get_by_role("checkbox", name="Puntos LiDAR")).not_to_be_checked()
+
+
+def test_people_can_be_read_as_sentences(page: Page) -> None:
+    page.locator("[data-opens=people-panel]").click()
+
+    person = page.locator("#people-list li").first
+    expect(person).to_contain_text(re.compile("vista|vio"), timeout=60_000)
+    expect(person).to_contain_text("AGI")
+    expect(page.locator("#people-nlos")).to_contain_text("Sin línea de vista")
+
+
+def test_a_decision_has_an_address_that_opens_and_prints(
+    open_page: OpenPage, stack: Site
+) -> None:
+    decision_id = until(lambda: _newest_decision(stack), 90.0, "a decision")
+    page = open_page(390, 844, route=f"/decisions/{decision_id}")
+    record = page.locator("#decision-record")
+
+    expect(record).to_contain_text(decision_id)
+    expect(record.locator(".chain li").first).to_be_visible()
+    expect(strip_stop(page, "fleet")).to_be_visible()
+    assert serious(page) == []
+
+    page.emulate_media(media="print")
+    expect(record.locator(".chain li").first).to_be_visible()
+    assert page.locator("button:visible, [data-stop]:visible").count() == 0
+
+
+def test_an_unknown_decision_is_said_to_be_unknown(open_page: OpenPage) -> None:
+    page = open_page(route="/about", alone=True)
+
+    visit(page, "/decisions/nothing-of-the-kind")
+
+    expect(page.locator("#decision-record")).to_contain_text("404")
+
+
+def test_the_sound_can_be_tried_and_only_the_chime_switched_off(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(route="/settings")
+
+    page.locator("#sound-test").click()
+    expect(page.locator("#sound-state")).to_contain_text("Sonando")
+    page.locator("#sound-others").uncheck()
+    page.reload()
+
+    expect(page.locator("#sound-others")).not_to_be_checked()
+
+
+def test_markup_from_a_robot_is_never_markup_on_a_page(page: Page, stack: Site) -> None:
+    _publish(stack, "AGI", _detection(PROBE))
+
+    # What is left of it without the characters that the wire forbids.
+    expect(page.locator("#log")).to_contain_text("onerror", timeout=10_000)
+    for route in ("/", "/alerts", "/fleet", "/history"):
+        visit(page, route)
+        assert page.locator("main img").count() == 0
+        assert evaluate(page, "() => window.probed ?? null") is None
+
+
+def test_markup_in_a_note_is_text_on_every_page(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(768, 1024, route="/alerts")
+    form = page.locator("#active-alerts form:visible").first
+    form.wait_for(timeout=90_000)
+
+    form.locator("input").fill(PROBE)
+    form.locator("button").click()
+
+    noted = page.locator("#past-rows td", has_text="operator")
+    expect(noted.first).to_be_visible(timeout=15_000)
+    assert page.locator("main img").count() == 0
+    assert evaluate(page, "() => window.probed ?? null") is None
+
+
+def _newest_decision(stack: Site) -> str | None:
+    with stack.api() as api:
+        items = api.get("decisions", params={"limit": 1}).json()["items"]
+    return str(items[0]["decision_id"]) if items else None
+
+
+def _detection(class_id: str) -> dict[str, Any]:
+    corners = {"xmin": 3, "xmax": 3.5, "ymin": 3, "ymax": 3.5, "zmin": 0, "zmax": 1}
+    return {
+        "bounding_boxes": {
+            "class_id": class_id,
+            "probability": 0.99,
+            "position": corners,
+            "frame_id": "map",
+        }
+    }
+
+
+def _publish(stack: Site, robot: str, payload: dict[str, Any]) -> None:
+    broker = BrokerAddress.from_url(stack.settings["IVEG_MQTT_URL"])
+    topic = f"/iveg/{robot}_yolox_bounding_boxes/attrs"
+    text = json.dumps(payload)
+    publish.single(topic, text, qos=1, hostname=broker.host, port=broker.port)
