@@ -15,6 +15,7 @@ from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.people import RING_S, People, Sighting
+from iveg.domain.profiles import profile_of
 from iveg.domain.world import RobotState, World
 
 RELEASE_M, RELEASE_S = 0.3, 1.0
@@ -174,7 +175,7 @@ class Mandates:
             speed_before=speed,
             in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
             distance_m=distance,
-            already_slow=_is_slow_for_another(robot, hazard),
+            already_slow=_is_slow_already(robot, hazard, speed),
         )
 
     def _leave(
@@ -261,17 +262,19 @@ def hazards_of(
         )
 
 
-def _is_slow_for_another(robot: RobotState, hazard: Hazard) -> bool:
-    """Whether a robot's slow-down has another cause.
+def _is_slow_already(robot: RobotState, hazard: Hazard, speed: float) -> bool:
+    """Whether a robot will show no slow-down, because it drives slowly already.
 
     A robot judges alerts by its own pose, too, and may report this very hazard a few
-    milliseconds before it is found here: its slow-down is still to be seen.
+    milliseconds before it is found here; while it is still fast, its slow-down is yet
+    to be seen.
     """
     report = robot.safety
     if report is None or report.speed_factor > HALF_SPEED:
         return False
     ours = (hazard.alert_id, hazard.cause)
-    return report.decision_id not in ours and report.cause not in ours
+    ahead = report.decision_id in ours or report.cause in ours
+    return not ahead or speed <= HALF_SPEED * profile_of(robot.robot_id).max_speed
 
 
 def _silent_observer(world: World, now: Instant) -> str | None:

@@ -383,12 +383,16 @@ def test_a_robot_that_is_slow_for_another_reason_will_show_no_slow_down() -> Non
     assert change.crossing.already_slow
 
 
-def test_a_robot_that_judged_this_very_alert_first_is_still_to_slow_down() -> None:
+@pytest.mark.parametrize(("speed", "already_slow"), [(0.8, False), (0.4, True)])
+def test_a_robot_that_judged_this_very_alert_first_and_is_fast_is_still_to_slow_down(
+    speed: float, already_slow: bool
+) -> None:
     scene = watching(Scene())
+    scene.drive("AGI", 0.0, linear=speed)
     scene.look("AGII", person(1.5))
     (somebody,) = scene.everyone
     scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
     scene.judge()
 
     (change,) = scene.changes
-    assert not change.crossing.already_slow
+    assert change.crossing.already_slow is already_slow
