@@ -94,6 +94,8 @@ def test_the_sound_can_be_tried_and_only_the_chime_switched_off(
     open_page: OpenPage,
 ) -> None:
     page = open_page(route="/settings")
+    # The page says how its sound is once it is wired.
+    expect(page.locator("#sound-state")).not_to_be_empty()
 
     page.locator("#sound-test").click()
     expect(page.locator("#sound-state")).to_contain_text("Sonando")
