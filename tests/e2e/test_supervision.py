@@ -132,6 +132,59 @@ def test_markup_in_a_note_is_text_on_every_page(
     assert evaluate(page, "() => window.probed ?? null") is None
 
 
+def test_an_operator_changes_the_rule_and_sees_its_version(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(390, 844, route="/settings")
+    radius = page.locator("#rule-new-radius")
+    expect(radius).to_have_value("2")
+    before = int(page.locator("#rule-version").inner_text())
+
+    radius.fill("2.5")
+    page.locator("#rule-form button").click()
+
+    expect(page.locator("#rule-radius")).to_have_text("2,5 m")
+    expect(page.locator("#rule-version")).to_have_text(str(before + 1))
+    expect(page.locator("#rule-note")).to_contain_text("por operator")
+    with stack.api() as api:
+        assert api.get("rule").json()["radius_m"] == 2.5
+
+
+def test_a_rule_that_somebody_else_has_changed_is_not_overwritten(
+    open_page: OpenPage,
+) -> None:
+    first = open_page(route="/settings", alone=True)
+    second = first.context.new_page()
+    second.goto(first.url)
+    for page in (first, second):
+        expect(page.locator("#rule-new-radius")).not_to_have_value("")
+
+    second.locator("#rule-new-radius").fill("3")
+    second.locator("#rule-form button").click()
+    expect(second.locator("#rule-result")).to_contain_text("Cambiada")
+    first.locator("#rule-new-radius").fill("4")
+    first.locator("#rule-form button").click()
+
+    expect(first.locator("#rule-result")).to_contain_text("Otra persona")
+    expect(first.locator("#rule-radius")).to_have_text("3,0 m")
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+def test_signing_out_ends_the_session(
+    open_page: OpenPage, stack: Site, width: int
+) -> None:
+    page = open_page(width, 900, route="/about", alone=True)
+    page.wait_for_selector("#sign-out:not([disabled])", state="attached")
+    page.locator("[data-opens=menu]:visible").first.click()
+
+    page.locator("#sign-out").click()
+
+    page.wait_for_url("**/signin")
+    assert page.locator("[data-stop]").count() == 0
+    answer = page.request.get(f"{stack.url}/api/v1/robots")
+    assert answer.status == 401
+
+
 def _newest_decision(stack: Site) -> str | None:
     with stack.api() as api:
         items = api.get("decisions", params={"limit": 1}).json()["items"]

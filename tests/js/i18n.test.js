@@ -53,6 +53,18 @@ test("a block answers for itself and for names that it lacks", async () => {
   equal(t("log.down.never_heard_of"), "bajó");
 });
 
+test("a person's number never reads as a priority", async () => {
+  const loaded = createWords(async () => ({
+    who: "{person:person}",
+    class: { person: "persona", track: { P: "persona {n}", R: "robot {n}" } },
+  }));
+  await loaded.use("es");
+  const said = ["P3", "R12", "person", "AGII"].map((person) =>
+    loaded.t("who", { person }),
+  );
+  equal(said, ["persona 3", "robot 12", "persona", "AGII"]);
+});
+
 test("a hole without a value shows that there is none", async () => {
   const { t } = await words("es");
   equal(t("plain", { a: null }), "— y —");

@@ -122,9 +122,16 @@ export function createWords(load) {
     hop: (value) => named("hop", value),
     drive: (value) => named("drive", value),
     lane: String,
-    person: (value) => named("class", value),
+    person: trackOf,
     sentence: (value, slots) => sentenceOf(value, slots),
   };
+
+  /** `P3` is a person's number in the house; on a page it would read as a priority.
+   * @param {unknown} value */
+  function trackOf(value) {
+    const [, kind, n] = /^([PR])(\d+)$/.exec(String(value)) ?? [];
+    return kind ? say(`class.track.${kind}`, { n }) : named("class", value);
+  }
 
   /** @param {any} value a key, or `{key, slots}` @param {Slots} slots */
   function sentenceOf(value, slots) {

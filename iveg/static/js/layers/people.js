@@ -13,6 +13,8 @@ import { circle, isolated, label } from "./paint.js";
  * @typedef {import("../scene.js").ScenePerson} ScenePerson
  */
 
+const WORDS_FROM_SCALE = 24;
+
 /** @param {Paint} paint */
 export function draw(paint) {
   for (const person of paint.scene.people) {
@@ -29,7 +31,10 @@ function drawPerson(paint, person) {
   else drawFigure(paint, person);
   if (person.stage === "seen") return;
   const isGone = person.stage === "last_seen";
-  const text = isGone ? words.lastSeen(person.ageS) : words.ago(person.ageS);
+  // From afar, sentences of several people would lie on each other.
+  const isNear = view.scale >= WORDS_FROM_SCALE;
+  const said = isGone ? words.lastSeen(person.ageS) : words.ago(person.ageS);
+  const text = isNear ? said : words.age(person.ageS);
   label(paint, text, 0, 20, { size: 11, colour: paint.theme.muted });
 }
 

@@ -3,9 +3,11 @@
  */
 
 import { readApi, sendApi } from "../api.js";
+import { dayAndTime } from "../history/madrid.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 
-/** @typedef {import("./settings.js").Rule} Rule */
+/** @typedef {import("./settings.js").Rule & {author?: string | null,
+ *   since?: string | null}} Rule */
 
 const WRITERS = new Set(["operator", "admin"]);
 
@@ -40,6 +42,7 @@ export function createRuleForm(words, onRule) {
       threshold.value = String(Math.round(found.confidence_threshold * 100));
       radius.value = String(found.radius_m);
     }
+    draw();
     onRule();
   }
 
@@ -57,18 +60,29 @@ export function createRuleForm(words, onRule) {
     const { status, body } = await sendApi("PUT", "rule", {
       confidence_threshold: threshold.valueAsNumber / 100,
       radius_m: radius.valueAsNumber,
+      // Numbers: the server tells a version that was overtaken by this one.
+      version: Number(rule?.version),
     });
     const isTaken = status === 200 && body;
     if (isTaken) take(body);
-    const why = String(body?.detail ?? status);
-    const said = isTaken
-      ? words.t("rule.saved", { version: body.version })
-      : words.t("rule.refused", { why });
-    setText(need("#rule-result"), said);
+    if (status === 409) await look();
+    setText(need("#rule-result"), resultOf(status, body));
+  }
+
+  /** @param {number} status @param {any} body */
+  function resultOf(status, body) {
+    if (status === 200 && body) return words.t("rule.saved", { version: body.version });
+    if (status === 409) return words.t("rule.stale");
+    if (status === 0) return words.t("rows.offline");
+    return words.t("rule.refused", { why: String(body?.detail ?? status) });
   }
 
   function draw() {
-    setText(need("#rule-note"), words.t(`rule.${note}`));
+    const since =
+      rule?.since && rule.author
+        ? words.t("rule.since", { at: dayAndTime(rule.since), who: rule.author })
+        : "";
+    setText(need("#rule-note"), `${words.t(`rule.${note}`)} ${since}`.trim());
   }
 
   form.addEventListener("submit", (event) => {

@@ -123,6 +123,7 @@ export function createMapbox(app, decision) {
   store.subscribe("climate", drawClimate);
   words.onChange(drawWords);
   drawWords();
+  for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
 
 /** @param {Person} person */

@@ -60,7 +60,7 @@ export function linesOf(person, words) {
   const { stage, ringM } = readPerson(person, performance.now());
   const { x, y } = person.position;
   const slots = {
-    person: person.class,
+    person: person.person_id,
     lane: person.lane,
     observers: person.observers.join(", "),
     age: ageOf(person),
@@ -75,8 +75,9 @@ export function linesOf(person, words) {
       distance: distance_m,
     }),
   );
+  const who = words.t(person.lane ? "people.who" : "people.who_free", slots);
   return [
-    words.t(person.lane ? "people.who" : "people.who_free", slots),
+    `${who[0].toUpperCase()}${who.slice(1)}`,
     words.t("people.where", slots),
     words.t(`people.${stage}`, slots),
     ...acts,

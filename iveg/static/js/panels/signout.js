@@ -6,10 +6,12 @@ import { need, setText } from "./dom.js";
 
 /** @param {import("../main.js").App} app */
 export function createSignOut({ words }) {
-  need("#sign-out").addEventListener("click", async () => {
+  const button = /** @type {HTMLButtonElement} */ (need("#sign-out"));
+  button.addEventListener("click", async () => {
     if (await signOut()) location.assign("/signin");
     else setText(need("#sign-out-note"), words.t("signout.failed"));
   });
+  button.disabled = false;
 }
 
 async function signOut() {

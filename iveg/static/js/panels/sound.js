@@ -16,7 +16,8 @@ export function createSoundPanel(words, tone) {
     tone.setChimes(others.checked);
     if (others.checked) tone.chime();
   });
-  need("#sound-test").addEventListener("click", () => {
+  const test = /** @type {HTMLButtonElement} */ (need("#sound-test"));
+  test.addEventListener("click", () => {
     said = tone.test() ? "played" : "blocked";
     draw();
   });
@@ -27,4 +28,5 @@ export function createSoundPanel(words, tone) {
 
   words.onChange(draw);
   draw();
+  test.disabled = others.disabled = false;
 }
