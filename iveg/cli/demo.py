@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from iveg.cli.running import run_until_told, sign_in_link
+from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings
 
 _log = logging.getLogger(__name__)
 _PATIENCE_S = 30.0
 _GRACE_S = 5.0
-_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +76,7 @@ def _on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settin
         )
     changes: dict[str, object] = {}
     for one in listeners:
-        if one.host not in _LOOPBACK and one.field != "port":
+        if one.host not in LOOPBACK and one.field != "port":
             raise SettingsError(one.variable, one.host, "an address on loopback")
         if _is_free(one.host, one.port):
             continue

@@ -19,13 +19,12 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.app import Dss, broker_of, create_app
-from iveg.cli.running import run_until_told, sign_in_link, tell_ready
+from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.settings import Settings
 
 _log = logging.getLogger(__name__)
 _LIVE_ROBOT_S = 10.0
-_LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _WS_MAX_BYTES = 65536
 
 
@@ -195,7 +194,7 @@ async def _refuse_replay(options: argparse.Namespace, settings: Settings) -> Non
     if options.force:
         return
     host = broker_of(settings).host
-    if host not in _LOOPBACK:
+    if host not in LOOPBACK:
         raise DataFileError(
             "IVEG_MQTT_URL", host, "is not on loopback; --force if that is meant"
         )

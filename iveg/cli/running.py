@@ -16,6 +16,8 @@ import uvloop
 
 from iveg.settings import Settings
 
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+
 
 def run_until_told(work: Coroutine[Any, Any, None], *, until_eof: bool = False) -> int:
     """Run to the end or to the first signal; returns the exit code."""

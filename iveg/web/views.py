@@ -3,7 +3,6 @@
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
-from datetime import UTC, datetime
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +19,7 @@ from iveg.domain.profiles import profile_of
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import FRESH_S, Command, StopMachine
 from iveg.domain.world import RobotState, World
+from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.web import schemas
@@ -27,12 +27,7 @@ from iveg.web import schemas
 
 def iso(wall: float | None) -> str | None:
     """Unix seconds as ISO-8601 UTC with milliseconds."""
-    return None if wall is None else _iso(wall)
-
-
-def _iso(wall: float) -> str:
-    text = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds")
-    return text.removesuffix("+00:00") + "Z"
+    return None if wall is None else format_stamp(wall)
 
 
 class Views:
@@ -170,8 +165,8 @@ class Views:
                 (radius for _, radius in person.rings(rule, now)), default=None
             ),
             "confidence": newest.confidence,
-            "first_seen": _iso(person.first_seen.wall),
-            "last_seen": _iso(newest.at.wall),
+            "first_seen": format_stamp(person.first_seen.wall),
+            "last_seen": format_stamp(newest.at.wall),
             "age_s": round(age, 3),
             "observers": [
                 name
@@ -244,8 +239,10 @@ class Views:
             "requested_by": command.requesters[0],
             "requesters": list(command.requesters),
             "times": {
-                "pressed": None if times.pressed is None else _iso(times.pressed),
-                "requested": _iso(times.requested.wall),
+                "pressed": None
+                if times.pressed is None
+                else format_stamp(times.pressed),
+                "requested": format_stamp(times.requested.wall),
                 "sent_fiware": _moment(times.sent_fiware),
                 "sent_direct": _moment(times.sent_direct),
                 "answer_fiware": _moment(times.answer_fiware),
@@ -299,7 +296,7 @@ class Views:
             "temperature": climate.temperature,
             "relative_humidity": climate.relative_humidity,
             "co2": climate.co2,
-            "received_at": _iso(received.wall),
+            "received_at": format_stamp(received.wall),
             "age_s": round(now.mono - received.mono, 3),
         }
 
@@ -349,7 +346,7 @@ def alert(alarm: Alarm) -> schemas.AlertJson:
         "key": condition.key,
         "slots": dict(condition.slots),
         "robot_id": condition.robot_id,
-        "raised_at": _iso(alarm.raised.wall),
+        "raised_at": format_stamp(alarm.raised.wall),
         "cleared_at": _moment(alarm.cleared),
         "acknowledged_at": _moment(alarm.acknowledged),
         "acknowledged_by": alarm.acknowledged_by,
@@ -362,7 +359,7 @@ def log_line(line: LogRecord) -> schemas.LogJson:
     """One log line."""
     return {
         "id": line.id,
-        "at": _iso(line.at),
+        "at": format_stamp(line.at),
         "kind": line.kind,
         "robot_id": line.robot_id,
         "key": line.key,
@@ -438,7 +435,7 @@ def _margin(margin: Margin | None) -> schemas.MarginJson | None:
 
 
 def _moment(at: Instant | None) -> str | None:
-    return None if at is None else _iso(at.wall)
+    return None if at is None else format_stamp(at.wall)
 
 
 def _round(value: float | None) -> float | None:
