@@ -552,4 +552,4 @@ def test_how_far_it_may_have_driven_grows_with_its_last_speed() -> None:
 
 def test_an_illegal_step_says_where_it_stood_and_what_was_asked() -> None:
     with pytest.raises(CommandRefusedError, match=r"READY.*RUNNING"):
-        Bench().machine._enter("READY", "ready")
+        Bench().machine.enter("READY", "ready")
