@@ -1,0 +1,61 @@
+"""Between the wire and the domain, both ways, without I/O.
+
+``read_…`` takes bytes to observations; ``write_…`` is its inverse.
+"""
+
+from iveg.ngsi.codec.attributes import read_attributes
+from iveg.ngsi.codec.commands import (
+    write_command,
+    write_desired,
+    write_release,
+    write_resume,
+    write_stop,
+)
+from iveg.ngsi.codec.door import MAX_DEPTH, Problem, Reading, load_json
+from iveg.ngsi.codec.feedback import read_feedback, write_feedback
+from iveg.ngsi.codec.fields import format_stamp, parse_stamp
+from iveg.ngsi.codec.incoming import (
+    read_answer,
+    read_entity,
+    read_measure,
+    read_notification,
+)
+from iveg.ngsi.codec.reports import (
+    write_answer,
+    write_canary,
+    write_climate,
+    write_detections,
+    write_navigation,
+    write_odometry,
+    write_safety,
+    write_scan,
+)
+
+__all__ = [
+    "MAX_DEPTH",
+    "Problem",
+    "Reading",
+    "format_stamp",
+    "load_json",
+    "parse_stamp",
+    "read_answer",
+    "read_attributes",
+    "read_entity",
+    "read_feedback",
+    "read_measure",
+    "read_notification",
+    "write_answer",
+    "write_canary",
+    "write_climate",
+    "write_command",
+    "write_desired",
+    "write_detections",
+    "write_feedback",
+    "write_navigation",
+    "write_odometry",
+    "write_release",
+    "write_resume",
+    "write_safety",
+    "write_scan",
+    "write_stop",
+]

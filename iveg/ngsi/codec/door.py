@@ -1,0 +1,85 @@
+"""What a stranger sends: JSON that may be hostile, and what could not be read."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import orjson
+from pydantic import ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import Observation
+from iveg.ngsi import payloads
+
+MAX_DEPTH = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something that could not be read.
+
+    Attributes:
+        source: Robot, device or subscription that it came from.
+        reason: A short, stable code to count by.
+        detail: For the one log line.
+    """
+
+    source: str
+    reason: str
+    detail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a message held: what could be read and what could not."""
+
+    observations: tuple[Observation, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+
+def load_json(body: bytes | str) -> Any:
+    """Parse JSON that may be hostile.
+
+    Raises:
+        UnreadableError: not JSON (NaN and Infinity are not), or deeper than 32.
+    """
+    try:
+        value = orjson.loads(body)
+    except orjson.JSONDecodeError as error:
+        raise UnreadableError("not_json", str(error)) from error
+    if _deeper_than(value, MAX_DEPTH):
+        raise UnreadableError("too_deep", f"more than {MAX_DEPTH} levels")
+    return value
+
+
+def _deeper_than(value: Any, limit: int) -> bool:
+    if isinstance(value, dict):
+        value = value.values()
+    elif isinstance(value, list):
+        if value and type(value[0]) in (float, int):
+            value = [part for part in value if type(part) in (dict, list)]
+    else:
+        return False
+    return limit == 0 or any(_deeper_than(part, limit - 1) for part in value)
+
+
+def unread(source: str, reason: str, detail: str = "") -> Reading:
+    """A reading that is one problem."""
+    return Reading(problems=(Problem(source, reason, detail),))
+
+
+def merge(readings: Iterable[Reading]) -> Reading:
+    """Several readings as one, in order."""
+    observations: list[Observation] = []
+    problems: list[Problem] = []
+    for reading in readings:
+        observations.extend(reading.observations)
+        problems.extend(reading.problems)
+    return Reading(tuple(observations), tuple(problems))
+
+
+def first_complaint(error: ValidationError) -> str:
+    """The first complaint of pydantic, without echoing the input."""
+    complaint = error.errors(include_input=False, include_url=False)[0]
+    place = ".".join(str(part) for part in complaint["loc"])
+    return payloads.clean_text(f"{place}: {complaint['msg']}")

@@ -1,0 +1,118 @@
+"""The feedback that iVeg publishes for the fleet, both ways."""
+
+from typing import Any
+
+import orjson
+from pydantic import ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.ngsi import payloads
+from iveg.ngsi.codec.door import first_complaint, load_json
+from iveg.ngsi.codec.fields import read_origin, rounded, without_none, write_origin
+
+
+def read_feedback(payload: bytes) -> Feedback:
+    """Read ``/{robot}/mqtt_feedback``.
+
+    Raises:
+        UnreadableError: not a feedback; counts as no feedback (safety.md §3.5).
+    """
+    try:
+        value = payloads.FeedbackValue.model_validate(load_json(payload))
+    except ValidationError as error:
+        raise UnreadableError("not_feedback", first_complaint(error)) from error
+    pose = value.robot_pose
+    return Feedback(
+        value.robot_id,
+        read_origin(value),
+        None if value.alert is None else _alert(value.alert),
+        tuple(_alert(alert) for alert in value.alerts),
+        None if pose is None else Pose2D(pose.x, pose.y, pose.yaw),
+        None if pose is None else Twist2D(pose.linear_velocity, pose.angular_velocity),
+        None if pose is None else pose.stamp,
+        {
+            robot_id: Mandate(
+                mandate.speed_factor,
+                mandate.reason,
+                mandate.cause,
+                mandate.distance_m,
+                mandate.decision_id,
+            )
+            for robot_id, mandate in value.mandates.items()
+        },
+        value.seen,
+    )
+
+
+def _alert(value: payloads.AlertValue) -> FeedbackAlert:
+    position = value.position
+    return FeedbackAlert(
+        value.decision_id or "",
+        value.stamp or "",
+        value.class_,
+        value.class_id,
+        value.conf,
+        None if position is None else (position.x, position.y, position.z),
+        value.radius_m,
+        value.observer,
+    )
+
+
+def write_feedback(feedback: Feedback) -> bytes:
+    """The bytes of ``/{robot}/mqtt_feedback``."""
+    return orjson.dumps(
+        {
+            **write_origin(feedback.origin),
+            "robot_id": feedback.robot_id,
+            "alert": None if feedback.alert is None else _write_alert(feedback.alert),
+            "alerts": [_write_alert(alert) for alert in feedback.alerts],
+            "robot_pose": _write_feedback_pose(feedback),
+            "mandates": {
+                robot_id: without_none(
+                    {
+                        "speed_factor": mandate.speed_factor,
+                        "reason": mandate.reason,
+                        "cause": mandate.cause,
+                        "distance_m": rounded(mandate.distance_m),
+                        "decision_id": mandate.decision_id,
+                    }
+                )
+                for robot_id, mandate in feedback.mandates.items()
+            },
+            "seen": dict(feedback.seen),
+        }
+    )
+
+
+def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:
+    position = alert.position
+    return without_none(
+        {
+            "decision_id": alert.decision_id or None,
+            "class": alert.class_,
+            "class_id": alert.class_id,
+            "conf": rounded(alert.confidence),
+            "position": None
+            if position is None
+            else dict(zip("xyz", map(rounded, position), strict=True)),
+            "radius_m": rounded(alert.radius_m),
+            "stamp": alert.stamp,
+            "observer": alert.observer,
+        }
+    )
+
+
+def _write_feedback_pose(feedback: Feedback) -> dict[str, Any] | None:
+    if feedback.pose is None:
+        return None
+    twist = feedback.twist or Twist2D(0.0, 0.0)
+    return {
+        "x": feedback.pose.x,
+        "y": feedback.pose.y,
+        "yaw": feedback.pose.yaw,
+        "linear_velocity": twist.linear_x,
+        "angular_velocity": twist.angular_z,
+        "stamp": feedback.pose_stamp,
+    }

@@ -1,0 +1,56 @@
+"""Fields that several messages share: who said it and when, holds, round numbers."""
+
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import Any
+
+from iveg.domain.observations import Hold, Origin
+from iveg.ngsi import payloads
+
+
+def format_stamp(wall: float) -> str:
+    """Unix seconds as the contract's ISO-8601 UTC with milliseconds."""
+    stamp = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds")
+    return stamp.removesuffix("+00:00") + "Z"
+
+
+def parse_stamp(text: str) -> float | None:
+    """Unix seconds of an ISO-8601 text; None where it is none."""
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    if moment.tzinfo is None:
+        moment = moment.replace(tzinfo=UTC)
+    return moment.timestamp()
+
+
+def read_origin(value: payloads.OriginFields) -> Origin:
+    """Which boot, which message, when."""
+    stamp_s = None if value.stamp is None else parse_stamp(value.stamp)
+    return Origin(value.boot, value.seq, value.stamp, stamp_s)
+
+
+def write_origin(origin: Origin) -> dict[str, Any]:
+    """The inverse of :func:`read_origin`."""
+    return {"boot": origin.boot, "seq": origin.seq, "stamp": origin.stamp}
+
+
+def read_holds(values: Iterable[payloads.HoldValue]) -> tuple[Hold, ...]:
+    """Why a robot may not move."""
+    return tuple(Hold(value.id, value.source, value.ack) for value in values)
+
+
+def write_hold(hold: Hold) -> dict[str, str]:
+    """One hold of a robot's report."""
+    return {"id": hold.id, "source": hold.source, "ack": hold.ack}
+
+
+def rounded(value: float | None) -> float | None:
+    """To a tenth of a millimetre, or of a thousandth."""
+    return None if value is None else round(value, 4)
+
+
+def without_none(fields: dict[str, Any]) -> dict[str, Any]:
+    """Only what is known: absent, never ``null``."""
+    return {name: value for name, value in fields.items() if value is not None}

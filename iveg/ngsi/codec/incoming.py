@@ -1,0 +1,95 @@
+"""From Orion's notifications and the robots' topics to observations.
+
+A part that cannot be read becomes a ``Problem`` beside its neighbours and never hurts
+them.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from iveg.domain.errors import UnreadableError
+from iveg.ngsi import names, payloads
+from iveg.ngsi.codec.attributes import (
+    canary,
+    climate,
+    command_answer,
+    read_attributes,
+    read_one,
+)
+from iveg.ngsi.codec.door import Reading, first_complaint, load_json, merge, unread
+
+
+def read_notification(body: bytes) -> tuple[str, Reading]:
+    """Read a notification, normalized or keyValues.
+
+    Returns:
+        The subscription's id and what its entities hold.
+
+    Raises:
+        UnreadableError: not a notification at all.
+    """
+    try:
+        notification = payloads.NotificationValue.model_validate(load_json(body))
+    except ValidationError as error:
+        raise UnreadableError("not_a_notification", first_complaint(error)) from error
+    return notification.subscriptionId, merge(
+        read_entity(entity) for entity in notification.data
+    )
+
+
+def read_entity(entity: Mapping[str, Any]) -> Reading:
+    """Read one NGSI-v2 entity in either representation."""
+    entity_id, entity_type = entity.get("id"), entity.get("type")
+    if not isinstance(entity_id, str) or not isinstance(entity_type, str):
+        return unread("?", "not_an_entity", "an entity needs id and type")
+    attributes = {
+        name: _attribute_value(value)
+        for name, value in entity.items()
+        if name not in ("id", "type")
+    }
+    if entity_type == names.ROBOT_TYPE:
+        if not names.is_robot_id(entity_id):
+            return unread(payloads.clean_text(entity_id), "bad_robot_id")
+        return read_attributes(entity_id, attributes)
+    if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
+        return read_one(entity_id, climate, attributes)
+    if (entity_id, entity_type) == (names.CANARY_ID, names.CANARY_TYPE):
+        return read_one(entity_id, canary, attributes)
+    return unread(
+        payloads.clean_text(entity_id),
+        "foreign_entity",
+        payloads.clean_text(entity_type),
+    )
+
+
+def _attribute_value(attribute: Any) -> Any:
+    if isinstance(attribute, dict) and "value" in attribute and "type" in attribute:
+        return attribute["value"]
+    return attribute
+
+
+def read_measure(device_id: str, payload: bytes) -> Reading:
+    """Read what a robot's device published on its ``attrs`` topic."""
+    robot_id = names.robot_of_device(device_id)
+    if not names.is_robot_id(robot_id):
+        return unread(payloads.clean_text(device_id), "bad_robot_id")
+    try:
+        attributes = load_json(payload)
+    except UnreadableError as error:
+        return unread(device_id, error.reason, error.detail)
+    if not isinstance(attributes, dict):
+        return unread(device_id, "not_an_object")
+    return read_attributes(robot_id, attributes)
+
+
+def read_answer(robot_id: str, payload: bytes) -> Reading:
+    """Read a robot's answer on its ``cmdexe`` topic."""
+    try:
+        value = load_json(payload)
+    except UnreadableError as error:
+        return unread(robot_id, error.reason, error.detail)
+    if not isinstance(value, dict):
+        return unread(robot_id, "not_an_object")
+    return read_one(robot_id, command_answer, value, names.COMMAND)

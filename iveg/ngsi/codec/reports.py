@@ -1,0 +1,159 @@
+"""What robots and sensors publish; the inverse of the readers."""
+
+from typing import Any
+
+import numpy as np
+import orjson
+
+from iveg.domain.observations import (
+    Climate,
+    CommandAnswer,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+    SafetyReport,
+)
+from iveg.ngsi import names
+from iveg.ngsi.codec.fields import rounded, without_none, write_hold, write_origin
+
+
+def write_odometry(value: Odometry) -> bytes:
+    """The bytes of ``/{apikey}/{robot}_odom/attrs``."""
+    return _measure(
+        value.origin,
+        {
+            names.ODOMETRY: {
+                "x": round(value.pose.x, 4),
+                "y": round(value.pose.y, 4),
+                "yaw": round(value.pose.yaw, 5),
+                "linear_velocity": round(value.twist.linear_x, 4),
+                "angular_velocity": round(value.twist.angular_z, 4),
+                **write_origin(value.origin),
+            }
+        },
+    )
+
+
+def write_scan(value: LaserScan) -> bytes:
+    """The bytes of ``/{apikey}/{robot}_lidar2D/attrs``; no return is ``null``."""
+    return _measure(
+        value.origin,
+        {
+            names.LIDAR: np.round(value.ranges.astype(np.float64), 3),
+            names.LIDAR_HEADER: {
+                "angle_min": value.angle_min,
+                "angle_increment": value.angle_increment,
+                "range_min": value.range_min,
+                "range_max": value.range_max,
+                "x": value.mount.x,
+                "y": value.mount.y,
+                "yaw": value.mount.yaw,
+                **write_origin(value.origin),
+            },
+        },
+    )
+
+
+def write_detections(value: DetectionFrame) -> bytes:
+    """The bytes of ``/{apikey}/{robot}_yolox_bounding_boxes/attrs``."""
+    boxes = [
+        without_none(
+            {
+                "class_id": detection.class_id,
+                "probability": round(detection.probability, 4),
+                "position": {
+                    side: round(getattr(detection.box, side), 4)
+                    for side in ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
+                },
+                "frame_id": detection.frame_id,
+                "det_id": detection.det_id,
+            }
+        )
+        for detection in value.detections
+    ]
+    return _measure(
+        value.origin,
+        {names.BOXES: boxes, names.BOXES_HEADER: write_origin(value.origin)},
+    )
+
+
+def write_safety(value: SafetyReport) -> bytes:
+    """The bytes of ``/{apikey}/{robot}_safety/attrs``."""
+    return _measure(
+        value.origin,
+        {
+            names.SAFETY: {
+                "speed_factor": value.speed_factor,
+                "reason": value.reason,
+                "cause": value.cause,
+                "decision_id": value.decision_id,
+                "holds": [write_hold(hold) for hold in value.holds],
+                "released": list(value.released),
+                "ch": value.challenge,
+                "v": round(value.linear, 4),
+                "w": round(value.angular, 4),
+                "feedback_age_s": rounded(value.feedback_age_s),
+                **write_origin(value.origin),
+            }
+        },
+    )
+
+
+def write_navigation(value: Navigation) -> bytes:
+    """The bytes of ``/{apikey}/{robot}_nav/attrs``."""
+    return _measure(
+        value.origin,
+        {
+            names.NAVIGATION: {
+                "task": value.task,
+                "goal": None
+                if value.goal is None
+                else {"x": round(value.goal[0], 3), "y": round(value.goal[1], 3)},
+                "path": [[round(x, 3), round(y, 3)] for x, y in value.path],
+                **write_origin(value.origin),
+            }
+        },
+    )
+
+
+def write_answer(value: CommandAnswer) -> bytes:
+    """The bytes of ``/{apikey}/{robot}/cmdexe``."""
+    return orjson.dumps(
+        {
+            names.COMMAND: {
+                "id": value.id,
+                "r": value.result,
+                "holds": [write_hold(hold) for hold in value.holds],
+                "ch": value.challenge,
+                "v": round(value.linear, 4),
+                "boot": value.origin.boot,
+                "seq": value.origin.seq,
+                "why": value.why,
+            }
+        }
+    )
+
+
+def write_climate(value: Climate, stamp: str) -> bytes:
+    """The bytes of ``/{apikey}/climate/attrs``."""
+    return orjson.dumps(
+        {
+            "temperature": value.temperature,
+            "relativeHumidity": value.relative_humidity,
+            "co2": value.co2,
+            "TimeInstant": stamp,
+        }
+    )
+
+
+def write_canary(origin: Origin) -> bytes:
+    """The bytes of ``/{apikey}/iveg-canary/attrs``."""
+    return _measure(origin, {"probe": write_origin(origin)})
+
+
+def _measure(origin: Origin, attributes: dict[str, Any]) -> bytes:
+    if origin.stamp is not None:
+        attributes["TimeInstant"] = origin.stamp
+    return orjson.dumps(attributes, option=orjson.OPT_SERIALIZE_NUMPY)
