@@ -70,9 +70,14 @@ Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
 
 
 class ContextBroker:
-    """Entities, subscriptions and registrations of all tenants."""
+    """Entities, subscriptions and registrations of all tenants.
 
-    def __init__(self) -> None:
+    Args:
+        started: When it came up (s, Unix time).
+    """
+
+    def __init__(self, started: float) -> None:
+        self.started = started
         self._tenants: dict[str, Tenant] = {}
         self.outbox = Outbox(lambda: clock.now().wall)
 

@@ -14,6 +14,7 @@ from http import HTTPStatus
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 import httptools
+import orjson
 
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
@@ -45,6 +46,11 @@ class Response:
     body: bytes = b""
     headers: dict[str, str] = field(default_factory=dict)
     content_type: str = "application/json"
+
+
+def json_response(value: object, status: int = 200) -> Response:
+    """An answer in JSON."""
+    return Response(status, orjson.dumps(value))
 
 
 Handler = Callable[[Request], Awaitable[Response]]

@@ -67,10 +67,10 @@ async def embedded_fiware(
     iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
     async with AsyncExitStack() as stack:
         south = await stack.enter_async_context(mqtt_broker(*mqtt))
-        broker = ContextBroker()
+        broker = ContextBroker(clock.now().wall)
         stack.callback(broker.close)
         agent = IotAgent(broker, south)
-        api = NgsiApi(broker, clock.now().wall)
+        api = NgsiApi(broker)
         orion_port = await stack.enter_async_context(
             http_server(api.handle, orion_host, orion[1])
         )
