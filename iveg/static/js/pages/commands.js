@@ -3,7 +3,8 @@
  */
 
 import { dayAndTime } from "../history/madrid.js";
-import { make, need, setText } from "../panels/dom.js";
+import { all, make, need, needPart, setText } from "../panels/dom.js";
+import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
 import { summaryOf, tookOf } from "./latency.js";
 import { createChips, createRows, soon } from "./rows.js";
 
@@ -20,9 +21,58 @@ export function start({ store, words }) {
     admits: ({ kind }) => isChosen(kind),
     onItems: (items) => drawSummary(items, words),
   });
-  store.subscribe("commands/", soon(rows.load));
-  store.subscribe("snapshot", soon(rows.load));
-  rows.load();
+  const drills = createDrills(store, words);
+  function load() {
+    rows.load();
+    drills.load();
+  }
+  store.subscribe("commands/", soon(load));
+  store.subscribe("snapshot", soon(load));
+  store.subscribe("alerts", drills.draw);
+  words.onChange(drills.draw);
+  load();
+}
+
+/**
+ * Each robot's last drill, for the sheet that somebody signs.
+ *
+ * @param {import("../store.js").Store} store
+ * @param {Words} words
+ */
+function createDrills(store, words) {
+  /** @typedef {Awaited<ReturnType<typeof readLast>>} Read */
+  const lines = all("[data-drills-of]");
+  /** @type {Map<HTMLElement, Read>} */
+  const read = new Map();
+
+  /** @param {HTMLElement} line */
+  function drawLine(line) {
+    const { last, status } = read.get(line) ?? { last: null, status: 0 };
+    const missing =
+      status === 200 ? words.t("drill.never") : words.t("drill.unread", { status });
+    const result = last ? verdictSaid(last, words) : missing;
+    setText(needPart("at", line), dayAndTime(last?.drilled_at ?? null));
+    setText(needPart("by", line), last?.by ?? "—");
+    setText(needPart("result", line), read.has(line) ? result : "—");
+    drawDue(needPart("due", line), String(line.dataset.drillsOf), store, words);
+  }
+
+  const draw = () => {
+    for (const line of lines) drawLine(line);
+  };
+
+  async function load() {
+    await Promise.all(
+      lines.map(async (line) => {
+        const found = await readLast(String(line.dataset.drillsOf));
+        // What was read stays when the server is gone: it is the past, and stays true.
+        if (found.status === 200 || !read.has(line)) read.set(line, found);
+      }),
+    );
+    draw();
+  }
+
+  return { load, draw };
 }
 
 /** @param {import("./latency.js").Order} command @param {Words} words */

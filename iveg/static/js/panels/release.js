@@ -135,7 +135,7 @@ export function createRelease(app, card, robotId) {
     send("release", { holds: (shown?.holds ?? []).map(({ id }) => id) });
   });
   resumeButton.addEventListener("click", () => send("resume", {}));
-  return { draw };
+  return { draw, factsOf };
 }
 
 /**
@@ -165,8 +165,8 @@ export function whyNotResume(facts) {
   return robot.mode === "STOPPED" ? "ok" : "not_ready";
 }
 
-/** @param {Facts} facts */
-function whyNotAtAll({ isConnected, role, ageS }) {
+/** What keeps anybody from asking for anything, or null. @param {Facts} facts */
+export function whyNotAtAll({ isConnected, role, ageS }) {
   if (!isConnected) return "no_link";
   if (!RELEASERS.has(role)) return "role";
   return ageS > FRESH_S ? "not_fresh" : null;

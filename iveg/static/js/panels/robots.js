@@ -6,6 +6,7 @@
 
 import { ageOf, linkOfRobot } from "../clock.js";
 import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
+import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
 import { createRelease } from "./release.js";
 
@@ -78,6 +79,7 @@ function createCard(app, card) {
   const gauge = createGauge();
   needPart("gauge", card).append(gauge.svg);
   const release = createRelease(app, card, robotId);
+  const drill = createDrill(app, card, robotId);
   const menu = needPart("menu", card);
   const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
   menu.addEventListener("click", (event) => {
@@ -113,6 +115,7 @@ function createCard(app, card) {
     drawMargin(robot?.margin ?? null);
     drawTask(robot);
     release.draw(robot);
+    drill.draw(release.factsOf(robot));
   }
 
   /** @param {Robot | undefined} robot */

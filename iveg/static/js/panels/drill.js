@@ -1,0 +1,165 @@
+/**
+ * A drill: STOP pressed on a robot that stands or creeps, to prove that STOP works.
+ *
+ * One tap, because it can only make a robot stand.  What it shows is the life of that
+ * very STOP, and what the history keeps of the last one.
+ */
+
+import { readApi, sendApi } from "../api.js";
+import { dayAndTime } from "../history/madrid.js";
+import { need, needPart, setHidden, setText } from "./dom.js";
+import { whyNotAtAll } from "./release.js";
+import { since } from "./stop_view.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../i18n.js").Words} Words */
+/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("./release.js").Facts} Facts */
+/**
+ * @typedef {{robot_id: string, drilled_at: string, by: string, passed: boolean | null,
+ *   standstill_ms: number | null}} Drill one of GET /drills
+ */
+
+/** At most this fast a robot may be stopped for a drill (m/s), as the server has it. */
+const CREEP_M_S = 0.2;
+/** Press to standing (safety 2.4). */
+const DEADLINE_MS = 5000;
+const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
+
+/**
+ * @param {App} app
+ * @param {HTMLElement} card
+ * @param {string} robotId
+ */
+export function createDrill({ store, words, line }, card, robotId) {
+  const button = /** @type {HTMLButtonElement} */ (need("[data-drill]", card));
+  const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
+  /** @type {Drill | null} */
+  let last = null;
+  let readStatus = 0;
+  let refused = 0;
+  let isBusy = false;
+  /** What the history held when it was read last. @type {string | null} */
+  let readFor = null;
+
+  /** @param {Facts} facts */
+  function draw(facts) {
+    if (!panel.open) {
+      readFor = null;
+      refused = 0;
+      return;
+    }
+    const why = isBusy ? "busy" : whyNotDrill(facts);
+    button.disabled = why !== "ok";
+    setText(needPart("drill-why", card), words.t(`drill.why.${why}`));
+    setText(needPart("drill-words", card), words.t("drill.button", { robot: robotId }));
+    const command = facts.command?.drill ? facts.command : undefined;
+    setText(needPart("drill-result", card), resultSaid(command));
+    setText(needPart("drill-last", card), lastSaid());
+    drawDue(needPart("drill-due", card), robotId, store, words);
+    readOnce(command);
+  }
+
+  /** @param {Command | undefined} command */
+  function resultSaid(command) {
+    if (refused) {
+      const known = `drill.refused.${refused}`;
+      const key = words.has(known) ? known : "drill.refused.other";
+      return words.t(key, { status: refused });
+    }
+    if (!command) return "";
+    const ageMs = 1000 * since(command.times.requested, line.serverNow());
+    const key = progressOf(command, ageMs);
+    const state = words.t(`history.state.${command.state}`);
+    const said = words.t(key, { state, ms: command.standstill_ms });
+    return key === "drill.running" ? said : `${said} ${words.t("drill.held")}`;
+  }
+
+  function lastSaid() {
+    if (readStatus === 0) return "";
+    if (readStatus !== 200) return words.t("drill.unread", { status: readStatus });
+    return last
+      ? words.t("drill.last", {
+          at: dayAndTime(last.drilled_at),
+          by: last.by,
+          result: verdictSaid(last, words),
+        })
+      : words.t("drill.never");
+  }
+
+  /** When the panel opens, and when a drill has moved on. @param {Command} [command] */
+  async function readOnce(command) {
+    const isNow = command ? `${command.command_id} ${command.state}` : "";
+    if (readFor === isNow) return;
+    readFor = isNow;
+    ({ status: readStatus, last } = await readLast(robotId));
+  }
+
+  button.addEventListener("click", async () => {
+    isBusy = true;
+    button.disabled = true;
+    const path = `robots/${encodeURIComponent(robotId)}/drill`;
+    const { status } = await sendApi("POST", path, { pressed_at: line.serverNow() });
+    isBusy = false;
+    refused = status === 202 ? 0 : status;
+  });
+  return { draw };
+}
+
+/**
+ * Says so when a robot's last drill is too long ago: the server's own reminder.
+ *
+ * @param {HTMLElement} place
+ * @param {string} robotId
+ * @param {import("../store.js").Store} store
+ * @param {Words} words
+ */
+export function drawDue(place, robotId, store, words) {
+  /** @type {import("../protocol.js").Alert[]} */
+  const alerts = store.get("alerts") ?? [];
+  const due = alerts.find(
+    ({ key, robot_id }) => key === "alert.drill_due" && robot_id === robotId,
+  );
+  setHidden(place, !due);
+  if (due) setText(place, words.t(due.key, due.slots));
+}
+
+/**
+ * The newest drill of a robot in the history.
+ *
+ * @param {string} robotId
+ * @returns {Promise<{status: number, last: Drill | null}>}
+ */
+export async function readLast(robotId) {
+  const query = `robot=${encodeURIComponent(robotId)}`;
+  const { status, body } = await readApi(`drills?${query}`);
+  return { status, last: status === 200 ? (body.items[0] ?? null) : null };
+}
+
+/** Key of the reason why no drill can be done now, or `ok`. @param {Facts} facts */
+export function whyNotDrill(facts) {
+  const common = whyNotAtAll(facts);
+  if (common) return common;
+  if (facts.command) return "stopped";
+  const speed = Math.abs(facts.robot?.twist?.linear ?? Number.POSITIVE_INFINITY);
+  return speed <= CREEP_M_S ? "ok" : "moving";
+}
+
+/**
+ * Key of what a drill that is going on has come to.
+ *
+ * @param {Command} command
+ * @param {number} ageMs since it was asked for
+ */
+export function progressOf({ state, standstill_ms: ms }, ageMs) {
+  if (ms !== null) return ms <= DEADLINE_MS ? "drill.passed" : "drill.slow";
+  const isOver = LOUD.has(state) && ageMs > DEADLINE_MS;
+  return isOver ? "drill.failed" : "drill.running";
+}
+
+/** What the history says of a drill. @param {Drill} drill @param {Words} words */
+export function verdictSaid({ passed, standstill_ms: ms }, words) {
+  if (passed === null) return words.t("drill.unknown");
+  if (passed) return words.t("drill.passed", { ms });
+  return ms === null ? words.t("drill.failed") : words.t("drill.slow", { ms });
+}
