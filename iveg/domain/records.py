@@ -192,6 +192,20 @@ class OdometryRecord:
     link: str | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClimateRecord:
+    """One reading of the air in the greenhouse; None where a sensor was silent.
+
+    Attributes:
+        temperature: (°C); ``relative_humidity`` 0 to 1; ``co2`` (ppm).
+    """
+
+    at: float
+    temperature: float | None = None
+    relative_humidity: float | None = None
+    co2: float | None = None
+
+
 Record = (
     DecisionRecord
     | DetectionRecord
@@ -200,6 +214,7 @@ Record = (
     | AlertRecord
     | LogRecord
     | OdometryRecord
+    | ClimateRecord
 )
 RECORD_TYPES: tuple[type[Record], ...] = (
     DecisionRecord,
@@ -209,9 +224,10 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     AlertRecord,
     LogRecord,
     OdometryRecord,
+    ClimateRecord,
 )
 
 
 def is_telemetry(record: Record) -> bool:
     """Whether a record may be dropped under pressure; the others never are."""
-    return isinstance(record, OdometryRecord | DetectionRecord)
+    return isinstance(record, OdometryRecord | DetectionRecord | ClimateRecord)

@@ -8,6 +8,7 @@ axis shows, and the page puts the words in the reader's language.
 import gzip
 import hashlib
 import importlib.resources
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +16,7 @@ from itertools import pairwise
 
 from iveg.adapters.history.series import (
     CONFIDENCE_BINS,
+    ClimateSeries,
     CommandLatency,
     ConfidenceCount,
     SpeedSeries,
@@ -24,6 +26,8 @@ from iveg.domain.profiles import profile_of
 _Trace = Mapping[str, object]
 
 _SILENCE_S = 5.0
+_AIR_SILENCE_S = 300.0
+_STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
 _BIN = 1.0 / CONFIDENCE_BINS
 
 
@@ -79,6 +83,21 @@ def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
     return _figure(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
 
 
+def climate_figures(series: ClimateSeries) -> dict[str, bytes]:
+    """Temperature (°C), relative humidity (%) and CO₂ (ppm) over time, as JSON.
+
+    A figure is empty where its sensor was silent all along; lines break where nothing
+    was heard for five minutes.
+    """
+    humidity = [None if h is None else 100.0 * h for h in series.relative_humidity]
+    values: dict[str, Sequence[float | None]] = {
+        "temperature": series.temperature,
+        "humidity": humidity,
+        "co2": series.co2,
+    }
+    return {kind: _climate_figure(series, kind, y) for kind, y in values.items()}
+
+
 @dataclass(frozen=True, slots=True)
 class Library:
     """Plotly for the browser.
@@ -86,10 +105,13 @@ class Library:
     Attributes:
         name: Changes with the content, so that a browser may keep it for good.
         packed: The script, gzipped.
+        style_ids: Style elements that it makes unless one of that id is there; a page
+            whose policy refuses them has to put something in their place first.
     """
 
     name: str
     packed: bytes
+    style_ids: tuple[str, ...] = ()
 
 
 @cache
@@ -98,7 +120,14 @@ def library() -> Library:
     data = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
     script = data.read_bytes()
     digest = hashlib.sha256(script).hexdigest()[:16]
-    return Library(f"plotly-{digest}.min.js", gzip.compress(script, 6, mtime=0))
+    style_ids = ("plotly.js-style-global", *map(bytes.decode, _ids_in(script)))
+    packed = gzip.compress(script, 6, mtime=0)
+    return Library(f"plotly-{digest}.min.js", packed, style_ids)
+
+
+def _ids_in(script: bytes) -> list[bytes]:
+    """Of the sheets that parts of the library bring along, named by their hash."""
+    return sorted(set(_STYLE_ID.findall(script)))
 
 
 def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
@@ -108,7 +137,7 @@ def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
         ("speed", [round(v, 3) for v in series.linear], {}),
         ("mandated", [fastest * f for f in series.mandated], {"shape": "hv"}),
     )
-    gaps = _gaps(series)
+    gaps = _gaps(series.at, max(_SILENCE_S, 3 * series.slice_s))
     for kind, values, line in lines:
         yield {
             "type": "scatter",
@@ -122,10 +151,27 @@ def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
         }
 
 
-def _gaps(series: SpeedSeries) -> list[int]:
+def _climate_figure(
+    series: ClimateSeries, kind: str, values: Sequence[float | None]
+) -> bytes:
+    at = [_ms(moment) for moment in series.at]
+    gaps = _gaps(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s))
+    trace: _Trace = {
+        "type": "scatter",
+        "mode": "lines",
+        "name": kind,
+        "meta": {"kind": kind, "slice_s": series.slice_s},
+        "x": _broken(at, gaps, at),
+        "y": _broken(values, gaps, [None] * len(at)),
+        "connectgaps": False,
+    }
+    was_heard = any(value is not None for value in values)
+    return _figure([trace] if was_heard else [], ("time", kind), {})
+
+
+def _gaps(at: Sequence[float], longest: float) -> list[int]:
     """Places after which nothing was heard for too long."""
-    longest = max(_SILENCE_S, 3 * series.slice_s)
-    pairs = enumerate(pairwise(series.at))
+    pairs = enumerate(pairwise(at))
     return [place for place, (one, other) in pairs if other - one > longest]
 
 

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Generic, TypeVar
 
+import orjson
 from fastapi import APIRouter, Depends, HTTPException, Path, Query
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
@@ -18,9 +19,10 @@ from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, Record
+from iveg.ngsi.codec import format_stamp
 from iveg.web import charts, exports
 from iveg.web.exports import MEDIA_TYPES, Form
-from iveg.web.history_filters import Filters, Range, filter_of, range_of
+from iveg.web.history_filters import Filters, Range, Span, filter_of, range_of
 from iveg.web.history_views import (
     AlertView,
     CommandView,
@@ -30,6 +32,7 @@ from iveg.web.history_views import (
     Listing,
     View,
     view_alert,
+    view_climate,
     view_command,
     view_decision,
     view_detection,
@@ -37,6 +40,7 @@ from iveg.web.history_views import (
 )
 
 R = TypeVar("R", bound=Record)
+_DAY_S = 86_400.0
 _FOR_GOOD = "public, max-age=31536000, immutable"
 _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
     MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
@@ -96,6 +100,18 @@ def router(
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
         return await _charts(queries, since, until, asked.robot, threshold())
+
+    @routes.get(
+        "/api/v1/history/climate",
+        summary="The air over a range",
+        description="Readings, or their means over slices of time, and Plotly figures "
+        "of them; the last 24 hours unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def climate(asked: Annotated[Span, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall, _DAY_S)
+        return await _climate(queries, since, until)
 
     @routes.get("/vendor/{name}", include_in_schema=False)
     async def vendor(name: str) -> Response:
@@ -218,7 +234,7 @@ async def _charts(
 
     def draw() -> bytes:
         parts = (
-            b'{"library":"/vendor/%s"' % charts.library().name.encode(),
+            orjson.dumps(_library()).removesuffix(b"}"),
             b'"speed":' + charts.speed_figure(speeds),
             b'"detections":' + charts.confidence_figure(counts, threshold),
             b'"stops":' + charts.stop_figure(stops) + b"}",
@@ -227,3 +243,30 @@ async def _charts(
 
     body = await asyncio.to_thread(draw)
     return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+async def _climate(queries: Queries, since: float, until: float) -> Response:
+    series = await queries.climate_series(since, until)
+
+    def draw() -> bytes:
+        head = orjson.dumps(
+            {
+                "since": format_stamp(since),
+                "until": format_stamp(until),
+                "slice_s": round(series.slice_s, 3),
+                "items": view_climate(series),
+                **_library(),
+            }
+        )
+        figures = charts.climate_figures(series).items()
+        parts = (b'"%s":%s' % (name.encode(), figure) for name, figure in figures)
+        return head.removesuffix(b"}") + b',"figures":{' + b",".join(parts) + b"}}"
+
+    body = await asyncio.to_thread(draw)
+    return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+def _library() -> dict[str, object]:
+    """Where the browser finds what draws figures, and what a strict page must hold."""
+    library = charts.library()
+    return {"library": f"/vendor/{library.name}", "style_ids": library.style_ids}

@@ -45,20 +45,25 @@ def _in_utc(moment: datetime) -> datetime:
 Moment = Annotated[datetime, BeforeValidator(_mend_plus), AfterValidator(_in_utc)]
 
 
-class Range(BaseModel):
-    """Since when, until when, and of which robot."""
+class Span(BaseModel):
+    """Since when and until when."""
 
     model_config = ConfigDict(extra="forbid")
 
     since: Moment | None = Field(None, description="From here on, inclusive (ISO-8601)")
     until: Moment | None = Field(None, description="Up to here, exclusive (ISO-8601)")
-    robot: str | None = Field(None, pattern=_ROBOT_ID, description="Robot id")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.since and self.until and self.since > self.until:
             raise ValueError("since is after until")
         return self
+
+
+class Range(Span):
+    """Since when, until when, and of which robot."""
+
+    robot: str | None = Field(None, pattern=_ROBOT_ID, description="Robot id")
 
 
 class Filters(Range):
@@ -100,14 +105,16 @@ def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
     )
 
 
-def range_of(asked: Range, now: float) -> tuple[float, float]:
-    """Since and until in Unix seconds; the last 15 minutes when nothing is asked.
+def range_of(
+    asked: Span, now: float, usual_s: float = _USUAL_RANGE_S
+) -> tuple[float, float]:
+    """Since and until in Unix seconds; the last ``usual_s`` when nothing is asked.
 
     Raises:
         RequestValidationError: the range is turned round or too long to draw.
     """
     until = now if asked.until is None else asked.until.timestamp()
-    since = until - _USUAL_RANGE_S if asked.since is None else asked.since.timestamp()
+    since = until - usual_s if asked.since is None else asked.since.timestamp()
     if since > until:
         raise _invalid("since", "since is after until")
     if until - since > LONGEST_RANGE_S:

@@ -5,6 +5,7 @@ from typing import Generic, TypeVar
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from iveg.adapters.history.series import ClimateSeries
 from iveg.domain.records import (
     AlertRecord,
     CommandRecord,
@@ -266,6 +267,24 @@ def view_decision(record: DecisionRecord) -> DecisionView:
         links=_links(record.links),
         sentence=_sentence(record),
     )
+
+
+def view_climate(series: ClimateSeries) -> list[dict[str, str | float | None]]:
+    """Readings as the live topic names them, oldest first."""
+    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
+    return [
+        {
+            "at": format_stamp(at),
+            "temperature": _rounded(temperature, 2),
+            "relative_humidity": _rounded(humidity, 4),
+            "co2": _rounded(co2, 1),
+        }
+        for at, temperature, humidity, co2 in zip(*columns, strict=True)
+    ]
+
+
+def _rounded(value: float | None, digits: int) -> float | None:
+    return None if value is None else round(value, digits)
 
 
 def _position(record: DecisionRecord) -> PointView | None:

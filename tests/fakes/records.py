@@ -4,6 +4,7 @@ from typing import Any
 
 from iveg.domain.records import (
     AlertRecord,
+    ClimateRecord,
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
@@ -30,6 +31,16 @@ def odometry_record(**fields: Any) -> OdometryRecord:
         "link": "LIVE",
     }
     return OdometryRecord(**(defaults | fields))
+
+
+def climate_record(**fields: Any) -> ClimateRecord:
+    defaults: dict[str, Any] = {
+        "at": NOON,
+        "temperature": 21.5,
+        "relative_humidity": 0.7,
+        "co2": 430.0,
+    }
+    return ClimateRecord(**(defaults | fields))
 
 
 def detection_record(**fields: Any) -> DetectionRecord:

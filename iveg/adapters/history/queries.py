@@ -154,6 +154,10 @@ class Queries:
         """Speed and factors of each robot over a range, at most 2,000 points each."""
         return await self._ask(lambda c: series.speed_series(c, since, until, robot))
 
+    async def climate_series(self, since: float, until: float) -> series.ClimateSeries:
+        """The air over a range, at most 288 points."""
+        return await self._ask(lambda c: series.climate_series(c, since, until))
+
     async def confidence_counts(
         self, since: float, until: float, robot: str | None = None
     ) -> tuple[series.ConfidenceCount, ...]:

@@ -19,11 +19,13 @@ from sqlalchemy import (
 )
 
 from iveg.adapters.history.lists import record_of
-from iveg.adapters.history.tables import commands, detections, odometry
+from iveg.adapters.history.tables import climate, commands, detections, odometry
 from iveg.domain.records import CommandRecord
 
 _Point = tuple[Any, ...]
 MOST_POINTS = 2000
+MOST_READINGS = 288
+"""A day of the air in slices of five minutes."""
 CONFIDENCE_BINS = 20
 
 
@@ -44,6 +46,23 @@ class SpeedSeries:
     linear: tuple[float, ...]
     mandated: tuple[float, ...]
     applied: tuple[float | None, ...]
+    slice_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClimateSeries:
+    """The air over a range; None where a sensor was silent.
+
+    Attributes:
+        at: Unix seconds, rising; the others have its length.
+        temperature: (°C), mean of a slice; ``relative_humidity`` 0 to 1, ``co2`` (ppm).
+        slice_s: Length of a slice (s); 0 where each point is one reading.
+    """
+
+    at: tuple[float, ...] = ()
+    temperature: tuple[float | None, ...] = ()
+    relative_humidity: tuple[float | None, ...] = ()
+    co2: tuple[float | None, ...] = ()
     slice_s: float = 0.0
 
 
@@ -96,6 +115,34 @@ def speed_series(
     robots = _robots(connection) if robot is None else [robot]
     found = (_one(connection, one, since, until, most) for one in robots)
     return tuple(series for series in found if series.at)
+
+
+def climate_series(
+    connection: Connection, since: float, until: float, most: int = MOST_READINGS
+) -> ClimateSeries:
+    """The air in ``since <= at < until``."""
+    c = climate.c
+    asked = (c.at >= since, c.at < until)
+    values = (c.temperature, c.relative_humidity, c.co2)
+    count = connection.scalar(select(func.count()).where(*asked)) or 0
+    if count <= most:
+        every = select(c.at, *values).where(*asked).order_by(c.at)
+        return _climate(_points(connection, every), 0.0)
+    slice_s = (until - since) / most
+    place = _whole(connection, (c.at - since) / slice_s)
+    means = (func.avg(value) for value in values)
+    slices = (
+        select(func.min(c.at), *means)
+        .where(*asked)
+        .group_by(place)
+        .order_by(func.min(c.at))
+    )
+    return _climate(_points(connection, slices), slice_s)
+
+
+def _climate(rows: list[_Point], slice_s: float) -> ClimateSeries:
+    at, warm, humid, co2 = zip(*rows, strict=True) if rows else ((),) * 4
+    return ClimateSeries(at, warm, humid, co2, slice_s)
 
 
 def confidence_counts(
@@ -209,7 +256,7 @@ def _series(robot: str, rows: list[_Point], slice_s: float) -> SpeedSeries:
     return SpeedSeries(robot, at, linear, mandated, applied, slice_s)
 
 
-def _whole(connection: Connection, value: ColumnElement[float]) -> ColumnElement[int]:
+def _whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
     """Rounded down: a cast does that on SQLite, and rounds to nearest on PostgreSQL."""
     if connection.dialect.name == "sqlite":
         return cast(value, Integer)

@@ -25,6 +25,7 @@ from sqlalchemy.types import TypeEngine
 
 from iveg.domain.records import (
     AlertRecord,
+    ClimateRecord,
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
@@ -210,6 +211,18 @@ odometry = Table(
     sqlite_autoincrement=True,
 )
 
+climate = Table(
+    "climate",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _number("temperature"),
+    _number("relative_humidity"),
+    _number("co2"),
+    Index(None, "at"),
+    sqlite_autoincrement=True,
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Shelf:
@@ -233,4 +246,5 @@ SHELVES: dict[type, Shelf] = {
     LogRecord: Shelf(log, ("id", "at")),
     DetectionRecord: Shelf(detections),
     OdometryRecord: Shelf(odometry),
+    ClimateRecord: Shelf(climate),
 }

@@ -13,6 +13,7 @@ from iveg.pipeline.record import Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,
+    climate_record,
     command_event_record,
     command_record,
     decision_record,
@@ -262,6 +263,36 @@ async def test_many_rows_of_one_moment_are_one_point(
     [series] = await queries.speed_series(NOON, NOON + 1)
 
     assert series.at == (NOON,)
+
+
+async def test_the_air_comes_back_reading_by_reading(
+    queries: Queries, database_url: str
+) -> None:
+    remember(
+        database_url,
+        climate_record(at=NOON + 60, temperature=None),
+        climate_record(),
+        climate_record(at=NOON + 120),
+    )
+
+    found = await queries.climate_series(NOON, NOON + 120)
+
+    assert (found.at, found.temperature) == ((NOON, NOON + 60), (21.5, None))
+    assert (found.relative_humidity, found.co2) == ((0.7, 0.7), (430.0, 430.0))
+    assert found.slice_s == 0.0
+    assert (await queries.climate_series(0.0, 1.0)).at == ()
+
+
+async def test_a_day_of_the_air_is_means_of_five_minutes(
+    queries: Queries, database_url: str
+) -> None:
+    rows = [climate_record(at=NOON + 60 * n, co2=400 + n % 5) for n in range(1440)]
+    remember(database_url, *rows)
+
+    found = await queries.climate_series(NOON, NOON + 86_400)
+
+    assert (len(found.at), found.slice_s) == (288, 300.0)
+    assert set(found.co2) == {402.0}
 
 
 async def test_detections_are_counted_by_class_and_confidence(

@@ -5,6 +5,7 @@ from iveg.pipeline.record import OdometryThinner, RecordQueue, Waiting
 from tests.fakes.records import (
     NOON,
     alert_record,
+    climate_record,
     command_event_record,
     command_record,
     decision_record,
@@ -37,11 +38,12 @@ def records(batch: list[Waiting]) -> list[Record]:
     return [one.record for one in batch]
 
 
-def test_only_odometry_and_detections_may_be_dropped() -> None:
+def test_only_telemetry_may_be_dropped() -> None:
     assert is_telemetry(odometry_record())
     assert is_telemetry(detection_record())
+    assert is_telemetry(climate_record())
     assert not any(is_telemetry(record) for record in KEPT)
-    assert len(RECORD_TYPES) == len(KEPT) + 2
+    assert len(RECORD_TYPES) == len(KEPT) + 3
 
 
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:

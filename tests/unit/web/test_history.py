@@ -15,11 +15,12 @@ from iveg.domain.errors import NotAllowedError
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, Record
 from iveg.pipeline.record import Waiting
-from iveg.web import problems
+from iveg.web import charts, problems
 from iveg.web.history import router
 from tests.fakes.records import (
     NOON,
     alert_record,
+    climate_record,
     command_record,
     decision_record,
     detection_record,
@@ -310,7 +311,9 @@ async def test_a_filter_that_cannot_be_used_is_refused_and_not_overlooked(
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-@pytest.mark.parametrize("path", [*LISTS, "decisions/D1", "history/charts"])
+@pytest.mark.parametrize(
+    "path", [*LISTS, "decisions/D1", "history/charts", "history/climate"]
+)
 async def test_whoever_may_not_read_gets_nothing(tmp_path: Path, path: str) -> None:
     past = Past(tmp_path, open_=False)
     transport = httpx.ASGITransport(app=past.app)
@@ -398,29 +401,69 @@ async def test_charts_show_the_last_quarter_of_an_hour(
         command_record(standstill_ms=412.0),
     )
 
-    charts = (await client.get("/api/v1/history/charts")).json()
+    figures = (await client.get("/api/v1/history/charts")).json()
 
-    speed, limit = charts["speed"]["data"]
+    speed, limit = figures["speed"]["data"]
     assert speed["meta"] == {"kind": "speed", "robot": "AGI", "slice_s": 0.0}
     assert speed["y"] == [0.9, 0.4, None, 0.0]
     assert speed["x"][0] == 1000.0 * NOON
     assert limit["y"] == [1.0, 0.5, None, 0.5]
     assert limit["line"]["shape"] == "hv"
-    [farmer] = charts["detections"]["data"]
+    [farmer] = figures["detections"]["data"]
     assert (farmer["name"], farmer["x"], farmer["y"]) == ("farmer", [0.825], [1])
-    assert charts["detections"]["layout"]["shapes"][0]["x0"] == 0.8
-    [standing] = charts["stops"]["data"]
+    assert figures["detections"]["layout"]["shapes"][0]["x0"] == 0.8
+    [standing] = figures["stops"]["data"]
     assert (standing["name"], standing["y"]) == ("standstill", [412.0])
 
 
 async def test_charts_of_nothing_are_empty_figures(client: httpx.AsyncClient) -> None:
-    charts = (await client.get("/api/v1/history/charts?robot=AGI")).json()
+    figures = (await client.get("/api/v1/history/charts?robot=AGI")).json()
 
-    assert [charts[name]["data"] for name in ("speed", "detections", "stops")] == [
+    assert [figures[name]["data"] for name in ("speed", "detections", "stops")] == [
         [],
         [],
         [],
     ]
+
+
+async def test_the_air_of_a_day_is_readings_and_figures(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        climate_record(at=NOON - 86_400.0),
+        climate_record(at=NOON - 3600.0, temperature=16.25, co2=None),
+        climate_record(at=NOON, co2=None),
+    )
+
+    air = (await client.get("/api/v1/history/climate")).json()
+
+    assert [item["temperature"] for item in air["items"]] == [16.25, 21.5]
+    assert air["items"][1]["at"] == "2023-11-14T22:13:20.000Z"
+    assert (air["until"], air["slice_s"]) == ("2023-11-14T22:14:20.000Z", 0.0)
+    # The line breaks between readings that are an hour apart.
+    [warmth] = air["figures"]["temperature"]["data"]
+    assert warmth["y"] == [16.25, None, 21.5]
+    [humidity] = air["figures"]["humidity"]["data"]
+    assert humidity["y"] == [70.0, None, 70.0]
+    assert air["figures"]["co2"]["data"] == []
+
+
+async def test_the_air_of_no_robot_can_be_asked_for(client: httpx.AsyncClient) -> None:
+    answer = await client.get("/api/v1/history/climate?robot=AGI")
+
+    assert answer.status_code == 422
+
+
+async def test_the_library_names_the_sheets_that_a_strict_page_refuses(
+    client: httpx.AsyncClient,
+) -> None:
+    air = (await client.get("/api/v1/history/climate")).json()
+    script = gzip.decompress(charts.library().packed)
+
+    assert "plotly.js-style-global" in air["style_ids"]
+    made = script.count(b'createElement("style")')
+    # One place makes those of Plotly itself, each other place its own.
+    assert len(air["style_ids"]) == made
 
 
 @pytest.mark.parametrize(
