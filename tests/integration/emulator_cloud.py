@@ -2,9 +2,6 @@
 
 import asyncio
 import contextlib
-import os
-import shutil
-import socket
 import time
 from collections import defaultdict
 from collections.abc import AsyncIterator, Callable
@@ -21,48 +18,19 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.embedded.mqtt_broker import mqtt_broker
 from iveg.ngsi import codec
+from tests.brokers import broker_on
+from tests.processes import free_ports
 
-_MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
-_CONF = """listener {port} 127.0.0.1
-allow_anonymous true
-set_tcp_nodelay true
-log_type none
-"""
 T = TypeVar("T")
 
 
 @contextlib.asynccontextmanager
 async def broker(folder: Path) -> AsyncIterator[BrokerAddress]:
-    """Mosquitto where it is installed, the embedded broker elsewhere."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = int(free.getsockname()[1])
-    address = BrokerAddress("127.0.0.1", port)
-    if _MOSQUITTO is None:
-        async with mqtt_broker("127.0.0.1", port):
-            yield address
-        return
-    conf = folder / "mosquitto.conf"
-    conf.write_text(_CONF.format(port=port))
-    process = await asyncio.create_subprocess_exec(_MOSQUITTO, "-c", str(conf))
-    try:
-        await _listening(port)
+    """A broker on a free port."""
+    (port,) = free_ports(1)
+    async with broker_on(port, folder) as address:
         yield address
-    finally:
-        process.kill()
-        await process.wait()
-
-
-async def _listening(port: int) -> None:
-    deadline = time.monotonic() + 10.0
-    while time.monotonic() < deadline:
-        with contextlib.suppress(OSError):
-            _, writer = await asyncio.open_connection("127.0.0.1", port)
-            writer.close()
-            return
-        await asyncio.sleep(0.02)
 
 
 async def until(true: Callable[[], object], within_s: float = 15.0) -> None:

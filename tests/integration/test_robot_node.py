@@ -5,9 +5,6 @@ Mosquitto where it is installed, the embedded broker elsewhere.
 
 import asyncio
 import contextlib
-import os
-import shutil
-import socket
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
@@ -26,51 +23,16 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.profiles import RobotProfile
-from iveg.embedded.mqtt_broker import mqtt_broker
 from iveg.ngsi import codec
 from iveg.robot.node import RobotNode
-
-MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
-CONF = """listener {port} 127.0.0.1
-allow_anonymous true
-set_tcp_nodelay true
-log_type none
-"""
-
-
-@contextlib.asynccontextmanager
-async def broker_on(port: int, folder: Path) -> AsyncIterator[BrokerAddress]:
-    address = BrokerAddress("127.0.0.1", port)
-    if MOSQUITTO is None:
-        async with mqtt_broker("127.0.0.1", port):
-            yield address
-        return
-    conf = folder / "mosquitto.conf"
-    conf.write_text(CONF.format(port=port))
-    process = await asyncio.create_subprocess_exec(MOSQUITTO, "-c", str(conf))
-    try:
-        await listening(port)
-        yield address
-    finally:
-        process.kill()
-        await process.wait()
-
-
-async def listening(port: int) -> None:
-    deadline = time.monotonic() + 10
-    while time.monotonic() < deadline:
-        with contextlib.suppress(OSError):
-            _, writer = await asyncio.open_connection("127.0.0.1", port)
-            writer.close()
-            return
-        await asyncio.sleep(0.02)
+from tests.brokers import broker_on
+from tests.processes import free_ports
 
 
 @pytest.fixture
 def port() -> int:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return int(free.getsockname()[1])
+    (free,) = free_ports(1)
+    return free
 
 
 @pytest.fixture
