@@ -17,7 +17,7 @@ from iveg.ngsi.payloads import HoldValue
 from iveg.robot.holds import HoldSet
 
 _HOLDS = TypeAdapter(list[HoldValue])
-_RELEASED = TypeAdapter(list[str])
+_NAMES = TypeAdapter(list[str])
 
 
 def read_holds(file: Path) -> HoldSet | None:
@@ -25,13 +25,17 @@ def read_holds(file: Path) -> HoldSet | None:
     try:
         stored = load_json(file.read_bytes())
         holds = _HOLDS.validate_python(stored["holds"])
-        released = _RELEASED.validate_python(stored["released"])
+        released = _NAMES.validate_python(stored["released"])
+        # A file of an older robot has none.
+        joined = _NAMES.validate_python(stored.get("joined", []))
     except FileNotFoundError:
         return HoldSet()
     except (OSError, UnreadableError, ValidationError, KeyError, TypeError):
         return None
     return HoldSet(
-        tuple(Hold(hold.id, hold.source, hold.ack) for hold in holds), tuple(released)
+        tuple(Hold(hold.id, hold.source, hold.ack) for hold in holds),
+        tuple(released),
+        tuple(joined),
     )
 
 
@@ -44,7 +48,7 @@ def write_holds(file: Path, holds: HoldSet) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     aside = file.with_name(file.name + ".new")
     with aside.open("wb") as stream:
-        stream.write(orjson.dumps({"holds": holds.holds, "released": holds.released}))
+        stream.write(orjson.dumps(holds))
         stream.flush()
         os.fsync(stream.fileno())
     aside.replace(file)

@@ -26,7 +26,7 @@ from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
-from iveg.robot.holds import MAX_HOLDS, HoldSet
+from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
 from iveg.robot.orders import Release, Resume, Stop, read_level, read_order
 
@@ -193,12 +193,11 @@ class SafetyMachine:
         return self._answer(hold_id or hold.id, "LATCHED")
 
     def _held_as(self, hold_id: str | None) -> Hold:
-        """The hold that a STOP becomes, or the one that it joins."""
+        """The hold that a STOP becomes, or the one that it is already."""
         held = None if hold_id is None else self._holds.find(hold_id)
         if held is not None and held.ack == "remote":
             return held
-        full = len(self._holds.holds) >= MAX_HOLDS
-        if hold_id is None or held is not None or full:
+        if hold_id is None or held is not None:
             return self._nameless_stop()
         return Hold(hold_id, "iveg", "remote")
 

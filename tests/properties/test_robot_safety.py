@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from iveg.domain.feedback import CLEAR, FeedbackAlert, Mandate
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Origin
+from iveg.domain.observations import Origin, SafetyReport
+from iveg.ngsi import codec
 from iveg.robot.caps import Cap, lowest
 from iveg.robot.effects import Drive
 from iveg.robot.hearsay import Hearsay
@@ -19,10 +20,11 @@ from tests.unit.robot.hostile import (
     NAMES,
     Event,
     Transition,
+    World,
     played,
     reports,
 )
-from tests.unit.robot.rig import AHEAD, REST, Rig, person, stop
+from tests.unit.robot.rig import AHEAD, REST, Rig, person, release, stop
 
 
 def released_by(transition: Transition) -> tuple[set[str], str]:
@@ -64,6 +66,77 @@ def test_R2_every_stop_that_comes_is_held_or_was_released(events: list[Event]) -
         released = name in one.before.released
         assert (name in one.after.remote) != released
         assert one.answers == ["RELEASED" if released else "LATCHED"]
+
+
+CROWDS = st.tuples(
+    st.integers(1, 90), st.lists(st.integers(0, 89), max_size=12), st.booleans()
+)
+"""So many STOPs of different names, which come again, and whether it reboots."""
+
+
+def crowded(crowd: tuple[int, list[int], bool]) -> tuple[World, list[str]]:
+    """A standing robot that all of them have stopped, and their names."""
+    count, again, reboots = crowd
+    names = [f"01N{number}" for number in range(count)]
+    world = played([])
+    world.wished = REST
+    world.run(0.6)
+    for name in names:
+        world.press(name)
+    for number in again:
+        world.press(names[number % count])
+    if reboots:
+        world.reboot()
+        world.run(0.6)
+    return world, names
+
+
+def read_back(world: World) -> SafetyReport:
+    """The last report as iVeg reads it."""
+    report = replace(world.reports[-1], origin=Origin("b", 1))
+    reading = codec.read_measure("AGI_safety", codec.write_safety(report))
+    (read,) = reading.observations
+    assert isinstance(read, SafetyReport)
+    return read
+
+
+@given(CROWDS, st.sampled_from(["01NEW", "01N0", "01N1"]))
+def test_R2_however_many_hold_it_the_newest_stop_is_named_in_a_readable_report(
+    crowd: tuple[int, list[int], bool], newest: str
+) -> None:
+    world, _ = crowded(crowd)
+    world.press(newest)
+    assert newest in {hold.id for hold in read_back(world).holds}
+
+
+@given(CROWDS)
+def test_R2_however_many_come_no_stop_is_dropped(
+    crowd: tuple[int, list[int], bool],
+) -> None:
+    world, names = crowded(crowd)
+    holds = world.machine.holds
+    assert set(names) <= holds.remote | set(holds.joined)
+    assert holds.remote.isdisjoint(holds.joined)
+
+
+@given(CROWDS, st.data())
+def test_R2_a_full_robot_is_let_go_by_all_its_names_and_the_newest_challenge_alone(
+    crowd: tuple[int, list[int], bool], data: st.DataObject
+) -> None:
+    world, names = crowded(crowd)
+    told = read_back(world)
+    seen = [hold.id for hold in told.holds if hold.ack == "remote"]
+    forgotten = data.draw(st.sampled_from(seen))
+    fewer = [one for one in seen if one != forgotten] or ["nobody"]
+    assert world.command(release(fewer, world.machine.challenge)).result == "REFUSED"
+    early = release(seen, world.machine.challenge)
+    world.press("01LATE")
+    assert world.command(early).result == "REFUSED"
+    assert world.release().result == "RELEASED"
+    assert world.machine.holds.remote == set()
+    kept = set(names[-40:]) & set(world.machine.holds.released)
+    assert kept
+    assert {world.stop(name).result for name in kept} == {"RELEASED"}
 
 
 @given(EVENTS)

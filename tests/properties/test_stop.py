@@ -362,6 +362,12 @@ class StopOverBadRoads(RuleBasedStateMachine):
     def the_red_button_is_pressed(self) -> None:
         self.carry(self.rig.machine.local_hold("hw", self.now))
 
+    @rule(many=st.sampled_from([1, 60]))
+    def strangers_stop_the_robot(self, many: int) -> None:
+        for _ in range(many):
+            payload = codec.write_command(codec.write_stop(self.new_id(), "x"))
+            self.carry(self.rig.machine.command(payload, self.now))
+
     @rule()
     def iveg_restarts(self) -> None:
         wanted, before = self.journal, self.episode

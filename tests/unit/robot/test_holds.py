@@ -11,7 +11,7 @@ from iveg.robot.holds import HoldSet
 STOP = Hold("01A", "iveg", "remote")
 BUTTON = Hold("hw-1", "hw", "local")
 LINK = Hold("link-1", "link", "auto")
-SET = HoldSet((STOP, BUTTON, LINK), ("old-1", "old-2"))
+SET = HoldSet((STOP, BUTTON, LINK), ("old-1", "old-2"), ("01J",))
 
 
 def test_only_remote_holds_must_be_named() -> None:
@@ -29,7 +29,8 @@ def test_a_link_hold_that_is_joined_becomes_remote() -> None:
 def test_what_is_lifted_is_remembered_and_what_was_not_held_is_not() -> None:
     lifted = SET.lift(["01A", "never"])
     assert lifted.holds == (BUTTON, LINK)
-    assert lifted.released == ("old-1", "old-2", "01A")
+    assert lifted.released == ("old-1", "old-2", "01J", "01A")
+    assert lifted.joined == ()
 
 
 def test_the_last_64_released_ids_are_kept() -> None:
@@ -38,6 +39,12 @@ def test_the_last_64_released_ids_are_kept() -> None:
         name = f"h{number}"
         holds = holds.latch(Hold(name, "iveg", "remote")).lift([name])
     assert holds.released == tuple(f"h{number}" for number in range(36, 100))
+
+
+def test_a_file_of_an_older_robot_has_no_joined_stops(tmp_path: Path) -> None:
+    file = tmp_path / "AGI.json"
+    file.write_bytes(b'{"holds": [], "released": ["01A"]}')
+    assert read_holds(file) == HoldSet(released=("01A",))
 
 
 def test_a_file_gives_back_what_was_written(tmp_path: Path) -> None:
