@@ -298,6 +298,7 @@ class Dss:
             "detections": {name: frame for name, frame in frames.items() if frame},
             "commands": views.open_commands(now),
             "alerts": views.alerts(),
+            "flood": views.flood(),
             "log": views.log(list(self.minutes.lines)[-200:]),
             "health": self.health(now),
             "climate": views.climate(now),
@@ -366,6 +367,7 @@ def create_app(dss: Dss) -> FastAPI:
             reader=require("read"),
             threshold=lambda: dss.assessor.rule.threshold,
             present=lambda name: dss.assessor.decision_record(name, clock.now()),
+            flood=dss.views.flood,
         )
     )
     app.include_router(health.router(clock.now, dss.health))

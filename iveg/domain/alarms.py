@@ -1,8 +1,9 @@
 """Notices to people, after ISA-18.2: raised, acknowledged, cleared (product.md §3).
 
 What is wrong is a set of conditions, found anew each time; the book compares it with
-what it holds.  A condition that goes clears its alarm; one that comes back soon is the
-same alarm, counted; acknowledging never hides what is still active.
+what it holds.  A condition that goes clears its alarm; one that comes back is the same
+alarm, one occurrence more.  One row stands for all of them, but never for less than
+the gravest that nobody has seen: grouping cannot hide an escalation.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,8 +15,10 @@ from iveg.domain.observations import Instant
 
 Priority = Literal["P1", "P2", "P3"]
 
-GROUPING_S = 30.0
+GROUPING_S = 600.0
 """The same condition back within this time is the same alarm, counted once more."""
+MEMBERS_KEPT = 20
+"""Occurrences that an alarm can still tell one by one; the others are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +37,55 @@ class Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class Alarm:
-    """One notice with its life."""
+class Occurrence:
+    """One time that a condition held, and who has seen it."""
 
-    alert_id: str
-    condition: Condition
+    priority: Priority
     raised: Instant
     cleared: Instant | None = None
     acknowledged: Instant | None = None
     acknowledged_by: str | None = None
     note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """One notice with its life: every occurrence of one condition.
+
+    Attributes:
+        condition: As it is now, or was when it cleared.
+        raised: The first occurrence.
+        members: The newest occurrences, oldest first; at least one.
+        unseen: Gravest priority that nobody has acknowledged; None when all are seen.
+        count: All occurrences.
+    """
+
+    alert_id: str
+    condition: Condition
+    raised: Instant
+    members: tuple[Occurrence, ...]
+    unseen: Priority | None
     count: int = 1
+
+    @property
+    def last(self) -> Occurrence:
+        """The newest occurrence."""
+        return self.members[-1]
+
+    @property
+    def cleared(self) -> Instant | None:
+        """When the condition went; None while it holds."""
+        return self.last.cleared
+
+    @property
+    def priority(self) -> Priority:
+        """What it is shown and sounds as: never less than the gravest unseen."""
+        return graver(self.condition.priority, self.unseen)
+
+
+def graver(one: Priority, other: Priority | None) -> Priority:
+    """The priority that must not be hidden by the other."""
+    return one if other is None else min(one, other)
 
 
 class AlarmBook:
@@ -62,16 +103,16 @@ class AlarmBook:
         self, conditions: Iterable[Condition], now: Instant, new_id: str
     ) -> list[Alarm]:
         """Take what is wrong now; returns the alarms that were raised or cleared."""
-        wrong = {(one.key, one.subject): one for one in conditions}
+        wrong = _gravest(conditions)
         changed = []
         for key, alarm in list(self._alarms.items()):
             if key in wrong or alarm.cleared is not None:
                 continue
-            self._alarms[key] = replace(alarm, cleared=now)
+            self._alarms[key] = _clear(alarm, now)
             changed.append(self._alarms[key])
         for number, (key, condition) in enumerate(wrong.items()):
             before = self._alarms.get(key)
-            if before is not None and before.cleared is None:
+            if before is not None and _goes_on(before, condition):
                 self._alarms[key] = replace(before, condition=condition)
                 continue
             self._alarms[key] = _raise(before, condition, now, f"{new_id}-{number}")
@@ -82,14 +123,10 @@ class AlarmBook:
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
     ) -> Alarm | None:
-        """Somebody has seen it; None when there is no such alarm."""
+        """Somebody has seen all of it; None when there is no such alarm."""
         for key, alarm in self._alarms.items():
             if alarm.alert_id == alert_id:
-                if alarm.acknowledged is None:
-                    alarm = replace(
-                        alarm, acknowledged=now, acknowledged_by=by, note=note
-                    )
-                    self._alarms[key] = alarm
+                self._alarms[key] = alarm = _see(alarm, by, note, now)
                 return alarm
         return None
 
@@ -100,12 +137,48 @@ class AlarmBook:
                 del self._alarms[key]
 
 
+def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition]:
+    """What is wrong by kind and subject; of two of the same the graver."""
+    wrong: dict[tuple[str, str], Condition] = {}
+    for one in conditions:
+        known = wrong.setdefault((one.key, one.subject), one)
+        if one.priority < known.priority:
+            wrong[one.key, one.subject] = one
+    return wrong
+
+
+def _goes_on(before: Alarm, condition: Condition) -> bool:
+    """Whether it is the same occurrence: one that gets graver is a new one."""
+    return before.cleared is None and condition.priority >= before.condition.priority
+
+
+def _clear(alarm: Alarm, now: Instant) -> Alarm:
+    last = replace(alarm.last, cleared=now)
+    return replace(alarm, members=(*alarm.members[:-1], last))
+
+
 def _raise(
     before: Alarm | None, condition: Condition, now: Instant, alert_id: str
 ) -> Alarm:
+    new = Occurrence(condition.priority, now)
     if before is None:
-        return Alarm(alert_id, condition, raised=now)
-    # Back soon: the same alarm, but a new occurrence needs a new acknowledgement.
-    return Alarm(
-        before.alert_id, condition, raised=before.raised, count=before.count + 1
+        return Alarm(alert_id, condition, now, (new,), unseen=new.priority)
+    past = before if before.cleared is not None else _clear(before, now)
+    # The same alarm, but a new occurrence needs a new acknowledgement.
+    return replace(
+        past,
+        condition=condition,
+        members=(*past.members, new)[-MEMBERS_KEPT:],
+        unseen=graver(new.priority, past.unseen),
+        count=past.count + 1,
     )
+
+
+def _see(alarm: Alarm, by: str, note: str, now: Instant) -> Alarm:
+    members = tuple(
+        one
+        if one.acknowledged is not None
+        else replace(one, acknowledged=now, acknowledged_by=by, note=note)
+        for one in alarm.members
+    )
+    return replace(alarm, members=members, unseen=None)

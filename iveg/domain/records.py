@@ -135,13 +135,16 @@ class AlertRecord:
     Attributes:
         priority: ``P1``, ``P2`` or ``P3``.
         key: Template of its sentence; ``slots`` JSON text that fills it.
+        raised_at: The first time; ``last_raised_at`` the newest.
         count: How often it was raised while it lived.
+        members: JSON text: the newest times, each with its priority and life.
     """
 
     alert_id: str
     priority: str
     key: str
     raised_at: float
+    last_raised_at: float
     slots: str = "{}"
     robot_id: str | None = None
     cleared_at: float | None = None
@@ -149,6 +152,7 @@ class AlertRecord:
     acknowledged_by: str | None = None
     note: str | None = None
     count: int = 1
+    members: str = "[]"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,6 +13,7 @@ from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import CLEAR, Mandate
+from iveg.domain.flood import Flood, FloodGauge
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Change, Crossing, Mandates
 from iveg.domain.observations import (
@@ -34,7 +35,7 @@ from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.telling import Teller
-from iveg.pipeline.wording import alarm_line, evidence_of, speed_line
+from iveg.pipeline.wording import alarm_line, evidence_of, flood_line, speed_line
 
 HEARTBEAT_S = 0.1
 
@@ -68,6 +69,7 @@ class Assessor:
         self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
         self.alarms = AlarmBook()
+        self._gauge = FloodGauge()
         self.mandates: dict[str, Mandate] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
         """How often a robot slowed for somebody whom it could not see itself."""
@@ -90,6 +92,11 @@ class Assessor:
     def placed(self) -> Mapping[str, list[Placed]]:
         """What each robot's newest look found, faint ones included."""
         return self.looks.placed
+
+    @property
+    def flood(self) -> Flood:
+        """How fast alarms come."""
+        return self._gauge.flood
 
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
         """A decision that is still in memory, with the verdicts of now."""
@@ -193,9 +200,21 @@ class Assessor:
         if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
         wrong = [*self._conditions(now), *more]
-        for alarm in self.alarms.sync(wrong, now, self._new_id()):
+        changed = self.alarms.sync(wrong, now, self._new_id())
+        for alarm in changed:
             self._minutes.alarm(alarm)
             self._log_alarm(alarm, now)
+        self._watch_flood(sum(one.cleared is None for one in changed), now)
+
+    def _watch_flood(self, raised: int, now: Instant) -> None:
+        before = self.flood
+        after = self._gauge.take(raised, now)
+        if after == before:
+            return
+        self._hub.changed("flood")
+        line = flood_line(before, after)
+        if line is not None:
+            self._minutes.log(line, now)
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():

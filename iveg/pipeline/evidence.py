@@ -34,10 +34,10 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         rule_version=str(decision.rule.version),
         rule_parameters=json.dumps(_parameters(decision.rule, hazard)),
         in_sight=crossing.in_sight,
-        feedback_at=_wall(decision.feedback),
-        applied_at=_wall(decision.applied),
-        observed_at=_wall(decision.observed),
-        ended_at=_wall(decision.ended),
+        feedback_at=wall_of(decision.feedback),
+        applied_at=wall_of(decision.applied),
+        observed_at=wall_of(decision.observed),
+        ended_at=wall_of(decision.ended),
         speed_before=crossing.speed_before,
         speed_after=decision.speed_after,
         links=json.dumps([_link(link) for link in decision.links(now)]),
@@ -63,5 +63,6 @@ def _link(link: Link) -> dict[str, object]:
     }
 
 
-def _wall(at: Instant | None) -> float | None:
+def wall_of(at: Instant | None) -> float | None:
+    """The wall clock of what has happened (Unix s); None of what has not."""
     return None if at is None else at.wall

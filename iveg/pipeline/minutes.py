@@ -8,7 +8,7 @@ import json
 from collections import deque
 from dataclasses import asdict, replace
 
-from iveg.domain.alarms import Alarm
+from iveg.domain.alarms import Alarm, Occurrence
 from iveg.domain.decisions import Decision
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant, Road
@@ -23,7 +23,7 @@ from iveg.domain.records import (
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
-from iveg.pipeline.evidence import record_of
+from iveg.pipeline.evidence import record_of, wall_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 
@@ -131,11 +131,11 @@ class Minutes:
                 state=command.state,
                 requested_by=command.requesters[0],
                 requested_at=times.requested.wall,
-                sent_fiware_at=_wall(times.sent_fiware),
-                sent_direct_at=_wall(times.sent_direct),
-                answer_fiware_at=_wall(times.answer_fiware),
-                answer_direct_at=_wall(times.answer_direct),
-                standing_at=_wall(times.standing),
+                sent_fiware_at=wall_of(times.sent_fiware),
+                sent_direct_at=wall_of(times.sent_direct),
+                answer_fiware_at=wall_of(times.answer_fiware),
+                answer_direct_at=wall_of(times.answer_direct),
+                standing_at=wall_of(times.standing),
                 standstill_ms=command.standstill_ms,
                 tries=command.tries,
                 reason=command.reason,
@@ -173,24 +173,34 @@ class Minutes:
 
     def alarm(self, alarm: Alarm) -> None:
         """An alarm was raised, acknowledged or cleared."""
-        condition = alarm.condition
+        condition, last = alarm.condition, alarm.last
+        members = [_member(one) for one in alarm.members]
         self._sink.offer(
             AlertRecord(
                 alert_id=alarm.alert_id,
-                priority=condition.priority,
+                priority=alarm.priority,
                 key=condition.key,
                 raised_at=alarm.raised.wall,
+                last_raised_at=last.raised.wall,
                 slots=json.dumps(dict(condition.slots), ensure_ascii=False),
                 robot_id=condition.robot_id,
-                cleared_at=_wall(alarm.cleared),
-                acknowledged_at=_wall(alarm.acknowledged),
-                acknowledged_by=alarm.acknowledged_by,
-                note=alarm.note or None,
+                cleared_at=wall_of(last.cleared),
+                acknowledged_at=wall_of(last.acknowledged),
+                acknowledged_by=last.acknowledged_by,
+                note=last.note or None,
                 count=alarm.count,
+                members=json.dumps(members, ensure_ascii=False),
             )
         )
         self._hub.changed("alerts")
 
 
-def _wall(at: Instant | None) -> float | None:
-    return None if at is None else at.wall
+def _member(one: Occurrence) -> dict[str, str | float | None]:
+    return {
+        "priority": one.priority,
+        "raised_at": one.raised.wall,
+        "cleared_at": wall_of(one.cleared),
+        "acknowledged_at": wall_of(one.acknowledged),
+        "acknowledged_by": one.acknowledged_by,
+        "note": one.note or None,
+    }

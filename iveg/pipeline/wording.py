@@ -6,6 +6,7 @@ from iveg.domain.alarms import Alarm
 from iveg.domain.decisions import Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
+from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Crossing
 from iveg.domain.observations import SafetyReport
@@ -125,6 +126,19 @@ def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
     )
 
 
+def flood_line(before: Flood, after: Flood) -> LogEvent | None:
+    """A flood of alarms began or is over; None while neither."""
+    if (before.since is None) == (after.since is None):
+        return None
+    key = "log.flood.over" if after.since is None else "log.flood.began"
+    slots: dict[str, Slot] = {
+        "count": after.count,
+        "minutes": FLOOD_WINDOW_S / 60,
+        "limit": FLOOD_LIMIT,
+    }
+    return LogEvent("alert", key, slots)
+
+
 def alarm_line(alarm: Alarm) -> LogEvent | None:
     """An alarm came or went; None for a slow-down, which has a line of its own."""
     condition = alarm.condition
@@ -134,6 +148,6 @@ def alarm_line(alarm: Alarm) -> LogEvent | None:
     slots: dict[str, Slot] = {
         **condition.slots,
         "alert": condition.key,
-        "priority": condition.priority,
+        "priority": alarm.priority,
     }
     return LogEvent("alert", key, slots, condition.robot_id)

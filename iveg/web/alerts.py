@@ -10,11 +10,10 @@ from starlette.responses import Response
 from iveg.domain.observations import Instant
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.assess import Assessor
-from iveg.web import schemas
+from iveg.web import schemas, shapes
 from iveg.web.auth import Principal, require
 from iveg.web.problems import Problem
 from iveg.web.robots import Json
-from iveg.web.views import alert
 
 
 class Acknowledgement(BaseModel):
@@ -40,6 +39,6 @@ def router(assessor: Assessor, clock: Callable[[], Instant]) -> APIRouter:
         found = assessor.acknowledge(alert_id, who.name, note, clock())
         if found is None:
             return Problem(404, "There is no such alert.").response()
-        return Json(alert(found))
+        return Json(shapes.alert(found))
 
     return routes

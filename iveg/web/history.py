@@ -17,14 +17,15 @@ from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
+from iveg.domain.flood import Flood
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, Record
 from iveg.ngsi.codec import format_stamp
-from iveg.web import charts, exports
+from iveg.web import charts, exports, schemas, shapes
 from iveg.web.exports import MEDIA_TYPES, Form
 from iveg.web.history_filters import Filters, Range, Span, filter_of, range_of
 from iveg.web.history_views import (
-    AlertView,
+    AlertListing,
     CommandView,
     DecisionView,
     DetectionView,
@@ -49,14 +50,15 @@ _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class _List(Generic[R]):
-    """One list: where it comes from and how it looks."""
+    """One list: where it comes from and how it looks; ``more`` stands beside it."""
 
     path: str
     of: ListOf[R]
     ask: Callable[[Filter], Awaitable[Page[R]]]
     view: Callable[[R], View]
-    model: type[View]
+    listing: type[Listing[Any]]
     says: str
+    more: Callable[[], dict[str, Any]] = dict
 
 
 def router(
@@ -65,6 +67,7 @@ def router(
     reader: Callable[..., Any],
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
+    flood: Callable[[], schemas.FloodJson] = lambda: shapes.flood(Flood()),
     read_clock: Callable[[], Instant] = clock.now,
 ) -> APIRouter:
     """The routes of the history.
@@ -74,10 +77,11 @@ def router(
         reader: Dependency that refuses whoever may not read.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
+        flood: How fast alerts come.
         read_clock: What "the last 15 minutes" end at.
     """
     routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
-    for one in _lists(queries):
+    for one in _lists(queries, flood):
         _add_list(routes, one)
 
     @routes.get("/api/v1/decisions/{decision_id}", summary="One decision")
@@ -124,14 +128,16 @@ def router(
     return routes
 
 
-def _lists(queries: Queries) -> tuple[_List[Any], ...]:
+def _lists(
+    queries: Queries, flood: Callable[[], schemas.FloodJson]
+) -> tuple[_List[Any], ...]:
     return (
         _List(
             "decisions",
             lists.DECISIONS,
             queries.decisions,
             view_decision,
-            DecisionView,
+            Listing[DecisionView],
             "Why robots were slowed, by when it began",
         ),
         _List(
@@ -139,7 +145,7 @@ def _lists(queries: Queries) -> tuple[_List[Any], ...]:
             lists.DETECTIONS,
             queries.detections,
             view_detection,
-            DetectionView,
+            Listing[DetectionView],
             "What robots saw, by when it reached iVeg",
         ),
         _List(
@@ -147,7 +153,7 @@ def _lists(queries: Queries) -> tuple[_List[Any], ...]:
             lists.COMMANDS,
             queries.commands,
             view_command,
-            CommandView,
+            Listing[CommandView],
             "Every STOP, release and resume, by when it was asked",
         ),
         _List(
@@ -155,15 +161,16 @@ def _lists(queries: Queries) -> tuple[_List[Any], ...]:
             lists.ALERTS,
             queries.alerts,
             view_alert,
-            AlertView,
-            "Every alert, by when it was raised",
+            AlertListing,
+            "Every alert, by when it was last raised, and how fast they come",
+            lambda: {"flood": flood()},
         ),
         _List(
             "log",
             lists.LOG,
             queries.log,
             view_entry,
-            EntryView,
+            Listing[EntryView],
             "The action and inference log",
         ),
     )
@@ -174,7 +181,7 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
         f"/api/v1/{one.path}",
         name=one.path,
         summary=one.says,
-        response_model=Listing[one.model],  # type: ignore[name-defined]
+        response_model=one.listing,
         responses={200: {"content": _CSV_AND_NDJSON}},
     )
     async def listing(
@@ -183,13 +190,14 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
         form = filters.format or exports.form_of(request.headers)
         asked = filter_of(filters, one.of)
         if form == "json":
-            return _listing(await one.ask(asked), one.view)
+            return _listing(await one.ask(asked), one)
         return await _file(one, filters, asked, form)
 
 
-def _listing(page: Page[R], view: Callable[[R], View]) -> Response:
+def _listing(page: Page[R], one: _List[R]) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
-    listing = Listing[View](items=[view(record) for record in page.items], next=after)
+    items = [one.view(record) for record in page.items]
+    listing = one.listing(items=items, next=after, **one.more())
     text = listing.model_dump_json(by_alias=True, serialize_as_any=True)
     return Response(text, media_type=MEDIA_TYPES["json"])
 

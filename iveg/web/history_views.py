@@ -14,6 +14,7 @@ from iveg.domain.records import (
     LogRecord,
 )
 from iveg.ngsi.codec import format_stamp
+from iveg.web import schemas
 
 
 class View(BaseModel):
@@ -84,7 +85,7 @@ class CommandView(View):
 
 
 class AlertView(View):
-    """One notice, through its life."""
+    """One notice, through its life; ``members`` are its newest occurrences."""
 
     alert_id: str
     priority: str
@@ -92,11 +93,19 @@ class AlertView(View):
     slots: JsonValue
     robot_id: str | None
     raised_at: str
+    last_raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
     acknowledged_by: str | None
     note: str | None
     count: int
+    members: list[schemas.OccurrenceJson]
+
+
+class AlertListing(Listing[AlertView]):
+    """One page of alerts, and how fast they come now."""
+
+    flood: schemas.FloodJson
 
 
 class EntryView(View):
@@ -214,11 +223,13 @@ def view_alert(record: AlertRecord) -> AlertView:
         slots=_json(record.slots),
         robot_id=record.robot_id,
         raised_at=format_stamp(record.raised_at),
+        last_raised_at=format_stamp(record.last_raised_at),
         cleared_at=_time(record.cleared_at),
         acknowledged_at=_time(record.acknowledged_at),
         acknowledged_by=record.acknowledged_by,
         note=record.note,
         count=record.count,
+        members=[_member(one) for one in _objects(record.members)],
     )
 
 
@@ -264,7 +275,7 @@ def view_decision(record: DecisionRecord) -> DecisionView:
         ended_at=_time(record.ended_at),
         speed_before=record.speed_before,
         speed_after=record.speed_after,
-        links=_links(record.links),
+        links=[_link(link) for link in _objects(record.links)],
         sentence=_sentence(record),
     )
 
@@ -316,17 +327,32 @@ def _sentence(record: DecisionRecord) -> SentenceView:
     return SentenceView(key=key, slots=slots)
 
 
-def _links(text: str) -> list[LinkView]:
-    links = _json(text)
-    found = links if isinstance(links, list) else []
-    return [_link(link) for link in found if isinstance(link, dict)]
+def _objects(text: str) -> list[dict[str, JsonValue]]:
+    found = _json(text)
+    items = found if isinstance(found, list) else []
+    return [one for one in items if isinstance(one, dict)]
+
+
+def _member(one: dict[str, JsonValue]) -> schemas.OccurrenceJson:
+    by, note = one.get("acknowledged_by"), one.get("note")
+    return {
+        "priority": str(one.get("priority")),
+        "raised_at": _moment(one.get("raised_at")) or "",
+        "cleared_at": _moment(one.get("cleared_at")),
+        "acknowledged_at": _moment(one.get("acknowledged_at")),
+        "acknowledged_by": None if by is None else str(by),
+        "note": None if note is None else str(note),
+    }
+
+
+def _moment(at: JsonValue) -> str | None:
+    return format_stamp(at) if isinstance(at, int | float) else None
 
 
 def _link(link: dict[str, JsonValue]) -> LinkView:
-    at = link.get("at")
     return LinkView(
         link=str(link.get("link")),
-        at=format_stamp(at) if isinstance(at, int | float) else None,
+        at=_moment(link.get("at")),
         value=link.get("value"),
         verdict=str(link.get("verdict")),
     )

@@ -21,7 +21,8 @@ from iveg.ngsi.codec import load_json
 from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
 from iveg.web.presses import read_press
-from iveg.web.views import Views, log_line
+from iveg.web.shapes import log_line
+from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
 TOO_SLOW = 4008
@@ -77,6 +78,10 @@ class Encoder:
             data = self._views.people(now)
         elif kind == "alerts":
             data = self._views.alerts()
+        elif kind == "flood":
+            data = self._views.flood()
+        elif kind == "rule":
+            data = self._views.rule()
         elif kind == "health":
             data = self._health(now)
         elif kind == "climate":

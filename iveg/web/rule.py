@@ -12,10 +12,9 @@ from iveg.domain.alerts import Class, Rule
 from iveg.domain.observations import Instant
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.rules import Rules
-from iveg.web import schemas
+from iveg.web import schemas, shapes
 from iveg.web.auth import Principal, require
 from iveg.web.robots import Json
-from iveg.web.views import rule_of
 
 T = TypeVar("T")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
@@ -87,12 +86,12 @@ def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
     @routes.get("/rule", response_model=schemas.RuleJson, dependencies=reader)
     async def rule() -> Response:
         """The version in force."""
-        return Json(rule_of(rules.current))
+        return Json(shapes.rule(rules.current))
 
     @routes.get("/rule/versions", response_model=RuleList, dependencies=reader)
     async def versions() -> Response:
         """Every version with its author and time, newest first."""
-        items = [rule_of(one) for one in reversed(rules.versions)]
+        items = [shapes.rule(one) for one in reversed(rules.versions)]
         return Json({"items": items, "next": None})
 
     @routes.put("/rule", response_model=schemas.RuleJson)
@@ -102,7 +101,7 @@ def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
         """Put a new version in force at once; what is not named stays as it is."""
         wanted = body.applied_to(rules.current)
         return Json(
-            rule_of(await rules.change(wanted, who.name, clock(), body.version))
+            shapes.rule(await rules.change(wanted, who.name, clock(), body.version))
         )
 
     return routes

@@ -237,8 +237,19 @@ class FrameJson(TypedDict):
     items: list[DetectionJson]
 
 
+class OccurrenceJson(TypedDict):
+    """One time that an alert was raised."""
+
+    priority: str
+    raised_at: str
+    cleared_at: str | None
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str | None
+
+
 class AlertJson(TypedDict):
-    """A notice to people."""
+    """A notice to people: all occurrences of one kind and subject as one."""
 
     alert_id: str
     priority: str
@@ -246,11 +257,22 @@ class AlertJson(TypedDict):
     slots: dict[str, Any]
     robot_id: str | None
     raised_at: str
+    last_raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
     acknowledged_by: str | None
     note: str | None
     count: int
+    members: list[OccurrenceJson]
+
+
+class FloodJson(TypedDict):
+    """How many alerts sounded within the window; ``since`` null: no flood."""
+
+    count: int
+    limit: int
+    window_s: float
+    since: str | None
 
 
 LogJson = TypedDict(

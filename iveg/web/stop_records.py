@@ -22,6 +22,7 @@ from iveg.web.auth import require
 from iveg.web.history_filters import Range, range_of
 from iveg.web.history_views import view_command
 from iveg.web.robots import Json
+from iveg.web.shapes import rounded
 
 DRILL_DEADLINE_MS = 5000.0
 """Press to STANDING, safety.md §2.4."""
@@ -146,9 +147,9 @@ def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatencyJson:
 def _spread(of: Spread) -> SpreadJson:
     return {
         "count": of.count,
-        "p50_ms": _round(of.p50),
-        "p95_ms": _round(of.p95),
-        "max_ms": _round(of.longest),
+        "p50_ms": rounded(of.p50, 1),
+        "p95_ms": rounded(of.p95, 1),
+        "max_ms": rounded(of.longest, 1),
     }
 
 
@@ -159,7 +160,7 @@ def _drill(record: CommandRecord, now: float) -> DrillJson:
         "drilled_at": format_stamp(record.requested_at),
         "by": record.requested_by,
         "passed": _passed(record, now),
-        "standstill_ms": _round(record.standstill_ms),
+        "standstill_ms": rounded(record.standstill_ms, 1),
         "command": view_command(record).model_dump(by_alias=True),
     }
 
@@ -170,7 +171,3 @@ def _passed(record: CommandRecord, now: float) -> bool | None:
         return record.standstill_ms <= DRILL_DEADLINE_MS
     late = 1000.0 * (now - record.requested_at) > DRILL_DEADLINE_MS
     return False if late else None
-
-
-def _round(value: float | None) -> float | None:
-    return None if value is None else round(value, 1)

@@ -117,6 +117,7 @@ def alert_record(**fields: Any) -> AlertRecord:
         "priority": "P2",
         "key": "alert.person_slowed",
         "raised_at": NOON,
+        "last_raised_at": NOON,
         "slots": '{"robot":"AGI"}',
         "robot_id": "AGI",
     }

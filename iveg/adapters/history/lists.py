@@ -115,7 +115,10 @@ COMMANDS = ListOf(
     tables.commands.c.command_id,
 )
 ALERTS = ListOf(
-    AlertRecord, tables.alerts, tables.alerts.c.raised_at, tables.alerts.c.alert_id
+    AlertRecord,
+    tables.alerts,
+    tables.alerts.c.last_raised_at,
+    tables.alerts.c.alert_id,
 )
 LOG = ListOf(
     LogRecord,

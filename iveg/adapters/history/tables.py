@@ -169,8 +169,10 @@ alerts = Table(
     _text("acknowledged_by"),
     _text("note"),
     Column("count", Integer, nullable=False),
+    _number("last_raised_at", null=False),
+    _text("members", null=False),
     _revision(),
-    Index(None, "raised_at", "alert_id"),
+    Index(None, "last_raised_at", "alert_id"),
     Index(None, "robot_id", "raised_at"),
 )
 

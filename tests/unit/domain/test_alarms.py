@@ -1,6 +1,8 @@
 """The life of a notice after ISA-18.2."""
 
-from iveg.domain.alarms import AlarmBook, Condition
+from dataclasses import replace
+
+from iveg.domain.alarms import GROUPING_S, MEMBERS_KEPT, AlarmBook, Condition
 from tests.builders import at
 
 LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")
@@ -51,9 +53,9 @@ def test_what_comes_back_later_is_a_new_alarm() -> None:
     book = AlarmBook()
     (first,) = book.sync([LOST], at(0), "a")
     book.sync([], at(5), "b")
-    book.sync([], at(40), "c")
+    book.sync([], at(5.1 + GROUPING_S), "c")
 
-    (again,) = book.sync([LOST], at(41), "d")
+    (again,) = book.sync([LOST], at(5.2 + GROUPING_S), "d")
 
     assert again.alert_id != first.alert_id
     assert again.count == 1
@@ -66,8 +68,9 @@ def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
     book.acknowledge(raised.alert_id, "ana", "on my way", at(3))
 
     (active,) = book.active
-    assert active.acknowledged == at(3)
-    assert (active.acknowledged_by, active.note) == ("ana", "on my way")
+    assert active.last.acknowledged == at(3)
+    assert (active.last.acknowledged_by, active.last.note) == ("ana", "on my way")
+    assert active.unseen is None
 
 
 def test_only_the_first_acknowledgement_counts() -> None:
@@ -78,7 +81,7 @@ def test_only_the_first_acknowledgement_counts() -> None:
     again = book.acknowledge(raised.alert_id, "ben", "no, mine", at(4))
 
     assert again is not None
-    assert again.acknowledged_by == "ana"
+    assert again.last.acknowledged_by == "ana"
 
 
 def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
@@ -89,7 +92,8 @@ def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
 
     (again,) = book.sync([LOST], at(3), "c")
 
-    assert again.acknowledged is None
+    assert again.last.acknowledged is None
+    assert again.unseen == "P1"
 
 
 def test_an_alarm_that_nobody_knows_cannot_be_acknowledged() -> None:
@@ -103,3 +107,62 @@ def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> N
 
     assert book.sync([nearer], at(1), "b") == []
     assert book.active[0].condition.slots == {"distance": 0.9}
+
+
+def test_an_alarm_tells_its_occurrences_one_by_one() -> None:
+    book = AlarmBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(first.alert_id, "ana", "battery", at(1))
+    book.sync([], at(5), "b")
+    book.sync([LOST], at(20), "c")
+
+    (alarm,) = book.active
+    earlier, last = alarm.members
+    assert (earlier.raised, earlier.cleared) == (at(0), at(5))
+    assert (earlier.acknowledged_by, earlier.note) == ("ana", "battery")
+    assert (last.raised, last.cleared) == (at(20), None)
+
+
+def test_of_many_occurrences_the_newest_are_kept_and_all_are_counted() -> None:
+    book = AlarmBook()
+    for number in range(MEMBERS_KEPT + 5):
+        book.sync([LOST], at(2 * number), "a")
+        book.sync([], at(2 * number + 1), "b")
+    book.sync([LOST], at(100), "c")
+
+    (alarm,) = book.active
+    assert (alarm.count, len(alarm.members)) == (MEMBERS_KEPT + 6, MEMBERS_KEPT)
+    assert alarm.raised == at(0)
+
+
+def test_a_condition_that_gets_graver_is_raised_again_though_it_was_seen() -> None:
+    book = AlarmBook()
+    (raised,) = book.sync([replace(LOST, priority="P3")], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "", at(1))
+
+    (graver,) = book.sync([LOST], at(2), "b")
+
+    assert (graver.alert_id, graver.priority) == (raised.alert_id, "P1")
+    assert graver.last.acknowledged is None
+    assert [one.priority for one in graver.members] == ["P3", "P1"]
+
+
+def test_what_nobody_saw_is_shown_as_grave_as_it_was() -> None:
+    book = AlarmBook()
+    book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+
+    (again,) = book.sync([replace(LOST, priority="P3")], at(9), "c")
+    seen = book.acknowledge(again.alert_id, "ana", "", at(10))
+
+    assert again.priority == "P1"
+    assert seen is not None
+    assert seen.priority == "P3"
+
+
+def test_of_two_conditions_of_one_kind_and_subject_the_graver_counts() -> None:
+    book = AlarmBook()
+
+    (raised,) = book.sync([LOST, replace(LOST, priority="P3")], at(0), "a")
+
+    assert raised.priority == "P1"

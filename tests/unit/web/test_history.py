@@ -87,7 +87,8 @@ async def test_a_list_of_nothing_has_no_items_and_no_next_page(
     answer = await client.get(f"/api/v1/{name}")
 
     assert answer.status_code == 200
-    assert answer.json() == {"items": [], "next": None}
+    body = answer.json()
+    assert (body["items"], body["next"]) == ([], None)
 
 
 async def test_a_detection_reads_as_the_contract_says(
@@ -144,7 +145,11 @@ async def test_a_command_reads_as_the_contract_says(
 async def test_alerts_and_log_read_as_their_live_topics_do(
     client: httpx.AsyncClient, past: Past
 ) -> None:
-    past.holds(alert_record(), log_record(class_="person", decision_id="D1"))
+    member = {"priority": "P2", "raised_at": NOON, "acknowledged_by": "ana"}
+    past.holds(
+        alert_record(members=orjson.dumps([member]).decode()),
+        log_record(class_="person", decision_id="D1"),
+    )
 
     [alert] = (await client.get("/api/v1/alerts")).json()["items"]
     [entry] = (await client.get("/api/v1/log")).json()["items"]
@@ -156,11 +161,22 @@ async def test_alerts_and_log_read_as_their_live_topics_do(
         "slots": {"robot": "AGI"},
         "robot_id": "AGI",
         "raised_at": "2023-11-14T22:13:20.000Z",
+        "last_raised_at": "2023-11-14T22:13:20.000Z",
         "cleared_at": None,
         "acknowledged_at": None,
         "acknowledged_by": None,
         "note": None,
         "count": 1,
+        "members": [
+            {
+                "priority": "P2",
+                "raised_at": "2023-11-14T22:13:20.000Z",
+                "cleared_at": None,
+                "acknowledged_at": None,
+                "acknowledged_by": "ana",
+                "note": None,
+            }
+        ],
     }
     assert entry == {
         "id": 1,

@@ -1,0 +1,226 @@
+"""Values of the domain in the shapes of ``schemas``, one function a shape.
+
+What is asked of the whole pipeline stands in ``views``; here nothing is looked up.
+"""
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from iveg.domain.alarms import Alarm, Occurrence
+from iveg.domain.alerts import WALKING_SPEED, Rule
+from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.margins import UNCERTAINTY_M, Margin
+from iveg.domain.observations import Instant
+from iveg.domain.people import Placed
+from iveg.domain.profiles import profile_of
+from iveg.domain.records import LogRecord
+from iveg.domain.stop import FRESH_S, Command, StopMachine
+from iveg.domain.world import RobotState
+from iveg.ngsi.codec import format_stamp
+from iveg.web import schemas
+
+
+def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJson:
+    """One command with the robot's last word."""
+    report, report_at = machine.report, machine.report_at
+    report_age = None if report_at is None else now.mono - report_at.mono
+    times = of.times
+    return {
+        "command_id": of.command_id,
+        "robot_id": of.robot_id,
+        "kind": of.kind,
+        "drill": of.drill,
+        "state": of.state,
+        "requested_by": of.requesters[0],
+        "requesters": list(of.requesters),
+        "times": {
+            "pressed": None if times.pressed is None else format_stamp(times.pressed),
+            "requested": format_stamp(times.requested.wall),
+            "sent_fiware": moment(times.sent_fiware),
+            "sent_direct": moment(times.sent_direct),
+            "answer_fiware": moment(times.answer_fiware),
+            "answer_direct": moment(times.answer_direct),
+            "standing": moment(times.standing),
+        },
+        "pressed_doubted": times.pressed_doubted,
+        "standstill_ms": rounded(of.standstill_ms),
+        "age_s": round(now.mono - times.requested.mono, 3),
+        "tries": of.tries,
+        "reason": of.reason,
+        "roads": dict(of.roads.items()),
+        "robot": {
+            "v": 0.0 if report is None else report.linear,
+            "report_age_s": rounded(report_age),
+            "moved_m": round(machine.moved_m(now), 2),
+        },
+        "challenge_fresh": report_age is not None and report_age <= FRESH_S,
+    }
+
+
+def house(greenhouse: Greenhouse) -> dict[str, Any]:
+    """The greenhouse as the page draws it."""
+    return {
+        "name": greenhouse.name,
+        "bounds": asdict(greenhouse.bounds),
+        "lanes": [
+            {"label": lane.label, **asdict(lane.area)} for lane in greenhouse.lanes
+        ],
+        "rows": [asdict(row) for row in greenhouse.rows],
+        "posts": [asdict(post) for post in greenhouse.posts],
+        "obstacles": [
+            {"kind": one.kind, **asdict(one.area)} for one in greenhouse.obstacles
+        ],
+    }
+
+
+def rule(of: Rule) -> schemas.RuleJson:
+    """One version of the of."""
+    return {
+        "id": of.id,
+        "version": of.version,
+        "confidence_threshold": of.threshold,
+        "class_thresholds": {str(k): v for k, v in of.class_thresholds.items()},
+        "radius_m": of.radius_m,
+        "factor": HALF_SPEED,
+        "aliases": {name: str(class_) for name, class_ in of.aliases.items()},
+        "possible_people": of.possible_people,
+        "author": of.author,
+        "since": None if of.since is None else format_stamp(of.since),
+    }
+
+
+def alert(alarm: Alarm) -> schemas.AlertJson:
+    """One alarm with its newest occurrences."""
+    condition, last = alarm.condition, alarm.last
+    return {
+        "alert_id": alarm.alert_id,
+        "priority": alarm.priority,
+        "key": condition.key,
+        "slots": dict(condition.slots),
+        "robot_id": condition.robot_id,
+        "raised_at": format_stamp(alarm.raised.wall),
+        "last_raised_at": format_stamp(last.raised.wall),
+        "cleared_at": moment(last.cleared),
+        "acknowledged_at": moment(last.acknowledged),
+        "acknowledged_by": last.acknowledged_by,
+        "note": last.note or None,
+        "count": alarm.count,
+        "members": [_member(one) for one in alarm.members],
+    }
+
+
+def _member(one: Occurrence) -> schemas.OccurrenceJson:
+    return {
+        "priority": one.priority,
+        "raised_at": format_stamp(one.raised.wall),
+        "cleared_at": moment(one.cleared),
+        "acknowledged_at": moment(one.acknowledged),
+        "acknowledged_by": one.acknowledged_by,
+        "note": one.note or None,
+    }
+
+
+def flood(of: Flood) -> schemas.FloodJson:
+    """How fast alarms come."""
+    return {
+        "count": of.count,
+        "limit": FLOOD_LIMIT,
+        "window_s": FLOOD_WINDOW_S,
+        "since": moment(of.since),
+    }
+
+
+def log_line(line: LogRecord) -> schemas.LogJson:
+    """One log line."""
+    return {
+        "id": line.id,
+        "at": format_stamp(line.at),
+        "kind": line.kind,
+        "robot_id": line.robot_id,
+        "key": line.key,
+        "slots": json.loads(line.slots),
+        "class": line.class_,
+        "decision_id": line.decision_id,
+    }
+
+
+def detection(
+    one: Placed, robot_id: str, stamp: str | None, road: str
+) -> schemas.DetectionJson:
+    """One box of one look, placed in ``map``."""
+    x, y, z = one.position
+    detection = one.detection
+    return {
+        "robot_id": robot_id,
+        "stamp": stamp,
+        "class": one.class_,
+        "class_id": detection.class_id,
+        "probability": detection.probability,
+        "position": {"x": x, "y": y, "z": z},
+        "box": {**asdict(detection.box), "frame_id": detection.frame_id},
+        "confident": one.kind != "faint",
+        "person_id": None if one.person is None else one.person.person_id,
+        "peer": one.peer,
+        "road": road,
+    }
+
+
+def navigation(robot: RobotState) -> schemas.NavigationJson | None:
+    """What a robot says it is about to do; None while it says nothing."""
+    intent = robot.navigation
+    if intent is None:
+        return None
+    goal = intent.goal
+    return {
+        "task": intent.task,
+        "goal": None if goal is None else {"x": goal[0], "y": goal[1]},
+        "path": [[x, y] for x, y in intent.path],
+    }
+
+
+def profile(robot_id: str) -> schemas.ProfileJson:
+    """The body of a robot."""
+    body = profile_of(robot_id)
+    return {
+        "drive": body.drive,
+        "length": body.length,
+        "width": body.width,
+        "max_speed": body.max_speed,
+        "turning_radius": body.turning_radius,
+    }
+
+
+def margin(of: Margin | None) -> schemas.MarginJson | None:
+    """What is left between a robot and a person; None where there is no pair."""
+    if of is None:
+        return None
+    return {
+        "robot_id": of.robot_id,
+        "person_id": of.person_id,
+        "gap_m": round(of.gap_m, 2),
+        "needs_m": round(of.needs_m, 2),
+        "margin_m": round(of.margin_m, 2),
+        "band": of.band,
+        "parts": {
+            "person_walks_m": round(of.walks_m, 2),
+            "reaction_m": round(of.reaction_m, 2),
+            "braking_m": round(of.braking_m, 2),
+            "uncertainty_m": UNCERTAINTY_M,
+        },
+        "age_s": round(of.age_s, 3),
+        "braking": of.braking,
+        "walking_speed": WALKING_SPEED,
+    }
+
+
+def moment(at: Instant | None) -> str | None:
+    """An instant as ISO-8601 UTC with milliseconds."""
+    return None if at is None else format_stamp(at.wall)
+
+
+def rounded(value: float | None, digits: int = 3) -> float | None:
+    """A number with no more decimals than it can mean."""
+    return None if value is None else round(value, digits)
