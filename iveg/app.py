@@ -29,6 +29,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.rules import FileRules
+from iveg.adapters.sessions import FileSessions
 from iveg.adapters.upkeep import Upkeep
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import HopError
@@ -54,6 +55,7 @@ from iveg.web import (
     costmap,
     health,
     history,
+    limits,
     live,
     notifications,
     openapi,
@@ -198,10 +200,12 @@ class Dss:
         self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
         self.climate = ClimateKeeper(world, self.recorder, self.hub)
         self.views = Views(self.assessor, self.commander)
+        self.sessions = FileSessions(directory / "sessions.jsonl")
         self.door = Door(
             sign_in_token=self.sign_in_token,
             api_token=settings.api_token,
-            now=lambda: clock.now().mono,
+            clock=clock.now,
+            store=self.sessions,
         )
 
     # --- life ---------------------------------------------------------------------
@@ -223,6 +227,7 @@ class Dss:
             await self.agent.close()
             self.queries.close()
             self.journal.close()
+            self.sessions.close()
 
     async def _live(self) -> None:
         async with asyncio.TaskGroup() as tasks:
@@ -388,6 +393,7 @@ def create_app(dss: Dss) -> FastAPI:
     app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
     problems.install(app, drawn.problem)
     app.add_middleware(security.BodyLimit)
+    app.add_middleware(limits.SocketLimits, identify=dss.door.identify, clock=clock.now)
     app.add_middleware(SignInLink, door=dss.door, refusal=drawn.refused_link)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(security.SecurityHeaders)

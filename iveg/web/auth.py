@@ -11,14 +11,12 @@ those that forgot::
 STOP outlives the session (safety.md §5.2): whoever was let in once can still stop.
 """
 
-import hashlib
 import hmac
 import logging
-import secrets
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
-from urllib.parse import parse_qs, urlsplit
+from typing import Any, Final
+from urllib.parse import parse_qs
 
 from fastapi import FastAPI
 from fastapi.dependencies.models import Dependant
@@ -30,123 +28,35 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from iveg.domain.errors import NotAllowedError
-from iveg.web.problems import (
-    ForeignOriginError,
-    NotJsonError,
-    NotSignedInError,
-    Problem,
-)
+from iveg.domain.observations import Instant
+from iveg.web.forgery import is_own, refuse_forgery, refuse_other_bodies
+from iveg.web.limits import Attempts
+from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.roles import MAY, NOBODY, Action, Principal, Role
+from iveg.web.sessions import Sessions, SessionStore
 
-Role = Literal["viewer", "operator", "admin", "program", "expired"]
-Action = Literal["open", "read", "stop", "release", "admin"]
-
-MAY: Final[Mapping[Role, frozenset[Action]]] = {
-    "viewer": frozenset({"open", "read", "stop"}),
-    "operator": frozenset({"open", "read", "stop", "release"}),
-    "admin": frozenset({"open", "read", "stop", "release", "admin"}),
-    "program": frozenset({"open", "read", "stop"}),
-    "expired": frozenset({"open", "stop"}),
-}
-"""The table of safety.md §5.1; what is not here is refused."""
+__all__ = [
+    "FOREIGN_ORIGIN",
+    "MAY",
+    "NO_SESSION",
+    "Action",
+    "Door",
+    "NotifySecret",
+    "Principal",
+    "Requirement",
+    "Role",
+    "SignInLink",
+    "declared_action",
+    "require",
+    "undeclared",
+]
 
 NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
 """Close codes of ``/live``."""
 
-_IDLE_S, _ABSOLUTE_S, _STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
-_MOST_SESSIONS = 1000
 _SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Principal:
-    """Somebody the door knows.
-
-    Attributes:
-        name: For the audit and the page; opaque to robots.
-        session: Digest of the session that lets them in; None for programs.
-    """
-
-    name: str
-    role: Role
-    session: bytes | None = None
-
-    def may(self, action: Action) -> bool:
-        """Whether the role's row holds this action."""
-        return action in MAY[self.role]
-
-
-NOBODY = Principal("nobody", "expired")
-"""Who comes through an open route unknown; never handed to a route that asks more."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Session:
-    name: str
-    role: Role
-    began: float
-    seen: float
-
-    def role_at(self, now: float) -> Role | None:
-        """The role that is left at ``now`` (s, monotonic); None when all is over."""
-        over = now - min(self.seen + _IDLE_S, self.began + _ABSOLUTE_S)
-        if over <= 0:
-            return self.role
-        return "expired" if over <= _STOP_ONLY_S else None
-
-
-class Sessions:
-    """Who is signed in, in memory; only digests of the tokens are kept.
-
-    Bounded: when it is full, the session that was idle longest ends.
-    """
-
-    def __init__(self, now: Callable[[], float], most: int = _MOST_SESSIONS) -> None:
-        self._now = now
-        self._most = most
-        self._sessions: dict[bytes, _Session] = {}
-
-    def __len__(self) -> int:
-        return len(self._sessions)
-
-    def open(self, name: str, role: Role) -> str:
-        """Begin a session; returns its token, which is known to nobody else."""
-        if len(self._sessions) >= self._most:
-            idle = min(self._sessions, key=lambda digest: self._sessions[digest].seen)
-            del self._sessions[idle]
-        token = secrets.token_urlsafe(32)
-        now = self._now()
-        self._sessions[_digest(token)] = _Session(name, role, now, now)
-        return token
-
-    def find(self, token: str) -> Principal | None:
-        """Who holds this token; counts as a sign of life."""
-        return self._principal(_digest(token), touch=True)
-
-    def current(self, principal: Principal) -> Principal | None:
-        """The same person as of now: with the role that is left, or gone."""
-        if principal.session is None:
-            return principal
-        return self._principal(principal.session, touch=False)
-
-    def revoke(self, principal: Principal) -> None:
-        """End a session at once, STOP included."""
-        if principal.session is not None:
-            self._sessions.pop(principal.session, None)
-
-    def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
-        session = self._sessions.get(digest)
-        if session is None:
-            return None
-        now = self._now()
-        role = session.role_at(now)
-        if role is None:
-            del self._sessions[digest]
-            return None
-        if touch and role != "expired":
-            self._sessions[digest] = replace(session, seen=now)
-        return Principal(session.name, role, digest)
 
 
 class Door:
@@ -155,27 +65,43 @@ class Door:
     Args:
         sign_in_token: The link's token (hex); it signs a browser in as operator.
         api_token: The bearer token of programs; empty lets no program in.
-        now: Monotonic time (s).
+        clock: Read at each question.
+        store: Where sessions outlive a restart; None forgets them.
     """
 
     def __init__(
-        self, *, sign_in_token: str, api_token: str, now: Callable[[], float]
+        self,
+        *,
+        sign_in_token: str,
+        api_token: str,
+        clock: Callable[[], Instant],
+        store: SessionStore | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
-        self._now = now
-        self.sessions = Sessions(now)
+        self._clock = clock
+        self._attempts = Attempts()
+        self.sessions = Sessions(clock, store)
         self.refused = 0
         """Sign-ins with a wrong token."""
         self._told_at: float | None = None
 
     # --- people sign in ---------------------------------------------------------
 
-    def sign_in(self, request: Request, token: str) -> Response | None:
-        """Exchange the link's token for a session cookie; None when it is wrong."""
+    def sign_in(self, request: Request, token: str) -> Response | Problem:
+        """Exchange the link's token for a session cookie, or say why not."""
+        address = "" if request.client is None else request.client.host
+        now = self._clock().mono
+        wait_s = self._attempts.wait_s(address, now)
+        if wait_s > 0.0:
+            headers = {"Retry-After": str(math.ceil(wait_s))}
+            detail = "Too many wrong links came from your address; wait a minute."
+            return Problem(429, detail, headers=headers)
         if not _same(token, self._sign_in_token):
-            self._tell_refused()
-            return None
+            self._attempts.failed(address, now)
+            self._tell_refused(now)
+            return Problem(401, "This link does not sign in here, or not any more.")
+        self._attempts.succeeded(address)
         response = RedirectResponse("/", 303)
         response.headers["Cache-Control"] = "no-store"
         response.headers["Referrer-Policy"] = "no-referrer"
@@ -202,10 +128,9 @@ class Door:
         )
         return response
 
-    def _tell_refused(self) -> None:
+    def _tell_refused(self, now: float) -> None:
         """Count it and say so once a minute, so that nobody can flood the log."""
         self.refused += 1
-        now = self._now()
         if self._told_at is None or now - self._told_at >= 60.0:
             self._told_at = now
             _log.warning("sign-in refused: wrong token (%d so far)", self.refused)
@@ -238,8 +163,8 @@ class Door:
             raise NotAllowedError(action, principal.role)
         if request.method not in _SAFE_METHODS:
             if principal.session is not None:
-                _refuse_forgery(request)
-            _refuse_other_bodies(request)
+                refuse_forgery(request)
+            refuse_other_bodies(request)
         return principal
 
     async def authorise_websocket(self, websocket: WebSocket) -> Principal:
@@ -257,7 +182,7 @@ class Door:
         principal = self.identify(websocket)
         by_cookie = principal is not None and principal.session is not None
         # Programs send no Origin; browsers always do.
-        if (origin is not None or by_cookie) and not _is_own(origin, websocket):
+        if (origin is not None or by_cookie) and not is_own(origin, websocket):
             raise WebSocketException(FOREIGN_ORIGIN)
         if principal is None or not principal.may("read"):
             await websocket.accept()
@@ -314,10 +239,9 @@ class SignInLink:
         scope["query_string"] = b""
         request = Request(scope)
         response = self._door.sign_in(request, token)
-        if response is None:
-            problem = Problem(401, "This link does not sign in here, or not any more.")
+        if isinstance(response, Problem):
             refuse = self._refusal or (lambda _, problem: problem.response())
-            response = refuse(request, problem)
+            response = refuse(request, response)
         await response(scope, receive, send)
 
 
@@ -393,48 +317,8 @@ def _calls(dependant: Dependant) -> Iterator[object]:
 # --- small shared pieces ------------------------------------------------------------
 
 
-def _refuse_forgery(request: Request) -> None:
-    """Cookies come along with anybody's request; these two signs do not.
-
-    Browsers send Sec-Fetch-Site to trustworthy addresses only, so over plain HTTP in
-    a greenhouse Origin has to do.
-    """
-    if request.headers.get("x-iveg") != "1":
-        raise ForeignOriginError("header X-IVEG: 1")
-    site = request.headers.get("sec-fetch-site")
-    if site is None:
-        own = _is_own(request.headers.get("origin"), request)
-    else:
-        own = site in ("same-origin", "none")
-    if not own:
-        raise ForeignOriginError("same origin")
-
-
-def _refuse_other_bodies(request: Request) -> None:
-    content_type = request.headers.get("content-type")
-    if content_type is None:
-        has_body = request.headers.get("content-length", "0") != "0"
-        if has_body or "transfer-encoding" in request.headers:
-            raise NotJsonError
-    elif content_type.partition(";")[0].strip().lower() != "application/json":
-        raise NotJsonError
-
-
-def _is_own(origin: str | None, connection: HTTPConnection) -> bool:
-    """Whether a page of this very server sent it.
-
-    Only host and port are compared: behind a proxy the scheme differs.
-    """
-    host = connection.headers.get("host", "")
-    return bool(host) and urlsplit(origin or "").netloc.lower() == host.lower()
-
-
 def _cookie_name(*, secure: bool) -> str:
     return "__Host-iveg" if secure else "iveg"
-
-
-def _digest(token: str) -> bytes:
-    return hashlib.sha256(token.encode()).digest()
 
 
 def _same(given: str, known: str) -> bool:

@@ -47,7 +47,7 @@ PALETTE_COOKIE = "iveg_palette"
 
 _DEVICES = tuple(device.suffix for device in ROBOT_DEVICES)
 _DECISION_ID = r"^[ -~]{1,64}$"
-_EXPLAINED = (400, 401, 403, 404, 405, 500, 503)
+_EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
 
 
 class Visitor(Protocol):
@@ -113,8 +113,10 @@ class Pages:
         response.headers.update(problem.headers)
         return response
 
-    def refused_link(self, request: Request, _: Problem) -> Response:
-        """The page for a sign-in link that is wrong."""
+    def refused_link(self, request: Request, problem: Problem) -> Response:
+        """The page for a sign-in link that is wrong, or tried too often."""
+        if problem.status != 401:
+            return self.problem(request, problem)
         return self.sign_in(request, 401, wrong=True)
 
     def sign_in(

@@ -47,7 +47,7 @@ class WebDesk(Desk):
         self.door = Door(
             sign_in_token="cd" * 32,
             api_token=API_TOKEN,
-            now=lambda: self.clock().mono,
+            clock=self.clock,
         )
         self.mapper = Mapper(self.world, self.assessor.greenhouse.bounds)
         self.rule_store = FakeRuleStore()

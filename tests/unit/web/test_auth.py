@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, FastAPI, WebSocket
 from starlette.requests import Request
 from starlette.types import Message
 
+from iveg.domain.observations import Instant
 from iveg.web import problems
 from iveg.web.auth import (
     MAY,
@@ -19,12 +20,12 @@ from iveg.web.auth import (
     Door,
     NotifySecret,
     Principal,
-    Sessions,
     SignInLink,
     declared_action,
     require,
     undeclared,
 )
+from iveg.web.sessions import Sessions
 
 SIGN_IN = "0123456789abcdef" * 2
 API = "a-program-and-its-token"
@@ -35,8 +36,8 @@ HOUR = 3600.0
 class Clock:
     now: float = 1000.0
 
-    def __call__(self) -> float:
-        return self.now
+    def __call__(self) -> Instant:
+        return Instant(self.now, 1e9 + self.now)
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def door(clock: Clock) -> Door:
-    return Door(sign_in_token=SIGN_IN, api_token=API, now=clock)
+    return Door(sign_in_token=SIGN_IN, api_token=API, clock=clock)
 
 
 def build_app(door: Door) -> FastAPI:
@@ -150,15 +151,55 @@ async def test_a_wrong_token_is_told_once_a_minute_and_never_quoted(
     clock: Clock,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    for _ in range(50):
+    for _ in range(5):
         await client.get("/", params={"token": "guess-after-guess"})
     clock.now += 61.0
     await client.get("/", params={"token": "guess-after-guess"})
 
     records = [r for r in caplog.records if r.levelno == logging.WARNING]
-    assert door.refused == 51
+    assert door.refused == 6
     assert len(records) == 2
     assert "guess" not in caplog.text
+
+
+async def test_the_sixth_wrong_link_in_a_minute_has_to_wait(
+    client: httpx.AsyncClient, clock: Clock
+) -> None:
+    for _ in range(5):
+        await client.get("/", params={"token": "wrong"})
+    answer = await client.get("/", params={"token": "wrong"})
+    clock.now += 45.5
+    later = await client.get("/", params={"token": "wrong"})
+
+    assert answer.status_code == 429
+    assert answer.headers["retry-after"] == "60"
+    assert later.headers["retry-after"] == "15"
+
+
+async def test_trying_while_one_has_to_wait_does_not_make_the_wait_longer(
+    client: httpx.AsyncClient, clock: Clock
+) -> None:
+    for _ in range(5):
+        await client.get("/", params={"token": "wrong"})
+    for _ in range(30):
+        clock.now += 2.0
+        await client.get("/", params={"token": "wrong"})
+    clock.now += 60.0
+
+    assert (await client.get("/", params={"token": SIGN_IN})).status_code == 303
+
+
+async def test_whoever_has_to_wait_to_sign_in_can_stop_all_the_same(
+    operator: httpx.AsyncClient,
+) -> None:
+    for _ in range(6):
+        await operator.get("/", params={"token": "wrong"})
+
+    answers = {
+        (await operator.post("/stop", headers=OWN)).status_code for _ in range(50)
+    }
+
+    assert answers == {200}
 
 
 async def test_the_query_with_the_token_is_gone_before_a_server_can_log_it(
@@ -246,7 +287,7 @@ async def test_a_wrong_bearer_token_is_a_stranger(
 
 
 async def test_without_the_setting_no_token_is_accepted(clock: Clock) -> None:
-    door = Door(sign_in_token="", api_token="", now=clock)
+    door = Door(sign_in_token="", api_token="", clock=clock)
     transport = httpx.ASGITransport(SignInLink(build_app(door), door))
     async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
         bearer = await client.get("/read", headers={"Authorization": "Bearer "})

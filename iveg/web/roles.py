@@ -1,0 +1,39 @@
+"""Who somebody is and what they may do (safety.md §5.1)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Role = Literal["viewer", "operator", "admin", "program", "expired"]
+Action = Literal["open", "read", "stop", "release", "admin"]
+
+MAY: Final[Mapping[Role, frozenset[Action]]] = {
+    "viewer": frozenset({"open", "read", "stop"}),
+    "operator": frozenset({"open", "read", "stop", "release"}),
+    "admin": frozenset({"open", "read", "stop", "release", "admin"}),
+    "program": frozenset({"open", "read", "stop"}),
+    "expired": frozenset({"open", "stop"}),
+}
+"""The table of safety.md §5.1; what is not here is refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class Principal:
+    """Somebody the door knows.
+
+    Attributes:
+        name: For the audit and the page; opaque to robots.
+        session: Digest of the session that lets them in; None for programs.
+    """
+
+    name: str
+    role: Role
+    session: bytes | None = None
+
+    def may(self, action: Action) -> bool:
+        """Whether the role's row holds this action."""
+        return action in MAY[self.role]
+
+
+NOBODY = Principal("nobody", "expired")
+"""Who comes through an open route unknown; never handed to a route that asks more."""
