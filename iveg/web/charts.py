@@ -27,6 +27,7 @@ _Trace = Mapping[str, object]
 
 _SILENCE_S = 5.0
 _AIR_SILENCE_S = 300.0
+_LEAST_ROOM = {"temperature": 4.0, "humidity": 20.0, "co2": 100.0}
 _STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
 _BIN = 1.0 / CONFIDENCE_BINS
 
@@ -158,15 +159,31 @@ def _climate_figure(
     gaps = _gaps(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s))
     trace: _Trace = {
         "type": "scatter",
-        "mode": "lines",
+        "mode": "lines+markers",
         "name": kind,
         "meta": {"kind": kind, "slice_s": series.slice_s},
+        "marker": {"size": 4},
         "x": _broken(at, gaps, at),
         "y": _broken(values, gaps, [None] * len(at)),
         "connectgaps": False,
     }
-    was_heard = any(value is not None for value in values)
-    return _figure([trace] if was_heard else [], ("time", kind), {})
+    heard = [value for value in values if value is not None]
+    layout = {"showlegend": False, "yaxis": {"range": _room(heard, _LEAST_ROOM[kind])}}
+    return _figure([trace] if heard else [], ("time", kind), layout)
+
+
+def _room(values: Sequence[float], least: float) -> list[float] | None:
+    """A range that keeps a sensor's noise from looking like weather; None: automatic.
+
+    Args:
+        values: What is drawn.
+        least: The axis covers at least as much.
+    """
+    low, high = min(values, default=0.0), max(values, default=0.0)
+    if not values or high - low >= least:
+        return None
+    middle = (low + high) / 2
+    return [middle - least / 2, middle + least / 2]
 
 
 def _gaps(at: Sequence[float], longest: float) -> list[int]:

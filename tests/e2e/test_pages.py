@@ -1,10 +1,11 @@
 """The pages beside the map: complete, reachable, readable, and never over a STOP."""
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import (
@@ -136,12 +137,67 @@ def test_the_climate_page_shows_what_the_house_measures(open_page: OpenPage) -> 
     expect(page.locator("#climate-temperature")).to_have_text(
         re.compile(r"^\d+,\d °C$"), timeout=15_000
     )
-    expect(page.locator("#climate-sentence")).to_contain_text("Leído hace")
+    expect(page.locator("#climate-sentence")).to_contain_text("al día")
+    expect(page.locator("#climate-co2-age")).to_have_text(re.compile(r"^hace \d+ s$"))
 
     page.click('[data-language="en"]')
     expect(page.locator("#climate-temperature")).to_have_text(
         re.compile(r"^\d+\.\d °C$")
     )
+
+
+def test_the_age_of_the_climate_begins_anew_with_each_reading(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(route="/climate")
+    age = page.locator("#climate-co2-age")
+
+    expect(age).to_have_text(re.compile(r"^hace [4-9] s$"), timeout=20_000)
+    expect(age).to_have_text(re.compile(r"^hace [0-2] s$"), timeout=20_000)
+
+
+@pytest.mark.parametrize("theme", ["light", *THEMES])
+def test_a_day_of_the_climate_is_drawn_in_the_readers_words(
+    open_page: OpenPage, theme: str
+) -> None:
+    page = open_page(390, 844, route="/about")
+    page.route("**/api/v1/history/climate", _day)
+    evaluate(
+        page, "([theme]) => { document.cookie = `iveg_theme=${theme};path=/`; }", theme
+    )
+
+    visit(page, "/climate")
+
+    expect(page.locator("#trend-temperature .main-svg").first).to_be_visible()
+    expect(page.locator("#trend-temperature")).to_contain_text("21,5")
+    # Noon in Madrid, in November.
+    expect(page.locator("#trend-temperature")).to_contain_text("12:00")
+    expect(page.locator("#trend-temperature-says")).to_contain_text("máximo 22,0 °C")
+    expect(page.locator("#trend-co2-says")).to_contain_text("ninguna lectura")
+    assert evaluate(page, OVERFLOW) <= 0
+    assert serious(page) == []
+
+    page.click('[data-language="en"]')
+    expect(page.locator("#trend-temperature")).to_contain_text("21.5")
+
+
+def test_the_first_reading_of_the_climate_is_remembered(open_page: OpenPage) -> None:
+    page = open_page(route="/climate")
+
+    expect(page.locator("#trend-temperature .main-svg").first).to_be_visible()
+    expect(page.locator("#trend-note")).to_contain_text("una por minuto")
+
+
+def test_a_day_without_climate_says_so(open_page: OpenPage) -> None:
+    page = open_page(route="/about")
+    page.route("**/api/v1/history/climate", lambda route: _fulfil(route, {}))
+
+    visit(page, "/climate")
+
+    expect(page.locator("#trend-empty")).to_have_text(
+        "Aún no hay datos de las últimas 24 h."
+    )
+    expect(page.locator("#trends")).to_be_hidden()
 
 
 def test_the_settings_page_shows_the_rule_in_force(
@@ -176,6 +232,31 @@ def test_a_page_says_when_its_list_cannot_be_read(open_page: OpenPage) -> None:
 
     expect(page.locator("#past-error")).to_contain_text("Sin conexión")
     expect(page.locator("#past-empty")).to_be_hidden()
+
+
+def _day(route: Route) -> None:
+    """Two readings an hour apart on a day in November."""
+    noon = 1_795_172_400_000
+    x, y = [noon, noon + 3_600_000], [21.0, 22.0]
+    trace = {"type": "scatter", "mode": "lines", "name": "", "x": x, "y": y}
+    _fulfil(route, {"temperature": trace})
+
+
+def _fulfil(route: Route, traces: Mapping[str, Mapping[str, Any]]) -> None:
+    """What the API answers, but of these traces."""
+    answer = route.fetch()
+    air = answer.json() | {
+        "since": "2026-11-20T10:00:00.000Z",
+        "until": "2026-11-20T13:00:00.000Z",
+    }
+    for part, figure in air["figures"].items():
+        figure["data"] = [
+            trace | {"meta": {"kind": part}}
+            for name, trace in traces.items()
+            if name == part
+        ]
+        figure["layout"]["yaxis"].pop("range", None)
+    route.fulfill(response=answer, json=air)
 
 
 def _layout(page: Page, route: str) -> tuple[int, Any]:

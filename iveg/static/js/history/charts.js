@@ -2,17 +2,21 @@
  * Figures that the server made and checked, in this page's colours and language.
  *
  * The library is large and comes from this server; it is asked for with the first
- * figure.  A figure's `meta` says what its traces and axes are.
+ * figure.  It styles a plot by sheets that a strict policy refuses, so an element of
+ * each sheet's name keeps it from trying, and the style sheet of the History page holds
+ * what a plot needs.  A figure's `meta` says what its traces and axes are.
  *
  * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
  *   y: (number | null)[], meta: Record<string, any>, line?: object,
  *   marker?: object}} Trace
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
  * @typedef {"speed" | "detections" | "stops"} ChartName
- * @typedef {{library: string} & Record<ChartName, Figure>} Charts
+ * @typedef {{library: string, style_ids: string[]}} Source where the library is
+ * @typedef {Source & Record<ChartName, Figure>} Charts
+ * @typedef {{since: number, until: number}} Span Unix milliseconds
  */
 
-import { all, need, setHidden, setText } from "../panels/dom.js";
+import { all, make, need, setHidden, setText } from "../panels/dom.js";
 import { wallText } from "./madrid.js";
 
 /** @type {readonly ChartName[]} */
@@ -25,6 +29,7 @@ const TICKS = [
   { dtickrange: [86_400_000, null], value: "%d/%m/%y" },
 ];
 const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
+const AIR = new Set(["temperature", "humidity", "co2"]);
 const SYMBOLS = { direct: "circle", fiware: "diamond", standstill: "square" };
 
 /** @type {Promise<any> | null} */
@@ -45,29 +50,49 @@ export async function drawCharts(charts, asked, words) {
     setHidden(need(`#chart-${name}-empty`), charts[name].data.length > 0);
   }
   if (CHARTS.every((name) => charts[name].data.length === 0)) return;
-  const plotly = await load(charts.library);
   for (const name of CHARTS) {
-    const { data, layout } = charts[name];
-    if (data.length === 0) continue;
-    const traces = data.map((trace, index) => dressed(trace, index, words));
-    const place = need(`#chart-${name}`);
-    await plotly.react(place, traces, laidOut(layout, asked, words), CONFIG);
+    if (charts[name].data.length === 0) continue;
+    await drawFigure(need(`#chart-${name}`), charts[name], charts, asked, words);
   }
 }
 
-/** @param {string} address */
-function load(address) {
-  library ??= new Promise((resolve, reject) => {
-    const script = document.createElement("script");
-    script.src = address;
-    script.onload = () => resolve(/** @type {any} */ (globalThis).Plotly);
-    script.onerror = () => {
-      library = null;
-      reject(new Error(address));
-    };
-    document.head.append(script);
-  });
-  return library;
+/**
+ * Draws one figure over the whole span.
+ *
+ * @param {HTMLElement} place
+ * @param {Figure} figure
+ * @param {Source} source
+ * @param {Span} span
+ * @param {import("../i18n.js").Words} words
+ * @throws {Error} the library could not be loaded
+ */
+export async function drawFigure(place, { data, layout }, source, span, words) {
+  const plotly = await load(source);
+  const traces = data.map((trace, index) => dressed(trace, index, words));
+  await plotly.react(place, traces, laidOut(layout, span, words), CONFIG);
+}
+
+/** @param {Source} source */
+async function load(source) {
+  library ??= summon(source);
+  try {
+    return await library;
+  } catch (error) {
+    library = null;
+    throw error;
+  }
+}
+
+/** @param {Source} source */
+async function summon(source) {
+  for (const id of source.style_ids) {
+    const keeper = make("i", "no-inline-styles");
+    keeper.id = id;
+    keeper.hidden = true;
+    document.body.append(keeper);
+  }
+  await import(source.library);
+  return /** @type {any} */ (globalThis).Plotly;
 }
 
 /**
@@ -85,7 +110,7 @@ function dressed(trace, index, words) {
   const line = { ...trace.line, color: colour, width: 2 };
   if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
   const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
-  const marker = { color: colour, size: 9, symbol };
+  const marker = { size: 9, symbol, ...trace.marker, color: colour };
   return { ...trace, x, name, line, marker };
 }
 
@@ -100,13 +125,14 @@ function colourOf(kind, who, index) {
   const slot = slots.find((chip) => chip.dataset.robot === who)?.dataset.slot;
   if (slot) return token(`--robot-${slot}`);
   if (PEOPLE.has(String(who))) return token("--person");
+  if (AIR.has(kind)) return token("--text-2");
   if (kind === "class") return token(`--robot-${((index + 3) % 6) + 3}`);
   return token(kind === "standstill" ? "--text" : `--robot-${index + 3}`);
 }
 
 /**
  * @param {Record<string, any>} layout
- * @param {import("./asked.js").Asked} asked
+ * @param {Span} asked
  * @param {import("../i18n.js").Words} words
  */
 function laidOut(layout, asked, words) {
@@ -129,6 +155,7 @@ function laidOut(layout, asked, words) {
       : {}),
   });
   const line = { color: token("--text"), width: 2, dash: "dot" };
+  const { showlegend = true } = layout;
   return {
     ...layout,
     xaxis: axis("x"),
@@ -139,9 +166,9 @@ function laidOut(layout, asked, words) {
     font: { family: token("--font"), size: 12, color: token("--text-2") },
     hoverlabel: { bgcolor: token("--raised"), font: { color: token("--text") } },
     separators: words.language() === "es" ? ",." : ".,",
-    margin: { l: 60, r: 16, t: 36, b: 60 },
+    margin: { l: 60, r: 16, t: showlegend ? 36 : 12, b: 60 },
     legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
-    showlegend: true,
+    showlegend,
     hovermode: "closest",
     autosize: true,
   };

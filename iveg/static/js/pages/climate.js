@@ -1,46 +1,151 @@
 /**
- * The Climate page: three numbers to read from afar, and how old they are.
+ * The Climate page: three numbers to read from afar, how old they are, and their day.
+ *
+ * @typedef {"temperature" | "humidity" | "co2"} Part
+ * @typedef {import("../history/charts.js").Source & {since: string, until: string,
+ *   slice_s: number, figures: Record<Part, import("../history/charts.js").Figure>}} Day
  */
 
+import { readApi } from "../api.js";
 import { ageOf } from "../clock.js";
-import { need, setAttribute, setText } from "../panels/dom.js";
+import { drawFigure } from "../history/charts.js";
+import { need, setAttribute, setHidden, setText } from "../panels/dom.js";
+import { onThemeChange } from "../panels/theme.js";
 
+/** @type {readonly Part[]} */
+const PARTS = ["temperature", "humidity", "co2"];
 const TICK_MS = 1000;
+/** As often as history keeps a reading. */
+const DAY_MS = 60_000;
 /** Air changes slowly; after five minutes a reading still says little of now (s). */
 const OLD_S = 300;
+const MINUTES_FROM_S = 120;
 
 /** @param {import("../page.js").Page} page */
 export function start({ store, words }) {
+  const day = createDay(words);
+
   function draw() {
     /** @type {import("../protocol.js").Climate | null} */
     const climate = store.get("climate") ?? null;
     const age = climate ? ageOf(climate) : Number.POSITIVE_INFINITY;
     const isOld = age > OLD_S || store.connection.state !== "open";
-    tile("temperature", climate?.temperature);
-    tile("humidity", climate?.relative_humidity);
-    tile("co2", climate?.co2);
+    tile("temperature", climate?.temperature, age);
+    tile("humidity", climate?.relative_humidity, age);
+    tile("co2", climate?.co2, age);
     need("#climate-page").toggleAttribute("data-old", isOld);
     const state = climate ? (isOld ? "late" : "ok") : "unknown";
     setAttribute(need("#climate-says"), "data-state", state);
     setText(need("#climate-sentence"), sentence(age, isOld));
   }
 
-  /** @param {string} part @param {number | null | undefined} value */
-  function tile(part, value) {
-    const said =
-      typeof value === "number" ? words.t(`climate.${part}`, { value }) : "—";
+  /** @param {Part} part @param {number | null | undefined} value @param {number} age */
+  function tile(part, value, age) {
+    const isKnown = typeof value === "number";
+    const said = isKnown ? words.t(`climate.tile.${part}`, { value }) : "—";
     setText(need(`#climate-${part}`), said);
+    setText(need(`#climate-${part}-age`), isKnown ? ago(age, words) : "");
   }
 
   /** @param {number} age (s) @param {boolean} isOld */
   function sentence(age, isOld) {
     if (!Number.isFinite(age)) return words.t("climate.waiting");
-    return words.t(isOld ? "climate.old" : "climate.fresh", { age });
+    // Without seconds: this line is read out whenever it changes.
+    return words.t(isOld ? "climate.old" : "climate.fresh", { ago: ago(age, words) });
   }
 
   store.subscribe("climate", draw);
   store.subscribe("connection", draw);
+  store.subscribe("snapshot", day.load);
   words.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
+  day.load();
+}
+
+/** @param {number} age (s) @param {import("../i18n.js").Words} words */
+function ago(age, words) {
+  const minutes = Math.floor(age / 60);
+  if (age < MINUTES_FROM_S) return words.t("climate.ago_s", { age });
+  return words.t("climate.ago_min", { minutes });
+}
+
+/**
+ * The last 24 hours, asked for again each minute while somebody can see them.
+ *
+ * @param {import("../i18n.js").Words} words
+ */
+function createDay(words) {
+  /** @type {Day | null} */
+  let day = null;
+  let status = 200;
+  let isBare = false;
+
+  async function load() {
+    if (document.hidden) return;
+    const answer = await readApi("history/climate");
+    status = answer.status;
+    // What was drawn stays when the server is gone: it is the past, and stays true.
+    if (status === 200) day = answer.body;
+    await draw();
+  }
+
+  async function draw() {
+    setHidden(need("#trend-error"), status === 200 && !isBare);
+    const wrong = status ? "rows.failed" : "rows.offline";
+    const why = isBare ? "history.error.library" : wrong;
+    setText(need("#trend-error"), words.t(why, { status }));
+    if (day === null) return;
+    const heard = PARTS.filter((part) => day?.figures[part].data.length);
+    setHidden(need("#trend-empty"), heard.length > 0);
+    setHidden(need("#trends"), heard.length === 0);
+    setText(need("#trend-note"), heard.length ? noteOf(day) : "");
+    for (const part of PARTS) await drawPart(part, day);
+  }
+
+  /** @param {Day} shown */
+  function noteOf({ slice_s }) {
+    const minutes = slice_s / 60;
+    return words.t(`climate.note.${slice_s ? "sliced" : "exact"}`, { minutes });
+  }
+
+  /** @param {Part} part @param {Day} shown */
+  async function drawPart(part, shown) {
+    const figure = shown.figures[part];
+    const place = need(`#trend-${part}`);
+    setHidden(place, figure.data.length === 0);
+    setText(need(`#trend-${part}-says`), spreadOf(part, figure));
+    if (figure.data.length === 0) return;
+    const span = { since: Date.parse(shown.since), until: Date.parse(shown.until) };
+    try {
+      await drawFigure(place, figure, shown, span, words);
+      isBare = false;
+    } catch {
+      isBare = true;
+      setHidden(need("#trend-error"), false);
+      setText(need("#trend-error"), words.t("history.error.library"));
+    }
+  }
+
+  /**
+   * Least and most of the day: what the line is for who cannot see it.
+   *
+   * @param {Part} part @param {import("../history/charts.js").Figure} figure
+   */
+  function spreadOf(part, { data }) {
+    const [trace] = data;
+    if (!trace) return words.t("climate.silent");
+    const values = trace.y.filter((value) => value !== null);
+    const share = part === "humidity" ? 0.01 : 1;
+    const say = (/** @type {number} */ value) =>
+      words.t(`climate.tile.${part}`, { value: value * share });
+    const [least, most] = [Math.min(...values), Math.max(...values)];
+    return words.t("climate.spread", { least: say(least), most: say(most) });
+  }
+
+  setInterval(load, DAY_MS);
+  document.addEventListener("visibilitychange", load);
+  words.onChange(draw);
+  onThemeChange(draw);
+  return { load };
 }
