@@ -161,6 +161,8 @@ class Door:
             raise NotSignedInError
         if not principal.may(action):
             raise NotAllowedError(action, principal.role)
+        if principal.role == "expired" and action == "stop":
+            _log.info("STOP by %s, whose session is over", principal.name)
         if request.method not in _SAFE_METHODS:
             if principal.session is not None:
                 refuse_forgery(request)

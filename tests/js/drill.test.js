@@ -7,7 +7,7 @@ import { equal, test } from "./harness.js";
 /** A robot that stands and that nobody stops. @param {Partial<Facts>} [changes] */
 function facts(changes = {}) {
   return {
-    isConnected: true,
+    connection: /** @type {const} */ ("open"),
     role: "operator",
     ageS: 0.1,
     robot: robot({ twist: { linear: 0.2, angular: 0 } }),
@@ -35,7 +35,7 @@ test("a robot that drives, or of which nothing is known, is not drilled", () => 
 
 test("a viewer drills nothing, and nobody does without a server", () => {
   equal(whyNotDrill(facts({ role: "viewer" })), "role");
-  equal(whyNotDrill(facts({ isConnected: false })), "no_link");
+  equal(whyNotDrill(facts({ connection: "lost" })), "no_link");
 });
 
 test("a robot that is stopped already proves nothing", () => {

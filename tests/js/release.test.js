@@ -12,7 +12,7 @@ const STILL = { linear: 0.001, angular: 0 };
 /** A robot that stands, proven, held by iVeg. @param {Partial<Facts>} [changes] */
 function facts(changes = {}) {
   return {
-    isConnected: true,
+    connection: /** @type {const} */ ("open"),
     role: "operator",
     ageS: 0.1,
     robot: robot({ mode: "STOPPED", holds: [IVEG], twist: STILL }),
@@ -32,7 +32,12 @@ test("a viewer may not release, and may not resume", () => {
 
 test("nothing is released on old news or without a server", () => {
   equal(whyNotRelease(facts({ ageS: 1.2 })), "not_fresh");
-  equal(whyNotRelease(facts({ isConnected: false })), "no_link");
+  equal(whyNotRelease(facts({ connection: "lost" })), "no_link");
+});
+
+test("f42 whoever was signed out has to sign in again to release, resume or drill", () => {
+  equal(whyNotRelease(facts({ connection: "signed-out" })), "signed_out");
+  equal(whyNotResume(facts({ connection: "signed-out" })), "signed_out");
 });
 
 test("a robot that still brakes is not released", () => {

@@ -1,4 +1,8 @@
-import { viewOfFleet, viewOfRobot } from "../../iveg/static/js/panels/stop_view.js";
+import {
+  doubtOf,
+  viewOfFleet,
+  viewOfRobot,
+} from "../../iveg/static/js/panels/stop_view.js";
 import { command } from "./builders.js";
 import { equal, test } from "./harness.js";
 
@@ -54,6 +58,31 @@ test("without a link to robot or server a control does not look as if it worked"
   equal(stateOf({ link: "UNKNOWN", ageS: Number.POSITIVE_INFINITY }), "lost");
   equal(stateOf({ connection: "lost" }), "lost");
   equal(stateOf({ connection: "signed-out" }), "lost");
+});
+
+test("f42 a session that is over says so and still looks as if it stops", () => {
+  const over = { connection: /** @type {const} */ ("signed-out"), isBlind: true };
+  equal(viewOfRobot(facts(over)), {
+    state: "late",
+    key: "stop.blind",
+    slots: { robot: "AGI" },
+  });
+  const taken = viewOfRobot(facts({ ...over, press: pressed({ accepted: true }) }));
+  equal(taken.key, "stop.blind_taken");
+});
+
+test("a press that the server does not take from an ended session is not believed", () => {
+  const over = { connection: /** @type {const} */ ("signed-out"), isBlind: true };
+  equal(stateOf({ ...over, press: pressed({ atMs: 9_000 }) }), "lost");
+});
+
+test("what is not known of a silent robot grows while nobody hears of it", () => {
+  const silent = command({
+    robot: { v: -0.5, report_age_s: 2, moved_m: 1 },
+    receivedAtMs: 7_000,
+  });
+  equal(doubtOf(silent, 10_000), { ageS: 5, movedM: 2.5 });
+  equal(doubtOf(command({ robot: null }), 10_000), null);
 });
 
 test("a standstill of before the server was lost is not shown as one of now", () => {

@@ -67,7 +67,7 @@ export function createRelease(app, card, robotId) {
   /** @param {Robot | undefined} robot */
   function factsOf(robot) {
     return {
-      isConnected: store.connection.state === "open",
+      connection: store.connection.state,
       role: document.body.dataset.role ?? "",
       robot,
       ageS: ageOf(robot),
@@ -139,7 +139,7 @@ export function createRelease(app, card, robotId) {
 }
 
 /**
- * @typedef {{isConnected: boolean, role: string, robot: Robot | undefined, ageS: number,
+ * @typedef {{connection: import("../store.js").ConnectionState, role: string, robot: Robot | undefined, ageS: number,
  *   command: Command | undefined}} Facts
  */
 
@@ -166,8 +166,9 @@ export function whyNotResume(facts) {
 }
 
 /** What keeps anybody from asking for anything, or null. @param {Facts} facts */
-export function whyNotAtAll({ isConnected, role, ageS }) {
-  if (!isConnected) return "no_link";
+export function whyNotAtAll({ connection, role, ageS }) {
+  if (connection === "signed-out") return "signed_out";
+  if (connection !== "open") return "no_link";
   if (!RELEASERS.has(role)) return "role";
   return ageS > FRESH_S ? "not_fresh" : null;
 }

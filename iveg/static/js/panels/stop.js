@@ -7,10 +7,17 @@
  * comes from `stop_view.js`, what it sends goes through `press.js`.
  */
 
+import { readApi } from "../api.js";
 import { ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createPresser } from "./press.js";
-import { since, stateOfCommand, viewOfFleet, viewOfRobot } from "./stop_view.js";
+import {
+  doubtOf,
+  since,
+  stateOfCommand,
+  viewOfFleet,
+  viewOfRobot,
+} from "./stop_view.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Command} Command */
@@ -26,6 +33,8 @@ const GESTURE_MS = 400;
 /** A robot's state may be a frame older than its command's own topic (ms). */
 const SETTLE_MS = 800;
 const ACCEPTED_LIMIT_MS = 3000;
+/** HTTP status of a session that may only stop; a stranger's is 401. */
+const KNOWN_BUT_BLIND = 403;
 const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
 
 /**
@@ -39,6 +48,8 @@ export function createStopPanel(app) {
   const commands = new Map();
   /** @type {Map<string, HTMLElement>} */
   const controls = new Map();
+  /** Whether the server knows this page well enough to stop, though not to watch. */
+  let isBlind = false;
 
   /** @param {string} robotId */
   function controlOf(robotId) {
@@ -88,7 +99,7 @@ export function createStopPanel(app) {
 
   /** @param {import("../protocol.js").Robot} robot */
   function takeRobot(robot) {
-    if (robot.stop) take(robot.stop);
+    if (robot.stop) take({ ...robot.stop, receivedAtMs: robot.receivedAtMs });
     else forget(robot.robot_id);
     controlOf(robot.robot_id);
   }
@@ -108,11 +119,21 @@ export function createStopPanel(app) {
     drawAll();
   }
 
+  /** A session that is over may still stop for hours: the server says whether. */
+  async function onConnection() {
+    const isOver = store.connection.state === "signed-out";
+    isBlind = isOver && (await readApi("robots")).status === KNOWN_BUT_BLIND;
+    drawAll();
+  }
+
   /** @param {string | null} robotId */
   function pendingOf(robotId) {
     const pending = presser.pending(robotId);
+    // Without a line no command ever answers a press.
     const isOld =
-      pending?.accepted && performance.now() - pending.atMs > ACCEPTED_LIMIT_MS;
+      !isBlind &&
+      pending?.accepted &&
+      performance.now() - pending.atMs > ACCEPTED_LIMIT_MS;
     if (isOld) presser.settle(robotId);
     return isOld ? null : pending;
   }
@@ -125,6 +146,7 @@ export function createStopPanel(app) {
     return {
       robotId,
       connection: store.connection.state,
+      isBlind,
       link: linkOfRobot(robot, nowMs),
       ageS: ageOf(robot, nowMs),
       command: commands.get(robotId)?.command ?? null,
@@ -143,7 +165,7 @@ export function createStopPanel(app) {
     for (const { id, view } of robots) draw(id, view);
     const connection = store.connection.state;
     const fleet = { connection, press: pendingOf(null), nowMs: performance.now() };
-    draw("fleet", viewOfFleet({ ...fleet, robots }));
+    draw("fleet", viewOfFleet({ ...fleet, isBlind, robots }));
     drawLoud(ids);
   }
 
@@ -174,21 +196,22 @@ export function createStopPanel(app) {
   /** @param {Command} command */
   function sentenceOf(command) {
     const { robot, roads } = command;
-    const heard = robot && robot.report_age_s !== null;
+    const doubt = doubtOf(command, performance.now());
     const state = String(stateOfCommand(command));
     /** @param {string} road */
     const roadSaid = (road) => words.t(`stop.road.${roads?.[road] ?? "unknown"}`);
     return words.t(`stop.p1.${state}`, {
       robot: command.robot_id,
-      seconds: since(command.times.requested, line.serverNow()),
+      seconds: since(
+        command.times.pressed ?? command.times.requested,
+        line.serverNow(),
+      ),
+      who: command.requesters.join(", "),
       tries: command.tries,
-      report: heard
-        ? words.t("stop.p1.report", { age: robot.report_age_s, speed: robot.v ?? 0 })
+      report: doubt
+        ? words.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
         : words.t("stop.p1.no_report"),
-      moved:
-        robot?.moved_m === null || robot?.moved_m === undefined
-          ? " "
-          : words.t("stop.p1.could", { distance: robot.moved_m }),
+      moved: doubt ? words.t("stop.p1.could", { distance: doubt.movedM }) : " ",
       roads: words.t("stop.p1.roads", {
         direct: roadSaid("direct"),
         fiware: roadSaid("fiware"),
@@ -224,7 +247,7 @@ export function createStopPanel(app) {
   store.subscribe("snapshot", restart);
   store.subscribe("commands/", take);
   store.subscribe("robots/", takeRobot);
-  store.subscribe("connection", drawAll);
+  store.subscribe("connection", onConnection);
   words.onChange(drawAll);
   setInterval(drawAll, TICK_MS);
   drawAll();

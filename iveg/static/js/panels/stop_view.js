@@ -16,13 +16,14 @@
  * @typedef {{
  *   robotId: string,
  *   connection: ConnectionState,
+ *   isBlind?: boolean,
  *   link: Link,
  *   ageS: number,
  *   command: Command | null,
  *   press: Pending | null,
  *   nowMs: number,
  *   serverNowS: number,
- * }} RobotFacts `nowMs` is `performance.now()`, `serverNowS` Unix time
+ * }} RobotFacts `isBlind`: the session is over and may still stop; `nowMs` is `performance.now()`, `serverNowS` Unix time
  */
 
 /** @type {Record<string, StopState>} */
@@ -69,6 +70,7 @@ export const TAKEN_LIMIT_MS = 500;
  */
 export function viewOfRobot(facts) {
   const robot = facts.robotId;
+  if (facts.isBlind) return blind(facts.press, facts.nowMs, { robot });
   if (isCut(facts.connection)) return lost(facts.press, facts.nowMs);
   const state = stateOfCommand(facts.command);
   if (facts.press && (!state || GIVES_WAY.has(state))) {
@@ -85,11 +87,12 @@ export function viewOfRobot(facts) {
 /**
  * The control of the whole fleet.
  *
- * @param {{connection: ConnectionState, press: Pending | null, nowMs: number,
- *   robots: {view: View, link: Link, ageS: number}[]}} facts
+ * @param {{connection: ConnectionState, isBlind?: boolean, press: Pending | null,
+ *   nowMs: number, robots: {view: View, link: Link, ageS: number}[]}} facts
  * @returns {View}
  */
-export function viewOfFleet({ connection, press, nowMs, robots }) {
+export function viewOfFleet({ connection, isBlind, press, nowMs, robots }) {
+  if (isBlind) return blind(press, nowMs, null);
   if (isCut(connection)) return lost(press, nowMs);
   if (press) return viewOfPress(press, nowMs);
   const total = robots.length;
@@ -186,13 +189,40 @@ function lost(press, nowMs) {
   return { state: "lost", key: "stop.lost", slots: {} };
 }
 
+/**
+ * A session that is over: STOP is still taken, and nothing of what it does is seen.
+ *
+ * @param {Pending | null} press
+ * @param {number} nowMs
+ * @param {{robot: string} | null} slots null is the fleet
+ * @returns {View}
+ */
+function blind(press, nowMs, slots) {
+  if (press?.accepted) return { state: "asked", key: "stop.blind_taken", slots: {} };
+  if (press) return lost(press, nowMs);
+  const key = slots ? "stop.blind" : "stop.blind_fleet";
+  return { state: "late", key, slots: slots ?? {} };
+}
+
 /** @param {ConnectionState} connection */
 const isCut = (connection) => connection === "lost" || connection === "signed-out";
 
 /** Age of the robot's last word about itself (s). @param {Command} command @param {number} nowMs */
-function reportAge(command, nowMs) {
-  const waitedS = (nowMs - (command.receivedAtMs ?? nowMs)) / 1000;
-  return (command.robot?.report_age_s ?? 0) + waitedS;
+const reportAge = (command, nowMs) => doubtOf(command, nowMs)?.ageS ?? 0;
+
+/**
+ * How long a robot has said nothing, and how far it may have driven in that time: as the
+ * server knew it, and from then on the browser counts.
+ *
+ * @param {Command} command
+ * @param {number} nowMs `performance.now()`
+ * @returns {{ageS: number, movedM: number} | null} null when it never said anything
+ */
+export function doubtOf({ robot, receivedAtMs }, nowMs) {
+  if (!robot || robot.report_age_s === null) return null;
+  const waitedS = Math.max(0, nowMs - (receivedAtMs ?? nowMs)) / 1000;
+  const movedM = (robot.moved_m ?? 0) + Math.abs(robot.v ?? 0) * waitedS;
+  return { ageS: robot.report_age_s + waitedS, movedM };
 }
 
 /** @param {RobotFacts} facts age that can be written (s) */
