@@ -133,6 +133,7 @@ export function snapshot(changes = {}) {
     detections: {},
     commands: [],
     alerts: [],
+    flood: null,
     log: [],
     health: null,
     climate: null,

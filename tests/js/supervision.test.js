@@ -1,7 +1,10 @@
 import { believedBy, hears } from "../../iveg/static/js/layers/belief.js";
 import { laidTo, lengthOf } from "../../iveg/static/js/layers/measure.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
+import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
+import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
+import { createStore } from "../../iveg/static/js/store.js";
 import { createWakeLock } from "../../iveg/static/js/wakelock.js";
 import { equal, near, test } from "./harness.js";
 
@@ -29,11 +32,13 @@ function alarm(differs = {}) {
     slots: { robot: "AGI" },
     robot_id: "AGI",
     raised_at: "2026-11-20T12:00:00Z",
+    last_raised_at: "2026-11-20T12:00:00Z",
     cleared_at: null,
     acknowledged_at: null,
     acknowledged_by: null,
     note: null,
     count: 1,
+    members: [],
     ...differs,
   });
 }
@@ -188,4 +193,120 @@ test("what is open and urgent stands first", () => {
   ]);
   const shown = [...list.children].map((item) => item.getAttribute("data-priority"));
   equal(shown, ["P1", "P2", "P1"]);
+});
+
+/** @param {string} at @param {object} [differs] */
+function occurrence(at, differs = {}) {
+  return {
+    priority: "P2",
+    raised_at: at,
+    cleared_at: null,
+    acknowledged_at: null,
+    acknowledged_by: null,
+    note: null,
+    ...differs,
+  };
+}
+
+test("an alarm that repeats is one row that tells each time", () => {
+  const list = document.createElement("ul");
+  const members = [
+    occurrence("2026-11-20T12:00:00Z", { note: PROBE }),
+    occurrence("2026-11-20T12:07:00Z"),
+  ];
+  createAlertList(list, words).draw([alarm({ count: 2, members })]);
+  const said = [...list.querySelectorAll(".members li")].map((one) => one.textContent);
+  equal(list.children.length, 1);
+  equal(
+    [said.length, said[0]?.includes("12:07"), said[1]?.includes(PROBE)],
+    [2, true, true],
+  );
+});
+
+test("whoever reads the occurrences keeps reading while more come", () => {
+  const list = document.createElement("ul");
+  const { draw } = createAlertList(list, words);
+  const members = [
+    occurrence("2026-11-20T12:00:00Z"),
+    occurrence("2026-11-20T12:07:00Z"),
+  ];
+  draw([alarm({ count: 2, members })]);
+  const details = /** @type {HTMLDetailsElement} */ (list.querySelector("details"));
+  details.open = true;
+  draw([
+    alarm({ count: 3, members: [...members, occurrence("2026-11-20T12:09:00Z")] }),
+  ]);
+  equal([list.contains(details), details.open], [true, true]);
+  equal(details.querySelectorAll("li").length, 3);
+});
+
+test("what happened once has nothing to open", () => {
+  const list = document.createElement("ul");
+  createAlertList(list, words).draw([alarm()]);
+  equal(list.querySelector("details")?.hidden, true);
+});
+
+test("a flood is told apart from a rate that a person can bear", () => {
+  const calm = { count: 3, limit: 10, window_s: 600, since: null };
+  equal(floodSaid(calm, words), "alert.rate 3 10 10 ");
+  const flood = { ...calm, count: 12, since: "2026-11-20T12:00:00Z" };
+  equal(floodSaid(flood, words), "alert.flood 12 10 10 2026-11-20T12:00:00Z");
+  equal(floodSaid(undefined, words), "");
+});
+
+/** The bell over a store; what sounded is in `heard`. */
+function bell() {
+  document.body.replaceChildren();
+  for (const id of ["alerts-button", "alerts-count", "alerts-flood", "alerts-empty"]) {
+    const element = document.createElement(id === "alerts-button" ? "button" : "p");
+    element.id = id;
+    document.body.append(element);
+  }
+  const list = document.createElement("ul");
+  list.id = "alerts";
+  document.body.append(list);
+  /** @type {string[]} */
+  const heard = [];
+  const tone = /** @type {import("../../iveg/static/js/panels/tone.js").Tone} */ (
+    /** @type {unknown} */ ({
+      sound: (/** @type {boolean} */ isOn) => heard.push(isOn ? "loud" : "still"),
+      chime: () => heard.push("chime"),
+    })
+  );
+  /** @type {(() => void)[]} */
+  const frames = [];
+  const store = createStore({ schedule: (flush) => frames.push(flush) });
+  const tell = (/** @type {object[]} */ alerts) => {
+    store.apply("alerts", alerts);
+    for (const flush of frames.splice(0)) flush();
+  };
+  const heardBy = /** @type {import("../../iveg/static/js/main.js").App} */ (
+    /** @type {unknown} */ ({
+      store,
+      words: { ...words, onChange: () => {} },
+    })
+  );
+  createAlertsPanel(heardBy, tone);
+  return { tell, heard };
+}
+
+test("each time that a group repeats it chimes, and once", () => {
+  const { tell, heard } = bell();
+  tell([]);
+  tell([alarm({ priority: "P2" })]);
+  tell([alarm({ priority: "P2" })]);
+  tell([alarm({ priority: "P2", count: 2 })]);
+  equal(
+    heard.filter((one) => one === "chime"),
+    ["chime", "chime"],
+  );
+});
+
+test("a group that holds a P1 sounds, whatever it began as", () => {
+  const { tell, heard } = bell();
+  tell([alarm({ priority: "P3" })]);
+  tell([alarm({ priority: "P1", count: 2 })]);
+  equal(heard.at(-1), "loud");
+  equal(document.querySelector("#alerts-button")?.getAttribute("data-worst"), "P1");
+  document.body.replaceChildren();
 });

@@ -67,11 +67,29 @@
  * }} Command
  *
  * @typedef {{
+ *   priority: "P1" | "P2" | "P3", raised_at: string, cleared_at: string | null,
+ *   acknowledged_at: string | null, acknowledged_by: string | null,
+ *   note: string | null,
+ * }} Occurrence one time that an alert was raised
+ *
+ * @typedef {{
  *   alert_id: string, priority: "P1" | "P2" | "P3", key: string,
  *   slots: Record<string, string | number | null>, robot_id: string | null,
- *   raised_at: string, cleared_at: string | null, acknowledged_at: string | null,
- *   acknowledged_by: string | null, note: string | null, count: number,
- * }} Alert
+ *   raised_at: string, last_raised_at: string, cleared_at: string | null,
+ *   acknowledged_at: string | null, acknowledged_by: string | null,
+ *   note: string | null, count: number, members: Occurrence[],
+ * }} Alert all occurrences of one kind and subject; `members` the newest of them
+ *
+ * @typedef {{
+ *   count: number, limit: number, window_s: number, since: string | null,
+ * }} Flood alerts that sounded within the window; `since` null: no flood
+ *
+ * @typedef {{
+ *   id: string, version: number, confidence_threshold: number, radius_m: number,
+ *   factor: number, class_thresholds?: Record<string, number>,
+ *   aliases?: Record<string, string>, possible_people?: boolean,
+ *   author?: string | null, since?: string | null,
+ * }} Rule the version in force
  *
  * @typedef {{
  *   id: number, at: string, kind: string, robot_id: string | null, key: string,
@@ -104,10 +122,9 @@
  * @typedef {Aged & {
  *   t: string, server: {boot: string, version: string, demo: boolean},
  *   user: {name: string, role: string} | null,
- *   rule: {id: string, version: string, confidence_threshold: number, radius_m: number,
- *     factor: number} | null,
+ *   rule: Rule | null,
  *   map: GreenhouseMap, robots: Robot[], people: Person[],
- *   detections: Record<string, Look>, commands: Command[], alerts: Alert[],
+ *   detections: Record<string, Look>, commands: Command[], alerts: Alert[], flood: Flood | null,
  *   log: Entry[], health: Health | null, climate: Climate | null,
  * }} Snapshot
  *

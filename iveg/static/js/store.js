@@ -239,6 +239,8 @@ function topicsOf(snapshot) {
     ),
     ...(snapshot.commands ?? []).map(under("commands", "command_id")),
     ["alerts", snapshot.alerts ?? []],
+    ["flood", snapshot.flood ?? null],
+    ["rule", snapshot.rule],
     ["health", snapshot.health],
     ["climate", snapshot.climate],
   ];

@@ -4,7 +4,8 @@
 
 import { dayAndTime } from "../history/madrid.js";
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
-import { make, need, setHidden } from "../panels/dom.js";
+import { createMembers, floodSaid } from "../panels/alert_members.js";
+import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createChips, createRows, soon } from "./rows.js";
 
@@ -13,12 +14,14 @@ import { createChips, createRows, soon } from "./rows.js";
 /** @param {import("../page.js").Page} page */
 export function start({ store, words, tone }) {
   const list = createAlertList(need("#active-alerts"), words);
+  /** @type {Set<string>} alarms whose occurrences somebody reads */
+  const opened = new Set();
   const isChosen = createChips("data-priority-chip", () => rows.draw());
   const rows = createRows({
     name: "past",
     path: "alerts",
     words,
-    cells: (alert) => cellsOf(alert, words),
+    cells: (alert) => cellsOf(alert, words, opened),
     admits: ({ priority }) => isChosen(priority),
   });
   const reload = soon(rows.load);
@@ -34,14 +37,25 @@ export function start({ store, words, tone }) {
     draw();
     reload();
   });
+  function drawFlood() {
+    /** @type {import("../protocol.js").Flood | null | undefined} */
+    const flood = store.get("flood");
+    setText(need("#flood"), floodSaid(flood, words));
+    need("#flood").toggleAttribute("data-flood", Boolean(flood?.since));
+  }
+
+  store.subscribe("flood", drawFlood);
   words.onChange(draw);
+  words.onChange(drawFlood);
   createSoundPanel(words, tone);
   draw();
+  drawFlood();
   rows.load();
 }
 
-/** @param {Alert} alert @param {import("../i18n.js").Words} words */
-function cellsOf(alert, words) {
+/** @param {Alert} alert @param {import("../i18n.js").Words} words
+ * @param {Set<string>} opened */
+function cellsOf(alert, words, opened) {
   const priority = make("td");
   priority.dataset.priority = alert.priority;
   priority.append(
@@ -50,13 +64,36 @@ function cellsOf(alert, words) {
   );
   const over = alert.cleared_at ? dayAndTime(alert.cleared_at) : "—";
   return [
-    make("td", "time", dayAndTime(alert.raised_at)),
+    make("td", "time", timesOf(alert)),
     priority,
-    make("td", "what", sentenceOf(alert, words)),
+    whatOf(alert, words, opened),
     make("td", "time", over),
     make("td", "", seenBy(alert, words)),
     make("td", "number", words.number(alert.count, 0)),
   ];
+}
+
+/** First and last time. @param {Alert} alert */
+function timesOf({ raised_at, last_raised_at }) {
+  const first = dayAndTime(raised_at);
+  const last = dayAndTime(last_raised_at);
+  return first === last ? first : `${first} – ${last}`;
+}
+
+/** What it says, and each time that it said so. @param {Alert} alert
+ * @param {import("../i18n.js").Words} words @param {Set<string>} opened */
+function whatOf(alert, words, opened) {
+  const cell = make("td", "what", sentenceOf(alert, words));
+  const { element, draw } = createMembers(words);
+  draw(alert);
+  // The table is written anew while somebody reads it.
+  element.open = opened.has(alert.alert_id);
+  element.addEventListener("toggle", () => {
+    if (element.open) opened.add(alert.alert_id);
+    else opened.delete(alert.alert_id);
+  });
+  cell.append(element);
+  return cell;
 }
 
 /** Who, when and what they said. @param {Alert} alert

@@ -6,6 +6,7 @@
  */
 
 import { sendApi } from "../api.js";
+import { createMembers } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../protocol.js").Alert} Alert */
@@ -22,6 +23,8 @@ const ACKNOWLEDGERS = new Set(["operator", "admin"]);
 export function createAlertList(list, words, send = acknowledge) {
   /** @type {Map<string, HTMLLIElement>} */
   const items = new Map();
+  /** @type {Map<string, ReturnType<typeof createMembers>>} */
+  const members = new Map();
   /** @type {Map<string, number>} HTTP status of acknowledgements that failed */
   const failures = new Map();
   /** @type {Alert[]} */
@@ -45,6 +48,7 @@ export function createAlertList(list, words, send = acknowledge) {
   function drop(id) {
     items.get(id)?.remove();
     items.delete(id);
+    members.delete(id);
     failures.delete(id);
   }
 
@@ -58,6 +62,9 @@ export function createAlertList(list, words, send = acknowledge) {
       else failures.set(alert.alert_id, status);
       draw(shown);
     });
+    const past = createMembers(words);
+    need("small", item).after(past.element);
+    members.set(alert.alert_id, past);
     items.set(alert.alert_id, item);
     return item;
   }
@@ -69,6 +76,7 @@ export function createAlertList(list, words, send = acknowledge) {
     const priority = words.t(`alert.priority.${alert.priority}`);
     setText(need("b", item), `${priority}: ${sentenceOf(alert, words)}`);
     setText(need("small", item), factsOf(alert, words));
+    members.get(alert.alert_id)?.draw(alert);
     const may = ACKNOWLEDGERS.has(document.body.dataset.role ?? "");
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
     const input = /** @type {HTMLInputElement} */ (need("input", item));
@@ -94,7 +102,8 @@ export function sentenceOf({ key, slots }, words) {
 function factsOf(alert, words) {
   return [
     words.t("alert.since", { at: alert.raised_at }),
-    alert.count > 1 && words.t("alert.times", { count: alert.count }),
+    alert.count > 1 &&
+      words.t("alert.times", { count: alert.count, at: alert.last_raised_at }),
     alert.cleared_at && words.t("alert.cleared", { at: alert.cleared_at }),
     alert.acknowledged_at &&
       words.t("alert.acknowledged", {
@@ -131,7 +140,7 @@ export function byUrgency(a, b) {
   return (
     Number(Boolean(a.cleared_at)) - Number(Boolean(b.cleared_at)) ||
     a.priority.localeCompare(b.priority) ||
-    b.raised_at.localeCompare(a.raised_at)
+    b.last_raised_at.localeCompare(a.last_raised_at)
   );
 }
 

@@ -6,6 +6,7 @@
  */
 
 import { byUrgency, createAlertList } from "./alert_list.js";
+import { floodSaid } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../protocol.js").Alert} Alert */
@@ -17,7 +18,7 @@ import { need, setAttribute, setHidden, setText } from "./dom.js";
 export function createAlertsPanel({ store, words }, tone) {
   const list = createAlertList(need("#alerts"), words);
   const button = need("#alerts-button");
-  /** @type {Set<string> | null} alarms that were there before; null before the first */
+  /** @type {Map<string, number> | null} occurrences told before; null before the first */
   let known = null;
 
   function draw() {
@@ -26,7 +27,14 @@ export function createAlertsPanel({ store, words }, tone) {
     const open = alerts.filter(({ cleared_at }) => !cleared_at).sort(byUrgency);
     setText(need("#alerts-count"), String(open.length));
     setAttribute(button, "data-worst", open[0]?.priority ?? "none");
-    button.title = words.t("header.alerts_count", { count: open.length });
+    /** @type {import("../protocol.js").Flood | null | undefined} */
+    const flood = store.get("flood");
+    const rate = floodSaid(flood, words);
+    const active = words.t("header.alerts_count", { count: open.length });
+    button.title = rate ? `${active} · ${rate}` : active;
+    button.toggleAttribute("data-flood", Boolean(flood?.since));
+    setText(need("#alerts-flood"), rate);
+    need("#alerts-flood").toggleAttribute("data-flood", Boolean(flood?.since));
     setHidden(need("#alerts-empty"), alerts.length > 0);
     list.draw(alerts);
   }
@@ -35,20 +43,24 @@ export function createAlertsPanel({ store, words }, tone) {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
     tone.sound(alerts.some(isLoud));
-    const news = alerts.filter(({ alert_id }) => known && !known.has(alert_id));
+    // A group that was there sounds again with each of its occurrences.
+    const news = alerts.filter(
+      ({ alert_id, count }) => known && known.get(alert_id) !== count,
+    );
     if (news.some(({ priority }) => priority !== "P1")) tone.chime();
-    known = new Set(alerts.map(({ alert_id }) => alert_id));
+    known = new Map(alerts.map(({ alert_id, count }) => [alert_id, count]));
   }
 
   store.subscribe("alerts", () => {
     draw();
     sound();
   });
+  store.subscribe("flood", draw);
   words.onChange(draw);
   draw();
 }
 
-/** It sounds until acknowledged, over or not. @param {Alert} alert */
+/** It sounds while it is active and nobody has seen it. @param {Alert} alert */
 function isLoud({ priority, acknowledged_at, cleared_at }) {
   return priority === "P1" && !acknowledged_at && !cleared_at;
 }
