@@ -324,14 +324,11 @@ class Dss:
 
     def site(self) -> Site:
         """What every page says of this server."""
-        rule = self.assessor.rule
         return Site(
             self.assessor.greenhouse.name,
             self.settings.robots,
             __version__,
             self._demo,
-            rule.threshold,
-            rule.radius_m,
         )
 
 
@@ -382,6 +379,7 @@ def create_app(dss: Dss) -> FastAPI:
             reader=require("read"),
             anyone=require("open"),
             document=cache(lambda: openapi.describe_api(app)),
+            rule=lambda: dss.assessor.rule,
         )
     )
 

@@ -160,6 +160,12 @@ class Minutes:
         self.command(command, None, at)
         self._audit(command, command.state, closed.key, at)
 
+    def rule(self, event: LogEvent, at: Instant) -> None:
+        """Another version of the rule is in force: its rings are others, too."""
+        self.log(event, at)
+        for topic in ("rule", "people"):
+            self._hub.changed(topic)
+
     def _audit(self, command: Command, state: str, why: str, at: Instant) -> None:
         self._sink.offer(
             CommandEventRecord(

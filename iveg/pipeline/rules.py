@@ -69,7 +69,7 @@ class Rules:
             await self._store.append(rule)
             self._judge.rule = rule
             self.versions.append(rule)
-        self._minutes.log(_line(before, rule), at)
+        self._minutes.rule(_line(before, rule), at)
         return rule
 
 

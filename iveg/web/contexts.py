@@ -8,6 +8,7 @@ attribute).  Live values never come this way; they arrive on ``/live``.
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+from iveg.domain.alerts import Rule
 from iveg.web.openapi import ApiDoc
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
@@ -22,16 +23,12 @@ class Site:
         greenhouse: Name as people say it.
         robots: Ids in fleet order; the order decides each robot's colour.
         demo: The robots are emulated.
-        confidence_threshold: From here on a detection counts (0 to 1).
-        radius_m: Of the ring around a person (m).
     """
 
     greenhouse: str
     robots: tuple[str, ...]
     version: str
     demo: bool
-    confidence_threshold: float
-    radius_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +142,15 @@ class DocsPage:
 
 @dataclass(frozen=True, slots=True)
 class AboutPage:
-    """``about.html``: what iVeg is, and what STOP is not."""
+    """``about.html``: what iVeg is, and what STOP is not.
+
+    Attributes:
+        rule: In force now; the page follows it on ``/live``.
+    """
 
     template: ClassVar[str] = "about.html"
     frame: Frame
+    rule: Rule
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
+from iveg.domain.alerts import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.contexts import (
     THEMES,
@@ -132,6 +133,7 @@ def router(
     reader: Callable[..., Any],
     anyone: Callable[..., Any],
     document: Callable[[], ApiDoc],
+    rule: Callable[[], Rule],
 ) -> APIRouter:
     """The routes of all pages.
 
@@ -140,6 +142,7 @@ def router(
         reader: Dependency that gives the visitor, or refuses a stranger.
         anyone: Dependency of the page that is open to strangers.
         document: The HTTP interface as it stands.
+        rule: The version in force.
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     who = Depends(reader)
@@ -161,7 +164,7 @@ def router(
 
     @routes.get("/about", response_model=None)
     async def about(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(AboutPage(pages.frame(request, "about", visitor)))
+        return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
 
     @routes.get("/signin", response_model=None, dependencies=[Depends(anyone)])
     async def signin(request: Request) -> Response:

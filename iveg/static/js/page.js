@@ -27,6 +27,7 @@ const ROUTES = {
   climate: () => import("./pages/climate.js"),
   settings: () => import("./pages/settings.js"),
   decision: () => import("./pages/decision.js"),
+  about: () => import("./pages/about.js"),
 };
 
 /** @param {App} app */

@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 import iveg
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
+from iveg.domain.alerts import Rule
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
 from iveg.web import history, problems
@@ -45,8 +46,6 @@ _SITE = Site(
     robots=("AGI", "AGII"),
     version="0",
     demo=False,
-    confidence_threshold=0.8,
-    radius_m=2.0,
 )
 
 
@@ -71,6 +70,7 @@ class Server:
                 reader=lambda: Principal("ana", "operator"),
                 anyone=lambda: None,
                 document=lambda: describe_api(app),
+                rule=Rule,
             )
         )
         app.add_api_route("/healthz", lambda: "ok")

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import struct
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -348,3 +349,35 @@ async def test_a_revoked_session_can_no_longer_stop() -> None:
 
         assert await browser.close_code() == 4401
     assert desk.fleet.stops == []
+
+
+async def test_a_new_rule_is_told_to_every_browser_with_the_rings_it_draws() -> None:
+    desk = WebDesk()
+    desk.drive("AGII")
+    desk.look("AGII", detection("farmer", 1.0))
+    async with (
+        desk.serving() as address,
+        looking(desk, address) as one,
+        looking(desk, address) as other,
+    ):
+        for browser in (one, other):
+            await browser.read_until("snapshot")
+        wanted = replace(desk.rules.current, radius_m=3.5)
+        await desk.rules.change(wanted, "ana", desk.clock())
+        rules = [(await each.read_until("rule"))[-1] for each in (one, other)]
+        people = (await one.read_until("people"))[-1]
+
+    assert [told["data"]["version"] for told in rules] == [2, 2]
+    assert [told["data"]["radius_m"] for told in rules] == [3.5, 3.5]
+    assert people["data"][0]["radius_m"] == pytest.approx(3.5)
+
+
+async def test_how_fast_alarms_come_is_told_when_it_changes() -> None:
+    desk = WebDesk()
+    async with desk.serving() as address, looking(desk, address) as browser:
+        await browser.read_until("snapshot")
+        desk.drive("AGI")
+        await desk.wait(3.2)
+        told = (await browser.read_until("flood"))[-1]
+
+    assert told["data"] == {"count": 1, "limit": 10, "window_s": 600.0, "since": None}

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import httpx
 import pytest
 from fastapi import FastAPI
 from starlette.responses import RedirectResponse, Response
 
+from iveg.domain.alerts import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.auth import Principal, require
 from iveg.web.contexts import Site
@@ -35,8 +36,6 @@ SITE = Site(
     robots=("AGI", "AGII"),
     version="9.8.7",
     demo=True,
-    confidence_threshold=0.8,
-    radius_m=2.0,
 )
 
 API = ApiDoc(
@@ -100,6 +99,7 @@ async def browser(door: FakeDoor) -> AsyncIterator[httpx.AsyncClient]:
             reader=door.reader,
             anyone=require("open"),
             document=lambda: API,
+            rule=lambda: replace(Rule(), threshold=0.75, radius_m=2.5),
         )
     )
     install(app, pages.problem)
@@ -217,7 +217,14 @@ async def test_about_says_what_stop_is_not(browser: httpx.AsyncClient) -> None:
     html = (await browser.get("/about", headers={"Accept-Language": "en"})).text
     assert "It is not an emergency stop and not certified." in html
     assert "not an ISO 13850 device" in html
-    assert "80 %" in html
+
+
+async def test_about_tells_the_rule_that_is_in_force_now(
+    browser: httpx.AsyncClient,
+) -> None:
+    html = (await browser.get("/about", headers={"Accept-Language": "en"})).text
+    assert "75 %" in html
+    assert "2.5 m" in html
 
 
 async def test_the_api_is_drawn_from_its_own_document(

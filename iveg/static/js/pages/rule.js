@@ -2,58 +2,61 @@
  * Changing the rule, where the server lets somebody: read, write, say what came of it.
  */
 
-import { readApi, sendApi } from "../api.js";
+import { sendApi } from "../api.js";
 import { dayAndTime } from "../history/madrid.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 
-/** @typedef {import("./settings.js").Rule & {author?: string | null,
- *   since?: string | null}} Rule */
+/** @typedef {import("../protocol.js").Rule} Rule */
 
 const WRITERS = new Set(["operator", "admin"]);
 
 /**
+ * @param {import("../store.js").Store} store
  * @param {import("../i18n.js").Words} words
- * @param {() => void} onRule told when `newest` has changed
  */
-export function createRuleForm(words, onRule) {
+export function createRuleForm(store, words) {
   const form = /** @type {HTMLFormElement} */ (need("#rule-form"));
   const [threshold, radius] = /** @type {HTMLInputElement[]} */ (
     ["threshold", "radius"].map((name) => need(`#rule-new-${name}`))
   );
-  /** @type {Rule | null} */
-  let rule = null;
-  /** @type {Set<string>} */
-  let verbs = new Set();
+  /** @type {Rule | null} the version that the person at the form has seen */
+  let seen = null;
   let note = "readonly";
 
-  /** What the server answers when asked for the rule; null where it cannot be asked. */
-  async function look() {
-    if (!verbs.has("get")) return;
-    const { status, body } = await readApi("rule");
-    if (status === 200) take(body);
-  }
-
-  /** @param {Rule} found */
-  function take(found) {
-    const isSame = rule?.version === found.version;
-    rule = found;
-    // Whoever is typing keeps what they typed.
-    if (!isSame) {
-      threshold.value = String(Math.round(found.confidence_threshold * 100));
-      radius.value = String(found.radius_m);
-    }
+  /** @param {Rule | null | undefined} rule */
+  function take(rule) {
+    if (!rule) return;
+    // Whoever is typing keeps what they typed, and hears that it was overtaken.
+    if (!seen || shows(seen) || shows(rule)) fill(rule);
+    else if (rule.version !== seen.version) say("rule.stale");
     draw();
-    onRule();
   }
 
-  /** @param {Set<string>} found what the server knows: `get`, `put` */
-  async function open(found) {
-    verbs = found;
+  /** Whether the form holds a version as it is. @param {Rule} rule */
+  function shows(rule) {
+    return (
+      threshold.value === percentOf(rule) && radius.value === String(rule.radius_m)
+    );
+  }
+
+  /** @param {Rule} rule */
+  function fill(rule) {
+    seen = rule;
+    threshold.value = percentOf(rule);
+    radius.value = String(rule.radius_m);
+  }
+
+  /** @param {string} key @param {Record<string, string | number>} [slots] */
+  function say(key, slots) {
+    setText(need("#rule-result"), words.t(key, slots));
+  }
+
+  /** @param {Set<string>} verbs what the server knows: `get`, `put` */
+  function open(verbs) {
     const may = WRITERS.has(document.body.dataset.role ?? "");
     if (verbs.has("put")) note = may ? "editable" : "role";
     setHidden(form, !verbs.has("put") || !may);
     draw();
-    await look();
   }
 
   async function save() {
@@ -61,23 +64,22 @@ export function createRuleForm(words, onRule) {
       confidence_threshold: threshold.valueAsNumber / 100,
       radius_m: radius.valueAsNumber,
       // Numbers: the server tells a version that was overtaken by this one.
-      version: Number(rule?.version),
+      version: Number(seen?.version),
     });
-    const isTaken = status === 200 && body;
-    if (isTaken) take(body);
-    if (status === 409) await look();
-    setText(need("#rule-result"), resultOf(status, body));
-  }
-
-  /** @param {number} status @param {any} body */
-  function resultOf(status, body) {
-    if (status === 200 && body) return words.t("rule.saved", { version: body.version });
-    if (status === 409) return words.t("rule.stale");
-    if (status === 0) return words.t("rows.offline");
-    return words.t("rule.refused", { why: String(body?.detail ?? status) });
+    if (status === 200 && body) {
+      fill(body);
+      say("rule.saved", { version: body.version });
+    } else if (status === 409) {
+      // Told once; whoever presses again means it.
+      seen = store.get("rule") ?? seen;
+      say("rule.stale");
+    } else if (status === 0) say("rows.offline");
+    else say("rule.refused", { why: String(body?.detail ?? status) });
   }
 
   function draw() {
+    /** @type {Rule | null | undefined} */
+    const rule = store.get("rule");
     const since =
       rule?.since && rule.author
         ? words.t("rule.since", { at: dayAndTime(rule.since), who: rule.author })
@@ -89,6 +91,13 @@ export function createRuleForm(words, onRule) {
     event.preventDefault();
     save();
   });
+  store.subscribe("rule", take);
   words.onChange(draw);
-  return { open, look, newest: () => rule };
+  take(store.get("rule"));
+  return { open };
+}
+
+/** @param {Rule} rule */
+function percentOf({ confidence_threshold }) {
+  return String(Math.round(confidence_threshold * 100));
 }

@@ -7,23 +7,21 @@ import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createRuleForm } from "./rule.js";
 
-/** @typedef {NonNullable<import("../protocol.js").Snapshot["rule"]>} Rule */
+/** @typedef {import("../protocol.js").Rule} Rule */
 
 /** @param {import("../page.js").Page} page */
 export function start({ store, words, tone, wake }) {
   createSoundPanel(words, tone);
   wireWake(wake, words);
-  const form = createRuleForm(words, draw);
+  const form = createRuleForm(store, words);
 
   function draw() {
-    const rule = form.newest() ?? store.get("snapshot")?.rule ?? null;
+    /** @type {Rule | null | undefined} */
+    const rule = store.get("rule");
     if (rule) drawRule(rule, words);
   }
 
-  store.subscribe("snapshot", () => {
-    draw();
-    form.look();
-  });
+  store.subscribe("rule", draw);
   words.onChange(draw);
   draw();
   findRoutes().then(form.open);
