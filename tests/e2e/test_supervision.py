@@ -56,6 +56,44 @@ def test_a_layer_that_was_switched_off_stays_off(page: Page) -> None:
     expect(page.get_by_role("checkbox", name="Puntos LiDAR")).not_to_be_checked()
 
 
+def test_filters_of_the_log_are_remembered_and_never_hide_in_silence(
+    page: Page,
+) -> None:
+    page.locator("#log li").first.wait_for(timeout=60_000)
+    more = page.locator("#log-chips .chip--more")
+    priority = page.locator('[data-filter="priority:P3"]')
+    expect(priority).to_be_hidden()
+    more.focus()
+    page.keyboard.press("Enter")
+    expect(more).to_be_focused()
+    expect(more).to_have_attribute("aria-expanded", "true")
+
+    priority.focus()
+    page.keyboard.press("Space")
+    page.locator('[data-filter="kind:speed"]').click()
+    page.reload()
+
+    # No slow-down is an alarm, so these two hide everything, and say so.
+    expect(page.locator("#log-empty")).to_contain_text("Velocidad · P3 aviso")
+    expect(priority).to_have_attribute("aria-pressed", "true")
+    expect(page.locator("#log li")).to_have_count(0)
+
+    page.locator("#log-clear").click()
+    expect(page.locator("#log li").first).to_be_visible()
+    expect(page.locator("#log-clear")).to_be_hidden()
+    expect(priority).to_be_hidden()
+
+
+def test_the_log_can_be_asked_for_one_rule(page: Page) -> None:
+    page.locator("#log-chips .chip--more").click()
+    page.locator('[data-filter="rule:person"]').click()
+
+    shown = page.locator("#log li")
+    expect(shown.first).to_contain_text(re.compile("persona"), timeout=90_000)
+    kinds = {item.get_attribute("data-kind") for item in shown.all()}
+    assert kinds == {"speed"}
+
+
 def test_people_can_be_read_as_sentences(page: Page) -> None:
     page.locator("[data-opens=people-panel]").click()
 

@@ -1,19 +1,15 @@
 /**
  * The action and inference log: newest first, every entry a plain sentence.
- *
- * Chips narrow it down: within one kind of chip any may match, across kinds all must;
- * no chip pressed shows everything.
  */
 
-import { make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { make, need, setHidden, setText } from "./dom.js";
+import { createChosen, createLogChips } from "./log_filter.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Entry} Entry */
 
 /** Entries in the list; the store keeps more, history keeps all. */
 const SHOWN = 200;
-const KINDS = ["detection", "speed", "command", "link", "alert", "system"];
-const CLASSES = ["person", "robot"];
 
 /**
  * @param {App} app
@@ -23,7 +19,17 @@ export function createLogPanel(app, decision) {
   const { store, words } = app;
   const list = need("#log");
   const empty = need("#log-empty");
-  const filter = createFilter(app, rebuild);
+  const clear = need("#log-clear");
+  const chosen = createChosen();
+  /** @type {Set<string>} */
+  const robots = new Set(store.robots().keys());
+  const chips = createLogChips({
+    place: need("#log-chips"),
+    words,
+    chosen,
+    robots: () => robots,
+    onChange: rebuild,
+  });
 
   /** @param {Entry} entry */
   function makeItem(entry) {
@@ -63,90 +69,47 @@ export function createLogPanel(app, decision) {
 
   /** @param {Entry} entry */
   function add(entry) {
-    filter.learn(entry);
-    if (!filter.admits(entry)) return;
+    learn([entry]);
+    if (!chosen.admits(entry)) return;
     list.prepend(makeItem(entry));
     while (list.children.length > SHOWN) list.lastElementChild?.remove();
     setHidden(empty, true);
+    setHidden(clear, true);
+  }
+
+  /** @param {readonly Entry[]} entries */
+  function learn(entries) {
+    const known = robots.size;
+    for (const robotId of store.robots().keys()) robots.add(robotId);
+    for (const { robot_id } of entries) if (robot_id) robots.add(robot_id);
+    if (robots.size > known) chips.draw();
   }
 
   function rebuild() {
     const entries = store.log();
-    for (const entry of entries) filter.learn(entry);
-    const shown = entries.filter(filter.admits).slice(-SHOWN).reverse();
+    learn(entries);
+    const shown = entries.filter(chosen.admits).slice(-SHOWN).reverse();
     list.replaceChildren(...shown.map(makeItem));
     setHidden(empty, shown.length > 0);
-    const key = entries.length ? "logpanel.empty_filter" : "logpanel.empty";
-    setText(empty, words.t(key));
+    const isHidden = entries.length > 0 && shown.length === 0;
+    const filters = chips.said().join(" · ");
+    const key = isHidden ? "logpanel.hidden" : "logpanel.empty";
+    setText(empty, words.t(key, { count: entries.length, filters }));
+    setHidden(clear, !isHidden);
   }
 
+  clear.addEventListener("click", () => {
+    chosen.clear();
+    chips.draw();
+    rebuild();
+    // The button goes away; the focus must not go with it.
+    list.focus();
+  });
   store.subscribe("log", add);
   store.subscribe("snapshot", rebuild);
   words.onChange(() => {
-    filter.draw();
+    chips.draw();
     rebuild();
   });
   rebuild();
-}
-
-/**
- * @param {App} app
- * @param {() => void} onChange
- */
-function createFilter({ store, words }, onChange) {
-  const place = need("#log-chips");
-  /** @type {Map<string, Set<string>>} what is pressed, by group */
-  const pressed = new Map([
-    ["kind", new Set()],
-    ["robot", new Set()],
-    ["class", new Set()],
-  ]);
-  /** @type {Set<string>} */
-  const robots = new Set();
-
-  /** @param {string} group @param {string} name @param {string} text */
-  function makeChip(group, name, text) {
-    const chip = make("button", "chip", text);
-    const names = /** @type {Set<string>} */ (pressed.get(group));
-    chip.type = "button";
-    chip.dataset.filter = `${group}:${name}`;
-    setAttribute(chip, "aria-pressed", String(names.has(name)));
-    chip.addEventListener("click", () => {
-      if (!names.delete(name)) names.add(name);
-      setAttribute(chip, "aria-pressed", String(names.has(name)));
-      onChange();
-    });
-    return chip;
-  }
-
-  function draw() {
-    for (const robotId of store.robots().keys()) robots.add(robotId);
-    place.replaceChildren(
-      ...KINDS.map((kind) => makeChip("kind", kind, words.t(`logpanel.kind.${kind}`))),
-      ...[...robots].map((robotId) => makeChip("robot", robotId, robotId)),
-      ...CLASSES.map((name) => makeChip("class", name, words.t(`class.${name}`))),
-    );
-  }
-
-  /** @param {string} group @param {string | null} value */
-  function isIn(group, value) {
-    const names = /** @type {Set<string>} */ (pressed.get(group));
-    return names.size === 0 || (value !== null && names.has(value));
-  }
-
-  draw();
-  return {
-    draw,
-    /** @param {Entry} entry */
-    learn(entry) {
-      if (!entry.robot_id || robots.has(entry.robot_id)) return;
-      robots.add(entry.robot_id);
-      draw();
-    },
-    /** @param {Entry} entry */
-    admits: (entry) =>
-      isIn("kind", entry.kind) &&
-      isIn("robot", entry.robot_id) &&
-      isIn("class", entry.class),
-  };
 }
