@@ -61,6 +61,9 @@ class Sink:
         """Take one."""
         self.last = record
 
+    async def secured(self) -> None:
+        """There is nothing to keep."""
+
 
 class Telling:
     """Stands where MQTT stands: writes the feedback and keeps when it left."""

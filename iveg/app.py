@@ -238,16 +238,20 @@ class Dss:
             tasks.create_task(self.upkeep.run(), name="upkeep")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())
-            tasks.create_task(self._remember_drills(), name="drills")
+            tasks.create_task(self._remember(), name="remember")
 
-    async def _remember_drills(self) -> None:
-        """Look when each robot was last drilled, as soon as the history answers."""
+    async def _remember(self) -> None:
+        """Take up what earlier runs left in the history, as soon as it answers."""
+        await self.recorder.caught_up()
         while True:
             try:
-                self.commander.drills.remember(await self.queries.last_drills())
+                left_open = await self.queries.open_commands()
+                drilled = await self.queries.last_drills()
             except HopError:
                 await asyncio.sleep(_HISTORY_AGAIN_S)
             else:
+                self.commander.close_earlier(left_open, clock.now())
+                self.commander.drills.remember(drilled)
                 return
 
     def _ended(self, task: asyncio.Task[None]) -> None:

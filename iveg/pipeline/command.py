@@ -21,6 +21,7 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
+from iveg.domain.records import CommandRecord
 from iveg.domain.stop import (
     Changed,
     Closed,
@@ -109,8 +110,6 @@ class Commander:
         """STOP these robots, in parallel; returns when it is sent and on disk."""
         machines = [self.machine(robot_id) for robot_id in robots]
         pressed = [self._press(machine, by, at, press) for machine in machines]
-        # Let every send reach its socket before the disk is asked for anything.
-        await asyncio.sleep(0)
         await self._write_down(pressed, by, at)
         return pressed
 
@@ -132,11 +131,15 @@ class Commander:
     async def _write_down(
         self, pressed: Iterable[Command], by: str, at: Instant
     ) -> None:
+        """What is wanted and who wanted it, on disk before it counts as accepted."""
+        # Let every send reach its socket before the disk is asked for anything.
+        await asyncio.sleep(0)
         for command in pressed:
             if self.machine(command.robot_id).follows(command):
                 await self._journal.wanted(
                     command.robot_id, "stopped", command.command_id, by, at
                 )
+        await self._minutes.secured()
 
     async def drill(
         self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
@@ -151,7 +154,6 @@ class Commander:
         self._perform(machine, machine.drill(by, at, self._new_id(), press), at)
         assert machine.stop is not None  # noqa: S101 - a drill begins an episode
         drilled = machine.stop
-        await asyncio.sleep(0)
         await self._write_down([drilled], by, at)
         return drilled
 
@@ -220,6 +222,24 @@ class Commander:
             effects = machine.press(by, now, self._new_id(), key="reasserted")
             self._perform(machine, effects, now)
 
+    def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
+        """Close the rows that an earlier run left open; nobody follows them any more.
+
+        A STOP whose robot was stopped again says under which name, and everything else
+        that it is not known how it ended.
+        """
+        for row in left:
+            if row.command_id in self.commands:
+                continue
+            machine = self.machines.get(row.robot_id)
+            heir = None
+            # One that waited for its resume had been released: nothing took its place.
+            stood = row.kind == "stop" and row.state != "READY"
+            if machine is not None and machine.wants_stop and stood:
+                heir = machine.hold_id
+            self._minutes.left_over(row, heir, now)
+        self._start(self._minutes.secured(), "audit-earlier")
+
     def broker_back(self) -> None:
         """The broker is there (again): it must hold every level."""
         for level in self._levels.values():
@@ -259,6 +279,7 @@ class Commander:
                     self._start(self._set_level(effect), f"level-{effect.robot_id}")
                 case Changed():
                     self._tell(machine, effect, at)
+                    self._start(self._minutes.secured(), f"audit-{machine.robot_id}")
                 case Closed():
                     self._minutes.closed(effect, at)
 
@@ -330,6 +351,11 @@ class Commander:
         await self._attempt(machine, effect.road, effect.hold_id, sending)
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
+        """Once, and never without a trace: the audit row is on disk before it goes."""
+        await self._minutes.secured()
+        if machine.once is None or machine.once.command_id != effect.command_id:
+            # The disk took so long that a STOP has come, or taken its place.
+            return
         if effect.kind == "release":
             sending = self._broker.release(
                 effect.robot_id, effect.ids, effect.challenge

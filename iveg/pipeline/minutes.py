@@ -160,13 +160,32 @@ class Minutes:
         self.command(command, None, at)
         self._audit(command, command.state, closed.key, at)
 
+    def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:
+        """A command of an earlier run is followed no more.
+
+        Args:
+            row: As the crash left it.
+            heir: The STOP that was asserted again in its place, if one was.
+            at: This moment.
+        """
+        state = "EXPIRED" if heir is None else "REPLACED"
+        self._sink.offer(replace(row, state=state, reason="restarted"))
+        told = "followed no more" if heir is None else f"asserted again under {heir}"
+        self._audit(row, state, f"server restarted; {told}", at)
+
+    async def secured(self) -> None:
+        """Return when every command and audit row so far would outlive a crash."""
+        await self._sink.secured()
+
     def rule(self, event: LogEvent, at: Instant) -> None:
         """Another version of the rule is in force: its rings are others, too."""
         self.log(event, at)
         for topic in ("rule", "people"):
             self._hub.changed(topic)
 
-    def _audit(self, command: Command, state: str, why: str, at: Instant) -> None:
+    def _audit(
+        self, command: Command | CommandRecord, state: str, why: str, at: Instant
+    ) -> None:
         self._sink.offer(
             CommandEventRecord(
                 command_id=command.command_id,

@@ -21,6 +21,9 @@ class RecordSink(Protocol):
     def offer(self, record: Record) -> None:
         """Remember a record in a while; never blocks and never fails."""
 
+    async def secured(self) -> None:
+        """Return when every command and audit row so far would outlive a crash."""
+
 
 class OdometryThinner:
     """Keeps 2 Hz a robot, and every change of what it was told, applies, or its link.

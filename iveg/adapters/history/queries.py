@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, and_, func, or_, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import lists, series
@@ -71,21 +71,6 @@ class Queries:
 
         return await self._ask(read)
 
-    async def latest_stop(self, robot_id: str) -> CommandRecord | None:
-        """The newest STOP of a robot, which a restart must look at."""
-        wanted = (
-            select(commands)
-            .where(commands.c.robot_id == robot_id, commands.c.kind == "stop")
-            .order_by(commands.c.requested_at.desc(), commands.c.command_id.desc())
-            .limit(1)
-        )
-
-        def read(connection: Connection) -> CommandRecord | None:
-            row = connection.execute(wanted).mappings().first()
-            return None if row is None else record_of(CommandRecord, row)
-
-        return await self._ask(read)
-
     async def command(self, command_id: str) -> CommandRecord | None:
         """One command; None when it is not known."""
         wanted = select(commands).where(commands.c.command_id == command_id)
@@ -93,6 +78,24 @@ class Queries:
         def read(connection: Connection) -> CommandRecord | None:
             row = connection.execute(wanted).mappings().first()
             return None if row is None else record_of(CommandRecord, row)
+
+        return await self._ask(read)
+
+    async def open_commands(self) -> tuple[CommandRecord, ...]:
+        """Commands whose last row says that they still go on, oldest first."""
+        c = commands.c
+        ended = ("RUNNING", "REPLACED", "EXPIRED")
+        stops = and_(c.kind == "stop", c.state.not_in(ended))
+        wanted = (
+            select(commands)
+            # A release that was refused or confirmed keeps the state that followed.
+            .where(or_(stops, and_(c.kind != "stop", c.state == "RELEASING")))
+            .order_by(c.requested_at, c.command_id)
+        )
+
+        def read(connection: Connection) -> tuple[CommandRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(CommandRecord, row) for row in rows)
 
         return await self._ask(read)
 

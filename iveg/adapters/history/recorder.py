@@ -5,6 +5,9 @@ that may not be lost go to the journal and telemetry waits its turn in the queue
 
     offer ──> queue ──> batch ──> database
                 └─ away ─> journal ─┘  on its return, and at the next start
+
+What was commanded does not wait for a batch: ``secured`` puts it into the journal at
+once, and what is then written twice is stored once.
 """
 
 import asyncio
@@ -21,7 +24,7 @@ from iveg.adapters.history.journal import Journal
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
-from iveg.domain.records import Record
+from iveg.domain.records import CommandEventRecord, CommandRecord, Record
 from iveg.pipeline.record import CAPACITY, RecordQueue, Waiting
 
 _log = logging.getLogger(__name__)
@@ -70,7 +73,10 @@ class Recorder:
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
+        self._unsecured: list[Waiting] = []
+        self._securing = asyncio.Lock()
         self._awake, self._full = asyncio.Event(), asyncio.Event()
+        self._caught_up = asyncio.Event()
         self._writing: asyncio.Task[None] | None = None
         self._closing = False
         self._revision = 0
@@ -85,19 +91,26 @@ class Recorder:
 
     def offer(self, record: Record) -> None:
         """Remember a record in a while; never blocks, never awaits, never fails."""
-        self._take(self._stamp(record))
-
-    async def secure(self, record: Record) -> bool:
-        """Remember a record, and return when it is on the disk in the journal.
-
-        For a STOP, which must survive a crash of the next millisecond.
-
-        Returns:
-            Whether the disk has it; when not, it waits in memory like any other.
-        """
         waiting = self._stamp(record)
+        if isinstance(record, CommandRecord | CommandEventRecord):
+            self._unsecured.append(waiting)
         self._take(waiting)
-        return await self._append([waiting])
+
+    async def secured(self) -> None:
+        """Return when every command and audit row so far is in the journal.
+
+        For a STOP, which must survive a crash of the next millisecond.  Those who ask
+        at the same time share one write; a disk that refuses leaves the rows in memory
+        like any other, and is seen in ``health``.
+        """
+        async with self._securing:
+            rows, self._unsecured = self._unsecured, []
+            if rows:
+                await self._append(rows)
+
+    async def caught_up(self) -> None:
+        """Return when the database has what earlier runs left in the journal."""
+        await self._caught_up.wait()
 
     def health(self, now: Instant) -> RecorderHealth:
         """How memory is doing at this moment."""
@@ -194,6 +207,7 @@ class Recorder:
             self._lose(repr(error))
         else:
             self._written += len(batch)
+            self._caught_up.set()
             self._come_back()
             return
         self._queue.put_back(batch)

@@ -41,7 +41,8 @@ def _join(episode: Episode, stop: Command, by: str) -> list[Effect]:
     if by in stop.requesters:
         return []
     stop.requesters.append(by)
-    return [Changed(episode.robot_id, stop.command_id, episode.state, "requested")]
+    why = f"joined by {by}"
+    return [Changed(episode.robot_id, stop.command_id, episode.state, "requested", why)]
 
 
 def drill(

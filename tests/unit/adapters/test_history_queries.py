@@ -182,20 +182,25 @@ async def test_one_decision_is_found_by_its_id(
     assert await queries.decision("D2") is None
 
 
-async def test_the_newest_stop_of_a_robot_is_found(
+async def test_open_commands_are_those_that_say_that_they_still_go_on(
     queries: Queries, database_url: str
 ) -> None:
-    newest = command_record(command_id="C2", requested_at=NOON + 1)
-    remember(
-        database_url,
-        command_record(),
-        newest,
-        command_record(command_id="C3", requested_at=NOON + 2, kind="release"),
-        command_record(command_id="C4", requested_at=NOON + 3, robot_id="AGII"),
+    going_on = (
+        command_record(command_id="S1", state="STANDING"),
+        command_record(command_id="S2", state="READY", requested_at=NOON + 1.0),
+        command_record(command_id="R1", kind="release", state="RELEASING"),
     )
+    refused_or_over = (
+        command_record(command_id="S3", state="REPLACED"),
+        command_record(command_id="S4", state="RUNNING"),
+        command_record(command_id="R2", kind="release", state="STANDING"),
+        command_record(command_id="R3", kind="resume", state="EXPIRED"),
+    )
+    remember(database_url, *going_on, *refused_or_over)
 
-    assert await queries.latest_stop("AGI") == newest
-    assert await queries.latest_stop("AGIII") is None
+    found = await queries.open_commands()
+
+    assert [row.command_id for row in found] == ["R1", "S1", "S2"]
 
 
 async def test_the_trail_of_a_command_is_told_in_order(

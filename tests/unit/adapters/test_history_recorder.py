@@ -250,7 +250,8 @@ async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_star
     database_url: str, tmp_path: Path
 ) -> None:
     crashed = Recorder(database_url, tmp_path / "journal")
-    assert await crashed.secure(command_record(state="REQUESTED"))
+    crashed.offer(command_record(state="REQUESTED"))
+    await crashed.secured()
 
     upgrade(database_url)
     assert scalar(database_url, "SELECT count(*) FROM commands") == 0
@@ -264,12 +265,31 @@ async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_star
     assert scalar(database_url, "SELECT state FROM commands") == "REQUESTED"
 
 
+async def test_it_has_caught_up_when_the_database_holds_what_a_crash_left(
+    database_url: str, tmp_path: Path
+) -> None:
+    crashed = Recorder(database_url, tmp_path / "journal")
+    crashed.offer(command_record(state="REQUESTED"))
+    await crashed.secured()
+
+    recorder = Recorder(database_url, tmp_path / "journal")
+    task = asyncio.create_task(recorder.run())
+    await asyncio.wait_for(recorder.caught_up(), _PATIENCE_S)
+    stored = scalar(database_url, "SELECT state FROM commands")
+    task.cancel()
+    await asyncio.wait({task})
+    await recorder.close()
+
+    assert stored == "REQUESTED"
+
+
 async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
     database_url: str, tmp_path: Path
 ) -> None:
     journal = tmp_path / "journal"
     first = Recorder(database_url, journal)
-    await first.secure(command_record(state="REQUESTED"))
+    first.offer(command_record(state="REQUESTED"))
+    await first.secured()
     old = journal.read_bytes()
     first.offer(command_record(state="STANDING"))
     await first.close()
@@ -291,12 +311,11 @@ async def test_replaying_the_audit_trail_twice_writes_it_once(
     journal = tmp_path / "journal"
     for _ in range(2):
         recorder = Recorder(database_url, journal)
-        await recorder.secure(command_event_record())
-        await recorder.secure(log_record())
+        recorder.offer(command_event_record())
+        await recorder.secured()
         await recorder.close()
 
     assert scalar(database_url, "SELECT count(*) FROM command_events") == 1
-    assert scalar(database_url, "SELECT count(*) FROM log") == 1
 
 
 async def test_closing_while_the_database_is_away_leaves_it_to_the_journal(
@@ -389,19 +408,33 @@ async def test_securing_a_stop_returns_when_the_journal_holds_it(
 ) -> None:
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
-    assert await recorder.secure(command_record())
+    recorder.offer(command_record())
+    await recorder.secured()
 
     assert b'"C1"' in (tmp_path / "journal").read_bytes()
     await recorder.close()
 
 
-async def test_securing_says_when_the_disk_did_not_take_it(
+async def test_whoever_secures_at_the_same_time_waits_for_the_same_write(
+    sqlite_url: str, tmp_path: Path
+) -> None:
+    recorder = Recorder(sqlite_url, tmp_path / "journal")
+    recorder.offer(command_record())
+
+    await asyncio.gather(*(recorder.secured() for _ in range(3)))
+
+    assert recorder.counters["history_journalled"] == 1
+    await recorder.close()
+
+
+async def test_what_the_disk_did_not_take_waits_for_the_database(
     sqlite_url: str, tmp_path: Path
 ) -> None:
     (tmp_path / "journal").mkdir()
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
-    assert not await recorder.secure(command_record())
+    recorder.offer(command_record())
+    await recorder.secured()
 
     (tmp_path / "journal").rmdir()
     await recorder.close()

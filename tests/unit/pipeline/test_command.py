@@ -9,6 +9,7 @@ from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.domain.stop import Command
 from tests.builders import safety_report
+from tests.fakes.records import command_record
 from tests.unit.pipeline.desk import Desk, conditions_of, settle
 
 
@@ -362,6 +363,75 @@ async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
     assert desk.fleet.stops == []
 
 
+async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> None:
+    desk = Desk()
+    desk.commander.restore({"AGI": "ana"}, desk.clock())
+    await settle()
+    before = len(desk.sink.records)
+    left = (
+        command_record(command_id="01STOP", state="SENT"),
+        command_record(command_id="01FREE", robot_id="AGII", state="READY"),
+        command_record(command_id="01LIFT", kind="release", state="RELEASING"),
+    )
+
+    desk.commander.close_earlier(left, desk.clock())
+    await settle()
+
+    again = desk.commander.machine("AGI").hold_id
+    new = desk.sink.durable[before:]
+    events = [one for one in new if isinstance(one, CommandEventRecord)]
+    rows = [one for one in new if isinstance(one, CommandRecord)]
+    assert [(one.command_id, one.state, one.why) for one in events] == [
+        ("01STOP", "REPLACED", f"server restarted; asserted again under {again}"),
+        ("01FREE", "EXPIRED", "server restarted; followed no more"),
+        ("01LIFT", "EXPIRED", "server restarted; followed no more"),
+    ]
+    assert [one.reason for one in rows] == ["restarted"] * 3
+
+
+async def test_a_row_of_a_hold_that_was_adopted_goes_on_in_this_run() -> None:
+    desk = Desk()
+    desk.report("AGI", Hold("01BEFORE", "iveg", "remote"))
+    before = len(desk.sink.records)
+
+    left = [command_record(command_id="01BEFORE", state="STANDING")]
+    desk.commander.close_earlier(left, desk.clock())
+    await settle()
+
+    assert desk.sink.records[before:] == []
+
+
+async def test_a_release_goes_out_when_its_audit_row_is_on_the_disk() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.sink.opened.clear()
+
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await settle()
+    waiting = [what for what, _, _ in desk.broker.asked]
+    desk.sink.opened.set()
+    await settle()
+
+    assert "release" not in waiting
+    assert desk.broker.asked[-1][0] == "release"
+
+
+async def test_a_release_that_the_disk_held_up_for_too_long_never_goes_out() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.sink.opened.clear()
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await desk.wait(2.1)
+
+    desk.sink.opened.set()
+    await settle()
+
+    assert "release" not in [what for what, _, _ in desk.broker.asked]
+    assert desk.commander.machine("AGI").wants_stop
+
+
 async def test_a_hold_that_this_run_did_not_make_is_adopted_and_written_down() -> None:
     desk = Desk()
 
@@ -419,12 +489,12 @@ async def test_f38_fifty_presses_are_fifty_rows_and_one_episode() -> None:
     for number in range(50):
         await desk.commander.stop(["AGI"], f"operator-{number}", desk.clock())
 
-    rows = [
-        one
-        for one in desk.sink.records
-        if isinstance(one, CommandEventRecord) and one.why == "requested"
+    events = [one for one in desk.sink.records if isinstance(one, CommandEventRecord)]
+    rows = [one for one in events if one.why != "sent"]
+    assert [row.why for row in rows] == [
+        "requested",
+        *(f"joined by operator-{number}" for number in range(1, 50)),
     ]
-    assert len(rows) == 50
     assert len({row.command_id for row in rows}) == 1
 
 
