@@ -1,4 +1,5 @@
 import { createWords, translate } from "../../iveg/static/js/i18n.js";
+import { laneName } from "../../iveg/static/js/lanes.js";
 import { equal, test } from "./harness.js";
 
 const BLOCKS = {
@@ -97,4 +98,30 @@ test("markup in a value stays text", async () => {
   translate(place, t);
   equal(line.childElementCount, 0);
   equal(line.textContent, "<img src=x> y $&");
+});
+
+test("a lane that iVeg named is named in the reader's words", () => {
+  /** @param {string} key @param {Record<string, string>} [slots] */
+  const t = (key, slots) => `${key} ${slots?.n}`.trim();
+  equal(
+    ["Pasillo 1", "12", "Pasillo 3 sur", "Pasillo central", "Cabecera norte"].map(
+      (label) => laneName(label, t),
+    ),
+    [
+      "lane.number 1",
+      "lane.number 12",
+      "lane.number_south 3",
+      "lane.central",
+      "lane.end_north",
+    ],
+  );
+});
+
+test("a name that a grower gave stays as it is", () => {
+  for (const label of ["Tomates de Ana", "Pasillo 1 bis", "pasillo 1", "Lane 4", ""]) {
+    equal(
+      laneName(label, () => "changed"),
+      label,
+    );
+  }
 });

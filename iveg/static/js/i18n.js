@@ -14,6 +14,8 @@
  * @typedef {ReturnType<typeof createWords>} Words
  */
 
+import { laneName } from "./lanes.js";
+
 /** @type {readonly Language[]} */
 export const LANGUAGES = ["es", "en"];
 const LOCALES = { es: "es-ES", en: "en-GB" };
@@ -121,7 +123,7 @@ export function createWords(load) {
     why: (value) => named("why", value),
     hop: (value) => named("hop", value),
     drive: (value) => named("drive", value),
-    lane: String,
+    lane: (value) => laneName(String(value), say),
     person: trackOf,
     sentence: (value, slots) => sentenceOf(value, slots),
   };

@@ -15,27 +15,59 @@ import { circle, isolated, label } from "./paint.js";
 
 const WORDS_FROM_SCALE = 24;
 
+/** Words nearer to each other than this would be read as one (px). */
+const WORDS_ACROSS_PX = 92;
+const WORDS_ABOVE_PX = 13;
+
 /** @param {Paint} paint */
 export function draw(paint) {
   for (const person of paint.scene.people) {
     isolated(paint.ctx, () => drawPerson(paint, person));
   }
+  isolated(paint.ctx, () => {
+    for (const person of worded(paint)) drawAge(paint, person);
+  });
+}
+
+/**
+ * Who gets words: of several whose words would lie on each other the newest.
+ *
+ * @param {Paint} paint
+ */
+export function worded({ scene, view }) {
+  const unseen = scene.people.filter(({ stage }) => stage !== "seen");
+  /** @type {ScenePerson[]} */
+  const chosen = [];
+  for (const person of unseen.sort((a, b) => a.ageS - b.ageS)) {
+    const isCovered = chosen.some(
+      ({ x, y }) =>
+        Math.abs(x - person.x) * view.scale < WORDS_ACROSS_PX &&
+        Math.abs(y - person.y) * view.scale < WORDS_ABOVE_PX,
+    );
+    if (!isCovered) chosen.push(person);
+  }
+  return chosen;
 }
 
 /** @param {Paint} paint @param {ScenePerson} person */
 function drawPerson(paint, person) {
-  const { ctx, view, words } = paint;
+  const { ctx, view } = paint;
   ctx.translate(screenX(view, person.x), screenY(view, person.y));
   if (person.stage !== "last_seen") drawRing(paint, person);
   if (person.peer) drawPeer(paint, person);
   else drawFigure(paint, person);
-  if (person.stage === "seen") return;
+}
+
+/** How long ago somebody was seen. @param {Paint} paint @param {ScenePerson} person */
+function drawAge(paint, person) {
+  const { view, words } = paint;
   const isGone = person.stage === "last_seen";
   // From afar, sentences of several people would lie on each other.
   const isNear = view.scale >= WORDS_FROM_SCALE;
   const said = isGone ? words.lastSeen(person.ageS) : words.ago(person.ageS);
   const text = isNear ? said : words.age(person.ageS);
-  label(paint, text, 0, 20, { size: 11, colour: paint.theme.muted });
+  const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
+  label(paint, text, x, y + 20, { size: 11, colour: paint.theme.muted });
 }
 
 /** @param {Paint} paint @param {ScenePerson} person */

@@ -5,8 +5,10 @@
  * @typedef {ReturnType<typeof createWords>} Words
  */
 
+import { laneName } from "../lanes.js";
+
 /**
- * @param {Translate} [t] of the keys `map.lane`, `map.ghost`, `map.last_seen`,
+ * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
  *   `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
  */
@@ -24,7 +26,7 @@ export function createWords(t = wordless, locale = document.documentElement.lang
   const percents = new Intl.NumberFormat(tongue, { style: "percent" });
   return {
     /** @param {string} lane */
-    lane: (lane) => (/^\d+$/.test(lane) ? t("map.lane", { n: lane }) : lane),
+    lane: (lane) => laneName(lane, t),
     /** A length of the scale bar. @param {number} m */
     metres: (m) => `${plain.format(m)} m`,
     /** A measured distance. @param {number} m */

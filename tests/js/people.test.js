@@ -1,0 +1,34 @@
+import { worded } from "../../iveg/static/js/layers/people.js";
+import { equal, test } from "./harness.js";
+
+/** @param {object[]} people @param {number} [scale] */
+const paint = (people, scale = 30) =>
+  /** @type {import("../../iveg/static/js/layers/paint.js").Paint} */ (
+    /** @type {unknown} */ ({ scene: { people }, view: { scale } })
+  );
+const who = (
+  /** @type {number} */ ageS,
+  /** @type {number} */ x,
+  stage = "last_seen",
+) => ({
+  ageS,
+  x,
+  y: 0,
+  stage,
+});
+
+test("of words that would lie on each other the newest stand", () => {
+  const old = who(60, 1);
+  const fresh = who(5, 2);
+  const far = who(90, 9);
+  equal(worded(paint([old, fresh, far])), [fresh, far]);
+});
+
+test("from near everybody has words", () => {
+  const people = [who(5, 1), who(60, 2)];
+  equal(worded(paint(people, 120)).length, 2);
+});
+
+test("who is seen now needs no age", () => {
+  equal(worded(paint([who(0, 1, "seen")])), []);
+});
