@@ -197,14 +197,31 @@ def test_a_rule_that_somebody_else_has_changed_is_not_overwritten(
     for page in (first, second):
         expect(page.locator("#rule-new-radius")).not_to_have_value("")
 
+    first.locator("#rule-new-radius").fill("4")
     second.locator("#rule-new-radius").fill("3")
     second.locator("#rule-form button").click()
     expect(second.locator("#rule-result")).to_contain_text("Cambiada")
-    first.locator("#rule-new-radius").fill("4")
+    expect(first.locator("#rule-radius")).to_have_text("3,0 m")
     first.locator("#rule-form button").click()
 
     expect(first.locator("#rule-result")).to_contain_text("Otra persona")
+    expect(first.locator("#rule-new-radius")).to_have_value("4")
     expect(first.locator("#rule-radius")).to_have_text("3,0 m")
+
+
+def test_a_new_rule_is_seen_in_every_browser_at_once(open_page: OpenPage) -> None:
+    about, settings = open_page(route="/about"), open_page(route="/settings")
+    writer = open_page(route="/settings")
+    expect(writer.locator("#rule-new-radius")).not_to_have_value("")
+    expect(settings.locator("#rule-new-radius")).not_to_have_value("")
+
+    writer.locator("#rule-new-radius").fill("2.8")
+    writer.locator("#rule-form button").click()
+
+    soon = 1000.0
+    expect(settings.locator("#rule-radius")).to_have_text("2,8 m", timeout=soon)
+    expect(settings.locator("#rule-new-radius")).to_have_value("2.8", timeout=soon)
+    expect(about.locator("#about-rule")).to_contain_text("2,8 m", timeout=soon)
 
 
 @pytest.mark.parametrize("width", [390, 1440])
