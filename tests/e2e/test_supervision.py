@@ -188,6 +188,55 @@ def test_an_operator_changes_the_rule_and_sees_its_version(
         assert api.get("rule").json()["radius_m"] == 2.5
 
 
+def test_an_operator_teaches_a_word_and_a_threshold(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(768, 1024, route="/settings")
+    words = page.locator("#aliases li")
+    expect(words.filter(has_text="farmer")).to_contain_text("persona")
+    before = int(page.locator("#rule-version").inner_text())
+
+    page.locator("#alias-word").fill("Tractor")
+    page.locator("#alias-class").select_option("robot")
+    page.locator("#alias-add").press("Enter")
+    expect(page.locator("#class-result")).to_contain_text("Sin guardar")
+    page.locator("#class-person").fill("70")
+    page.locator("#class-save").click()
+
+    expect(page.locator("#class-result")).to_contain_text(f"versión {before + 1}")
+    expect(page.locator("#rule-version")).to_have_text(str(before + 1))
+    with stack.api() as api:
+        rule = api.get("rule").json()
+    assert rule["aliases"]["tractor"] == "robot"
+    assert rule["class_thresholds"] == {"person": 0.7}
+    page.reload()
+    expect(words.filter(has_text="tractor")).to_contain_text("robot")
+
+    words.filter(has_text="tractor").locator("button").click()
+    page.locator("#class-person").fill("")
+    page.locator("#class-save").click()
+    expect(page.locator("#rule-version")).to_have_text(str(before + 2))
+    expect(words.filter(has_text="tractor")).to_have_count(0)
+
+
+def test_a_word_in_markup_is_text_on_the_settings_page(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(route="/settings")
+    expect(page.locator("#class-save")).to_be_visible()
+
+    page.locator("#alias-word").fill(PROBE)
+    page.locator("#alias-add").click()
+    expect(page.locator("#aliases")).to_contain_text("<img")
+    page.locator("#class-save").click()
+
+    # The server keeps what the wire allows of it.
+    expect(page.locator("#class-result")).to_contain_text("versión")
+    expect(page.locator("#aliases")).to_contain_text("img src")
+    assert page.locator("main img").count() == 0
+    assert evaluate(page, "() => window.probed ?? null") is None
+
+
 def test_a_rule_that_somebody_else_has_changed_is_not_overwritten(
     open_page: OpenPage,
 ) -> None:

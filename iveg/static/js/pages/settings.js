@@ -5,6 +5,7 @@
 import { readApi } from "../api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
+import { createClassForm } from "./classes.js";
 import { createRuleForm } from "./rule.js";
 
 /** @typedef {import("../protocol.js").Rule} Rule */
@@ -13,7 +14,7 @@ import { createRuleForm } from "./rule.js";
 export function start({ store, words, tone, wake }) {
   createSoundPanel(words, tone);
   wireWake(wake, words);
-  const form = createRuleForm(store, words);
+  const forms = [createRuleForm(store, words), createClassForm(store, words)];
 
   function draw() {
     /** @type {Rule | null | undefined} */
@@ -24,7 +25,9 @@ export function start({ store, words, tone, wake }) {
   store.subscribe("rule", draw);
   words.onChange(draw);
   draw();
-  findRoutes().then(form.open);
+  findRoutes().then((verbs) => {
+    for (const form of forms) form.open(verbs);
+  });
 }
 
 /** @param {Rule} rule @param {import("../i18n.js").Words} words */

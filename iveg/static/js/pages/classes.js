@@ -1,0 +1,173 @@
+/**
+ * The words of detectors: what each stands for, and how certain each class must be.
+ *
+ * A change is a new version of the rule.  Whoever is at the form keeps what they typed
+ * when somebody else is faster, and is told.
+ *
+ * @typedef {import("../protocol.js").Rule} Rule
+ * @typedef {"person" | "robot"} Class
+ */
+
+import { sendApi } from "../api.js";
+import { make, need, setHidden, setText } from "../panels/dom.js";
+
+/** @type {readonly Class[]} */
+const CLASSES = ["person", "robot"];
+const WRITERS = new Set(["operator", "admin"]);
+
+/**
+ * @param {import("../store.js").Store} store
+ * @param {import("../i18n.js").Words} words
+ */
+export function createClassForm(store, words) {
+  const form = /** @type {HTMLFormElement} */ (need("#class-form"));
+  const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
+  const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
+  const possible = /** @type {HTMLInputElement} */ (need("#class-possible"));
+  /** @type {Rule | null} the version that the person at the form has seen */
+  let seen = null;
+  /** @type {Map<string, Class>} */
+  let aliases = new Map();
+  /** @type {{key: string, slots: Record<string, string | number>} | null} */
+  let said = null;
+
+  /** @param {Rule | null | undefined} rule */
+  function take(rule) {
+    if (!rule) return;
+    if (!seen || JSON.stringify(typed()) === JSON.stringify(writtenOf(seen))) {
+      fill(rule);
+    } else if (rule.version !== seen.version) say("rule.stale");
+  }
+
+  /** @param {Rule} rule */
+  function fill(rule) {
+    seen = rule;
+    aliases = new Map(Object.entries(writtenOf(rule).aliases));
+    for (const name of CLASSES) {
+      const share = rule.class_thresholds?.[name];
+      thresholdOf(name).value =
+        share === undefined ? "" : String(Math.round(share * 100));
+    }
+    possible.checked = rule.possible_people === true;
+    draw();
+  }
+
+  /** What stands in the form, as the API takes it. */
+  function typed() {
+    const thresholds = CLASSES.flatMap((name) => {
+      const share = thresholdOf(name).valueAsNumber;
+      return Number.isNaN(share) ? [] : [[name, share / 100]];
+    });
+    return {
+      class_thresholds: Object.fromEntries(thresholds),
+      aliases: Object.fromEntries([...aliases].sort()),
+      possible_people: possible.checked,
+    };
+  }
+
+  async function save() {
+    const body = { ...typed(), version: Number(seen?.version) };
+    const answer = await sendApi("PUT", "rule", body);
+    if (answer.status === 200 && answer.body) {
+      fill(answer.body);
+      say("rule.saved", { version: answer.body.version });
+    } else if (answer.status === 409) {
+      // Told once; whoever presses again means it.
+      seen = store.get("rule") ?? seen;
+      say("rule.stale");
+    } else if (answer.status === 0) say("rows.offline");
+    else say("rule.refused", { why: String(answer.body?.detail ?? answer.status) });
+  }
+
+  function add() {
+    const name = word.value.trim().toLowerCase();
+    if (!name || CLASSES.some((own) => own === name))
+      return say("classes.own", { name });
+    aliases.set(name, /** @type {Class} */ (meaning.value));
+    word.value = "";
+    draw();
+    say("classes.unsaved");
+    return word.focus();
+  }
+
+  /** @param {string} name */
+  function remove(name) {
+    aliases.delete(name);
+    draw();
+    say("classes.unsaved");
+    // The button that was pressed is gone; the focus must not go with it.
+    word.focus();
+  }
+
+  /** @param {string} key @param {Record<string, string | number>} [slots] */
+  function say(key, slots = {}) {
+    said = { key, slots };
+    setText(need("#class-result"), words.t(key, slots));
+  }
+
+  function draw() {
+    const rows = [...aliases].sort().map(([name, class_]) => makeRow(name, class_));
+    need("#aliases").replaceChildren(...rows);
+    if (said) say(said.key, said.slots);
+  }
+
+  /** @param {string} name @param {Class} class_ */
+  function makeRow(name, class_) {
+    const item = make("li", "alias");
+    const gone = make("button", "button alias__remove", words.t("classes.remove"));
+    gone.type = "button";
+    gone.ariaLabel = words.t("classes.remove_one", { name });
+    gone.addEventListener("click", () => remove(name));
+    const meant = make("span", "", words.t("classes.means", { class: class_ }));
+    item.append(make("b", "", name), meant, gone);
+    return item;
+  }
+
+  /** @param {Set<string>} verbs what the server knows: `get`, `put` */
+  function open(verbs) {
+    const may = verbs.has("put") && WRITERS.has(document.body.dataset.role ?? "");
+    /** @type {HTMLFieldSetElement} */ (need("#class-fields")).disabled = !may;
+    setHidden(need("#class-save"), !may);
+  }
+
+  need("#alias-add").addEventListener("click", add);
+  word.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") return;
+    // Enter in this field means this word, not the whole form.
+    event.preventDefault();
+    add();
+  });
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    save();
+  });
+  store.subscribe("rule", take);
+  words.onChange(draw);
+  take(store.get("rule"));
+  return { open };
+}
+
+/** @param {Class} name */
+function thresholdOf(name) {
+  return /** @type {HTMLInputElement} */ (need(`#class-${name}`));
+}
+
+/**
+ * What of a rule stands in the form; the classes' own names always mean themselves.
+ *
+ * @param {Rule} rule
+ */
+export function writtenOf({ aliases = {}, class_thresholds = {}, possible_people }) {
+  const given = Object.entries(aliases).filter(
+    ([name]) => !CLASSES.some((own) => own === name),
+  );
+  const shares = CLASSES.flatMap((name) => {
+    const share = class_thresholds[name];
+    return share === undefined ? [] : [[name, Math.round(share * 100) / 100]];
+  });
+  return {
+    class_thresholds: Object.fromEntries(shares),
+    aliases: /** @type {Record<string, Class>} */ (Object.fromEntries(given.sort())),
+    possible_people: possible_people === true,
+  };
+}
