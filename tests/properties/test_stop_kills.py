@@ -229,31 +229,6 @@ def test_f39_without_reports_answers_bring_delivered_and_never_standing() -> Non
     assert (soon, rig.iveg.state) == ("DELIVERED", "STILL_MOVING")
 
 
-def test_f11_half_a_second_of_latency_never_makes_a_false_standstill() -> None:
-    rnd = Random(1)  # noqa: S311 - repeatable on purpose
-    rig = Watched()
-    stood = 0
-    for _ in range(100):
-        bring_to(rig, "RUNNING")
-        rig.run_for(1.0)
-        rig.somebody_presses("ana")
-        for _ in range(8):
-            # The rig itself checks each standstill against what really happened.
-            waits(rig, "slow")
-            rig.run_for(rnd.uniform(0.3, 0.7))
-            waits(rig, "open")
-            rig.run_for(TICK_S)
-        rig.run_for(2.5)
-        stood += rig.iveg.state == "STANDING" and rig.rig.speed < 0.02
-
-    assert stood == 100
-
-
-def waits(rig: Watched, weather: Weather) -> None:
-    for name in UP:
-        rig.roads[name].weather = weather
-
-
 def crawling() -> Watched:
     """A robot at 0.3 m/s, which brakes in well under a second."""
     rig = Watched()
