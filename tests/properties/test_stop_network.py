@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from iveg.domain.stop import STANDING_S
+from iveg.domain.stop import STANDING_FRESH_S, STANDING_S
 from tests.properties.test_stop import (
     SORTS,
     TICK_S,
@@ -139,7 +139,8 @@ def test_f12_a_third_of_everything_lost_still_stands_in_ten_seconds(batch: int) 
         took.append(rig.until_it_stands(30.0))
         assert rig.iveg.stop is not None
         tries.append(rig.iveg.stop.tries)
-        assert all(rested >= STANDING_S - TICK_S for _, rested in rig.stood)
+        # A move between two samples may be lost with them; one that goes on may not.
+        assert all(rested >= STANDING_FRESH_S - TICK_S for _, rested in rig.stood)
 
     assert max(took) <= STANDING_WITHIN_S
     assert min(tries) >= 1
