@@ -285,7 +285,7 @@ class Dss:
 
     def health(self, now: Instant) -> Any:
         """The chain from robot to screen."""
-        return health.health_of(self.chain, self.counters, now)
+        return health.health_of(self.chain, self.counters, self.views.safety, now)
 
     def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
         """Everything that is known, for a browser that has just come."""

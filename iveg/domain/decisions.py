@@ -163,6 +163,11 @@ class Decisions:
                     del self._all[key]
                     break
 
+    @property
+    def known(self) -> Iterable[Decision]:
+        """All that are in memory: the open ones and the newest that ended."""
+        return self._all.values()
+
     def every_open(self) -> Iterable[Decision]:
         """All open decisions."""
         return [one for one in self._all.values() if one.ended is None]

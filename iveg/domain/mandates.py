@@ -59,6 +59,7 @@ class Crossing:
         distance_m: Now; ``entered_m`` at the trigger.
         outside_since: When it was first found outside (monotonic, s).
         already_slow: It was slowed for something else: no slow-down will be seen.
+        ahead: It had judged this very hazard itself and said so before.
         in_sight: Whether the robot had a line of sight to the centre at the trigger.
     """
 
@@ -71,6 +72,7 @@ class Crossing:
     in_sight: bool
     distance_m: float
     already_slow: bool = False
+    ahead: bool = False
     outside_since: float | None = None
 
 
@@ -176,6 +178,7 @@ class Mandates:
             in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
             distance_m=distance,
             already_slow=_is_slow_already(robot, hazard, speed),
+            ahead=_is_ahead(robot, hazard),
         )
 
     def _leave(
@@ -269,12 +272,20 @@ def _is_slow_already(robot: RobotState, hazard: Hazard, speed: float) -> bool:
     milliseconds before it is found here; while it is still fast, its slow-down is yet
     to be seen.
     """
+    if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
+        return False
+    slow = HALF_SPEED * profile_of(robot.robot_id).max_speed
+    return not _is_ahead(robot, hazard) or speed <= slow
+
+
+def _is_ahead(robot: RobotState, hazard: Hazard) -> bool:
+    """Whether a robot reports that it is slow for this very hazard."""
     report = robot.safety
     if report is None or report.speed_factor > HALF_SPEED:
         return False
-    ours = (hazard.alert_id, hazard.cause)
-    ahead = report.decision_id in ours or report.cause in ours
-    return not ahead or speed <= HALF_SPEED * profile_of(robot.robot_id).max_speed
+    # A peer's own ring has no alert, and a robot may name none: that is no match.
+    ours = {hazard.alert_id, hazard.cause} - {None}
+    return report.decision_id in ours or report.cause in ours
 
 
 def _silent_observer(world: World, now: Instant) -> str | None:

@@ -11,7 +11,7 @@ data: a distance is as old as the older of both positions.  Left out: the intrus
 distance C, since nobody reaches through a light curtain here.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -89,6 +89,17 @@ def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
     looks = [look for look in person.sightings.values() if look.age_s(now) <= RING_S]
     margins = [_to_look(robot, person, look, now) for look in looks]
     return least(one for one in margins if one is not None)
+
+
+def margins_of(
+    robots: Iterable[RobotState], people: Collection[Person], now: Instant
+) -> Iterator[Margin]:
+    """Of every robot with every person, as far as there are pairs."""
+    for robot in robots:
+        for person in people:
+            margin = margin_of(robot, person, now)
+            if margin is not None:
+                yield margin
 
 
 def least(margins: Iterable[Margin]) -> Margin | None:

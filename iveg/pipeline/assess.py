@@ -12,10 +12,12 @@ from iveg.domain.alarms import Alarm, AlarmBook, Condition
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.events import LogEvent, Slot
+from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.feedback import CLEAR, Mandate
 from iveg.domain.flood import Flood, FloodGauge
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Change, Crossing, Mandates
+from iveg.domain.margins import POSE_LOST_S, margins_of
 from iveg.domain.observations import (
     DetectionFrame,
     Instant,
@@ -70,6 +72,7 @@ class Assessor:
         self.decisions = Decisions()
         self.alarms = AlarmBook()
         self._gauge = FloodGauge()
+        self._exposures = Exposures()
         self.mandates: dict[str, Mandate] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
         """How often a robot slowed for somebody whom it could not see itself."""
@@ -102,6 +105,20 @@ class Assessor:
         """A decision that is still in memory, with the verdicts of now."""
         decision = self.decisions.get(decision_id)
         return None if decision is None else record_of(decision, now)
+
+    def live_decisions(self) -> Iterable[Decision]:
+        """Those in memory that are of robots, not of recordings."""
+        robots = self.world.robots
+        return (
+            one
+            for one in self.decisions.known
+            if not robots[one.crossing.robot_id].is_replay
+        )
+
+    @property
+    def exposure(self) -> Exposure | None:
+        """How close the fleet came to people today; None before the first look."""
+        return self._exposures.today
 
     # --- one observation ----------------------------------------------------------
 
@@ -199,12 +216,21 @@ class Assessor:
         self._judge(now)
         if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
+        if self._exposures.due(now):
+            self._look_at_margins(now)
         wrong = [*self._conditions(now), *more]
         changed = self.alarms.sync(wrong, now, self._new_id())
         for alarm in changed:
             self._minutes.alarm(alarm)
             self._log_alarm(alarm, now)
         self._watch_flood(sum(one.cleared is None for one in changed), now)
+
+    def _look_at_margins(self, now: Instant) -> None:
+        fleet = list(self.world.live_robots())
+        margins = [*margins_of(fleet, self.people.known.values(), now)]
+        ages = [robot.age_s(now) for robot in fleet]
+        seen = any(age is not None and age <= POSE_LOST_S for age in ages)
+        self._exposures.look(margins, now, seen=seen)
 
     def _watch_flood(self, raised: int, now: Instant) -> None:
         before = self.flood

@@ -14,9 +14,12 @@ from iveg.web.robots import Json
 
 
 def health_of(
-    chain: Chain, counters: Callable[[], Counter[str]], now: Instant
+    chain: Chain,
+    counters: Callable[[], Counter[str]],
+    safety: Callable[[Instant], schemas.SafetyJson],
+    now: Instant,
 ) -> schemas.HealthJson:
-    """Every hop with its state and age, and all counters."""
+    """Every hop with its state and age, all counters, and how the fleet is told."""
     hops: list[schemas.HopJson] = [
         {
             "hop": hop.name,
@@ -31,6 +34,7 @@ def health_of(
         "ok": all(hop["state"] == "ok" for hop in hops),
         "hops": hops,
         "counters": dict(sorted(counters().items())),
+        "safety": safety(now),
     }
 
 

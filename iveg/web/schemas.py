@@ -301,12 +301,64 @@ class HopJson(TypedDict):
     detail: str
 
 
+class AlertLatencyJson(TypedDict):
+    """From the datum that fired the rule to the robot's own report (ms)."""
+
+    p50_ms: float | None
+    p95_ms: float | None
+    p99_ms: float | None
+    count: int
+    window_s: float
+    age_s: float | None
+
+
+class NotEchoedJson(TypedDict):
+    """Alerts that a robot did not answer in time, of those that it should have."""
+
+    count: int
+    of: int
+    within_s: float
+    window_s: float
+    age_s: float | None
+
+
+class NegativeMarginJson(TypedDict):
+    """How much of today's known time some margin was below zero (0 to 1)."""
+
+    share: float | None
+    known_s: float
+    unknown_s: float
+    count: int
+    since: str | None
+    age_s: float | None
+
+
+class WorstMarginJson(TypedDict):
+    """The least margin of today, when it was, and of how many looks."""
+
+    margin: MarginJson | None
+    at: str | None
+    count: int
+    since: str | None
+    age_s: float | None
+
+
+class SafetyJson(TypedDict):
+    """How soon the fleet obeys and how close it comes to people; never "safe"."""
+
+    alert_latency: AlertLatencyJson
+    not_echoed: NotEchoedJson
+    negative_margin: NegativeMarginJson
+    worst_margin: WorstMarginJson
+
+
 class HealthJson(TypedDict):
-    """Whether the chain is whole, and what was counted."""
+    """Whether the chain is whole, what was counted, and how the fleet is told."""
 
     ok: bool
     hops: list[HopJson]
     counters: dict[str, int]
+    safety: SafetyJson
 
 
 class ClimateJson(TypedDict):

@@ -9,6 +9,8 @@ from typing import Any
 
 from iveg.domain.alarms import Alarm, Occurrence
 from iveg.domain.alerts import WALKING_SPEED, Rule
+from iveg.domain.echoes import ECHO_S, WINDOW_S, Echoes
+from iveg.domain.exposure import Exposure
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
@@ -214,6 +216,51 @@ def margin(of: Margin | None) -> schemas.MarginJson | None:
         "braking": of.braking,
         "walking_speed": WALKING_SPEED,
     }
+
+
+def safety(
+    echoes: Echoes, exposure: Exposure | None, now: Instant
+) -> schemas.SafetyJson:
+    """How soon the fleet obeys, and how close it comes to people."""
+    day = exposure or Exposure(now, now)
+    age = None if exposure is None else round(now.mono - day.looked.mono, 1)
+    since = None if exposure is None else moment(day.since)
+    return {
+        "alert_latency": {
+            "p50_ms": _ms(echoes.p50_s),
+            "p95_ms": _ms(echoes.p95_s),
+            "p99_ms": _ms(echoes.p99_s),
+            "count": echoes.timed,
+            "window_s": WINDOW_S,
+            "age_s": rounded(echoes.echo_age_s, 1),
+        },
+        "not_echoed": {
+            "count": echoes.missed,
+            "of": echoes.asked,
+            "within_s": ECHO_S,
+            "window_s": WINDOW_S,
+            "age_s": rounded(echoes.asked_age_s, 1),
+        },
+        "negative_margin": {
+            "share": rounded(day.share, 5),
+            "known_s": round(day.known_s, 1),
+            "unknown_s": round(day.unknown_s, 1),
+            "count": day.looks,
+            "since": since,
+            "age_s": age,
+        },
+        "worst_margin": {
+            "margin": None if day.worst is None else margin(day.worst.margin),
+            "at": None if day.worst is None else moment(day.worst.at),
+            "count": day.looks,
+            "since": since,
+            "age_s": age,
+        },
+    }
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1000.0 * seconds, 1)
 
 
 def moment(at: Instant | None) -> str | None:

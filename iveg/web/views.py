@@ -1,13 +1,13 @@
 """What is known, in the shapes of ``schemas``: built when somebody asks, never kept."""
 
-from collections.abc import Iterable, Iterator
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain.echoes import echoes_of
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.margins import Margin, least, margin_of
+from iveg.domain.margins import least, margins_of
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.people import Person
 from iveg.domain.records import LogRecord
@@ -91,7 +91,7 @@ class Views:
             "clock_offset_s": shapes.rounded(robot.clock.offset_s),
             "road": robot.frame_road,
             "profile": shapes.profile(robot_id),
-            "margin": shapes.margin(least(self._margins([robot], now))),
+            "margin": shapes.margin(least(margins_of([robot], self._people(), now))),
             "cmd_status": robot.command_status,
         }
 
@@ -174,25 +174,14 @@ class Views:
                 }
                 for one in crossings
             ],
-            "margin": shapes.margin(least(self._margins(self._fleet(), now, [person]))),
+            "margin": shapes.margin(least(margins_of(self._fleet(), [person], now))),
         }
+
+    def _people(self) -> list[Person]:
+        return list(self._assessor.people.known.values())
 
     def _fleet(self) -> list[RobotState]:
         return list(self._world.live_robots())
-
-    def _margins(
-        self,
-        robots: Iterable[RobotState],
-        now: Instant,
-        people: Iterable[Person] | None = None,
-    ) -> Iterator[Margin]:
-        """Of every robot with every person, as far as they are known."""
-        among = self._assessor.people.known.values() if people is None else people
-        for robot in robots:
-            for person in among:
-                margin = margin_of(robot, person, now)
-                if margin is not None:
-                    yield margin
 
     def frame(self, robot_id: str, now: Instant) -> schemas.FrameJson | None:
         """One robot's newest look, faint detections included."""
@@ -244,6 +233,11 @@ class Views:
     def log(self, lines: list[LogRecord]) -> list[schemas.LogJson]:
         """Log lines."""
         return [shapes.log_line(line) for line in lines]
+
+    def safety(self, now: Instant) -> schemas.SafetyJson:
+        """How soon the fleet obeys, and how close it comes to people."""
+        echoes = echoes_of(self._assessor.live_decisions(), now)
+        return shapes.safety(echoes, self._assessor.exposure, now)
 
     def climate(self, now: Instant) -> schemas.ClimateJson | None:
         """The newest reading of the air."""

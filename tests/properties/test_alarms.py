@@ -48,7 +48,8 @@ def test_a_group_is_never_shown_below_the_gravest_that_nobody_saw(
             assert alarm.priority == min({alarm.condition.priority} | person.unseen)
             assert (alarm.unseen is None) == (not person.unseen)
             assert (alarm.last.acknowledged is None) >= (alarm.unseen is not None)
-        [person.acknowledge() for _ in range(sees)]
+        for _ in range(sees):
+            person.acknowledge()
 
 
 @given(lives)
@@ -61,7 +62,8 @@ def test_every_escalation_is_raised_anew_and_needs_to_be_seen(
         assert bool(raised) == ((wrong or "P9") < before)
         assert all(one.last.acknowledged is None for one in raised)
         before = wrong or "P9"
-        [person.acknowledge() for _ in range(sees)]
+        for _ in range(sees):
+            person.acknowledge()
 
 
 @given(lives)

@@ -26,8 +26,11 @@ def spread(values: Iterable[float | None]) -> Spread:
     known = sorted(value for value in values if value is not None)
     if not known:
         return Spread(0, None, None, None)
-    return Spread(len(known), _rank(known, 0.50), _rank(known, 0.95), known[-1])
+    return Spread(
+        len(known), nearest_rank(known, 0.50), nearest_rank(known, 0.95), known[-1]
+    )
 
 
-def _rank(known: list[float], share: float) -> float:
+def nearest_rank(known: list[float], share: float) -> float:
+    """Of sorted values the least that this share (0 to 1) does not exceed."""
     return known[max(0, ceil(share * len(known)) - 1)]

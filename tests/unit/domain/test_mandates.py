@@ -396,3 +396,25 @@ def test_a_robot_that_judged_this_very_alert_first_and_is_fast_is_still_to_slow_
 
     (change,) = scene.changes
     assert change.crossing.already_slow is already_slow
+
+
+def test_a_robot_that_had_judged_this_very_alert_itself_was_ahead() -> None:
+    scene = watching(Scene())
+    scene.look("AGII", person(1.5))
+    (somebody,) = scene.everyone
+    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.ahead
+
+
+def test_a_robot_that_names_no_alert_was_not_ahead_of_a_peers_own_ring() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5)
+    scene.drive("AGI", 49.0)
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert mine.crossing.already_slow
+    assert not mine.crossing.ahead

@@ -1,5 +1,8 @@
 """What supervisors and Prometheus are told of the chain."""
 
+import pytest
+
+from tests.builders import detection
 from tests.unit.web.desk import WebDesk
 
 
@@ -63,3 +66,50 @@ async def test_strangers_get_no_figures() -> None:
         ]
 
     assert answers == [401, 401]
+
+
+async def test_how_the_fleet_is_told_says_nothing_before_anything_was_measured() -> (
+    None
+):
+    async with WebDesk().program() as program:
+        told = (await program.get("/api/v1/health")).json()["safety"]
+
+    assert told["alert_latency"]["p99_ms"] is None
+    assert (told["not_echoed"]["count"], told["not_echoed"]["of"]) == (0, 0)
+    assert told["negative_margin"]["share"] is None
+    assert told["worst_margin"]["margin"] is None
+
+
+async def test_how_the_fleet_is_told_is_measured_from_the_robots_own_report() -> None:
+    desk = WebDesk()
+    for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
+        desk.drive(robot_id, x)
+        desk.look(robot_id)
+        desk.report(robot_id, factor=1.0, reason="clear", linear=0.5)
+    desk.look("AGII", detection("farmer", 1.5))
+    await desk.wait(0.2)
+    desk.report("AGI", factor=0.5, reason="person", linear=0.5)
+    await desk.wait(0.5)
+    async with desk.program() as program:
+        told = (await program.get("/api/v1/health")).json()["safety"]
+
+    assert told["alert_latency"]["p50_ms"] == pytest.approx(200.0, abs=1.0)
+    assert (told["alert_latency"]["count"], told["alert_latency"]["age_s"]) == (1, 0.5)
+    assert (told["not_echoed"]["count"], told["not_echoed"]["of"]) == (0, 1)
+    assert told["negative_margin"]["share"] == 1.0
+    assert told["worst_margin"]["margin"]["robot_id"] == "AGI"
+    assert told["worst_margin"]["margin"]["margin_m"] < 0.0
+
+
+async def test_a_robot_that_never_answers_is_counted_as_not_echoed() -> None:
+    desk = WebDesk()
+    for robot_id, x in (("AGI", 0.0), ("AGII", 50.0)):
+        desk.drive(robot_id, x)
+        desk.look(robot_id)
+    desk.look("AGII", detection("farmer", 1.5))
+    await desk.wait(1.2)
+    async with desk.program() as program:
+        told = (await program.get("/api/v1/health")).json()["safety"]
+
+    assert (told["not_echoed"]["count"], told["not_echoed"]["of"]) == (1, 1)
+    assert told["alert_latency"]["count"] == 0

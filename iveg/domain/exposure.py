@@ -1,0 +1,117 @@
+"""How long today the fleet was closer to people than stopping takes (safety.md §6.3).
+
+Margins are looked at a few times a second; each look stands for the time since the one
+before.  What nobody could know is counted apart: it is neither margin nor danger.  A
+day is one of UTC.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from iveg.domain.margins import Margin
+from iveg.domain.observations import Instant
+
+PERIOD_S = 0.5
+"""How often margins are looked at."""
+_LONGEST_S = 2 * PERIOD_S
+"""A look after a longer silence does not stand for all of it."""
+_DAY_S = 86_400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Worst:
+    """The least margin of a day, and when it was."""
+
+    margin: Margin
+    at: Instant
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """One day so far.
+
+    Attributes:
+        since: The first look of the day.
+        looked: The newest look; ``looks`` how many.
+        known_s: Time whose margins are known (s), with nobody near included.
+        negative_s: The part of it in which some robot could not have stopped in time.
+        unknown_s: Time in which some margin, or the whole fleet, was unknown (s).
+    """
+
+    since: Instant
+    looked: Instant
+    looks: int = 0
+    known_s: float = 0.0
+    negative_s: float = 0.0
+    unknown_s: float = 0.0
+    worst: Worst | None = None
+
+    @property
+    def share(self) -> float | None:
+        """Of the known time that was negative (0 to 1); None before any."""
+        return self.negative_s / self.known_s if self.known_s > 0.0 else None
+
+
+@dataclass(slots=True)
+class Exposures:
+    """Keeps the account of the day.
+
+    Attributes:
+        today: None before the first look.
+    """
+
+    today: Exposure | None = field(default=None)
+
+    def due(self, now: Instant) -> bool:
+        """Whether it is time to look again."""
+        # Ticks come a hair early; a look must not wait for the one after.
+        return (
+            self.today is None or now.mono - self.today.looked.mono >= PERIOD_S - 1e-3
+        )
+
+    def look(self, margins: Sequence[Margin], now: Instant, *, seen: bool) -> Exposure:
+        """Take one look.
+
+        Args:
+            margins: Of every robot with every person, as far as there are pairs.
+            now: When.
+            seen: Whether anything is known of any robot.
+        """
+        before = self.today
+        if before is None or _day(before.since) != _day(now):
+            before = Exposure(
+                since=now, looked=now if before is None else before.looked
+            )
+        past = min(max(0.0, now.mono - before.looked.mono), _LONGEST_S)
+        known = [one for one in margins if one.known]
+        least = min(known, key=lambda one: one.margin_m, default=None)
+        self.today = replace(
+            _spend(before, past, least, whole=seen and len(known) == len(margins)),
+            looked=now,
+            looks=before.looks + 1,
+            worst=_worse(before.worst, least, now),
+        )
+        return self.today
+
+
+def _spend(
+    day: Exposure, past: float, least: Margin | None, *, whole: bool
+) -> Exposure:
+    """Book the time; a margin that is known to be negative needs no other."""
+    if least is not None and least.margin_m < 0.0:
+        return replace(
+            day, known_s=day.known_s + past, negative_s=day.negative_s + past
+        )
+    if not whole:
+        return replace(day, unknown_s=day.unknown_s + past)
+    return replace(day, known_s=day.known_s + past)
+
+
+def _worse(worst: Worst | None, least: Margin | None, now: Instant) -> Worst | None:
+    if least is None or (worst is not None and worst.margin.margin_m <= least.margin_m):
+        return worst
+    return Worst(least, now)
+
+
+def _day(at: Instant) -> int:
+    return int(at.wall // _DAY_S)

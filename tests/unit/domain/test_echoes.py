@@ -1,0 +1,88 @@
+"""How soon the fleet answers, over the decisions of five minutes."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.alerts import Rule
+from iveg.domain.decisions import Decision
+from iveg.domain.echoes import ECHO_S, WINDOW_S, echoes_of
+from iveg.domain.mandates import Crossing, Hazard
+from tests.builders import START, at
+
+
+def asked(
+    entered: float = 0.0,
+    *,
+    after: float | None = None,
+    already_slow: bool = False,
+    ahead: bool = False,
+) -> Decision:
+    """AGII was told at ``entered`` and answered ``after`` that long; None: never."""
+    crossing = Crossing(
+        f"d-{entered}",
+        "AGII",
+        Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0),
+        entered=at(entered),
+        entered_m=1.43,
+        speed_before=0.8,
+        in_sight=False,
+        distance_m=1.43,
+        already_slow=already_slow,
+        ahead=ahead,
+    )
+    one = Decision(crossing, Rule())
+    return one if after is None else replace(one, applied=at(entered + after))
+
+
+def test_nothing_asked_is_nothing_measured() -> None:
+    nothing = echoes_of([], START)
+
+    assert (nothing.timed, nothing.p50_s, nothing.echo_age_s) == (0, None, None)
+    assert (nothing.asked, nothing.missed, nothing.asked_age_s) == (0, 0, None)
+
+
+def test_the_spread_is_that_of_the_nearest_ranks() -> None:
+    hundred = [asked(number, after=0.01 * (number + 1)) for number in range(100)]
+
+    told = echoes_of(hundred, at(110))
+
+    assert told.timed == 100
+    assert told.p50_s == pytest.approx(0.50)
+    assert told.p95_s == pytest.approx(0.95)
+    assert told.p99_s == pytest.approx(0.99)
+    assert told.echo_age_s == pytest.approx(110 - 99 - 1.0)
+
+
+def test_what_was_asked_longer_ago_than_the_window_counts_no_more() -> None:
+    told = echoes_of([asked(0.0, after=0.1), asked(1.0)], at(WINDOW_S + 1.5))
+
+    assert (told.timed, told.asked) == (0, 0)
+
+
+def test_an_answer_after_a_second_is_timed_and_missed() -> None:
+    told = echoes_of([asked(after=1.2)], at(5))
+
+    assert told.p50_s == pytest.approx(1.2)
+    assert (told.asked, told.missed) == (1, 1)
+
+
+def test_an_answer_that_may_still_come_in_time_is_not_missed_yet() -> None:
+    before = echoes_of([asked()], at(ECHO_S))
+    after = echoes_of([asked()], at(ECHO_S + 0.1))
+
+    assert (before.asked, before.missed) == (0, 0)
+    assert (after.asked, after.missed) == (1, 1)
+    assert after.asked_age_s == pytest.approx(ECHO_S + 0.1)
+
+
+def test_a_robot_that_was_slow_for_something_else_has_nothing_to_echo() -> None:
+    told = echoes_of([asked(already_slow=True)], at(5))
+
+    assert (told.timed, told.asked) == (0, 0)
+
+
+def test_a_robot_that_was_ahead_has_echoed_but_is_not_timed() -> None:
+    told = echoes_of([asked(after=0.4, ahead=True)], at(5))
+
+    assert (told.timed, told.asked, told.missed) == (0, 1, 0)
