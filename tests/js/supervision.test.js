@@ -1,5 +1,6 @@
 import { believedBy, hears } from "../../iveg/static/js/layers/belief.js";
 import { laidTo, lengthOf } from "../../iveg/static/js/layers/measure.js";
+import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
@@ -309,4 +310,37 @@ test("a group that holds a P1 sounds, whatever it began as", () => {
   equal(heard.at(-1), "loud");
   equal(document.querySelector("#alerts-button")?.getAttribute("data-worst"), "P1");
   document.body.replaceChildren();
+});
+
+/** Nothing measured yet. */
+function nothing() {
+  const none = { count: 0, age_s: null, since: null };
+  return /** @type {import("../../iveg/static/js/protocol.js").Safety} */ ({
+    alert_latency: { ...none, p50_ms: null, p95_ms: null, p99_ms: null, window_s: 300 },
+    not_echoed: { ...none, of: 0, within_s: 1, window_s: 300 },
+    negative_margin: { ...none, share: null, known_s: 0, unknown_s: 0 },
+    worst_margin: { ...none, margin: null, at: null },
+  });
+}
+
+test("what was not measured is no zero", () => {
+  const values = Object.values(tilesOf(nothing(), 0, words)).map(({ value }) => value);
+  equal(values, ["—", "—", "—", "—"]);
+});
+
+test("an order that nobody missed is a zero of so many", () => {
+  const safety = nothing();
+  safety.not_echoed = { count: 0, of: 7, within_s: 1, window_s: 300, age_s: 2 };
+  const { value } = tilesOf(safety, 0, words).echo;
+  equal(value.startsWith("tiles.echo_value 0 7 "), true);
+});
+
+test("the age of a tile grows while the server is silent", () => {
+  const safety = nothing();
+  safety.alert_latency = {
+    ...{ p50_ms: 120, p95_ms: 240, p99_ms: 310 },
+    ...{ count: 8, window_s: 300, age_s: 3 },
+  };
+  const { of } = tilesOf(safety, 4, words).latency;
+  equal(of, "tiles.latency_of 120 240 310 8 300 3 5 7");
 });

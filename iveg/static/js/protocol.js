@@ -101,8 +101,19 @@
  *   ok: boolean,
  *   hops: {hop: string, state: "ok" | "late" | "down" | "unknown", age_s: number | null,
  *     key: string, detail: string | null}[],
- *   counters: Record<string, number>,
+ *   counters: Record<string, number>, safety?: Safety,
  * }} Health
+ *
+ * @typedef {{
+ *   alert_latency: {p50_ms: number | null, p95_ms: number | null, p99_ms: number | null,
+ *     count: number, window_s: number, age_s: number | null},
+ *   not_echoed: {count: number, of: number, within_s: number, window_s: number,
+ *     age_s: number | null},
+ *   negative_margin: {share: number | null, known_s: number, unknown_s: number,
+ *     count: number, since: string | null, age_s: number | null},
+ *   worst_margin: {margin: Margin | null, at: string | null, count: number,
+ *     since: string | null, age_s: number | null},
+ * }} Safety how soon the fleet obeys, and how close it comes to people
  *
  * @typedef {Aged & {temperature: number | null, relative_humidity: number | null,
  *   co2: number | null, received_at: string}} Climate

@@ -5,6 +5,7 @@
 import { ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { judgeChain } from "./chain.js";
+import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../protocol.js").Robot} Robot */
 /** @typedef {import("../i18n.js").Words} Words */
@@ -12,7 +13,8 @@ import { judgeChain } from "./chain.js";
 const TICK_MS = 500;
 
 /** @param {import("../page.js").Page} page */
-export function start({ store, words }) {
+export function start(page) {
+  const { store, words } = page;
   const suffixes = (need("#devices").dataset.suffixes ?? "").split(" ");
 
   function draw() {
@@ -106,6 +108,7 @@ export function start({ store, words }) {
   words.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
+  createTiles(page);
 }
 
 /** @param {import("../clock.js").Aged | undefined} value */

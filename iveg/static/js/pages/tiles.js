@@ -1,0 +1,106 @@
+/**
+ * Four numbers for whoever studies the fleet (safety 6.3): how soon a robot obeys, who did
+ * not answer, how long margins were negative, and the worst of them; each with its age
+ * and of how many.
+ */
+
+import { ageOf } from "../clock.js";
+import { need, setText } from "../panels/dom.js";
+
+/** @typedef {import("../protocol.js").Health} Health */
+/** @typedef {import("../protocol.js").Safety} Safety */
+/** @typedef {import("../i18n.js").Words} Words */
+/** @typedef {{value: string, of: string}} Tile */
+
+const TICK_MS = 1000;
+
+/** @param {import("../main.js").App} app */
+export function createTiles({ store, words }) {
+  function draw() {
+    /** @type {Health | null | undefined} */
+    const health = store.get("health");
+    if (!health?.safety) return;
+    const waitedS = ageOf({ age_s: 0, receivedAtMs: health.receivedAtMs });
+    for (const [name, tile] of Object.entries(tilesOf(health.safety, waitedS, words))) {
+      setText(need(`#tile-${name}`), tile.value);
+      setText(need(`#tile-${name}-of`), tile.of);
+    }
+  }
+
+  store.subscribe("health", draw);
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+}
+
+/**
+ * @param {Safety} safety
+ * @param {number} waitedS since the server wrote the ages (s)
+ * @param {Words} words
+ * @returns {Record<"latency" | "echo" | "negative" | "worst", Tile>}
+ */
+export function tilesOf(safety, waitedS, words) {
+  const aged = (/** @type {number | null} */ age) =>
+    age === null ? null : age + waitedS;
+  return {
+    latency: latencyOf(safety.alert_latency, aged, words),
+    echo: echoOf(safety.not_echoed, aged, words),
+    negative: negativeOf(safety.negative_margin, aged, words),
+    worst: worstOf(safety.worst_margin, aged, words),
+  };
+}
+
+/** @param {Safety["alert_latency"]} it @param {(age: number | null) => number | null} aged
+ * @param {Words} words @returns {Tile} */
+function latencyOf(it, aged, words) {
+  const minutes = it.window_s / 60;
+  if (!it.count) return { value: "—", of: words.t("tiles.no_alerts", { minutes }) };
+  const slots = { ...it, minutes, age: aged(it.age_s) };
+  return {
+    value: words.t("tiles.latency_value", slots),
+    of: words.t("tiles.latency_of", slots),
+  };
+}
+
+/** @param {Safety["not_echoed"]} it @param {(age: number | null) => number | null} aged
+ * @param {Words} words @returns {Tile} */
+function echoOf(it, aged, words) {
+  const minutes = it.window_s / 60;
+  if (!it.of) return { value: "—", of: words.t("tiles.no_alerts", { minutes }) };
+  const slots = { ...it, minutes, age: aged(it.age_s) };
+  return {
+    value: words.t("tiles.echo_value", slots),
+    of: words.t("tiles.echo_of", slots),
+  };
+}
+
+/** @param {Safety["negative_margin"]} it @param {(age: number | null) => number | null} aged
+ * @param {Words} words @returns {Tile} */
+function negativeOf(it, aged, words) {
+  if (it.share === null) return { value: "—", of: words.t("tiles.no_margins") };
+  const slots = {
+    share: it.share * 100,
+    known: it.known_s / 60,
+    unknown: it.unknown_s / 60,
+    since: it.since,
+    count: it.count,
+    age: aged(it.age_s),
+  };
+  return {
+    value: words.t("tiles.negative_value", slots),
+    of: words.t("tiles.negative_of", slots),
+  };
+}
+
+/** @param {Safety["worst_margin"]} it @param {(age: number | null) => number | null} aged
+ * @param {Words} words @returns {Tile} */
+function worstOf(it, aged, words) {
+  if (!it.margin) return { value: "—", of: words.t("tiles.no_margins") };
+  const { margin_m, robot_id, person_id } = it.margin;
+  const whose = { margin_m, robot: robot_id, person: person_id };
+  const when = { at: it.at, since: it.since, count: it.count, age: aged(it.age_s) };
+  return {
+    value: words.t("tiles.worst_value", whose),
+    of: words.t("tiles.worst_of", { ...whose, ...when }),
+  };
+}
