@@ -109,6 +109,10 @@ test("every step of a STOP has its own look", () => {
 test("a robot that moved while held is told apart from one that was asked to stop", () => {
   const again = command({ kind: "stop", state: "SENT", reason: "moved" });
   equal(stateOf({ command: again }), "moved");
+  const braking = command({ kind: "stop", state: "DELIVERED", reason: "moved" });
+  equal(stateOf({ command: braking }), "moved");
+  const standing = command({ kind: "stop", state: "STANDING", reason: "moved" });
+  equal(stateOf({ command: standing }), "standing");
 });
 
 test("a standstill says how long it took, when that is known", () => {

@@ -83,7 +83,7 @@ function cellsOf(command, words) {
   return [
     make("td", "time", dayAndTime(command.times.requested)),
     make("td", "", command.robot_id),
-    make("td", "", words.t(`history.kind.${command.kind}`)),
+    make("td", "", orderSaid(command, words)),
     make("td", "", words.t(`history.state.${command.state}`)),
     make("td", "", command.requested_by),
     number(took.sentDirect),
@@ -93,6 +93,11 @@ function cellsOf(command, words) {
     number(took.standing),
     number(command.tries),
   ];
+}
+
+/** @param {import("./latency.js").Order} command @param {Words} words */
+function orderSaid({ kind, drill }, words) {
+  return drill ? words.t("drill.heading") : words.t(`history.kind.${kind}`);
 }
 
 /** @param {import("./latency.js").Order[]} items @param {Words} words */

@@ -2,7 +2,7 @@
  * What a STOP took on each road, from the press on: pure arithmetic on its times.
  *
  * @typedef {{command_id: string, robot_id: string, kind: string, state: string,
- *   requested_by: string, tries: number, standstill_ms: number | null,
+ *   requested_by: string, tries: number, drill?: boolean, standstill_ms: number | null,
  *   times: {requested: string, sent_fiware: string | null, sent_direct: string | null,
  *     answer_fiware: string | null, answer_direct: string | null,
  *     standing: string | null}}} Order

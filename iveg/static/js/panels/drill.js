@@ -16,7 +16,7 @@ import { since } from "./stop_view.js";
 /** @typedef {import("../protocol.js").Command} Command */
 /** @typedef {import("./release.js").Facts} Facts */
 /**
- * @typedef {{robot_id: string, drilled_at: string, by: string, passed: boolean | null,
+ * @typedef {{robot_id: string, command_id: string, drilled_at: string, by: string, passed: boolean | null,
  *   standstill_ms: number | null}} Drill one of GET /drills
  */
 
@@ -24,6 +24,7 @@ import { since } from "./stop_view.js";
 const CREEP_M_S = 0.2;
 /** Press to standing (safety 2.4). */
 const DEADLINE_MS = 5000;
+const READ_AGAIN_MS = 1000;
 const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
 
 /**
@@ -41,6 +42,7 @@ export function createDrill({ store, words, line }, card, robotId) {
   let isBusy = false;
   /** What the history held when it was read last. @type {string | null} */
   let readFor = null;
+  let readAtMs = 0;
 
   /** @param {Facts} facts */
   function draw(facts) {
@@ -89,9 +91,14 @@ export function createDrill({ store, words, line }, card, robotId) {
 
   /** When the panel opens, and when a drill has moved on. @param {Command} [command] */
   async function readOnce(command) {
+    const nowMs = performance.now();
     const isNow = command ? `${command.command_id} ${command.state}` : "";
-    if (readFor === isNow) return;
+    // The history is written in batches, so what has just ended is in it a moment later.
+    const isBehind = last?.passed === null || (command && !isOf(last, command));
+    const isDue = isBehind && nowMs - readAtMs > READ_AGAIN_MS;
+    if (readFor === isNow && !isDue) return;
     readFor = isNow;
+    readAtMs = nowMs;
     ({ status: readStatus, last } = await readLast(robotId));
   }
 
@@ -135,6 +142,9 @@ export async function readLast(robotId) {
   const { status, body } = await readApi(`drills?${query}`);
   return { status, last: status === 200 ? (body.items[0] ?? null) : null };
 }
+
+/** @param {Drill | null} drill @param {Command} command */
+const isOf = (drill, command) => drill?.command_id === command.command_id;
 
 /** Key of the reason why no drill can be done now, or `ok`. @param {Facts} facts */
 export function whyNotDrill(facts) {

@@ -28,6 +28,7 @@ const STRIP_HOLDS = 4;
 
 const PHONE = matchMedia("(max-width: 767px)");
 const TICK_MS = 100;
+const ASK_EVERY_MS = 1000;
 /** How long after `pointerup` a click still belongs to the same gesture (ms). */
 const GESTURE_MS = 400;
 /** A robot's state may be a frame older than its command's own topic (ms). */
@@ -117,6 +118,21 @@ export function createStopPanel(app) {
     for (const command of snapshot.commands ?? []) take(command);
     for (const robot of snapshot.robots ?? []) takeRobot(robot);
     drawAll();
+  }
+
+  /** Tries of a STOP that nobody answers are told to who asks. */
+  function ask() {
+    if (store.connection.state !== "open") return;
+    for (const { command } of commands.values()) {
+      if (LOUD.has(stateOfCommand(command) ?? "")) askOf(command);
+    }
+  }
+
+  /** @param {Command} command */
+  async function askOf({ command_id }) {
+    const path = `commands/${encodeURIComponent(command_id)}`;
+    const { status, body } = await readApi(path);
+    if (status === 200) take({ ...body, receivedAtMs: performance.now() });
   }
 
   /** A session that is over may still stop for hours: the server says whether. */
@@ -250,6 +266,7 @@ export function createStopPanel(app) {
   store.subscribe("connection", onConnection);
   words.onChange(drawAll);
   setInterval(drawAll, TICK_MS);
+  setInterval(ask, ASK_EVERY_MS);
   drawAll();
   return { place, commandOf: (/** @type {string} */ id) => commands.get(id)?.command };
 }

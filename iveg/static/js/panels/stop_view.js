@@ -39,8 +39,11 @@ const BY_COMMAND = {
   READY: "rearmed",
 };
 
-/** Reasons of a command that was made because a held robot moved. */
-const MOVED = new Set(["moved", "moved_while_held", "hold_lost"]);
+/** Reason of a command that was made because a held robot moved. */
+const MOVED = "moved";
+
+/** Until it stands again, that it moved is more than that it was told to stop. */
+const MOVED_UNTIL = new Set(["asked", "acknowledged"]);
 
 /** States in which a new press is news and has to be seen. */
 const GIVES_WAY = new Set(["standing", "stale", "releasing", "rearmed"]);
@@ -134,7 +137,7 @@ function viewOfQuietFleet(connection, robots) {
 export function stateOfCommand(command) {
   if (!command) return null;
   const state = BY_COMMAND[command.state] ?? null;
-  const moved = state === "asked" && MOVED.has(command.reason ?? "");
+  const moved = command.reason === MOVED && MOVED_UNTIL.has(state ?? "");
   return moved ? "moved" : state;
 }
 

@@ -1,0 +1,46 @@
+"""What a person does at the page with a robot: let it go again."""
+
+from typing import Any
+
+from playwright.sync_api import APIResponse, Page
+
+from tests.e2e.reading import card
+from tests.processes import Site, until
+
+HELD_MS = 2300
+"""How long the release is held, and a little more."""
+_OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+
+
+def open_menu(page: Page, robot: str) -> None:
+    """Open the menu of a robot's card."""
+    card(page, robot).locator(".card__menu").click()
+    card(page, robot).locator("dialog[open]").wait_for()
+
+
+def ask(page: Page, stack: Site, path: str, body: object) -> APIResponse:
+    """What the page would send, under its own session."""
+    url = f"{stack.url}/api/v1/{path}"
+    return page.request.post(url, data=body, headers=_OWN)
+
+
+def look(page: Page, stack: Site, robot: str) -> dict[str, Any]:
+    """What the server says of a robot."""
+    answer = page.request.get(f"{stack.url}/api/v1/robots/{robot}")
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def let_go(page: Page, stack: Site, robot: str, within_s: float = 30.0) -> None:
+    """Release and resume a robot until nothing stops it; a refusal is tried again."""
+
+    def is_free() -> bool:
+        seen = look(page, stack, robot)
+        holds = [hold["id"] for hold in seen["holds"]]
+        if seen["stop_state"] == "READY":
+            ask(page, stack, f"robots/{robot}/resume", {})
+        elif holds:
+            ask(page, stack, f"robots/{robot}/release", {"holds": holds})
+        return seen["stop_state"] == "RUNNING" and not holds
+
+    until(is_free, within_s, f"{robot} is free")

@@ -1,0 +1,156 @@
+"""A robot on strings: it speaks the contract, and its brakes do what a test wants.
+
+The emulator's robots always brake.  This one shows what iVeg makes of a robot that
+obeys slowly, never, only in words, or for a while.
+"""
+
+import asyncio
+import contextlib
+import secrets
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import orjson
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.ngsi import names
+from iveg.ngsi.codec import format_stamp
+from tests.processes import Site, site
+
+_APIKEY = "iveg"
+_EVERY_S = 0.1
+CRUISE = 0.4
+"""How fast it drives when nothing holds it (m/s)."""
+
+
+@dataclass
+class Puppet:
+    """One robot in a thread of its own; a test pulls its strings.
+
+    Attributes:
+        brakes: It comes to rest when it is held.
+        answers: It obeys and says so; else it is deaf to commands.
+        speaks: It reports; else it is silent.
+        speed: (m/s).
+        holds: What holds it, by id.
+    """
+
+    robot_id: str
+    address: BrokerAddress
+    brakes: bool = True
+    answers: bool = True
+    speaks: bool = True
+    speed: float = CRUISE
+    holds: list[str] = field(default_factory=list)
+    released: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._boot = secrets.token_hex(4)
+        self._seq = 0
+        self._challenge = secrets.token_hex(8)
+        topic = names.command_topic(_APIKEY, self.robot_id)
+        self._link = MqttLink(self.address, self.robot_id, {topic: 1}, self._obey)
+
+    async def live(self) -> None:
+        """Report ten times a second until cancelled."""
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._link.run(), name="puppet-link")
+            while True:
+                if self.holds and self.brakes:
+                    self.speed = 0.0
+                if self.speaks:
+                    self._report()
+                await asyncio.sleep(_EVERY_S)
+
+    def _obey(self, _: str, payload: bytes) -> None:
+        if not self.answers:
+            return
+        order = orjson.loads(payload).get(names.COMMAND, {})
+        if "stop" in order:
+            self._latch(order["stop"]["id"])
+        elif "release" in order and set(order["release"]["ids"]) == set(self.holds):
+            self.released += self.holds
+            self.holds.clear()
+            self._answer("RELEASED", None)
+        elif "resume" in order and not self.holds:
+            self.speed = CRUISE
+            self._answer("RESUMED", None)
+
+    def _latch(self, hold_id: str) -> None:
+        if hold_id not in self.holds and hold_id not in self.released:
+            self.holds.append(hold_id)
+        self._answer("LATCHED", hold_id)
+
+    def _answer(self, result: str, hold_id: str | None) -> None:
+        word = {"id": hold_id, "r": result, "v": self.speed, "why": None}
+        answer = {"cmd": {**word, **self._held(), **self._origin()}}
+        topic = names.answer_topic(_APIKEY, self.robot_id)
+        self._link.offer(topic, orjson.dumps(answer), qos=1)
+
+    def _report(self) -> None:
+        pose = {"x": 2.0, "y": 2.0, "yaw": 0.0}
+        motion = {"linear_velocity": self.speed, "angular_velocity": 0.0}
+        self._measure("_odom", names.ODOMETRY, {**pose, **motion})
+        is_moving = self.speed > 0.0 and not self.holds
+        applied = {
+            "speed_factor": 1 if is_moving else 0,
+            "reason": "clear" if is_moving else "hold",
+            "cause": self.holds[0] if self.holds else None,
+            "decision_id": None,
+            "released": self.released[-64:],
+            "v": self.speed,
+            "w": 0.0,
+            "feedback_age_s": 0.1,
+        }
+        self._measure("_safety", names.SAFETY, {**applied, **self._held()})
+
+    def _measure(self, suffix: str, attribute: str, value: dict[str, object]) -> None:
+        origin = self._origin()
+        message = {attribute: {**value, **origin}, "TimeInstant": origin["stamp"]}
+        topic = names.measure_topic(_APIKEY, self.robot_id + suffix)
+        self._link.offer(topic, orjson.dumps(message), qos=1)
+
+    def _held(self) -> dict[str, object]:
+        holds = [{"id": it, "source": "iveg", "ack": "remote"} for it in self.holds]
+        return {"holds": holds, "ch": self._challenge}
+
+    def _origin(self) -> dict[str, object]:
+        self._seq += 1
+        stamp = format_stamp(clock.now().wall)
+        return {"boot": self._boot, "seq": self._seq, "stamp": stamp}
+
+
+@contextlib.contextmanager
+def stage(directory: Path, **settings: str) -> Iterator[tuple[Site, Puppet]]:
+    """FIWARE, dashboard and one puppet; no emulator."""
+    with site(directory, IVEG_ROBOTS="AGV", **settings) as place:
+        place.start("fiware").wait_until_ready()
+        place.start("serve")
+        place.wait_until_served()
+        with puppet("AGV", place.settings["IVEG_MQTT_URL"]) as robot:
+            place.wait_until_live(robots=1)
+            yield place, robot
+
+
+@contextlib.contextmanager
+def puppet(robot_id: str, mqtt_url: str) -> Iterator[Puppet]:
+    """A robot that lives as long as the block."""
+    found = Puppet(robot_id, BrokerAddress.from_url(mqtt_url))
+    loop = asyncio.new_event_loop()
+    living = loop.create_task(found.live())
+
+    def run() -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            loop.run_until_complete(living)
+
+    thread = threading.Thread(target=run, name=robot_id)
+    thread.start()
+    try:
+        yield found
+    finally:
+        loop.call_soon_threadsafe(living.cancel)
+        thread.join(10)
+        loop.close()

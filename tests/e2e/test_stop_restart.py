@@ -1,0 +1,130 @@
+"""iVeg dies and comes back, sessions end: the open page can still stop."""
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.hands import let_go, open_menu
+from tests.e2e.puppet import CRUISE, Puppet, stage
+from tests.e2e.reading import card, strip_stop
+from tests.processes import Program, Site, until
+
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
+
+WITHIN_MS = 15_000
+HOUR = 3600.0
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Puppet]]:
+    with stage(tmp_path_factory.mktemp("restart")) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def stack(scene: tuple[Site, Puppet]) -> Site:
+    return scene[0]
+
+
+@pytest.fixture
+def page(open_page: OpenPage) -> Page:
+    """A browser that rightly says when the server is gone."""
+    found = open_page(alone=True)
+    found.wait_for_selector('[data-robot="AGV"][data-link="LIVE"]')
+    return found
+
+
+@pytest.fixture
+def agv(scene: tuple[Site, Puppet], page: Page, stack: Site) -> Puppet:
+    """The robot, driving and obedient."""
+    robot = scene[1]
+    let_go(page, stack, "AGV")
+    robot.speed = CRUISE
+    return robot
+
+
+def test_the_open_page_recovers_from_a_kill_by_itself_and_its_stop_stands(
+    page: Page, agv: Puppet, stack: Site
+) -> None:
+    _server(stack).kill()
+    expect(page.locator("#banner")).to_contain_text("Sin conexión", timeout=5000)
+    expect(strip_stop(page, "AGV")).to_have_attribute("data-state", "lost")
+    _serve_again(stack)
+
+    control = strip_stop(page, "AGV")
+    expect(control).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+    control.click()
+    expect(control).to_contain_text("PARADO (", timeout=WITHIN_MS)
+    assert agv.speed == 0.0
+
+
+def test_a_press_while_the_server_is_dead_arrives_when_it_is_back(
+    page: Page, agv: Puppet, stack: Site
+) -> None:
+    _server(stack).kill()
+    control = strip_stop(page, "AGV")
+    expect(control).to_have_attribute("data-state", "lost", timeout=5000)
+    control.click()
+    _serve_again(stack)
+
+    expect(control).to_contain_text("PARADO (", timeout=WITHIN_MS)
+    assert agv.speed == 0.0
+
+
+def test_f42_a_page_whose_session_is_over_stops_and_asks_to_sign_in_for_the_rest(
+    page: Page, agv: Puppet, stack: Site
+) -> None:
+    _server(stack).kill()
+    _age_sessions(stack, 13 * HOUR)
+    _serve_again(stack)
+
+    control = strip_stop(page, "AGV")
+    expect(control).to_contain_text("PARAR AGV (sesión terminada)", timeout=WITHIN_MS)
+    expect(page.locator("#banner")).to_contain_text("La sesión ha terminado")
+    control.click()
+
+    expect(control).to_contain_text("Orden entregada: mire el robot o entre de nuevo")
+    until(lambda: agv.speed == 0.0, 5.0, "the robot stands")
+    open_menu(page, "AGV")
+    why = card(page, "AGV").locator('[data-part="release-why"]')
+    expect(why).to_have_text("La sesión ha terminado: entre de nuevo para rearmar.")
+    expect(page.locator('[data-release="AGV"]')).to_be_disabled()
+    page.goto(stack.sign_in_link)
+    expect(strip_stop(page, "AGV")).to_contain_text("PARADO", timeout=WITHIN_MS)
+
+
+@pytest.mark.usefixtures("agv")
+def test_who_signed_out_can_no_longer_stop_and_no_page_looks_as_if_they_could(
+    page: Page, stack: Site
+) -> None:
+    other = page.context.new_page()
+    other.goto(stack.url)
+    expect(other.locator("#sign-out")).to_be_enabled()
+    other.evaluate("() => document.querySelector('#sign-out').click()")
+    other.wait_for_url("**/signin")
+
+    control = strip_stop(page, "AGV")
+    expect(control).to_have_attribute("data-state", "lost", timeout=WITHIN_MS)
+    expect(control).to_contain_text("SIN ENLACE: use la seta roja del robot")
+
+
+def _server(stack: Site) -> Program:
+    return [one for one in stack.programs if one.words[0] == "serve"][-1]
+
+
+def _serve_again(stack: Site) -> None:
+    stack.start("serve")
+    stack.wait_until_served()
+
+
+def _age_sessions(stack: Site, seconds: float) -> None:
+    """As if that much time had gone by while iVeg was away."""
+    path = stack.directory / "sessions.jsonl"
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    for line in lines:
+        line["began"] -= seconds
+        line["seen"] -= seconds
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))

@@ -1,0 +1,330 @@
+"""Every state of the STOP control (product.md §4), each by a fault that is real.
+
+AGI and AGII are the emulator's; AGV is a puppet whose brakes and words obey the test.
+One stack serves all tests, so each leaves it as it found it.
+"""
+
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.e2e.conftest import OpenPage
+from tests.e2e.hands import ask, let_go, look, open_menu
+from tests.e2e.puppet import CRUISE, Puppet, puppet
+from tests.e2e.reading import card, evaluate, strip_stop
+from tests.processes import Program, Site, site, until
+
+pytestmark = [pytest.mark.e2e, pytest.mark.slow]
+
+STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+WITHIN_MS = 10_000
+
+_WATCH = """([robot]) => {
+  const control = document.querySelector(`#stops [data-stop="${robot}"]`);
+  const said = [];
+  const look = () => {
+    const words = control.querySelector('.stop__words').textContent;
+    said.push([control.dataset.state, words]);
+  };
+  const options = {subtree: true, childList: true, characterData: true,
+                   attributes: true, attributeFilter: ['data-state']};
+  new MutationObserver(look).observe(control, options);
+  window.__said = said;
+}"""
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    with site(tmp_path_factory.mktemp("stop"), IVEG_ROBOTS="AGI,AGII,AGV") as place:
+        place.start("fiware").wait_until_ready()
+        place.start("serve")
+        place.wait_until_served()
+        place.start("emulator", "--robots", "2")
+        place.wait_until_live()
+        yield place
+
+
+@pytest.fixture(scope="module")
+def strings(stack: Site) -> Iterator[Puppet]:
+    with puppet("AGV", stack.settings["IVEG_MQTT_URL"]) as robot:
+        yield robot
+
+
+@pytest.fixture
+def agv(strings: Puppet, page: Page, stack: Site) -> Puppet:
+    """The puppet, driving and obedient."""
+    strings.brakes = strings.answers = strings.speaks = True
+    _make_ready(page, stack, "AGV")
+    strings.speed = CRUISE
+    return strings
+
+
+@pytest.fixture
+def agi(page: Page, stack: Site) -> Locator:
+    """AGI's control, ready."""
+    _make_ready(page, stack, "AGI")
+    return strip_stop(page, "AGI")
+
+
+@pytest.fixture
+def english(open_page: OpenPage) -> Page:
+    """The same page in English."""
+    page = open_page(locale="en-GB")
+    page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
+    return page
+
+
+# --- the link ------------------------------------------------------------------------
+
+
+def test_ready_is_a_red_octagon_that_names_what_it_stops(
+    agi: Locator, english: Page
+) -> None:
+    expect(agi).to_have_attribute("data-state", "ready")
+    expect(agi).to_have_text("PARAR AGI", use_inner_text=True)
+    expect(strip_stop(english, "AGI")).to_have_text("STOP AGI", use_inner_text=True)
+    assert "polygon" in _style(agi, "clipPath", "::before")
+
+
+def test_a_late_link_is_outlined_with_its_age_and_a_lost_one_is_hatched_and_crossed(
+    agi: Locator, english: Page, stack: Site
+) -> None:
+    in_english = strip_stop(english, "AGI")
+    with _frozen(stack, "emulator"):
+        late = expect(agi)
+        late.to_have_attribute("data-state", "late", timeout=4000)
+        late.to_have_text(re.compile(r"PARAR AGI \(enlace lento [1-3] s\)"))
+        assert _style(agi, "display", "::after") == "block"
+
+        expect(agi).to_have_attribute("data-state", "lost", timeout=4000)
+        expect(agi).to_contain_text("SIN ENLACE: use la seta roja del robot")
+        expect(in_english).to_contain_text("NO LINK: use the red button on the robot")
+        assert "repeating-linear-gradient" in _style(agi, "backgroundImage", "::before")
+        assert "×" in _style(agi.locator(".stop__who"), "content", "::before")
+
+    expect(agi).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+
+
+# --- unconfirmed ---------------------------------------------------------------------
+
+
+def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
+    page: Page, agi: Locator, english: Page, stack: Site
+) -> None:
+    with _frozen(stack, "emulator"):
+        expect(agi).to_have_attribute("data-state", "lost", timeout=8000)
+        agi.click()
+
+        expect(agi).to_contain_text("PARADA SIN CONFIRMAR: use la seta roja")
+        expect(strip_stop(english, "AGI")).to_contain_text(
+            "STOP NOT CONFIRMED: use the red button"
+        )
+        line = page.locator("#p1 .p1__line")
+        expect(line).to_contain_text("AGI: PARADA SIN CONFIRMAR: use la seta roja")
+        expect(line).to_contain_text(re.compile(r"Pulsado hace \d+ s por operator"))
+        expect(line).to_contain_text(re.compile(r"Último informe hace [\d,]+ s, a"))
+        expect(line).to_contain_text("Vías: directa enviada, FIWARE enviada")
+        expect(english.locator("#p1 .p1__line")).to_contain_text(
+            re.compile(r"Pressed \d+ s ago by operator, \d+ tries")
+        )
+        box = line.bounding_box()
+        assert box is not None
+        assert box["width"] > 1300
+        first = _numbers(line)
+        until(lambda: _numbers(line)["tries"] > first["tries"] + 1, 8.0, "more tries")
+        later = _numbers(line)
+        assert later["pressed"] > first["pressed"]
+        assert later["heard"] > first["heard"]
+
+    # L1: nobody has to do anything for the truth to come back.
+    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(page.locator("#p1 .p1__line")).to_have_count(0)
+
+
+def test_a_deaf_robot_drives_on_and_the_page_says_how_far_it_may_be(
+    page: Page, agv: Puppet
+) -> None:
+    agv.answers = agv.brakes = False
+    agv.speaks = False
+    strip_stop(page, "AGV").click()
+
+    line = page.locator("#p1 .p1__line")
+    expect(line).to_contain_text("a 0,40 m/s", timeout=WITHIN_MS)
+    expect(line).to_contain_text(re.compile(r"Puede haber avanzado [\d,]+ m"))
+    first = _numbers(line)["moved"]
+    until(lambda: _numbers(line)["moved"] > first + 0.5, 8.0, "the doubt grows")
+
+    agv.answers = agv.brakes = agv.speaks = True
+    expect(strip_stop(page, "AGV")).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+# --- asked, acknowledged, standing ---------------------------------------------------
+
+
+def test_asked_acknowledged_and_standing_are_three_different_words(
+    page: Page, agv: Puppet
+) -> None:
+    agv.brakes = False
+    evaluate(page, _WATCH, "AGV")
+    control = strip_stop(page, "AGV")
+    control.click()
+    expect(control).to_contain_text("Confirmado, frenando…", timeout=WITHIN_MS)
+    agv.brakes = True
+    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+    said: list[list[str]] = page.evaluate("window.__said")
+    states = list(dict.fromkeys(state for state, _ in said if state != "ready"))
+    assert states == ["asked", "acknowledged", "standing"]
+    asked = [words for state, words in said if state == "asked"]
+    assert any(re.fullmatch(r"Parando… \d+ ms", words) for words in asked)
+
+
+def test_f40_a_robot_that_only_says_that_it_brakes_is_told_on(
+    page: Page, agv: Puppet
+) -> None:
+    agv.brakes = False
+    strip_stop(page, "AGV").click()
+
+    control = strip_stop(page, "AGV")
+    expect(control).to_contain_text("RECIBIDA PERO SE MUEVE", timeout=WITHIN_MS)
+    line = page.locator("#p1 .p1__line")
+    expect(line).to_contain_text("AGV: RECIBIDA PERO SE MUEVE: use la seta roja")
+    expect(line).to_contain_text("a 0,40 m/s")
+
+    agv.brakes = True
+    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+# --- was standing ---------------------------------------------------------------------
+
+
+def test_a_standstill_that_is_no_longer_reported_turns_grey_and_counts(
+    page: Page, agi: Locator, stack: Site
+) -> None:
+    agi.click()
+    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    with _frozen(stack, "emulator"):
+        expect(agi).to_have_attribute("data-state", "stale", timeout=5000)
+        for second in ("3", "5"):
+            expect(agi).to_contain_text(
+                f"visto parado hace {second} s: ahora no se sabe", timeout=5000
+            )
+
+    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+def test_a_held_robot_that_moves_again_is_stopped_under_a_new_id(
+    page: Page, agv: Puppet, stack: Site
+) -> None:
+    control = strip_stop(page, "AGV")
+    control.click()
+    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    before = look(page, stack, "AGV")["stop"]["command_id"]
+    agv.brakes, agv.speed = False, CRUISE
+
+    expect(control).to_contain_text("SE HA MOVIDO", timeout=WITHIN_MS)
+    expect(page.locator("#p1 .p1__line")).to_contain_text("AGV: SE HA MOVIDO.")
+    assert look(page, stack, "AGV")["stop"]["command_id"] != before
+
+    agv.brakes = True
+    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+# --- release --------------------------------------------------------------------------
+
+
+def test_nothing_is_released_on_old_news(page: Page, agi: Locator, stack: Site) -> None:
+    agi.click()
+    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+    holds = [hold["id"] for hold in look(page, stack, "AGI")["holds"]]
+    open_menu(page, "AGI")
+    release = page.locator('[data-release="AGI"]')
+    expect(release).to_be_enabled()
+    with _frozen(stack, "emulator"):
+        expect(release).to_be_disabled(timeout=4000)
+        expect(card(page, "AGI").locator('[data-part="release-why"]')).to_have_text(
+            "El informe del robot no es reciente."
+        )
+        body = {"holds": holds}
+        assert ask(page, stack, "robots/AGI/release", body).status == 409
+
+    expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
+
+
+def test_f37_who_stops_while_another_holds_the_release_wins(
+    open_page: OpenPage, page: Page, agv: Puppet, stack: Site
+) -> None:
+    # The browser rightly notes the 409.
+    other = open_page(alone=True)
+    control = strip_stop(other, "AGV")
+    control.click()
+    expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
+    open_menu(other, "AGV")
+    release = other.locator('[data-release="AGV"]')
+    expect(release).to_be_enabled()
+    release.hover()
+    other.mouse.down()
+    other.wait_for_timeout(1000)
+    strip_stop(page, "AGV").click()
+    result = card(other, "AGV").locator('[data-part="result"]')
+    expect(result).to_have_text(
+        "El robot ha cambiado entretanto. Mire la lista y repita.", timeout=WITHIN_MS
+    )
+    other.mouse.up()
+
+    assert look(page, stack, "AGV")["stop_state"] == "STANDING"
+    assert agv.speed == 0.0
+
+
+# --- helpers --------------------------------------------------------------------------
+
+
+def _make_ready(page: Page, stack: Site, robot: str) -> None:
+    let_go(page, stack, robot)
+    expect(strip_stop(page, robot)).to_have_attribute(
+        "data-state", "ready", timeout=WITHIN_MS
+    )
+
+
+@contextmanager
+def _frozen(stack: Site, word: str) -> Iterator[None]:
+    """A part that is there and does nothing, as under SIGSTOP."""
+    program = _program(stack, word)
+    program.process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        program.process.send_signal(signal.SIGCONT)
+
+
+def _program(stack: Site, word: str) -> Program:
+    return [program for program in stack.programs if program.words[0] == word][-1]
+
+
+def _style(place: Locator, name: str, pseudo: str) -> str:
+    script = "(element, [name, pseudo]) => getComputedStyle(element, pseudo)[name]"
+    return str(place.evaluate(script, [name, pseudo]))
+
+
+_SENTENCE = {
+    "pressed": r"hace (\d+) s por",
+    "tries": r"(\d+) intentos",
+    "heard": r"informe hace ([\d,]+) s",
+    "moved": r"avanzado ([\d,]+) m",
+}
+
+
+def _numbers(line: Locator) -> dict[str, float]:
+    """What the full-width line counts."""
+    text = line.inner_text()
+    found = {name: re.search(hole, text) for name, hole in _SENTENCE.items()}
+    assert all(found.values()), text
+    return {
+        name: float(match[1].replace(",", "."))
+        for name, match in found.items()
+        if match
+    }
