@@ -221,6 +221,7 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
+            self.assessor.leave(clock.now())
             await self.commander.close()
             await self.recorder.close()
             await self.orion.close()
@@ -246,12 +247,15 @@ class Dss:
         while True:
             try:
                 left_open = await self.queries.open_commands()
+                decisions = await self.queries.open_decisions()
+                alerted = await self.queries.open_alerts()
                 drilled = await self.queries.last_drills()
             except HopError:
                 await asyncio.sleep(_HISTORY_AGAIN_S)
             else:
                 self.commander.close_earlier(left_open, clock.now())
                 self.commander.drills.remember(drilled)
+                self.assessor.close_earlier(decisions, alerted, clock.now())
                 return
 
     def _ended(self, task: asyncio.Task[None]) -> None:

@@ -124,11 +124,16 @@ class AlarmBook:
         self, alert_id: str, by: str, note: str, now: Instant
     ) -> Alarm | None:
         """Somebody has seen all of it; None when there is no such alarm."""
-        for key, alarm in self._alarms.items():
-            if alarm.alert_id == alert_id:
-                self._alarms[key] = alarm = _see(alarm, by, note, now)
-                return alarm
-        return None
+        alarm = self.find(alert_id)
+        if alarm is not None:
+            alarm = _see(alarm, by, note, now)
+            self._alarms[alarm.condition.key, alarm.condition.subject] = alarm
+        return alarm
+
+    def find(self, alert_id: str) -> Alarm | None:
+        """An alarm that is active or was not long ago."""
+        found = (one for one in self._alarms.values() if one.alert_id == alert_id)
+        return next(found, None)
 
     def _forget(self, now: Instant) -> None:
         for key, alarm in list(self._alarms.items()):

@@ -5,6 +5,9 @@ link has a time and a verdict; a link that does not come in time is itself an al
 (product.md §6)::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
+
+A link is ``open`` while it may still come and never for longer: it comes, is missing,
+or iVeg itself is interrupted and its end is ``unknown``.
 """
 
 from collections.abc import Iterable
@@ -16,9 +19,16 @@ from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.mandates import Crossing
 from iveg.domain.observations import Instant, SafetyReport
 
-LinkVerdict = Literal["ok", "late", "missing", "n/a", "open"]
+LinkVerdict = Literal["ok", "late", "missing", "n/a", "open", "unknown"]
 LinkName = Literal[
-    "detection", "filter", "geometry", "rule", "feedback", "applied", "observed"
+    "detection",
+    "filter",
+    "geometry",
+    "rule",
+    "feedback",
+    "applied",
+    "observed",
+    "interrupted",
 ]
 
 OBSERVED_SHARE = 0.55
@@ -46,6 +56,8 @@ class Decision:
         feedback: When the mandate was first published; ``applied`` when the robot
             said so; ``observed`` when its odometry showed it.
         speed_after: Speed at ``observed`` (m/s).
+        waited_out: Whether every link has come or is missing.
+        interrupted: iVeg went away while it was open; ``ended`` is when that was.
     """
 
     crossing: Crossing
@@ -55,6 +67,8 @@ class Decision:
     observed: Instant | None = None
     ended: Instant | None = None
     speed_after: float | None = None
+    waited_out: bool = False
+    interrupted: bool = False
 
     @property
     def decision_id(self) -> str:
@@ -89,6 +103,16 @@ class Decision:
         """The robot was let go."""
         return replace(self, ended=at)
 
+    def aged(self, now: Instant) -> "Decision":
+        """Time passed; a link that did not come is missing from now on."""
+        if self.waited_out or now.mono - self.crossing.entered.mono < MISSING_S:
+            return self
+        return replace(self, waited_out=True)
+
+    def broken_off(self, at: Instant) -> "Decision":
+        """Break it off: iVeg goes away, and nobody will know how it went on."""
+        return replace(self, ended=at, interrupted=True)
+
     def overdue(self, now: Instant) -> bool:
         """Whether the slow-down should have been seen by now and was not."""
         waited = now.mono - self.crossing.entered.mono
@@ -121,7 +145,12 @@ class Decision:
             self._step("observed", self.observed, self.speed_after, now)
             if self.judged
             else Link("observed", "n/a", None, crossing.speed_before),
+            *self._interruption(),
         )
+
+    def _interruption(self) -> Iterable[Link]:
+        if self.interrupted and self.ended is not None:
+            yield Link("interrupted", "unknown", self.ended.wall)
 
     def _step(
         self, name: LinkName, at: Instant | None, value: float | None, now: Instant
@@ -130,9 +159,11 @@ class Decision:
         if at is not None:
             took = at.mono - start
             return Link(name, "ok" if took <= LATE_S else "late", at.wall, value)
-        if self.ended is not None or now.mono - start >= MISSING_S:
+        if now.mono - start >= MISSING_S:
             return Link(name, "missing")
-        return Link(name, "open")
+        if self.ended is None:
+            return Link(name, "open")
+        return Link(name, "unknown" if self.interrupted else "missing")
 
 
 class Decisions:

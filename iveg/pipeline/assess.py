@@ -8,13 +8,11 @@ and nowhere else, so that a loop that hangs falls silent and slows the robots.
 from collections.abc import Callable, Iterable, Mapping
 
 from iveg.domain import conditions
-from iveg.domain.alarms import Alarm, AlarmBook, Condition
+from iveg.domain.alarms import Condition
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Decisions
-from iveg.domain.events import LogEvent, Slot
 from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.feedback import CLEAR, Mandate
-from iveg.domain.flood import Flood, FloodGauge
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Change, Crossing, Mandates
 from iveg.domain.margins import POSE_LOST_S, margins_of
@@ -28,16 +26,17 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.people import People, Placed
-from iveg.domain.records import DecisionRecord
+from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.world import World
 from iveg.pipeline.ageing import Ageing
+from iveg.pipeline.alarming import Alarming
 from iveg.pipeline.evidence import record_of
 from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Fleet, Ids
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.telling import Teller
-from iveg.pipeline.wording import alarm_line, evidence_of, flood_line, speed_line
+from iveg.pipeline.wording import evidence_of, speed_line
 
 HEARTBEAT_S = 0.1
 
@@ -70,8 +69,7 @@ class Assessor:
         self.rule = rule
         self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
-        self.alarms = AlarmBook()
-        self._gauge = FloodGauge()
+        self.alarms = Alarming(minutes, hub, new_id)
         self._exposures = Exposures()
         self.mandates: dict[str, Mandate] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
@@ -95,11 +93,6 @@ class Assessor:
     def placed(self) -> Mapping[str, list[Placed]]:
         """What each robot's newest look found, faint ones included."""
         return self.looks.placed
-
-    @property
-    def flood(self) -> Flood:
-        """How fast alarms come."""
-        return self._gauge.flood
 
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
         """A decision that is still in memory, with the verdicts of now."""
@@ -216,14 +209,11 @@ class Assessor:
         self._judge(now)
         if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
+        for decision in self.decisions.every_open():
+            self._advance(decision, decision.aged(now), now)
         if self._exposures.due(now):
             self._look_at_margins(now)
-        wrong = [*self._conditions(now), *more]
-        changed = self.alarms.sync(wrong, now, self._new_id())
-        for alarm in changed:
-            self._minutes.alarm(alarm)
-            self._log_alarm(alarm, now)
-        self._watch_flood(sum(one.cleared is None for one in changed), now)
+        self.alarms.sync([*self._conditions(now), *more], now)
 
     def _look_at_margins(self, now: Instant) -> None:
         fleet = list(self.world.live_robots())
@@ -232,38 +222,32 @@ class Assessor:
         seen = any(age is not None and age <= POSE_LOST_S for age in ages)
         self._exposures.look(margins, now, seen=seen)
 
-    def _watch_flood(self, raised: int, now: Instant) -> None:
-        before = self.flood
-        after = self._gauge.take(raised, now)
-        if after == before:
-            return
-        self._hub.changed("flood")
-        line = flood_line(before, after)
-        if line is not None:
-            self._minutes.log(line, now)
-
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
 
-    # --- people -------------------------------------------------------------------
+    def close_earlier(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """Close the rows that an earlier run left open; nobody follows them any more.
 
-    def acknowledge(
-        self, alert_id: str, by: str, note: str, now: Instant
-    ) -> Alarm | None:
-        """Somebody has seen an alarm; None when there is no such one."""
-        alarm = self.alarms.acknowledge(alert_id, by, note, now)
-        if alarm is not None:
-            self._minutes.alarm(alarm)
-            slots: dict[str, Slot] = {
-                **alarm.condition.slots,
-                "alert": alarm.condition.key,
-                "by": by,
-            }
-            self._minutes.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
-        return alarm
+        Their ids are random, so what is not in memory is not of this run.
+        """
+        self._minutes.left_behind(
+            [one for one in decisions if self.decisions.get(one.decision_id) is None],
+            [one for one in alerts if not self.alarms.knows(one.alert_id)],
+            now,
+        )
+
+    def leave(self, now: Instant) -> None:
+        """Break off what is open: iVeg goes away, and the record says so."""
+        for decision in self.decisions.every_open():
+            self._advance(decision, decision.broken_off(now), now)
 
     # --- words --------------------------------------------------------------------
 
@@ -288,8 +272,3 @@ class Assessor:
             after.decision_id,
         )
         self._log_speed(report, at)
-
-    def _log_alarm(self, alarm: Alarm, at: Instant) -> None:
-        line = alarm_line(alarm)
-        if line is not None:
-            self._minutes.log(line, at)

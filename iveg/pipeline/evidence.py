@@ -1,13 +1,14 @@
 """A decision as it is written down and read: each link with time, value and verdict."""
 
 import json
+from dataclasses import replace
 
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Link
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.mandates import Hazard
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord
+from iveg.domain.records import AlertRecord, DecisionRecord
 
 
 def record_of(decision: Decision, now: Instant) -> DecisionRecord:
@@ -42,6 +43,30 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         speed_after=decision.speed_after,
         links=json.dumps([_link(link) for link in decision.links(now)]),
     )
+
+
+def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
+    """A decision that an earlier run left open: nobody knows how it went on.
+
+    Args:
+        record: As the crash left it.
+        found: When this run found it (Unix s).
+    """
+    links = [
+        {**link, "verdict": "unknown"} if link["verdict"] == "open" else link
+        for link in json.loads(record.links)
+    ]
+    links.append(_link(Link("interrupted", "unknown", found)))
+    return replace(record, ended_at=found, links=json.dumps(links))
+
+
+def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
+    """An alert that an earlier run left active; what is still wrong is a new one."""
+    members = json.loads(record.members)
+    for one in members[-1:]:
+        one["cleared_at"] = found
+    text = json.dumps(members, ensure_ascii=False)
+    return replace(record, cleared_at=found, members=text)
 
 
 def _parameters(rule: Rule, hazard: Hazard) -> dict[str, object]:

@@ -6,6 +6,7 @@ API and the database say the same.
 
 import json
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 
 from iveg.domain.alarms import Alarm, Occurrence
@@ -17,13 +18,14 @@ from iveg.domain.records import (
     AlertRecord,
     CommandEventRecord,
     CommandRecord,
+    DecisionRecord,
     DetectionRecord,
     LogRecord,
     OdometryRecord,
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
-from iveg.pipeline.evidence import record_of, wall_of
+from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 
@@ -65,6 +67,18 @@ class Minutes:
     def decision(self, decision: Decision, now: Instant) -> None:
         """A decision is new or has grown a link."""
         self._sink.offer(record_of(decision, now))
+
+    def left_behind(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """What an earlier run left open is over, and nobody knows how it ended."""
+        for decision in decisions:
+            self._sink.offer(left_behind(decision, now.wall))
+        for alert in alerts:
+            self._sink.offer(cleared_behind(alert, now.wall))
 
     def detection(
         self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: Road

@@ -36,7 +36,7 @@ def router(assessor: Assessor, clock: Callable[[], Instant]) -> APIRouter:
     ) -> Response:
         """Say that somebody has seen it; it stays listed while it is active."""
         note = clean_text(body.note)
-        found = assessor.acknowledge(alert_id, who.name, note, clock())
+        found = assessor.alarms.acknowledge(alert_id, who.name, note, clock())
         if found is None:
             return Problem(404, "There is no such alert.").response()
         return Json(shapes.alert(found))

@@ -228,7 +228,7 @@ class Views:
 
     def flood(self) -> schemas.FloodJson:
         """How fast alarms come."""
-        return shapes.flood(self._assessor.flood)
+        return shapes.flood(self._assessor.alarms.flood)
 
     def log(self, lines: list[LogRecord]) -> list[schemas.LogJson]:
         """Log lines."""

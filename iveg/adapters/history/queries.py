@@ -16,7 +16,13 @@ from iveg.adapters.history import lists, series
 from iveg.adapters.history.engine import reading_engine
 from iveg.adapters.history.lists import Filter, Page, record_of
 from iveg.adapters.history.migrate import reason_of
-from iveg.adapters.history.tables import command_events, commands, decisions, log
+from iveg.adapters.history.tables import (
+    alerts,
+    command_events,
+    commands,
+    decisions,
+    log,
+)
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
@@ -96,6 +102,26 @@ class Queries:
         def read(connection: Connection) -> tuple[CommandRecord, ...]:
             rows = connection.execute(wanted).mappings()
             return tuple(record_of(CommandRecord, row) for row in rows)
+
+        return await self._ask(read)
+
+    async def open_decisions(self) -> tuple[DecisionRecord, ...]:
+        """Decisions whose last row has no end."""
+        wanted = select(decisions).where(decisions.c.ended_at.is_(None))
+
+        def read(connection: Connection) -> tuple[DecisionRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(DecisionRecord, row) for row in rows)
+
+        return await self._ask(read)
+
+    async def open_alerts(self) -> tuple[AlertRecord, ...]:
+        """Alerts whose last row says that they are active."""
+        wanted = select(alerts).where(alerts.c.cleared_at.is_(None))
+
+        def read(connection: Connection) -> tuple[AlertRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(AlertRecord, row) for row in rows)
 
         return await self._ask(read)
 

@@ -203,6 +203,21 @@ async def test_open_commands_are_those_that_say_that_they_still_go_on(
     assert [row.command_id for row in found] == ["R1", "S1", "S2"]
 
 
+async def test_what_has_no_end_is_found_whenever_it_began(
+    queries: Queries, database_url: str
+) -> None:
+    remember(
+        database_url,
+        decision_record(),
+        decision_record(decision_id="D2", ended_at=NOON + 2.0),
+        alert_record(),
+        alert_record(alert_id="A2", cleared_at=NOON + 2.0),
+    )
+
+    assert await queries.open_decisions() == (decision_record(),)
+    assert await queries.open_alerts() == (alert_record(),)
+
+
 async def test_the_trail_of_a_command_is_told_in_order(
     queries: Queries, database_url: str
 ) -> None:

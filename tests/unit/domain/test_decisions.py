@@ -252,3 +252,31 @@ def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
     assert book.get("open") is opened
     assert book.get("ended-0") is None
     assert book.get("ended-4") is not None
+
+
+def test_what_did_not_come_in_time_is_missing_from_then_on() -> None:
+    one = decision()
+
+    assert one.aged(at(1.9)) is one
+    aged = one.aged(at(2.0))
+    assert aged.waited_out
+    assert aged.aged(at(9.0)) is aged
+    assert verdicts(aged, 2.0)["applied"] == "missing"
+
+
+def test_what_was_open_when_iveg_went_away_is_unknown_and_says_when() -> None:
+    broken = decision().published(at(0.01)).broken_off(at(0.5))
+
+    assert verdicts(broken, 99.0)["feedback"] == "ok"
+    assert broken.links(at(0.5))[-1].at == at(0.5).wall
+    assert {name: verdicts(broken, 0.5)[name] for name in ("applied", "observed")} == {
+        "applied": "unknown",
+        "observed": "unknown",
+    }
+    assert verdicts(broken, 0.5)["interrupted"] == "unknown"
+
+
+def test_what_was_missing_when_iveg_went_away_is_missing() -> None:
+    broken = decision().aged(at(3.0)).broken_off(at(5.0))
+
+    assert verdicts(broken, 5.0)["applied"] == "missing"

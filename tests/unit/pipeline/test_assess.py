@@ -15,6 +15,7 @@ from iveg.domain.records import (
     OdometryRecord,
 )
 from tests.builders import detection, detection_frame, odometry, origin
+from tests.fakes.records import alert_record
 from tests.unit.pipeline.desk import Desk, conditions_of
 
 HEDGE = Greenhouse(
@@ -216,7 +217,7 @@ async def test_acknowledging_is_written_down_and_told() -> None:
     await desk.wait(3.2)
     (first, *_) = desk.assessor.alarms.active
 
-    desk.assessor.acknowledge(first.alert_id, "ana", "seen", desk.clock())
+    desk.assessor.alarms.acknowledge(first.alert_id, "ana", "seen", desk.clock())
 
     newest = desk.records(AlertRecord)[-1]
     assert isinstance(newest, AlertRecord)
@@ -227,8 +228,90 @@ async def test_acknowledging_is_written_down_and_told() -> None:
 def test_an_alarm_that_nobody_knows_is_acknowledged_by_nobody() -> None:
     desk = Desk()
 
-    assert desk.assessor.acknowledge("none", "ana", "", desk.clock()) is None
+    assert desk.assessor.alarms.acknowledge("none", "ana", "", desk.clock()) is None
     assert desk.sentences() == []
+
+
+# --- what is stored ---------------------------------------------------------------
+
+
+def stored_verdicts(desk: Desk) -> set[str]:
+    """Verdicts of the newest row of the newest decision."""
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    return {one["verdict"] for one in json.loads(newest.links)}
+
+
+async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    assert "open" in stored_verdicts(desk)
+
+    for _ in range(5):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert desk.assessor.decisions.every_open()
+    assert stored_verdicts(desk) == {"ok", "missing"}
+
+
+async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for _ in range(10):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert len(desk.records(DecisionRecord)) <= 4
+
+
+def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    desk.assessor.leave(desk.clock())
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert newest.ended_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+
+
+def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
+    crashed, desk = watched(Desk()), Desk()
+    meet(crashed)
+    left = crashed.records(DecisionRecord)[-1]
+    assert isinstance(left, DecisionRecord)
+
+    desk.assessor.close_earlier([left], [alert_record()], desk.clock())
+
+    (closed,), (cleared,) = desk.records(DecisionRecord), desk.records(AlertRecord)
+    assert isinstance(closed, DecisionRecord)
+    assert isinstance(cleared, AlertRecord)
+    assert closed.decision_id == left.decision_id
+    assert closed.ended_at == cleared.cleared_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+    assert json.loads(closed.links)[-1]["link"] == "interrupted"
+
+
+async def test_what_this_run_has_open_is_left_alone() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(0.1)
+    decisions, alerts = desk.records(DecisionRecord), desk.records(AlertRecord)
+    before = len(desk.sink.records)
+
+    desk.assessor.close_earlier(
+        [one for one in decisions if isinstance(one, DecisionRecord)],
+        [one for one in alerts if isinstance(one, AlertRecord)],
+        desk.clock(),
+    )
+
+    assert alerts
+    assert len(desk.sink.records) == before
 
 
 # --- the log ----------------------------------------------------------------------

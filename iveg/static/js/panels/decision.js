@@ -9,7 +9,7 @@ import { make, need } from "./dom.js";
 /**
  * @typedef {{link: string, at: string | number | null,
  *   value: string | number | null,
- *   verdict: "ok" | "late" | "missing" | "n/a" | "open"}} Link
+ *   verdict: "ok" | "late" | "missing" | "n/a" | "open" | "unknown"}} Link
  * @typedef {{decision_id: string, kind: string, robot_id: string | null,
  *   person_id: string | null, started_at: string | null, ended_at: string | null,
  *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}} Decision
