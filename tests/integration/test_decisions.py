@@ -57,3 +57,36 @@ def mandated(api: httpx.Client) -> str | None:
     robots = api.get("robots").json()["items"]
     found = (robot["mandate"]["decision_id"] for robot in robots)
     return next((one for one in found if one is not None), None)
+
+
+def links_of(decision: dict[str, Any]) -> dict[str, str]:
+    return {link["link"]: link["verdict"] for link in decision["links"]}
+
+
+@pytest.mark.slow
+def test_what_a_kill_leaves_open_is_closed_after_the_restart(
+    driving: Site,
+) -> None:
+    with driving.api() as api:
+        left = until(lambda: mandated(api), WATCHED_S, "a robot that is slowed")
+        until(
+            lambda: any(
+                one["decision_id"] == left
+                for one in api.get("decisions").json()["items"]
+            ),
+            5.0,
+            "its row",
+        )
+    serving = next(one for one in driving.programs if one.words[0] == "serve")
+    serving.kill()
+    driving.start("serve")
+    driving.wait_until_served()
+
+    with driving.api() as api:
+        told = until(lambda: closed(api, left), 20.0, "the row to be closed")
+    assert "open" not in links_of(told).values()
+
+
+def closed(api: httpx.Client, decision_id: str) -> dict[str, Any] | None:
+    told: dict[str, Any] = api.get(f"decisions/{decision_id}").json()
+    return told if told["ended_at"] is not None else None
