@@ -15,6 +15,10 @@ from iveg.robot.holds import HoldSet
 
 _log = logging.getLogger(__name__)
 _MAX_ANSWERS = 256
+_UNDER_WAY = 16
+"""Messages that the broker has yet to confirm.  One at a time would be one report a
+second over a radio that takes half a second each way, and no standstill is measured
+from those."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +49,7 @@ class SafetyLane:
         self._kept_answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
         self._newest_report: Message | None = None
         self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
+        self._room = asyncio.Semaphore(_UNDER_WAY)
         self._disk_fails = False
         self.unsent = 0
         """Answers and reports that found no broker; the next report says the same."""
@@ -93,17 +98,26 @@ class SafetyLane:
 
     async def send_forever(self) -> None:
         """Publish answers, then the newest report, until cancelled."""
-        while True:
-            await self._send_wake.wait()
-            self._send_wake.clear()
-            while self._kept_answers:
-                await self._send(self._kept_answers.popleft())
-            report, self._newest_report = self._newest_report, None
-            if report is not None:
-                await self._send(report)
+        async with asyncio.TaskGroup() as sending:
+            while True:
+                await self._send_wake.wait()
+                self._send_wake.clear()
+                while self._kept_answers or self._newest_report is not None:
+                    await self._room.acquire()
+                    # Tasks begin in this order, and each is on its way at once.
+                    sending.create_task(self._send(self._next()))
+
+    def _next(self) -> Message:
+        if self._kept_answers:
+            return self._kept_answers.popleft()
+        report, self._newest_report = self._newest_report, None
+        assert report is not None  # noqa: S101 - the caller has looked
+        return report
 
     async def _send(self, message: Message) -> None:
         try:
             await self._publish(message.topic, message.payload)
         except HopError:
             self.unsent += 1
+        finally:
+            self._room.release()

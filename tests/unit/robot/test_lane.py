@@ -33,6 +33,8 @@ class World:
         self.disk_ready.set()
         self.disk_fails = False
         self.broker_away = False
+        self.confirms = asyncio.Event()
+        self.confirms.set()
         self.lane = SafetyLane(self.keep, self.publish)
 
     def keep(self, holds: HoldSet) -> None:
@@ -45,6 +47,7 @@ class World:
         if self.broker_away:
             raise HopError("mqtt", "not connected")
         self.seen.append(payload)
+        await self.confirms.wait()
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[SafetyLane]:
@@ -129,3 +132,32 @@ async def test_what_finds_no_broker_is_counted_and_not_sent_later() -> None:
         lane.answer(message("sent"))
         await world.until_seen(1)
     assert world.seen == [b"sent"]
+
+
+async def test_reports_wait_for_no_confirmation_of_the_one_before() -> None:
+    world = World()
+    world.confirms.clear()
+    async with world.running() as lane:
+        for number in range(5):
+            lane.report(message(str(number)))
+            await world.until_seen(number + 1)
+    assert world.seen == [b"0", b"1", b"2", b"3", b"4"]
+
+
+async def test_with_sixteen_unconfirmed_the_newest_report_waits_for_room() -> None:
+    world = World()
+    world.confirms.clear()
+    async with world.running() as lane:
+        for number in range(16):
+            lane.answer(message(str(number)))
+        await world.until_seen(16)
+        lane.report(message("old"))
+        await asyncio.sleep(0)
+        lane.report(message("new"))
+        lane.answer(message("answer"))
+        await asyncio.sleep(0.01)
+        waited = world.seen[16:]
+        world.confirms.set()
+        await world.until_seen(18)
+    assert waited == []
+    assert world.seen[16:] == [b"answer", b"new"]
