@@ -34,10 +34,15 @@ topic +/+/cmd in 1 / /
 
 
 class Field:
-    """Every part a process of its own: broker, FIWARE, iVeg and robots."""
+    """Every part a process of its own: broker, FIWARE, iVeg and robots.
+
+    Attributes:
+        radio: Port through which robots reach the broker; None: straight.
+    """
 
     def __init__(self, place: Site, *emulator: str) -> None:
         self.place = place
+        self.radio: int | None = None
         self._emulator = emulator or ("--held",)
         (self._south,) = free_ports(1)
         self.port = int(urlsplit(place.settings["IVEG_MQTT_URL"]).port or 0)
@@ -54,14 +59,18 @@ class Field:
         if part == "broker":
             self._start_broker()
         elif part == "fiware":
-            field = self.place.settings["IVEG_MQTT_URL"]
             # FIWARE has a broker of its own, behind the bridge.
-            self.place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{self._south}"
-            self._running[part] = self.place.start(part)
-            self.place.settings["IVEG_MQTT_URL"] = field
+            self._start_at(self._south, part)
+        elif part == "emulator":
+            self._start_at(self.radio or self.port, part, *self._emulator)
         else:
-            words = self._emulator if part == "emulator" else ()
-            self._running[part] = self.place.start(part, *words)
+            self._start_at(self.port, part)
+
+    def _start_at(self, broker: int, part: str, *words: str) -> None:
+        field = self.place.settings["IVEG_MQTT_URL"]
+        self.place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{broker}"
+        self._running[part] = self.place.start(part, *words)
+        self.place.settings["IVEG_MQTT_URL"] = field
 
     def kill(self, part: str) -> None:
         """What a power cut does."""

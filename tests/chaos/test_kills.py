@@ -25,7 +25,7 @@ ROBOTS = ("AGI", "AGII")
 VICTIMS = ("serve", "broker", "fiware", "emulator")
 ACTS = ("press", "press_one", "release", "let_go", "let_go", "nothing")
 AGAIN_WITHIN_S = 40.0
-"""Ready in 10 s on a machine that does nothing else."""
+"""Ends a test in which nothing comes any more; ``test_faults`` measures the start."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,145 @@
+"""A TCP proxy that stands where the radio does: late, lossy, and cut at any moment.
+
+Bytes keep their order, as TCP keeps it; what the network loses comes later, and what a
+reset takes is gone with its connection.  The emulator's own relay spoils what a robot
+says, packet by packet; this one spoils the connection, in both directions.
+"""
+
+import asyncio
+import contextlib
+import socket
+import threading
+from dataclasses import dataclass
+from random import Random
+
+_CHUNK = 65_536
+_RESET_EVERY_S = 2.0
+_AGAIN_S = 0.3
+"""After this long TCP sends again what was lost."""
+
+
+@dataclass(frozen=True)
+class Weather:
+    """What happens to each piece of a stream, and to its connection.
+
+    Attributes:
+        late_s: Every piece takes this long, give or take ``jitter_s``.
+        lost: Share of the pieces that have to be sent again.
+        reset: Chance of a connection, every two seconds, to be reset.
+    """
+
+    late_s: float = 0.0
+    jitter_s: float = 0.0
+    lost: float = 0.0
+    reset: float = 0.0
+
+    def delay(self, rnd: Random) -> float:
+        """How long this piece takes (s)."""
+        late = self.late_s + rnd.uniform(-self.jitter_s, self.jitter_s)
+        while rnd.random() < self.lost:
+            late += _AGAIN_S
+        return max(0.0, late)
+
+
+FAIR = Weather()
+LATE = Weather(late_s=0.5, jitter_s=0.2)
+LOSSY = Weather(lost=0.3, reset=0.3)
+
+
+class Radio:
+    """Passes connections on to a broker, in a thread of its own.
+
+    Attributes:
+        port: Where robots connect to.
+        weather: Read for every piece, so it can change at any moment.
+        resets: Connections that were reset.
+    """
+
+    def __init__(self, broker: int, seed: int = 1) -> None:
+        self.weather = FAIR
+        self.resets = 0
+        self._broker = broker
+        self._rnd = Random(seed)  # noqa: S311 - repeatable on purpose
+        self._open: set[asyncio.StreamWriter] = set()
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listener.getsockname()[1]
+        self._thread = threading.Thread(target=self._run, name="radio")
+
+    def __enter__(self) -> "Radio":
+        self._loop = asyncio.new_event_loop()
+        self._task = self._loop.create_task(self._serve())
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._loop.call_soon_threadsafe(self._task.cancel)
+        self._thread.join(10)
+        self._loop.close()
+
+    def _run(self) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            self._loop.run_until_complete(self._task)
+
+    async def _serve(self) -> None:
+        server = await asyncio.start_server(self._accept, sock=self._listener)
+        try:
+            while True:
+                await asyncio.sleep(_RESET_EVERY_S)
+                for writer in list(self._open):
+                    if self._rnd.random() < self.weather.reset:
+                        self.resets += 1
+                        writer.transport.abort()
+        finally:
+            server.close()
+            for writer in list(self._open):
+                writer.transport.abort()
+            # A last turn for those that carried them.
+            await asyncio.sleep(0.05)
+
+    async def _accept(
+        self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        self._open.add(writer)
+        try:
+            there, back = await asyncio.open_connection("127.0.0.1", self._broker)
+        except OSError:
+            writer.transport.abort()
+            self._open.discard(writer)
+            return
+        carrying = [
+            asyncio.create_task(self._carry(reader, back)),
+            asyncio.create_task(self._carry(there, writer)),
+        ]
+        await asyncio.wait(carrying, return_when=asyncio.FIRST_COMPLETED)
+        for task in carrying:
+            task.cancel()
+        self._open.discard(writer)
+        for one in (writer, back):
+            one.transport.abort()
+
+    async def _carry(
+        self, source: asyncio.StreamReader, sink: asyncio.StreamWriter
+    ) -> None:
+        """Every piece at its time, none before the one that came before it."""
+        pieces: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue(1000)
+        passing = asyncio.create_task(self._pass_on(pieces, sink))
+        last = 0.0
+        try:
+            while piece := await source.read(_CHUNK):
+                due = self._loop.time() + self.weather.delay(self._rnd)
+                last = max(last, due)
+                await pieces.put((last, piece))
+        except OSError:
+            return
+        finally:
+            passing.cancel()
+
+    async def _pass_on(
+        self, pieces: asyncio.Queue[tuple[float, bytes]], sink: asyncio.StreamWriter
+    ) -> None:
+        while True:
+            due, piece = await pieces.get()
+            await asyncio.sleep(max(0.0, due - self._loop.time()))
+            with contextlib.suppress(OSError):
+                sink.write(piece)
+                await sink.drain()

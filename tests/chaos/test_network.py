@@ -1,0 +1,94 @@
+"""Real robots behind a radio that is late (F11) or loses and resets (F12).
+
+A thousand of each are run on the virtual clock in ``properties/test_stop_network``;
+these few prove that the real sockets behave as it says.
+"""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from tests.chaos.field import Field
+from tests.chaos.person import Person
+from tests.chaos.radio import FAIR, LATE, LOSSY, Radio, Weather
+from tests.chaos.witness import Witness
+from tests.processes import Site, until
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
+STOPS = 3
+PATIENCE_S = 40.0
+
+
+@pytest.fixture(scope="module")
+def stack(place: Site, radio: Radio) -> Iterator[Field]:
+    """Everything runs, the robots are on the radio, and nobody is in their way."""
+    running = Field(place, "--held", "--scenario", "peers")
+    running.radio = radio.port
+    try:
+        running.start_all()
+        yield running
+    finally:
+        place.stop_all()
+        running.close()
+
+
+@pytest.fixture(scope="module")
+def radio(place: Site) -> Iterator[Radio]:
+    with Radio(Field(place).port) as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def fair_weather_after(radio: Radio) -> Iterator[None]:
+    yield
+    radio.weather = FAIR
+
+
+def stop_through(
+    weather: Weather, radio: Radio, person: Person, witness: Witness
+) -> tuple[float, int]:
+    """Stop a robot that drives in this weather; seconds to STANDING, and tries."""
+    robot = witness.of("AGI")
+    radio.weather = FAIR
+    person.let_go("AGI", PATIENCE_S)
+    radio.weather = weather
+    until(lambda: robot.factor <= 0.5 and robot.speed > 0.1, PATIENCE_S, "it slows")
+    starts = robot.starts
+
+    began = time.monotonic()
+    until(lambda: person.press("AGI"), PATIENCE_S, "STOP is accepted")
+    person.wait_for("AGI", "STANDING", PATIENCE_S)
+    took = time.monotonic() - began
+
+    told = person.look("AGI")
+    assert told is not None
+    words = robot.words
+    # Ten reports later the witness has seen what had been under way meanwhile.
+    until(lambda: robot.words > words + 10, PATIENCE_S, "more reports")
+    assert robot.starts == starts, "it moved after it had been told to stand"
+    assert robot.speed < 0.02
+    return took, int(told["stop"]["tries"])
+
+
+def test_f11_half_a_second_of_latency_slows_robots_and_fakes_no_standstill(
+    radio: Radio, stack: Field, person: Person, witness: Witness
+) -> None:
+    for _ in range(STOPS):
+        stop_through(LATE, radio, person, witness)
+
+    assert stack.radio == radio.port
+    assert witness.unlicensed == 0
+
+
+def test_f12_loss_and_resets_leave_a_stop_that_stands_and_tells_its_tries(
+    radio: Radio, stack: Field, person: Person, witness: Witness
+) -> None:
+    told = [stop_through(LOSSY, radio, person, witness) for _ in range(STOPS)]
+
+    assert stack.radio == radio.port
+    assert radio.resets > 0
+    assert all(tries >= 1 for _, tries in told)
+    assert max(tries for _, tries in told) > 1
+    assert sorted(took for took, _ in told)[STOPS // 2] <= 10.0
+    assert witness.unlicensed == 0
