@@ -156,7 +156,7 @@ async def test_spanish_is_what_readers_of_no_known_language_get(
 ) -> None:
     answer = await browser.get("/", headers={"Accept-Language": "de"})
     assert '<html lang="es"' in answer.text
-    assert read_words("es").say("stop.ready_fleet") in answer.text
+    assert read_words("es").say("stop.loading") in answer.text
 
 
 async def test_the_browsers_language_is_used(browser: httpx.AsyncClient) -> None:
