@@ -7,9 +7,11 @@ line of ``test-output/chaos-SEED.jsonl``.
 
 import json
 import os
+import sqlite3
 import threading
 import time
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -106,4 +108,34 @@ def test_f13_kills_move_nothing_that_nobody_released(
         person.wait_for(robot, "STANDING", AGAIN_WITHIN_S)
     assert witness.unlicensed == 0, log
     assert witness.starts > 0, "nothing ever moved, so nothing was proved"
+    followed = {
+        str((person.look(robot) or {})["stop"]["command_id"]) for robot in ROBOTS
+    }
+    file = Path(stack.place.directory) / "history.sqlite"
+    until(lambda: left_open(file) <= followed, AGAIN_WITHIN_S, "no other row is open")
+    assert set(beginnings(file).values()) == {1}
     person.let_go("AGI", AGAIN_WITHIN_S)
+
+
+def left_open(file: Path) -> set[str]:
+    """STOPs whose row says that they still go on."""
+    with sqlite3.connect(file, timeout=5.0) as reader:
+        found = reader.execute(
+            "SELECT command_id FROM commands WHERE kind = 'stop'"
+            " AND state NOT IN ('RUNNING', 'REPLACED', 'EXPIRED')"
+        ).fetchall()
+    return {row[0] for row in found}
+
+
+def beginnings(file: Path) -> dict[str, int]:
+    """STOP of a person → audit rows that say how it began (I9)."""
+    with sqlite3.connect(file, timeout=5.0) as reader:
+        return dict(
+            reader.execute(
+                "SELECT c.command_id, sum(e.state = 'REQUESTED' AND e.why IN"
+                " ('requested', 'reasserted', 'moved', 'release_unconfirmed'))"
+                " FROM commands c JOIN command_events e USING (command_id)"
+                " WHERE c.kind = 'stop' AND c.requested_by != 'iveg'"
+                " GROUP BY c.command_id"
+            ).fetchall()
+        )
