@@ -93,7 +93,7 @@ class Puppet:
     def _report(self) -> None:
         pose = {"x": 2.0, "y": 2.0, "yaw": 0.0}
         motion = {"linear_velocity": self.speed, "angular_velocity": 0.0}
-        self._measure("_odom", names.ODOMETRY, {**pose, **motion})
+        self._measure("_odom", names.ODOMETRY, {**pose, **motion}, qos=0)
         is_moving = self.speed > 0.0 and not self.holds
         applied = {
             "speed_factor": 1 if is_moving else 0,
@@ -105,13 +105,15 @@ class Puppet:
             "w": 0.0,
             "feedback_age_s": 0.1,
         }
-        self._measure("_safety", names.SAFETY, {**applied, **self._held()})
+        self._measure("_safety", names.SAFETY, {**applied, **self._held()}, qos=1)
 
-    def _measure(self, suffix: str, attribute: str, value: dict[str, object]) -> None:
+    def _measure(
+        self, suffix: str, attribute: str, value: dict[str, object], qos: int
+    ) -> None:
         origin = self._origin()
         message = {attribute: {**value, **origin}, "TimeInstant": origin["stamp"]}
         topic = names.measure_topic(_APIKEY, self.robot_id + suffix)
-        self._link.offer(topic, orjson.dumps(message), qos=1)
+        self._link.offer(topic, orjson.dumps(message), qos=qos)
 
     def _held(self) -> dict[str, object]:
         holds = [{"id": it, "source": "iveg", "ack": "remote"} for it in self.holds]

@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
+from tests.e2e.hands import HELD_MS, let_go, open_menu
 from tests.e2e.reading import card, number, strip_stop, wait_for_mode
 from tests.processes import Site, until
 
@@ -13,7 +14,6 @@ pytestmark = pytest.mark.e2e
 
 STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
 BOTH_STANDING = re.compile(r"PARADO \(2/2\)")
-HELD_MS = 2300
 WITHIN_MS = 8000
 """Braking, the window of 1.0 s in which standing is measured, and a busy machine."""
 
@@ -22,7 +22,7 @@ WITHIN_MS = 8000
 def driving(page: Page, stack: Site) -> None:
     """Every test begins with two robots that nothing holds."""
     for robot in ("AGI", "AGII"):
-        _set_going(page, robot)
+        let_go(page, stack, robot)
 
 
 def test_a_press_makes_the_robot_stand_and_says_how_long_it_took(page: Page) -> None:
@@ -96,7 +96,7 @@ def test_release_alone_moves_nothing_and_resume_drives_again(page: Page) -> None
 def test_a_release_that_is_not_held_for_two_seconds_does_nothing(page: Page) -> None:
     strip_stop(page, "AGI").click()
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
-    _open_menu(page, "AGI")
+    open_menu(page, "AGI")
     release = page.locator('[data-release="AGI"]')
     expect(release).to_be_enabled(timeout=WITHIN_MS)
 
@@ -118,40 +118,9 @@ def test_a_program_may_stop_and_may_not_release(page: Page, stack: Site) -> None
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
 
 
-def _set_going(page: Page, robot: str) -> None:
-    """Release and resume a robot that an earlier test has stopped.
-
-    A hold for a lost link clears by itself, and a release that the robot does not
-    confirm in time turns back into a STOP, so this looks again after each step.
-    """
-    drives = ", ".join(
-        f'.card[data-robot="{robot}"][data-mode="{mode}"]'
-        for mode in ("RUNNING", "SLOW")
-    )
-    release, resume = (
-        f'[data-{action}="{robot}"]:not([disabled])' for action in ("release", "resume")
-    )
-    _open_menu(page, robot)
-    for _ in range(6):
-        page.wait_for_selector(f"{drives}, {release}, {resume}")
-        if page.locator(drives).count():
-            break
-        if page.locator(resume).count():
-            page.locator(resume).click()
-        else:
-            page.locator(release).click(delay=HELD_MS)
-        page.wait_for_timeout(500)
-    page.keyboard.press("Escape")
-
-
 def _release(page: Page, robot: str) -> None:
     """Hold the release for the two seconds that it asks for."""
-    _open_menu(page, robot)
+    open_menu(page, robot)
     release = page.locator(f'[data-release="{robot}"]')
     expect(release).to_be_enabled(timeout=WITHIN_MS)
     release.click(delay=HELD_MS)
-
-
-def _open_menu(page: Page, robot: str) -> None:
-    card(page, robot).locator(".card__menu").click()
-    card(page, robot).locator("dialog[open]").wait_for()

@@ -1,6 +1,6 @@
 """Every state of the STOP control (product.md §4), each by a fault that is real.
 
-AGI and AGII are the emulator's; AGV is a puppet whose brakes and words obey the test.
+AGI is the emulator's; AGV is a puppet whose brakes and words obey the test.
 One stack serves all tests, so each leaves it as it found it.
 """
 
@@ -39,12 +39,12 @@ _WATCH = """([robot]) => {
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with site(tmp_path_factory.mktemp("stop"), IVEG_ROBOTS="AGI,AGII,AGV") as place:
+    with site(tmp_path_factory.mktemp("stop"), IVEG_ROBOTS="AGI,AGV") as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
-        place.start("emulator", "--robots", "2")
-        place.wait_until_live()
+        place.start("emulator", "--robots", "1")
+        place.wait_until_live(robots=1)
         yield place
 
 
@@ -52,6 +52,12 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 def strings(stack: Site) -> Iterator[Puppet]:
     with puppet("AGV", stack.settings["IVEG_MQTT_URL"]) as robot:
         yield robot
+
+
+@pytest.fixture
+def page(open_page: OpenPage) -> Page:
+    """A page with no map on it: every page has the STOP controls, and this is light."""
+    return _listening(open_page(route="/about"))
 
 
 @pytest.fixture
@@ -73,12 +79,22 @@ def agi(page: Page, stack: Site) -> Locator:
 @pytest.fixture
 def english(open_page: OpenPage) -> Page:
     """The same page in English."""
-    page = open_page(locale="en-GB")
-    page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
-    return page
+    return _listening(open_page(locale="en-GB", route="/about"))
 
 
 # --- the link ------------------------------------------------------------------------
+
+
+def test_a_control_whose_script_has_not_run_does_not_look_as_if_it_stopped(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(alone=True)
+    page.route("**/main.js", lambda route: route.abort())
+    page.goto(f"{stack.url}/about")
+
+    control = strip_stop(page, "AGI")
+    expect(control).to_have_attribute("data-state", "lost")
+    expect(control).to_contain_text("Cargando… Si tarda: seta roja")
 
 
 def test_ready_is_a_red_octagon_that_names_what_it_stops(
@@ -237,7 +253,10 @@ def test_a_held_robot_that_moves_again_is_stopped_under_a_new_id(
 # --- release --------------------------------------------------------------------------
 
 
-def test_nothing_is_released_on_old_news(page: Page, agi: Locator, stack: Site) -> None:
+def test_nothing_is_released_on_old_news(
+    open_page: OpenPage, agi: Locator, stack: Site
+) -> None:
+    page = _listening(open_page())
     agi.click()
     expect(agi).to_contain_text(STANDING, timeout=WITHIN_MS)
     holds = [hold["id"] for hold in look(page, stack, "AGI")["holds"]]
@@ -259,7 +278,7 @@ def test_f37_who_stops_while_another_holds_the_release_wins(
     open_page: OpenPage, page: Page, agv: Puppet, stack: Site
 ) -> None:
     # The browser rightly notes the 409.
-    other = open_page(alone=True)
+    other = _listening(open_page(alone=True))
     control = strip_stop(other, "AGV")
     control.click()
     expect(control).to_contain_text(STANDING, timeout=WITHIN_MS)
@@ -281,6 +300,11 @@ def test_f37_who_stops_while_another_holds_the_release_wins(
 
 
 # --- helpers --------------------------------------------------------------------------
+
+
+def _listening(page: Page) -> Page:
+    page.wait_for_selector('#mark[data-state="open"]', state="attached")
+    return page
 
 
 def _make_ready(page: Page, stack: Site, robot: str) -> None:
