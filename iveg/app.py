@@ -66,8 +66,9 @@ from iveg.web import (
     security,
     stop_records,
 )
-from iveg.web.auth import Door, NotifySecret, Principal, SignInLink, require
+from iveg.web.auth import Door, NotifySecret, Principal, require
 from iveg.web.contexts import Site
+from iveg.web.signin import SignInLink
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)

@@ -16,7 +16,6 @@ import logging
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final
-from urllib.parse import parse_qs
 
 from fastapi import FastAPI
 from fastapi.dependencies.models import Dependant
@@ -24,7 +23,6 @@ from fastapi.routing import iter_route_contexts
 from starlette.exceptions import WebSocketException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
-from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from iveg.domain.errors import NotAllowedError
@@ -45,7 +43,6 @@ __all__ = [
     "Principal",
     "Requirement",
     "Role",
-    "SignInLink",
     "declared_action",
     "require",
     "undeclared",
@@ -211,47 +208,6 @@ class NotifySecret:
         # Both are always compared, so that time does not tell which one matched.
         matches = [_same(given, known) for known in (self.current, self._previous)]
         return any(matches)
-
-
-class SignInLink:
-    """Takes ``GET /?token=…`` off the road before anything can log or keep it.
-
-    Args:
-        door: Where the token is looked at.
-        refusal: Draws the page for a wrong token; None answers a problem.
-    """
-
-    def __init__(
-        self,
-        app: ASGIApp,
-        door: Door,
-        refusal: Callable[[Request, Problem], Response] | None = None,
-    ) -> None:
-        self._app = app
-        self._door = door
-        self._refusal = refusal
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        token = _token_in_link(scope)
-        if token is None:
-            await self._app(scope, receive, send)
-            return
-        # Servers write the query into their access log after the answer.
-        scope["query_string"] = b""
-        request = Request(scope)
-        response = self._door.sign_in(request, token)
-        if isinstance(response, Problem):
-            refuse = self._refusal or (lambda _, problem: problem.response())
-            response = refuse(request, response)
-        await response(scope, receive, send)
-
-
-def _token_in_link(scope: Scope) -> str | None:
-    if scope["type"] != "http" or scope["path"] != "/" or scope["method"] != "GET":
-        return None
-    query: bytes = scope["query_string"]
-    return parse_qs(query.decode("latin-1")).get("token", [None])[0]
 
 
 # --- what a route asks for ----------------------------------------------------------

@@ -20,12 +20,12 @@ from iveg.web.auth import (
     Door,
     NotifySecret,
     Principal,
-    SignInLink,
     declared_action,
     require,
     undeclared,
 )
 from iveg.web.sessions import Sessions
+from iveg.web.signin import SignInLink
 
 SIGN_IN = "0123456789abcdef" * 2
 API = "a-program-and-its-token"
