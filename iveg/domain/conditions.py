@@ -8,6 +8,8 @@ from iveg.domain.events import Slot
 from iveg.domain.observations import Instant
 from iveg.domain.world import RobotState
 
+EXPECTED = "alert.person_slowed"
+"""The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
 CLOCK_OFFSET_S = 0.25
 UNREADABLE_SHOWN_S = 10.0
 
@@ -27,7 +29,7 @@ def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
         key = "alert.person_not_slowing" if person else "alert.no_slow_down"
         yield Condition("P1", key, subject, crossing.robot_id, slots)
     elif person:
-        yield Condition("P2", "alert.person_slowed", subject, crossing.robot_id, slots)
+        yield Condition("P2", EXPECTED, subject, crossing.robot_id, slots)
 
 
 def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:

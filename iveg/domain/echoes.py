@@ -1,11 +1,14 @@
 """How soon the fleet does as it is told (safety.md §6.3).
 
-From the datum that fired the rule to the robot's own report that it applies the
-factor: both are read on our clock, so no clock has to be believed.  Left out is the way
-from camera to iVeg, which only the robot's clock could tell.
+Timed is the whole road of an alert: from the notification of a detection that put a
+robot into a ring to that robot's own report that it applies the factor.  Both are read
+on our clock, so no clock has to be believed; left out is the way from camera to iVeg,
+which only the robot's clock could tell.
 
-A robot that was slow for something else has nothing to echo.  One that judged the same
-alert itself was ahead of us: it counts as an echo, but what it took cannot be told.
+Whoever drives into a ring that is known already judges it by its own pose, and one that
+has judged the same alert was ahead of us: both count as asked and echoed, but what they
+took says nothing of the road.  A robot that was slow for something else has nothing to
+echo.
 """
 
 import math
@@ -19,6 +22,8 @@ from iveg.domain.stop.latency import nearest_rank
 WINDOW_S = 300.0
 ECHO_S = 1.0
 """A robot that has not answered by then has not echoed."""
+_SAME_MOMENT_S = 1e-3
+"""A detection is judged at the moment that it arrives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +53,7 @@ def echoes_of(decisions: Iterable[Decision], now: Instant) -> Echoes:
     """What the decisions of the last five minutes tell; of those in memory."""
     recent = [one for one in decisions if _counts(one, now)]
     due = [one for one in recent if _is_due(one, now)]
-    heard = [one for one in recent if one.applied and not one.crossing.ahead]
+    heard = [one for one in recent if _tells_the_road(one)]
     took = sorted(_took_s(one) for one in heard)
     return Echoes(
         timed=len(took),
@@ -65,6 +70,15 @@ def echoes_of(decisions: Iterable[Decision], now: Instant) -> Echoes:
 def _counts(decision: Decision, now: Instant) -> bool:
     crossing = decision.crossing
     return not crossing.already_slow and now.mono - crossing.entered.mono <= WINDOW_S
+
+
+def _tells_the_road(decision: Decision) -> bool:
+    """Whether a detection fired the rule, and a robot answered that knew of nothing."""
+    crossing = decision.crossing
+    look = crossing.hazard.sighting
+    if decision.applied is None or crossing.ahead or look is None:
+        return False
+    return crossing.entered.mono - look.at.mono <= _SAME_MOMENT_S
 
 
 def _is_due(decision: Decision, now: Instant) -> bool:

@@ -1,8 +1,9 @@
 """How long today the fleet was closer to people than stopping takes (safety.md §6.3).
 
 Margins are looked at a few times a second; each look stands for the time since the one
-before.  What nobody could know is counted apart: it is neither margin nor danger.  A
-day is one of UTC.
+before.  What nobody could know is counted apart: it is neither margin nor danger.
+So is a margin to somebody who was last seen more than a second ago: it shrinks with
+their absence alone and was never measured.  A day is one of UTC.
 """
 
 from collections.abc import Sequence
@@ -13,6 +14,8 @@ from iveg.domain.observations import Instant
 
 PERIOD_S = 0.5
 """How often margins are looked at."""
+FRESH_S = 1.0
+"""Older positions are remembered, not measured (safety.md §3.3)."""
 _LONGEST_S = 2 * PERIOD_S
 """A look after a longer silence does not stand for all of it."""
 _DAY_S = 86_400.0
@@ -83,7 +86,7 @@ class Exposures:
                 since=now, looked=now if before is None else before.looked
             )
         past = min(max(0.0, now.mono - before.looked.mono), _LONGEST_S)
-        known = [one for one in margins if one.known]
+        known = [one for one in margins if one.known and one.age_s <= FRESH_S]
         least = min(known, key=lambda one: one.margin_m, default=None)
         self.today = replace(
             _spend(before, past, least, whole=seen and len(known) == len(margins)),

@@ -2,7 +2,7 @@
 
 A flood begins when more than ten alarms come within ten minutes and is over when fewer
 than five do (ANSI/ISA-18.2, clause on monitoring and assessment; EEMUA 191).  It is
-told, and hides nothing.
+told, and hides nothing.  Whoever counts leaves out what asks nothing of anybody.
 """
 
 from collections import deque

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from iveg.domain.alarms import Alarm
+from iveg.domain.conditions import EXPECTED
 from iveg.domain.decisions import Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
@@ -142,7 +143,7 @@ def flood_line(before: Flood, after: Flood) -> LogEvent | None:
 def alarm_line(alarm: Alarm) -> LogEvent | None:
     """An alarm came or went; None for a slow-down, which has a line of its own."""
     condition = alarm.condition
-    if condition.key == "alert.person_slowed":
+    if condition.key == EXPECTED:
         return None
     key = "log.alert.raised" if alarm.cleared is None else "log.alert.cleared"
     slots: dict[str, Slot] = {

@@ -8,6 +8,7 @@ from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision
 from iveg.domain.echoes import ECHO_S, WINDOW_S, echoes_of
 from iveg.domain.mandates import Crossing, Hazard
+from iveg.domain.people import Sighting
 from tests.builders import START, at
 
 
@@ -17,12 +18,19 @@ def asked(
     after: float | None = None,
     already_slow: bool = False,
     ahead: bool = False,
+    looked: float | None = 0.0,
 ) -> Decision:
-    """AGII was told at ``entered`` and answered ``after`` that long; None: never."""
+    """AGII was told at ``entered`` and answered ``after`` that long; None: never.
+
+    It was seen ``looked`` before it was told; None where a peer's own ring was entered.
+    """
+    look = None
+    if looked is not None:
+        look = Sighting("AGI", 1.0, 0.0, 0.9, at(entered - looked), "farmer", 0.94)
     crossing = Crossing(
         f"d-{entered}",
         "AGII",
-        Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0),
+        Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0, look),
         entered=at(entered),
         entered_m=1.43,
         speed_before=0.8,
@@ -80,6 +88,15 @@ def test_a_robot_that_was_slow_for_something_else_has_nothing_to_echo() -> None:
     told = echoes_of([asked(already_slow=True)], at(5))
 
     assert (told.timed, told.asked) == (0, 0)
+
+
+@pytest.mark.parametrize("looked", [0.05, None])
+def test_whoever_drives_into_a_known_ring_has_echoed_but_is_not_timed(
+    looked: float | None,
+) -> None:
+    told = echoes_of([asked(after=0.01, looked=looked)], at(5))
+
+    assert (told.timed, told.asked, told.missed) == (0, 1, 0)
 
 
 def test_a_robot_that_was_ahead_has_echoed_but_is_not_timed() -> None:

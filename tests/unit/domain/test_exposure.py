@@ -13,6 +13,7 @@ from tests.builders import at
 WIDE = Margin("AGI", "P1", 5.0, 1.0, 0.5, 0.1, age_s=0.1, speed=0.5, braking=1.0)
 NEAR = replace(WIDE, gap_m=1.5)
 LOST = replace(NEAR, known=False)
+LONG_AGO = replace(NEAR, age_s=1.1)
 
 
 def watch(days: Exposures, *looks: list[Margin], seen: bool = True) -> None:
@@ -48,7 +49,7 @@ def test_the_worst_margin_keeps_who_and_when() -> None:
 def test_what_nobody_knows_is_neither_margin_nor_danger() -> None:
     days = Exposures()
 
-    watch(days, [], [LOST], [WIDE, LOST])
+    watch(days, [], [LOST], [WIDE, LONG_AGO])
     watch(days, [], seen=False)
 
     today = days.today

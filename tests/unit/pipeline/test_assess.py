@@ -232,6 +232,26 @@ def test_an_alarm_that_nobody_knows_is_acknowledged_by_nobody() -> None:
     assert desk.sentences() == []
 
 
+async def test_a_slow_down_that_the_rule_asked_for_is_no_part_of_a_flood() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(0.1)
+
+    assert conditions_of(desk) == ["alert.person_slowed"]
+    assert desk.assessor.alarms.flood.count == 0
+
+
+async def test_a_flood_is_told_when_it_begins() -> None:
+    desk = Desk()
+    for number in range(11):
+        desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
+        desk.drive("AGI", float(number), linear=0.5)
+        await desk.wait(3.2)
+
+    assert desk.assessor.alarms.flood.since is not None
+    assert desk.sentences().count("log.flood.began") == 1
+
+
 # --- what is stored ---------------------------------------------------------------
 
 

@@ -64,7 +64,7 @@ function cellsOf(alert, words, opened) {
   );
   const over = alert.cleared_at ? dayAndTime(alert.cleared_at) : "—";
   return [
-    make("td", "time", timesOf(alert)),
+    make("td", "time", timesOf(alert, words)),
     priority,
     whatOf(alert, words, opened),
     make("td", "time", over),
@@ -73,11 +73,10 @@ function cellsOf(alert, words, opened) {
   ];
 }
 
-/** First and last time. @param {Alert} alert */
-function timesOf({ raised_at, last_raised_at }) {
+/** First and last time. @param {Alert} alert @param {import("../i18n.js").Words} words */
+function timesOf({ raised_at, last_raised_at, count }, words) {
   const first = dayAndTime(raised_at);
-  const last = dayAndTime(last_raised_at);
-  return first === last ? first : `${first} – ${last}`;
+  return count === 1 ? first : `${first} – ${words.time(last_raised_at)}`;
 }
 
 /** What it says, and each time that it said so. @param {Alert} alert
