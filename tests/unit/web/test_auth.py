@@ -388,6 +388,31 @@ def test_sessions_are_bounded_and_the_longest_idle_gives_way(clock: Clock) -> No
     ]
 
 
+async def test_f42_a_stop_of_an_ended_session_is_written_to_the_log(
+    operator: httpx.AsyncClient, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock.now += 13 * HOUR
+    with caplog.at_level(logging.INFO):
+        answer = await operator.post("/stop", headers=OWN)
+
+    assert answer.status_code == 200
+    assert "STOP by operator, whose session is over" in caplog.text
+
+
+async def test_f42_an_ended_session_stops_from_our_own_page_alone(
+    operator: httpx.AsyncClient, clock: Clock
+) -> None:
+    clock.now += 13 * HOUR
+
+    statuses = [
+        (await operator.post("/stop")).status_code,
+        (await operator.post("/release", headers=OWN)).status_code,
+        (await operator.get("/read")).status_code,
+    ]
+
+    assert statuses == [403, 403, 403]
+
+
 # --- forgery ------------------------------------------------------------------------
 
 
