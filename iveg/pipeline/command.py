@@ -134,12 +134,14 @@ class Commander:
         """What is wanted and who wanted it, on disk before it counts as accepted."""
         # Let every send reach its socket before the disk is asked for anything.
         await asyncio.sleep(0)
-        for command in pressed:
-            if self.machine(command.robot_id).follows(command):
-                await self._journal.wanted(
-                    command.robot_id, "stopped", command.command_id, by, at
-                )
-        await self._minutes.secured()
+        stands = [one for one in pressed if self.machine(one.robot_id).follows(one)]
+        await asyncio.gather(
+            self._minutes.secured(),
+            *(
+                self._journal.wanted(one.robot_id, "stopped", one.command_id, by, at)
+                for one in stands
+            ),
+        )
 
     async def drill(
         self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
