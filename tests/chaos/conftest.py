@@ -21,8 +21,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture(scope="module")
 def stack(place: Site) -> Iterator[Field]:
-    """Everything runs; the robots are held since they booted."""
-    running = Field(place)
+    """Everything runs; the robots are held, and nobody is in their way."""
+    running = Field(place, "--held", "--scenario", "peers")
     try:
         running.start_all()
         yield running
