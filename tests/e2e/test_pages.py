@@ -245,13 +245,14 @@ def _day(route: Route) -> None:
 def _fulfil(route: Route, traces: Mapping[str, Mapping[str, Any]]) -> None:
     """What the API answers, but of these traces."""
     answer = route.fetch()
-    air = answer.json() | {
+    air: dict[str, Any] = {
+        **answer.json(),
         "since": "2026-11-20T10:00:00.000Z",
         "until": "2026-11-20T13:00:00.000Z",
     }
     for part, figure in air["figures"].items():
         figure["data"] = [
-            trace | {"meta": {"kind": part}}
+            {**trace, "meta": {"kind": part}}
             for name, trace in traces.items()
             if name == part
         ]

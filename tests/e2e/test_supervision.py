@@ -10,11 +10,12 @@ from playwright.sync_api import Page, expect
 
 from iveg.adapters.mqtt import BrokerAddress
 from tests.e2e.conftest import OpenPage
-from tests.e2e.reading import evaluate, serious, strip_stop, visit
+from tests.e2e.reading import OVERFLOW, evaluate, serious, strip_stop, visit
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
+THEMES = ("light", "dark", "sunlight")
 PROBE = "<img src=x onerror=window.probed=1>"
 
 
@@ -113,7 +114,8 @@ def test_a_decision_has_an_address_that_opens_and_prints(
     expect(record).to_contain_text(decision_id)
     expect(record.locator(".chain li").first).to_be_visible()
     expect(strip_stop(page, "fleet")).to_be_visible()
-    assert serious(page) == []
+    found = {theme: _serious_in(page, theme) for theme in THEMES}
+    assert found == {theme: [] for theme in THEMES}
 
     page.emulate_media(media="print")
     expect(record.locator(".chain li").first).to_be_visible()
@@ -168,6 +170,19 @@ def test_markup_in_a_note_is_text_on_every_page(
     expect(noted.first).to_be_visible(timeout=15_000)
     assert page.locator("main img").count() == 0
     assert evaluate(page, "() => window.probed ?? null") is None
+
+
+def test_the_fleet_page_tells_how_the_fleet_obeys_with_age_and_count(
+    open_page: OpenPage,
+) -> None:
+    page = open_page(360, 800, route="/fleet")
+
+    for tile in ("echo", "negative", "worst"):
+        place = page.locator(f"#tile-{tile}")
+        expect(place).to_contain_text(re.compile(r"\d"), timeout=90_000)
+        expect(page.locator(f"#tile-{tile}-of")).to_contain_text("hace")
+    assert evaluate(page, OVERFLOW) <= 0
+    assert serious(page) == []
 
 
 def test_an_operator_changes_the_rule_and_sees_its_version(
@@ -287,6 +302,12 @@ def test_signing_out_ends_the_session(
     assert page.locator("[data-stop]").count() == 0
     answer = page.request.get(f"{stack.url}/api/v1/robots")
     assert answer.status == 401
+
+
+def _serious_in(page: Page, theme: str) -> list[str]:
+    script = "([theme]) => { document.documentElement.dataset.theme = theme; }"
+    evaluate(page, script, theme)
+    return serious(page)
 
 
 def _newest_decision(stack: Site) -> str | None:

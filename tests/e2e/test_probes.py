@@ -1,0 +1,153 @@
+"""Names that are markup: refused at the door, or text on every page, never more.
+
+The house has a lane of such a name, and its detectors, robots and people try the rest.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from paho.mqtt import publish
+from playwright.sync_api import Page, expect
+
+import iveg
+from iveg.adapters.mqtt import BrokerAddress
+from tests.e2e.conftest import OpenPage
+from tests.e2e.reading import evaluate, visit
+from tests.processes import Site, site, until
+
+pytestmark = pytest.mark.e2e
+
+PROBE = "<img src=x onerror=window.probed=1>"
+ROUTES = ("/", "/alerts", "/commands", "/history", "/fleet", "/climate", "/settings")
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A house whose middle lane is named in markup, with robots that drive."""
+    place = tmp_path_factory.mktemp("probed")
+    house = Path(iveg.__file__).parent / "data/greenhouses/mvsim-20x20.toml"
+    named = house.read_text().replace('"Pasillo 3"', f'"{PROBE}"')
+    assert PROBE in named
+    (place / "house.toml").write_text(named)
+    with site(place, IVEG_GREENHOUSE=str(place / "house.toml")) as probed:
+        probed.start("fiware").wait_until_ready()
+        probed.start("serve")
+        probed.wait_until_served()
+        probed.start("emulator")
+        probed.wait_until_live()
+        yield probed
+
+
+@pytest.mark.parametrize("name", [PROBE, "AGI,<b>", "A GI", "Á", "climate"])
+def test_a_robot_of_a_hostile_name_is_refused_before_anything_starts(
+    tmp_path: Path, name: str
+) -> None:
+    with site(tmp_path, IVEG_ROBOTS=name) as wrong:
+        program = wrong.start("serve")
+        status = program.process.wait(30.0)
+
+    assert status != 0
+    [said] = program.text().strip().splitlines()
+    assert "IVEG_ROBOTS" in said
+    assert "Traceback" not in said
+
+
+def test_a_robot_that_nobody_named_reaches_no_page(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page()
+    told = _notify(stack, PROBE)
+    _publish(stack, PROBE.replace(" ", ""), "odom", _odometry())
+    expect(page.locator('.card[data-robot="AGI"]')).to_be_visible()
+
+    # Taken and counted, as Orion would try again for ever.
+    assert told == 204
+    with stack.api() as api:
+        ids = [robot["robot_id"] for robot in api.get("robots").json()["items"]]
+    assert ids == ["AGI", "AGII"]
+    _assert_text_only(page)
+
+
+def test_a_robot_of_a_hostile_name_cannot_be_asked_for(stack: Site) -> None:
+    with stack.api() as api:
+        for path in (f"robots/{PROBE}", f"robots/{PROBE}/scan", f"commands/{PROBE}"):
+            answer = api.get(path)
+
+            assert answer.status_code in (404, 422)
+            assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_a_class_in_markup_is_text(open_page: OpenPage, stack: Site) -> None:
+    page = open_page()
+    corners = {"xmin": 9, "xmax": 9.5, "ymin": 9, "ymax": 9.5, "zmin": 0, "zmax": 1}
+    box = {"class_id": PROBE, "probability": 0.99, "position": corners}
+    _publish(stack, "AGI", "yolox_bounding_boxes", {"bounding_boxes": box})
+
+    expect(page.locator("#log")).to_contain_text("onerror", timeout=20_000)
+    _assert_text_only(page)
+
+
+def test_a_reason_that_the_contract_does_not_know_changes_nothing(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page()
+    state = {"speed_factor": 0.5, "reason": PROBE, "cause": PROBE, "holds": []}
+    _publish(stack, "AGI", "safety", {"safety_state": state})
+
+    def is_counted() -> bool:
+        with stack.api() as api:
+            counters = api.get("health").json()["counters"]
+        return any("reject" in name and n > 0 for name, n in counters.items())
+
+    until(is_counted, 10.0, "a message that was refused and counted")
+    _assert_text_only(page)
+
+
+def test_a_lane_in_markup_is_text_on_the_map_and_in_the_lists(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page()
+    with stack.api() as api:
+        lanes = [lane["label"] for lane in api.get("map").json()["lanes"]]
+    assert PROBE in lanes
+
+    page.locator("[data-opens=people-panel]").click()
+    expect(page.locator("#people-list")).to_contain_text("onerror", timeout=90_000)
+    _assert_text_only(page)
+
+
+def _assert_text_only(page: Page) -> None:
+    for route in ROUTES:
+        visit(page, route)
+        assert page.locator("img").count() == 0
+        assert evaluate(page, "() => window.probed ?? null") is None
+
+
+def _odometry() -> dict[str, object]:
+    pose = {"x": 1, "y": 1, "yaw": 0, "linear_velocity": 0, "angular_velocity": 0}
+    return {"base_pose_ground_truth": pose}
+
+
+def _notify(stack: Site, robot: str) -> int:
+    """What the notification of a robot that nobody named is answered."""
+    secret = {"X-Iveg-Notify-Token": stack.settings["IVEG_NOTIFY_TOKEN"]}
+    attributes = {
+        name: {"type": "StructuredValue", "value": value}
+        for name, value in _odometry().items()
+    }
+    entity = {"id": robot, "type": "Robot", **attributes}
+    body = {"subscriptionId": "0" * 24, "data": [entity]}
+    address = stack.settings["IVEG_NOTIFY_URL"]
+    return httpx.post(
+        address, json=body, headers=secret, timeout=10.0, trust_env=False
+    ).status_code
+
+
+def _publish(stack: Site, robot: str, kind: str, payload: dict[str, object]) -> None:
+    broker = BrokerAddress.from_url(stack.settings["IVEG_MQTT_URL"])
+    topic = f"/iveg/{robot}_{kind}/attrs"
+    text = json.dumps(payload)
+    publish.single(topic, text, qos=1, hostname=broker.host, port=broker.port)
