@@ -4,6 +4,7 @@
 
 import { ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
+import { modeSaid } from "../panels/robots.js";
 import { judgeChain } from "./chain.js";
 import { createTiles } from "./tiles.js";
 
@@ -127,14 +128,10 @@ function machineCells(robot, words) {
   const age = ageSaid(ageOf(robot), words);
   const { profile, navigation, clock_offset_s, holds } = robot;
   const sources = holds.map(({ source }) => words.t(`release.hold_source.${source}`));
-  const mode =
-    robot.mode === "SLOW"
-      ? words.t("robot.mode_slow", { factor: robot.speed_factor ?? 0.5 })
-      : words.t(`robot.mode.${robot.mode}`);
   return [
     make("b", "", robot.robot_id),
     `${words.t(`robot.link.${link}`)} · ${age}`,
-    link === "LOST" ? "—" : mode,
+    link === "LOST" ? "—" : modeSaid(robot, words),
     profile ? words.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, words) : "—",
     robot.road ? words.t(`fleet.road.${robot.road}`) : "—",

@@ -120,12 +120,7 @@ function createCard(app, card) {
 
   /** @param {Robot | undefined} robot */
   function drawMode(robot) {
-    const mode = robot?.mode ?? "UNKNOWN";
-    const said =
-      mode === "SLOW"
-        ? words.t("robot.mode_slow", { factor: robot?.speed_factor ?? 0.5 })
-        : words.t(`robot.mode.${mode}`);
-    setText(fields.mode, said);
+    setText(fields.mode, modeSaid(robot, words));
     setText(needPart("why", card), robot ? whyOf(robot) : "");
   }
 
@@ -231,4 +226,20 @@ function createCard(app, card) {
   }
 
   return { draw };
+}
+
+/**
+ * What a robot does, in words; that it was told to stop is not that it stands.
+ *
+ * @param {Robot | undefined} robot
+ * @param {import("../i18n.js").Words} words
+ */
+export function modeSaid(robot, words) {
+  const { mode = "UNKNOWN", stop, speed_factor } = robot ?? {};
+  if (stop && stop.state !== "STANDING") {
+    const state = words.t(`history.state.${stop.state}`);
+    return words.t("robot.mode_stopping", { state });
+  }
+  if (mode !== "SLOW") return words.t(`robot.mode.${mode}`);
+  return words.t("robot.mode_slow", { factor: speed_factor ?? 0.5 });
 }
