@@ -1,5 +1,6 @@
 import { believedBy, hears } from "../../iveg/static/js/layers/belief.js";
 import { laidTo, lengthOf } from "../../iveg/static/js/layers/measure.js";
+import { soon } from "../../iveg/static/js/pages/rows.js";
 import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
@@ -343,4 +344,33 @@ test("the age of a tile grows while the server is silent", () => {
   };
   const { of } = tilesOf(safety, 4, words).latency;
   equal(of, "tiles.latency_of 120 240 310 8 300 3 5 7");
+});
+
+/** @param {() => boolean} isSo within two seconds */
+async function until(isSo) {
+  const deadline = performance.now() + 2000;
+  while (!isSo()) {
+    if (performance.now() > deadline) throw new Error("it never came true");
+    await new Promise((done) => setTimeout(done, 1));
+  }
+}
+
+test("a table is read anew while events never end", async () => {
+  let reads = 0;
+  const ask = soon(() => {
+    reads += 1;
+  }, 20);
+  const events = setInterval(ask, 5);
+  await until(() => reads >= 3).finally(() => clearInterval(events));
+});
+
+test("several events at once are one reading, and one more for what came after", async () => {
+  let reads = 0;
+  const ask = soon(() => {
+    reads += 1;
+  }, 20);
+  ask();
+  await until(() => reads === 1);
+  for (let i = 0; i < 9; i += 1) ask();
+  await until(() => reads === 3);
 });

@@ -81,8 +81,9 @@ export function createRows({ name, path, words, cells, admits = () => true, onIt
 }
 
 /**
- * Calls `fn` once, a while after the last of several events: the history is written in
- * batches, so what has just happened is in it a moment later.
+ * Calls `fn` a while after an event, and once for all that come in between: the history
+ * is written in batches, so what has just happened is in it a moment later.  Events that
+ * never end do not put it off.
  *
  * @param {() => void} fn
  * @param {number} [afterMs]
@@ -90,9 +91,18 @@ export function createRows({ name, path, words, cells, admits = () => true, onIt
 export function soon(fn, afterMs = 1200) {
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let timer;
+  let isAsked = false;
+  function begin() {
+    isAsked = false;
+    timer = setTimeout(() => {
+      timer = undefined;
+      fn();
+      if (isAsked) begin();
+    }, afterMs);
+  }
   return () => {
-    clearTimeout(timer);
-    timer = setTimeout(fn, afterMs);
+    if (timer === undefined) begin();
+    else isAsked = true;
   };
 }
 
