@@ -162,7 +162,7 @@ async def test_spanish_is_what_readers_of_no_known_language_get(
 async def test_the_browsers_language_is_used(browser: httpx.AsyncClient) -> None:
     answer = await browser.get("/", headers={"Accept-Language": "en-GB,es;q=0.5"})
     assert '<html lang="en"' in answer.text
-    assert "STOP ALL" in answer.text
+    assert read_words("en").say("stop.loading") in answer.text
 
 
 async def test_the_remembered_language_wins_over_the_browsers(
