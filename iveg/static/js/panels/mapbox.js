@@ -54,8 +54,21 @@ export function createMapbox(app, decision) {
   /** @param {{kind: string, id: string}} picked */
   function onPick({ kind, id }) {
     if (kind === "robot") return goToCard(id);
-    const person = store.people().find(({ person_id }) => person_id === id);
-    if (person?.decision_id) decision.open(person.decision_id, canvas);
+    const decisionId = decisionAbout(id);
+    if (decisionId) decision.open(decisionId, canvas);
+  }
+
+  /**
+   * What was decided because of somebody: what holds now, else the last that was.
+   *
+   * @param {string} personId
+   */
+  function decisionAbout(personId) {
+    for (const { mandate } of store.robots().values()) {
+      if (mandate?.cause === personId) return mandate.decision_id;
+    }
+    const told = store.log().filter(({ slots }) => slots.person === personId);
+    return told.findLast(({ decision_id }) => decision_id)?.decision_id ?? null;
   }
 
   function drawFacts() {
