@@ -10,6 +10,7 @@ import logging
 import random
 import socket
 import ssl
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
@@ -120,6 +121,7 @@ class MqttLink:
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=_NODELAY,
             max_queued_incoming_messages=_MAX_INCOMING,
+            queue_type=Inbox,
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
@@ -181,6 +183,33 @@ class MqttLink:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
         _heed_cancellation()
+
+
+class Inbox(asyncio.Queue[aiomqtt.Message]):
+    """What waits to be read: of a topic's telemetry (QoS 0) only the newest.
+
+    A reader that falls behind must not read ever older news; what was sent at QoS 1
+    (orders, answers, safety reports) is kept, in order.
+    """
+
+    _queue: "deque[aiomqtt.Message | str]"
+
+    def _init(self, maxsize: int) -> None:
+        super()._init(maxsize)
+        self._newest: dict[str, aiomqtt.Message] = {}
+
+    def _put(self, item: aiomqtt.Message) -> None:
+        if item.qos > 0:
+            self._queue.append(item)
+            return
+        topic = item.topic.value
+        if topic not in self._newest:
+            self._queue.append(topic)
+        self._newest[topic] = item
+
+    def _get(self) -> aiomqtt.Message:
+        waiting = self._queue.popleft()
+        return self._newest.pop(waiting) if isinstance(waiting, str) else waiting
 
 
 def _heed_cancellation() -> None:
