@@ -17,6 +17,8 @@ Priority = Literal["P1", "P2", "P3"]
 
 GROUPING_S = 600.0
 """The same condition back within this time is the same alarm, counted once more."""
+MOST_KEPT = 200
+"""More alarms than this, and even a P1 that nobody saw is left to the history."""
 MEMBERS_KEPT = 20
 """Occurrences that an alarm can still tell one by one; the others are counted."""
 
@@ -78,6 +80,11 @@ class Alarm:
         return self.last.cleared
 
     @property
+    def waits(self) -> bool:
+        """Whether it is for people to see: it holds, or was a P1 that nobody saw."""
+        return self.cleared is None or self.unseen == "P1"
+
+    @property
     def priority(self) -> Priority:
         """What it is shown and sounds as: never less than the gravest unseen."""
         return graver(self.condition.priority, self.unseen)
@@ -95,9 +102,9 @@ class AlarmBook:
         self._alarms: dict[tuple[str, str], Alarm] = {}
 
     @property
-    def active(self) -> list[Alarm]:
-        """What is wrong now, whatever anybody acknowledged."""
-        return [one for one in self._alarms.values() if one.cleared is None]
+    def waiting(self) -> list[Alarm]:
+        """What is wrong now, seen or not, and each P1 that went before it was seen."""
+        return [one for one in self._alarms.values() if one.waits]
 
     def sync(
         self, conditions: Iterable[Condition], now: Instant, new_id: str
@@ -138,7 +145,8 @@ class AlarmBook:
     def _forget(self, now: Instant) -> None:
         for key, alarm in list(self._alarms.items()):
             cleared = alarm.cleared
-            if cleared is not None and now.mono - cleared.mono > GROUPING_S:
+            is_old = cleared is not None and now.mono - cleared.mono > GROUPING_S
+            if is_old and (not alarm.waits or len(self._alarms) > MOST_KEPT):
                 del self._alarms[key]
 
 

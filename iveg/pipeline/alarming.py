@@ -24,9 +24,9 @@ class Alarming:
         self._gauge = FloodGauge()
 
     @property
-    def active(self) -> list[Alarm]:
-        """What is wrong now, whatever anybody acknowledged."""
-        return self._book.active
+    def waiting(self) -> list[Alarm]:
+        """What is wrong now, and each P1 that went before anybody saw it."""
+        return self._book.waiting
 
     @property
     def flood(self) -> Flood:

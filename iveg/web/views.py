@@ -221,10 +221,10 @@ class Views:
         ]
 
     def alerts(self) -> list[schemas.AlertJson]:
-        """All that is wrong now, gravest first."""
-        active = self._assessor.alarms.active
-        active.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        return [shapes.alert(one) for one in active]
+        """All that is for people to see now, gravest first."""
+        waiting = self._assessor.alarms.waiting
+        waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
+        return [shapes.alert(one) for one in waiting]
 
     def flood(self) -> schemas.FloodJson:
         """How fast alarms come."""

@@ -32,7 +32,7 @@ class Person:
         return changed
 
     def acknowledge(self) -> None:
-        for one in self.book.active:
+        for one in self.book.waiting:
             self.book.acknowledge(one.alert_id, "ana", "", at(self.now))
             self.unseen.clear()
 
@@ -44,7 +44,7 @@ def test_a_group_is_never_shown_below_the_gravest_that_nobody_saw(
     person = Person()
     for wrong, sees in life:
         person.live(wrong)
-        for alarm in person.book.active:
+        for alarm in person.book.waiting:
             assert alarm.priority == min({alarm.condition.priority} | person.unseen)
             assert (alarm.unseen is None) == (not person.unseen)
             assert (alarm.last.acknowledged is None) >= (alarm.unseen is not None)
@@ -73,7 +73,7 @@ def test_every_occurrence_is_counted_and_the_newest_are_told(
     person, raised = Person(), 0
     for wrong, _ in life:
         raised += sum(one.cleared is None for one in person.live(wrong))
-        for alarm in person.book.active:
+        for alarm in person.book.waiting:
             assert alarm.count == raised
             assert len(alarm.members) == min(raised, MEMBERS_KEPT)
             assert alarm.raised.mono <= alarm.members[0].raised.mono

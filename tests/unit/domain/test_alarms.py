@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from iveg.domain.alarms import GROUPING_S, MEMBERS_KEPT, AlarmBook, Condition
+from iveg.domain.alarms import GROUPING_S, MEMBERS_KEPT, MOST_KEPT, AlarmBook, Condition
 from tests.builders import at
 
 LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")
@@ -17,7 +17,7 @@ def test_what_is_wrong_is_raised_once() -> None:
 
     assert [one.condition for one in first] == [LOST, SLOWED]
     assert again == []
-    assert len(book.active) == 2
+    assert len(book.waiting) == 2
 
 
 def test_two_of_a_kind_are_told_apart_by_their_subject() -> None:
@@ -36,7 +36,38 @@ def test_what_is_no_longer_wrong_clears() -> None:
     (cleared,) = book.sync([], at(5), "b")
 
     assert cleared.cleared == at(5)
-    assert book.active == []
+
+
+def test_what_is_over_and_not_grave_waits_for_nobody() -> None:
+    book = AlarmBook()
+    book.sync([replace(LOST, priority="P2")], at(0), "a")
+
+    book.sync([], at(5), "b")
+
+    assert book.waiting == []
+
+
+def test_a_p1_that_is_over_waits_until_somebody_has_seen_it() -> None:
+    book = AlarmBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+    book.sync([], at(6 + 2 * GROUPING_S), "c")
+
+    (waiting,) = book.waiting
+    book.acknowledge(raised.alert_id, "ana", "", at(7 + 2 * GROUPING_S))
+
+    assert (waiting.priority, waiting.cleared) == ("P1", at(5))
+    assert book.waiting == []
+
+
+def test_p1s_that_nobody_ever_sees_do_not_fill_the_memory() -> None:
+    book = AlarmBook()
+
+    for second in range(0, 10 * MOST_KEPT, 10):
+        wrong = [replace(LOST, subject=f"AGI/{second}")]
+        book.sync(wrong, at(second * GROUPING_S), f"{second}")
+
+    assert len(book.waiting) <= MOST_KEPT + 1
 
 
 def test_what_comes_back_soon_is_the_same_alarm_counted() -> None:
@@ -52,6 +83,7 @@ def test_what_comes_back_soon_is_the_same_alarm_counted() -> None:
 def test_what_comes_back_later_is_a_new_alarm() -> None:
     book = AlarmBook()
     (first,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(first.alert_id, "ana", "", at(3))
     book.sync([], at(5), "b")
     book.sync([], at(5.1 + GROUPING_S), "c")
 
@@ -67,7 +99,7 @@ def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
 
     book.acknowledge(raised.alert_id, "ana", "on my way", at(3))
 
-    (active,) = book.active
+    (active,) = book.waiting
     assert active.last.acknowledged == at(3)
     assert (active.last.acknowledged_by, active.last.note) == ("ana", "on my way")
     assert active.unseen is None
@@ -106,7 +138,7 @@ def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> N
     nearer = Condition("P2", SLOWED.key, SLOWED.subject, "AGI", {"distance": 0.9})
 
     assert book.sync([nearer], at(1), "b") == []
-    assert book.active[0].condition.slots == {"distance": 0.9}
+    assert book.waiting[0].condition.slots == {"distance": 0.9}
 
 
 def test_an_alarm_tells_its_occurrences_one_by_one() -> None:
@@ -116,7 +148,7 @@ def test_an_alarm_tells_its_occurrences_one_by_one() -> None:
     book.sync([], at(5), "b")
     book.sync([LOST], at(20), "c")
 
-    (alarm,) = book.active
+    (alarm,) = book.waiting
     earlier, last = alarm.members
     assert (earlier.raised, earlier.cleared) == (at(0), at(5))
     assert (earlier.acknowledged_by, earlier.note) == ("ana", "battery")
@@ -130,7 +162,7 @@ def test_of_many_occurrences_the_newest_are_kept_and_all_are_counted() -> None:
         book.sync([], at(2 * number + 1), "b")
     book.sync([LOST], at(100), "c")
 
-    (alarm,) = book.active
+    (alarm,) = book.waiting
     assert (alarm.count, len(alarm.members)) == (MEMBERS_KEPT + 6, MEMBERS_KEPT)
     assert alarm.raised == at(0)
 

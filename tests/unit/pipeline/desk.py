@@ -188,4 +188,4 @@ async def settle() -> None:
 
 def conditions_of(desk: Desk) -> Iterable[str]:
     """What is wrong, by key."""
-    return [one.condition.key for one in desk.assessor.alarms.active]
+    return [one.condition.key for one in desk.assessor.alarms.waiting]

@@ -197,7 +197,7 @@ async def lost(desk: WebDesk) -> str:
     """A moving robot is lost; returns the alert's id."""
     desk.drive("AGI")
     await desk.wait(3.2)
-    (alarm,) = desk.assessor.alarms.active
+    (alarm,) = desk.assessor.alarms.waiting
     return alarm.alert_id
 
 

@@ -24,7 +24,7 @@ export function createAlertsPanel({ store, words }, tone) {
   function draw() {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
-    const open = alerts.filter(({ cleared_at }) => !cleared_at).sort(byUrgency);
+    const open = [...alerts].sort(byUrgency);
     setText(need("#alerts-count"), String(open.length));
     setAttribute(button, "data-worst", open[0]?.priority ?? "none");
     /** @type {import("../protocol.js").Flood | null | undefined} */
@@ -60,7 +60,7 @@ export function createAlertsPanel({ store, words }, tone) {
   draw();
 }
 
-/** It sounds while it is active and nobody has seen it. @param {Alert} alert */
-function isLoud({ priority, acknowledged_at, cleared_at }) {
-  return priority === "P1" && !acknowledged_at && !cleared_at;
+/** It sounds until somebody has seen it, also when it is over. @param {Alert} alert */
+function isLoud({ priority, acknowledged_at }) {
+  return priority === "P1" && !acknowledged_at;
 }
