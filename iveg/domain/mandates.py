@@ -60,7 +60,8 @@ class Crossing:
         outside_since: When it was first found outside (monotonic, s).
         already_slow: It was slowed for something else: no slow-down will be seen.
         ahead: It had judged this very hazard itself and said so before.
-        in_sight: Whether the robot had a line of sight to the centre at the trigger.
+        in_sight: Whether the robot saw it itself, or had a line of sight to the centre
+            at the trigger.
     """
 
     decision_id: str
@@ -175,7 +176,9 @@ class Mandates:
             entered=now,
             entered_m=distance,
             speed_before=speed,
-            in_sight=self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
+            # Whom its own detector found it sees, whatever leaves the plan knows of.
+            in_sight=hazard.observer == robot.robot_id
+            or self._greenhouse.in_sight(pose.x, pose.y, hazard.x, hazard.y),
             distance_m=distance,
             already_slow=_is_slow_already(robot, hazard, speed),
             ahead=_is_ahead(robot, hazard),

@@ -60,6 +60,7 @@ class Alarming:
                 **alarm.condition.slots,
                 "alert": alarm.condition.key,
                 "by": by,
+                "priority": alarm.priority,
             }
             self._minutes.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
         return alarm

@@ -184,7 +184,7 @@ class Assessor:
     def _crossed(self, change: Change, now: Instant) -> None:
         crossing = change.crossing
         if change.began:
-            if not crossing.in_sight and crossing.hazard.observer != crossing.robot_id:
+            if not crossing.in_sight:
                 self.protected_unseen += 1
             decision = Decision(crossing, self.rule)
             self.decisions.put(decision)

@@ -1,6 +1,6 @@
 """What the log says of speeds and alarms: which sentence, and what fills its holes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from iveg.domain.alarms import Alarm
 from iveg.domain.conditions import EXPECTED
@@ -17,7 +17,11 @@ from iveg.domain.world import RobotState, World
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Who was seen by whom, and how far from the robot that slowed down (m)."""
+    """Who was seen by whom, and how far from the robot that slowed down (m).
+
+    Attributes:
+        decision_id: The decision that opens; None where the robot was ahead of ours.
+    """
 
     cause: str
     class_: str
@@ -25,6 +29,7 @@ class Evidence:
     distance_m: float
     in_sight: bool
     confidence: float | None = None
+    decision_id: str | None = None
 
 
 def evidence_of(
@@ -45,6 +50,25 @@ def evidence_of(
     if decision is not None:
         return _of_crossing(decision.crossing)
     robot = world.robots[report.robot_id]
+    found = _without_decision(report, robot, people, world, greenhouse)
+    if found is None:
+        return None
+    ours = (
+        one.decision_id
+        for one in decisions.every_open()
+        if (one.crossing.robot_id, one.crossing.hazard.cause)
+        == (robot.robot_id, found.cause)
+    )
+    return replace(found, decision_id=next(ours, None))
+
+
+def _without_decision(
+    report: SafetyReport,
+    robot: RobotState,
+    people: People,
+    world: World,
+    greenhouse: Greenhouse,
+) -> Evidence | None:
     for person in people.known.values():
         if report.decision_id == person.decision_id:
             return _of_person(person, robot, greenhouse)
@@ -62,6 +86,7 @@ def _of_crossing(crossing: Crossing) -> Evidence:
         crossing.entered_m,
         crossing.in_sight,
         confidence,
+        crossing.decision_id,
     )
 
 
@@ -76,7 +101,8 @@ def _of_person(
         person.class_,
         look.observer,
         pose.distance_to(look.x, look.y),
-        greenhouse.in_sight(pose.x, pose.y, look.x, look.y),
+        look.observer == robot.robot_id
+        or greenhouse.in_sight(pose.x, pose.y, look.x, look.y),
         look.confidence,
     )
 
@@ -123,7 +149,7 @@ def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
         slots,
         report.robot_id,
         None if evidence is None else evidence.class_,
-        report.decision_id,
+        None if evidence is None else evidence.decision_id,
     )
 
 

@@ -200,7 +200,7 @@ PersonJson = TypedDict(
         "observers": list[str],
         "possible": bool,
         "doubtful": bool,
-        "decision_id": str,
+        "decision_id": str | None,
         "lane": str | None,
         "acting": list[ActingJson],
         "margin": MarginJson | None,

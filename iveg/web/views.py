@@ -164,7 +164,7 @@ class Views:
             ],
             "possible": newest.possible,
             "doubtful": newest.reach_m > 0.0,
-            "decision_id": person.decision_id,
+            "decision_id": max((one.decision_id for one in crossings), default=None),
             "lane": self.greenhouse.lane_at(newest.x, newest.y),
             "acting": [
                 {

@@ -44,6 +44,42 @@ def test_a_robot_ahead_of_our_decision_is_told_with_whom_it_means() -> None:
     assert (slots["observer"], slots["distance"]) == ("AGII", 4.0)
 
 
+def test_a_line_opens_no_decision_that_does_not_exist() -> None:
+    desk = Desk(house=HEDGE)
+    desk.drive("AGI", 0.0)
+    desk.look("AGII", detection("farmer", 4.0))
+    (person,) = desk.assessor.people.known.values()
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=person.decision_id)
+
+    line = [one for one in desk.minutes.lines if one.robot_id == "AGI"][-1]
+    assert line.decision_id is None
+
+
+def test_a_line_of_a_robot_ahead_opens_our_decision_when_there_is_one() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.look("AGII", detection("farmer", 1.0))
+    (person,) = desk.assessor.people.known.values()
+    (crossing,) = desk.assessor.crossings
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=person.decision_id)
+
+    line = [one for one in desk.minutes.lines if one.robot_id == "AGI"][-1]
+    assert line.decision_id == crossing.decision_id
+
+
+def test_nobody_is_unseen_by_the_robot_that_saw_them() -> None:
+    desk = Desk(house=HEDGE)
+    desk.drive("AGI", 0.0)
+    desk.look("AGI", detection("farmer", 4.0))
+    (person,) = desk.assessor.people.known.values()
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=person.decision_id)
+
+    assert told(desk)[0] == "log.speed_down.person"
+
+
 def test_a_robot_that_means_a_peer_is_told_with_its_distance() -> None:
     desk = Desk()
     desk.drive("AGI", 0.0)
