@@ -19,7 +19,6 @@ from iveg import __version__
 from iveg.adapters import clock
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.adapters.history.climate import ClimateKeeper
 from iveg.adapters.history.engine import sqlite_file, sqlite_url
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
@@ -199,7 +198,6 @@ class Dss:
             read_clock=clock.now,
         )
         self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
-        self.climate = ClimateKeeper(world, self.recorder, self.hub)
         self.views = Views(self.assessor, self.commander)
         self.sessions = FileSessions(directory / "sessions.jsonl")
         self.door = Door(
@@ -236,7 +234,6 @@ class Dss:
             tasks.create_task(self.link.run(), name="mqtt")
             tasks.create_task(self.loop.run(), name="rule-loop")
             tasks.create_task(self.mapper.run(clock.now), name="costmap")
-            tasks.create_task(self.climate.run(), name="climate")
             tasks.create_task(self.upkeep.run(), name="upkeep")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())

@@ -17,6 +17,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Change, Crossing, Mandates
 from iveg.domain.margins import POSE_LOST_S, margins_of
 from iveg.domain.observations import (
+    Climate,
     DetectionFrame,
     Instant,
     LaserScan,
@@ -126,6 +127,8 @@ class Assessor:
         match observation:
             case Odometry():
                 self._moved(observation, received.at)
+            case Climate():
+                self._minutes.climate(observation, received.at)
             case LaserScan():
                 self._hub.changed(f"robots/{observation.robot_id}/scan")
             case SafetyReport():

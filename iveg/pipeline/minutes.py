@@ -12,10 +12,11 @@ from dataclasses import asdict, replace
 from iveg.domain.alarms import Alarm, Occurrence
 from iveg.domain.decisions import Decision
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Instant, Road
+from iveg.domain.observations import Climate, Instant, Road
 from iveg.domain.people import Placed
 from iveg.domain.records import (
     AlertRecord,
+    ClimateRecord,
     CommandEventRecord,
     CommandRecord,
     DecisionRecord,
@@ -30,6 +31,8 @@ from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 
 _KEPT_LINES = 500
+CLIMATE_PERIOD_S = 60.0
+"""Air changes slowly: a day is 1,440 rows."""
 
 
 class Minutes:
@@ -43,6 +46,7 @@ class Minutes:
         self._hub = hub
         self._sink = sink
         self._thinner = OdometryThinner()
+        self._climate_kept: float | None = None
         # Starting at the clock keeps ids growing over restarts without asking anyone.
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
@@ -207,6 +211,23 @@ class Minutes:
                 at=at.wall,
                 state=state,
                 why=why,
+            )
+        )
+
+    def climate(self, read: Climate, at: Instant) -> None:
+        """The air was measured: pages are told each time, history once a minute."""
+        self._hub.changed("climate")
+        # Devices that send every minute are late as often as early.
+        kept = self._climate_kept
+        if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:
+            return
+        self._climate_kept = at.mono
+        self._sink.offer(
+            ClimateRecord(
+                at=at.wall,
+                temperature=read.temperature,
+                relative_humidity=read.relative_humidity,
+                co2=read.co2,
             )
         )
 
