@@ -27,7 +27,8 @@ import orjson
 from benchmarks.process import machine, percentile, print_table
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.ngsi import codec
-from tests.chaos.field import MOSQUITTO, Field
+from tests.brokers import MOSQUITTO
+from tests.chaos.field import Field
 from tests.processes import Site, site
 
 ROBOTS = ("AGI", "AGII")

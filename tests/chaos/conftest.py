@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.chaos.field import MOSQUITTO, Field
+from tests.brokers import MOSQUITTO
+from tests.chaos.field import Field, running
 from tests.chaos.person import Person
 from tests.chaos.witness import Witness
 from tests.processes import Site, site
@@ -21,14 +22,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 
 @pytest.fixture(scope="module")
 def stack(place: Site) -> Iterator[Field]:
-    """Everything runs; the robots are held, and nobody is in their way."""
-    running = Field(place, "--held", "--scenario", "peers")
-    try:
-        running.start_all()
-        yield running
-    finally:
-        place.stop_all()
-        running.close()
+    with running(place) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

@@ -5,22 +5,19 @@ embedded agent, its commands come back.  Each direction has its own topics, so n
 goes round in circles.
 """
 
-import shutil
 import signal
 import socket
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from tests.brokers import MOSQUITTO, PLAIN
 from tests.processes import Program, Site, free_ports, until
 
-MOSQUITTO = shutil.which("mosquitto", path="/usr/bin:/usr/sbin:/usr/local/sbin")
-_CONF = """listener {port} 127.0.0.1
-allow_anonymous true
-set_tcp_nodelay true
-log_type none
-connection fiware
-address 127.0.0.1:{south}
+_CONF = f"""{PLAIN}connection fiware
+address 127.0.0.1:{{south}}
 bridge_protocol_version mqttv311
 try_private false
 notifications false
@@ -106,3 +103,20 @@ class Field:
         except OSError:
             return False
         return True
+
+
+@contextmanager
+def running(place: Site, radio: int | None = None) -> Iterator[Field]:
+    """Everything runs; the robots are held, and nobody is in their way.
+
+    Args:
+        radio: Port through which the robots meet the broker, if not its own.
+    """
+    field = Field(place, "--held", "--scenario", "peers")
+    field.radio = radio
+    try:
+        field.start_all()
+        yield field
+    finally:
+        place.stop_all()
+        field.close()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.chaos.field import Field
+from tests.chaos.field import Field, running
 from tests.chaos.person import Person
 from tests.chaos.radio import FAIR, LATE, LOSSY, Radio, Weather
 from tests.chaos.witness import Witness
@@ -22,15 +22,9 @@ PATIENCE_S = 40.0
 
 @pytest.fixture(scope="module")
 def stack(place: Site, radio: Radio) -> Iterator[Field]:
-    """Everything runs, the robots are on the radio, and nobody is in their way."""
-    running = Field(place, "--held", "--scenario", "peers")
-    running.radio = radio.port
-    try:
-        running.start_all()
-        yield running
-    finally:
-        place.stop_all()
-        running.close()
+    """The robots are on the radio."""
+    with running(place, radio.port) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
