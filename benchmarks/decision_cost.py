@@ -76,6 +76,11 @@ class Telling:
         codec.write_feedback(feedback)
         self.left = time.perf_counter()
 
+    def taken(self) -> float | None:
+        """When the newest left since the last time of asking (s)."""
+        left, self.left = self.left, None
+        return left
+
     async def stop(self, *_: object) -> None:
         """Nobody is stopped here."""
 
@@ -221,11 +226,13 @@ async def latency(robots: int, seconds: float) -> list[float]:
         wait = start + one.at - time.perf_counter()
         await asyncio.sleep(max(0.0, wait))
         # A notification that had to wait for its turn has waited since it was due.
-        now, fleet.left = clock.now(), None
+        now = clock.now()
+        fleet.taken()
         for received in read(one.body, now):
             assessor.take(received)
-        if fleet.left is not None:
-            took.append((fleet.left - start - one.at) * 1e3)
+        left = fleet.taken()
+        if left is not None:
+            took.append((left - start - one.at) * 1e3)
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
             assessor.tick(now)
