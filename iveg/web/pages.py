@@ -39,7 +39,6 @@ from iveg.web.contexts import (
 )
 from iveg.web.openapi import ApiDoc
 from iveg.web.problems import Problem
-from iveg.web.security import PLOTLY_CONTENT_SECURITY_POLICY
 from iveg.web.words import LANGUAGES, Slot, Words, preferred_language, read_words
 
 LANGUAGE_COOKIE = "iveg_language"
@@ -85,22 +84,16 @@ class Pages:
             return Frame(self._site, look, route)
         return Frame(self._site, look, route, visitor.name, visitor.role)
 
-    def draw(
-        self, page: Page, status: int = 200, policy: str | None = None
-    ) -> HTMLResponse:
+    def draw(self, page: Page, status: int = 200) -> HTMLResponse:
         """A page as a response.
 
         Args:
             page: Its context.
             status: HTTP status.
-            policy: A Content-Security-Policy other than everybody's.
         """
         environment = self._environments[page.frame.look.language]
         html = environment.get_template(page.template).render(page=page)
-        headers = {"Vary": "Cookie, Accept-Language"}
-        if policy is not None:
-            headers["Content-Security-Policy"] = policy
-        return HTMLResponse(html, status, headers)
+        return HTMLResponse(html, status, {"Vary": "Cookie, Accept-Language"})
 
     def problem(self, request: Request, problem: Problem) -> Response:
         """A problem as a page: the way in for a stranger, an explanation else."""
@@ -153,8 +146,7 @@ def router(
 
     @routes.get("/history", response_model=None)
     async def history(request: Request, visitor: Annotated[Any, who]) -> Response:
-        page = HistoryPage(pages.frame(request, "history", visitor))
-        return pages.draw(page, policy=PLOTLY_CONTENT_SECURITY_POLICY)
+        return pages.draw(HistoryPage(pages.frame(request, "history", visitor)))
 
     _add_supervision(routes, pages, who)
 

@@ -21,16 +21,7 @@ CONTENT_SECURITY_POLICY = (
     "form-action 'self'; frame-ancestors 'none'; object-src 'none'; "
     "require-trusted-types-for 'script'"
 )
-
-PLOTLY_CONTENT_SECURITY_POLICY = (
-    CONTENT_SECURITY_POLICY.replace(
-        "style-src 'self'", "style-src 'self' 'unsafe-inline'"
-    )
-    .replace("img-src 'self' data:", "img-src 'self' data: blob:")
-    .replace("; require-trusted-types-for 'script'", "")
-)
-"""For the History page alone: Plotly writes style elements and sets innerHTML itself.
-Scripts still come from this server only."""
+"""One for every page: figures are drawn under it too (see ``charts.Library``)."""
 
 _ALWAYS = (
     ("content-security-policy", CONTENT_SECURITY_POLICY),

@@ -205,12 +205,12 @@ async def test_names_from_outside_are_text_and_not_markup(
     assert "<b>1</b>" not in html
 
 
-async def test_only_the_history_page_may_style_as_plotly_needs(
+async def test_pages_with_figures_are_held_by_the_same_policy(
     browser: httpx.AsyncClient,
 ) -> None:
-    header = "content-security-policy"
-    assert (await browser.get("/")).headers[header] == CONTENT_SECURITY_POLICY
-    assert "'unsafe-inline'" in (await browser.get("/history")).headers[header]
+    for route in ("/", "/history", "/climate"):
+        headers = (await browser.get(route)).headers
+        assert headers["content-security-policy"] == CONTENT_SECURITY_POLICY
 
 
 async def test_about_says_what_stop_is_not(browser: httpx.AsyncClient) -> None:

@@ -3,7 +3,7 @@
  *
  * The library is large and comes from this server; it is asked for with the first
  * figure.  It styles a plot by sheets that a strict policy refuses, so an element of
- * each sheet's name keeps it from trying, and the style sheet of the History page holds
+ * each sheet's name keeps it from trying, and the style sheet of pages with figures holds
  * what a plot needs.  A figure's `meta` says what its traces and axes are.
  *
  * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
