@@ -10,8 +10,8 @@ from contextlib import suppress
 from typing import Any
 
 import pytest
+from playwright import sync_api
 from playwright.sync_api import Browser, Page, expect
-from playwright.sync_api import TimeoutError as TooLateError
 
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, strip_stop, visit
 from tests.processes import Program, Site, until
@@ -144,7 +144,7 @@ def test_a_ring_on_the_map_opens_its_decision(live: Page, stack: Site) -> None:
             return False
         live.locator("#map").click(position={"x": place[0], "y": place[1]})
         # The next tap comes later than a double tap would, and closes nothing.
-        with suppress(TooLateError):
+        with suppress(sync_api.TimeoutError):
             chain.wait_for(timeout=4000)
         return chain.is_visible()
 
@@ -241,9 +241,17 @@ _THUMBNAIL = """(canvas) => {
 _ON_SCREEN = """async ([rings, robots]) => {
   const {createViewport, fitTo, screenX, screenY} =
     await import('/static/js/viewport.js');
+  const {coverOf} = await import('/static/js/layers/scalebar.js');
   const {bounds} = await (await fetch('/api/v1/map')).json();
-  const {width, height} = document.querySelector('#map').getBoundingClientRect();
-  const view = fitTo(createViewport(width, height), bounds);
+  const {left, top, width, height} =
+    document.querySelector('#map').getBoundingClientRect();
+  const over = [...document.querySelectorAll('[data-over-map]')].map((element) => {
+    const box = element.getBoundingClientRect();
+    return {left: box.left - left, top: box.top - top,
+            right: box.right - left, bottom: box.bottom - top};
+  });
+  const covers = [...over, coverOf({height})];
+  const view = fitTo(createViewport(width, height), bounds, undefined, covers);
   const place = ({x, y}) => [screenX(view, x), screenY(view, y)];
   const far = (ring) => robots.every(({x, y}) =>
     Math.hypot(x - ring.x, y - ring.y) * view.scale > 40);

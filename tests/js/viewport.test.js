@@ -43,6 +43,51 @@ test("a fitted house is whole, centred and as large as fits", () => {
   near(fitted.x, 10);
 });
 
+const PHONE = { ...viewport.createViewport(390, 430) };
+const TOOLS = { left: 334, top: 10, right: 380, bottom: 234 };
+const CHIPS = { left: 10, top: 10, right: 310, bottom: 74 };
+const BAR = { left: 0, top: 392, right: 146, bottom: 430 };
+const HOUSE = { xmin: 0, ymin: 0, xmax: 20, ymax: 20 };
+
+/** @param {viewport.Viewport} fitted where the house is (px) */
+const placeOf = (fitted) => ({
+  left: viewport.screenX(fitted, HOUSE.xmin),
+  top: viewport.screenY(fitted, HOUSE.ymax),
+  right: viewport.screenX(fitted, HOUSE.xmax),
+  bottom: viewport.screenY(fitted, HOUSE.ymin),
+});
+
+/** @param {viewport.Rect} a @param {viewport.Rect} b */
+const meet = (a, b) =>
+  a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+
+test("nothing that lies over the map lies over a fitted house", () => {
+  const covers = [TOOLS, CHIPS, BAR];
+  const place = placeOf(viewport.fitTo(PHONE, HOUSE, 28, covers));
+  equal(
+    covers.map((cover) => meet(place, cover)),
+    [false, false, false],
+  );
+  equal(place.left >= 0 && place.bottom <= PHONE.height, true);
+});
+
+test("without what lies over the map the tools would cover the house", () => {
+  equal(meet(placeOf(viewport.fitTo(PHONE, HOUSE, 28)), TOOLS), true);
+});
+
+test("a cover in a corner is passed where the house stays larger", () => {
+  const wide = { ...PHONE, width: 1000 };
+  const fitted = viewport.fitTo(wide, HOUSE, 28, [BAR]);
+  near(fitted.scale, (430 - 56) / 20);
+  equal(placeOf(fitted).left > BAR.right, true);
+});
+
+test("a cover that leaves too little room is looked through", () => {
+  const all = { left: 0, top: 0, right: 390, bottom: 430 };
+  const fitted = viewport.fitTo(PHONE, HOUSE, 28, [all, TOOLS]);
+  equal(fitted, viewport.fitTo(PHONE, HOUSE, 28, [TOOLS]));
+});
+
 test("bounds leave out what is no number, and nothing has no bounds", () => {
   const points = [
     { x: 1, y: 2 },

@@ -9,6 +9,8 @@
  * @typedef {import("./scene.js").Scene} Scene
  * @typedef {import("./viewport.js").Viewport} Viewport
  * @typedef {ReturnType<typeof createCamera>} Camera
+ * @typedef {{now: () => viewport.Rect[], forget: () => void}} Covers what lies over the
+ *   map, and how to measure that anew
  */
 
 import { hasArea } from "./layers/greenhouse.js";
@@ -18,6 +20,9 @@ import * as viewport from "./viewport.js";
 const OPENING_MS = 1000;
 const FOLLOW_FROM_SCALE = 24;
 const STEP_ZOOM = 1.4;
+const PADDING_PX = 28;
+/** @type {Covers} */
+const NOTHING = { now: () => [], forget: () => undefined };
 const FLEET_MARGIN_M = 3;
 const FIELD_MARGIN_M = 2;
 /** Every so many-eth laser point is enough to know how far a field reaches. */
@@ -26,8 +31,9 @@ const POINT_STRIDE = 8;
 /**
  * @param {() => Scene} sceneNow the scene last drawn
  * @param {(robotId: string | null) => void} [onFollow]
+ * @param {Covers} [covers]
  */
-export function createCamera(sceneNow, onFollow) {
+export function createCamera(sceneNow, onFollow, covers = NOTHING) {
   let view = viewport.createViewport(0, 0);
   /** @type {string | null} */
   let followed = null;
@@ -42,9 +48,12 @@ export function createCamera(sceneNow, onFollow) {
     isMoved = true;
   }
 
+  /** @param {import("./viewport.js").Box2D} box */
+  const fitted = (box) => viewport.fitTo(view, box, PADDING_PX, covers.now());
+
   function fitView() {
     const box = boundsOfScene(sceneNow());
-    if (box) view = viewport.fitTo(view, box);
+    if (box) view = fitted(box);
   }
 
   /** Fits the first sight of a house; never again once a person has moved the map. */
@@ -97,6 +106,7 @@ export function createCamera(sceneNow, onFollow) {
       if (openedOn !== null && !isMoved) fitView();
     },
     fit() {
+      covers.forget();
       follow(null);
       isMoved = false;
       fitView();
@@ -105,7 +115,7 @@ export function createCamera(sceneNow, onFollow) {
       follow(null);
       const poses = sceneNow().robots.map(({ pose }) => pose);
       const box = viewport.boundsOf(poses, FLEET_MARGIN_M);
-      if (box) move(viewport.fitTo(view, box));
+      if (box) move(fitted(box));
     },
     follow,
     pan,

@@ -22,6 +22,7 @@ import { believedBy, hears } from "./layers/belief.js";
 import { laidTo, lengthOf } from "./layers/measure.js";
 import { browserStorage, createChoices } from "./layers/memory.js";
 import { pick } from "./layers/pick.js";
+import { coverOf } from "./layers/scalebar.js";
 import { readTheme } from "./layers/theme.js";
 import { createTrails } from "./layers/trail.js";
 import { createWords } from "./layers/words.js";
@@ -48,6 +49,7 @@ export function createMap(canvas, store, options = {}) {
   const choices = createChoices(storage, invalidate);
   const trails = createTrails();
   const hook = createPaintHook();
+  const covers = createCovers(canvas, invalidate);
   const picture = createPicture(canvas, trails, choices.isOn, choices.trailSeconds);
   /** @type {Set<Picker>} */
   const pickers = new Set();
@@ -59,7 +61,7 @@ export function createMap(canvas, store, options = {}) {
   let isMeasuring = false;
   let frame = 0;
   const camera = redrawing(
-    createCamera(() => scene, options.onFollow),
+    createCamera(() => scene, options.onFollow, covers),
     invalidate,
   );
 
@@ -105,6 +107,7 @@ export function createMap(canvas, store, options = {}) {
   }
 
   function resize() {
+    covers.forget();
     camera.resize(canvas.clientWidth, canvas.clientHeight);
     // Drawn at once: a resized canvas is blank until it is.
     cancelAnimationFrame(frame);
@@ -136,7 +139,8 @@ export function createMap(canvas, store, options = {}) {
       invalidate();
     }),
     every(AGEING_MS, invalidate),
-    onResize(canvas, resize),
+    onResize([canvas], resize),
+    covers.end,
     () => cancelAnimationFrame(frame),
   ];
   invalidate();
@@ -283,9 +287,53 @@ function every(ms, fn) {
   return () => clearInterval(timer);
 }
 
-/** @param {HTMLElement} element @param {() => void} fn */
-function onResize(element, fn) {
+/**
+ * What lies over the map (`data-over-map` beside it, and the bar of its scale), each at
+ * its largest since the house was fitted: counts come and go, and a house that moved
+ * with them could not be watched.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {() => void} onGrowth
+ */
+function createCovers(canvas, onGrowth) {
+  const house = canvas.parentElement;
+  /** @type {HTMLElement[]} */
+  const over = [...(house?.querySelectorAll("[data-over-map]") ?? [])].map(asElement);
+  /** @type {Map<Element, import("./viewport.js").Rect>} */
+  const largest = new Map();
+
+  function measure() {
+    const { left: x, top: y } = canvas.getBoundingClientRect();
+    for (const element of over) {
+      const now = element.getBoundingClientRect();
+      if (!now.width || !now.height) continue;
+      const was = largest.get(element);
+      largest.set(element, {
+        left: Math.min(now.left - x, was?.left ?? Number.POSITIVE_INFINITY),
+        top: Math.min(now.top - y, was?.top ?? Number.POSITIVE_INFINITY),
+        right: Math.max(now.right - x, was?.right ?? 0),
+        bottom: Math.max(now.bottom - y, was?.bottom ?? 0),
+      });
+    }
+    onGrowth();
+  }
+
+  return {
+    now: () => [...largest.values(), coverOf({ height: canvas.clientHeight })],
+    forget() {
+      largest.clear();
+      measure();
+    },
+    end: onResize(over, measure),
+  };
+}
+
+/** @param {Element} element */
+const asElement = (element) => /** @type {HTMLElement} */ (element);
+
+/** @param {HTMLElement[]} elements @param {() => void} fn */
+function onResize(elements, fn) {
   const observer = new ResizeObserver(fn);
-  observer.observe(element);
+  for (const element of elements) observer.observe(element);
   return () => observer.disconnect();
 }

@@ -7,11 +7,17 @@
  * @typedef {{width: number, height: number, scale: number, x: number, y: number}} Viewport
  *   canvas size (CSS px), scale (px/m), world point at its centre (m)
  * @typedef {import("./protocol.js").Box2D} Box2D
+ * @typedef {{left: number, top: number, right: number, bottom: number}} Rect (px),
+ *   `right` and `bottom` counted from the left and the top as well
  */
 
 /** From a house of a kilometre to the teeth of a wheel (px/m). */
 export const MIN_SCALE = 1;
 export const MAX_SCALE = 400;
+/** Between the house and what lies over the map (px). */
+const GAP_PX = 8;
+/** What covers more is looked through: the house keeps a third of the canvas each way. */
+const MOST_OF_A_SIDE = 1 / 3;
 
 /**
  * @param {number} width (CSS px)
@@ -53,20 +59,62 @@ export function visible(view) {
 }
 
 /**
- * Shows a whole rectangle, centred.
+ * Shows a whole rectangle, in the middle of what nothing covers.
+ *
+ * What lies over a corner can be passed beside or above it: the larger picture wins.
  *
  * @param {Viewport} view
  * @param {Box2D} box (m)
  * @param {number} [padding] kept free on every side (px)
+ * @param {readonly Rect[]} [covers] what lies over the canvas, at its edges
  * @returns {Viewport}
  */
-export function fitTo(view, box, padding = 28) {
+export function fitTo(view, box, padding = 28, covers = []) {
   const room = Math.min(padding, view.width / 8, view.height / 8);
-  const across = (view.width - 2 * room) / Math.max(box.xmax - box.xmin, 1);
-  const along = (view.height - 2 * room) / Math.max(box.ymax - box.ymin, 1);
-  const x = (box.xmin + box.xmax) / 2;
-  const y = (box.ymin + box.ymax) / 2;
-  return { ...view, scale: clampScale(Math.min(across, along)), x, y };
+  let ways = [{ left: room, top: room, right: room, bottom: room }];
+  for (const cover of covers) {
+    ways = ways.flatMap((way) => passing(view, way, cover));
+  }
+  const fitted = ways.map((way) => fitBetween(view, box, way));
+  return fitted.reduce((best, one) => (one.scale > best.scale ? one : best));
+}
+
+/**
+ * Insets that also leave a cover alone, beside it or above or below; as they were where
+ * it leaves too little room.
+ *
+ * @param {Viewport} view @param {Rect} way @param {Rect} cover
+ * @returns {Rect[]}
+ */
+function passing({ width, height }, way, cover) {
+  const beside = nearest("left", cover.right, "right", width - cover.left);
+  const along = nearest("top", cover.bottom, "bottom", height - cover.top);
+  const ways = [
+    { ...beside, most: width * MOST_OF_A_SIDE },
+    { ...along, most: height * MOST_OF_A_SIDE },
+  ]
+    .filter(({ px, most }) => px <= most)
+    .map(({ side, px }) => ({ ...way, [side]: Math.max(way[side], px) }));
+  return ways.length > 0 ? ways : [way];
+}
+
+/**
+ * @param {keyof Rect} one @param {number} px how far the cover reaches from there
+ * @param {keyof Rect} other @param {number} otherPx
+ */
+function nearest(one, px, other, otherPx) {
+  const [side, reach] = px < otherPx ? [one, px] : [other, otherPx];
+  return { side, px: reach + GAP_PX };
+}
+
+/** @param {Viewport} view @param {Box2D} box @param {Rect} free insets (px) */
+function fitBetween(view, box, { left, top, right, bottom }) {
+  const across = (view.width - left - right) / Math.max(box.xmax - box.xmin, 1);
+  const along = (view.height - top - bottom) / Math.max(box.ymax - box.ymin, 1);
+  const scale = clampScale(Math.min(across, along));
+  const x = (box.xmin + box.xmax) / 2 - (left - right) / 2 / scale;
+  const y = (box.ymin + box.ymax) / 2 + (top - bottom) / 2 / scale;
+  return { ...view, scale, x, y };
 }
 
 /**

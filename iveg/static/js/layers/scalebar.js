@@ -4,11 +4,24 @@ import { isolated, label } from "./paint.js";
 
 const LONGEST_PX = 130;
 const MARGIN_PX = 16;
+/** With its label. */
+const TALL_PX = 22;
 const STEPS_M = [200, 100, 50, 20, 10, 5, 2, 1, 0.5, 0.2, 0.1];
 
 /** @param {number} scale (px/m) @returns {number} (m) */
 export function barLength(scale) {
   return STEPS_M.find((m) => m * scale <= LONGEST_PX) ?? 0.1;
+}
+
+/**
+ * Where a bar of any length may lie.
+ *
+ * @param {{height: number}} view
+ * @returns {import("../viewport.js").Rect}
+ */
+export function coverOf({ height }) {
+  const right = MARGIN_PX + LONGEST_PX;
+  return { left: 0, top: height - MARGIN_PX - TALL_PX, right, bottom: height };
 }
 
 /** @param {import("./paint.js").Paint} paint */
