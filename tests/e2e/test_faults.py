@@ -49,9 +49,14 @@ def test_a_dead_server_is_said_within_three_seconds_and_the_page_recovers(
 
     stack.start("serve")
     stack.wait_until_live(deadline_s=60.0)
-    page.goto(stack.sign_in_link)
+
+    # Nobody touches the page: its session is kept, and it finds the server by itself.
+    expect(page.locator("body")).to_have_attribute(
+        "data-connection", "open", timeout=15_000
+    )
     expect(card(page, "AGI")).to_have_attribute("data-link", "LIVE", timeout=15_000)
     expect(page.locator("#banner")).to_be_hidden()
+    assert page.url == f"{stack.url}/"
 
 
 def test_a_dead_emulator_leaves_ghosts_not_robots(page: Page, stack: Site) -> None:
