@@ -1,18 +1,16 @@
 """STOP, release and resume: from a person's hand to the robot's own word.
 
-The machines of ``domain/stop`` decide; this module performs what they ask for on both
-roads at once.  Nothing is awaited before the first byte is on its way, and nothing
-that fails on one road holds up the other.
+The machines of ``domain/stop`` decide; ``sending`` carries what they want sent; this
+module stands between the two and tells people, disk and browsers how far it has come.
 """
 
 import asyncio
-import logging
-from collections.abc import Coroutine, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 from iveg.domain.alarms import Condition
-from iveg.domain.errors import HopError, UnknownRobotError
+from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import (
     CommandAnswer,
@@ -29,7 +27,6 @@ from iveg.domain.stop import (
     Effect,
     Press,
     SendOnce,
-    SendRoad,
     SendStop,
     SetLevel,
     StopMachine,
@@ -39,8 +36,8 @@ from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Ids, Journal
 from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.sending import Sender
 
-_log = logging.getLogger(__name__)
 _KEPT = 200
 _PLAIN = Press()
 
@@ -56,6 +53,8 @@ _ALARMS = {
     "UNCONFIRMED": "alert.stop_unconfirmed",
     "STILL_MOVING": "alert.stop_still_moving",
 }
+_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALARMS}
+"""A STOP in one of these has not been seen to stand, not even once."""
 
 
 class Commander:
@@ -81,15 +80,11 @@ class Commander:
         self.commands: dict[str, Command] = {}
         self.drills = drills or Drills()
         self._presses = Presses()
-        self._levels: dict[str, SetLevel] = {}
-        self._fleet = fleet
-        self._broker = broker
+        self._sender = Sender(fleet, broker, minutes, clock, self._came_back)
         self._journal = journal
         self._minutes = minutes
         self._hub = hub
         self._new_id = new_id
-        self._clock = clock
-        self._tasks: set[asyncio.Task[None]] = set()
 
     def machine(self, robot_id: str) -> StopMachine:
         """One robot's machine.
@@ -240,24 +235,17 @@ class Commander:
             if machine is not None and machine.wants_stop and stood:
                 heir = machine.hold_id
             self._minutes.left_over(row, heir, now)
-        self._start(self._minutes.secured(), "audit-earlier")
+        self._sender.start(self._minutes.secured(), "audit-earlier")
 
     def broker_back(self) -> None:
         """The broker is there (again): it must hold every level."""
-        for level in self._levels.values():
-            self._start(self._set_level(level), f"level-{level.robot_id}")
+        self._sender.levels_again()
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """What is wrong with STOP."""
         yield from self.drills.conditions(now)
-        for robot_id, machine in self.machines.items():
-            key = _ALARMS.get(machine.state)
-            if key is not None:
-                age = 0.0
-                if machine.stop is not None:
-                    age = now.mono - machine.stop.times.requested.mono
-                slots: dict[str, Slot] = {"robot": robot_id, "age": round(age, 1)}
-                yield Condition("P1", key, robot_id, robot_id, slots)
+        for machine in self.machines.values():
+            yield from _conditions_of(machine, now)
 
     # --- effects ------------------------------------------------------------------
 
@@ -267,23 +255,28 @@ class Commander:
         for effect in effects:
             match effect:
                 case SendStop():
-                    self._start(
-                        self._send_stop(machine, effect),
-                        f"stop-{effect.road}-{effect.robot_id}",
-                    )
-                case SendOnce():
-                    self._start(
-                        self._send_once(machine, effect),
-                        f"{effect.kind}-{effect.robot_id}",
-                    )
-                case SetLevel():
-                    self._levels[effect.robot_id] = effect
-                    self._start(self._set_level(effect), f"level-{effect.robot_id}")
+                    self._sender.send(machine, effect)
+                    # A silent robot says nothing that would carry the new count.
+                    self._show(machine)
+                case SendOnce() | SetLevel():
+                    self._sender.send(machine, effect)
                 case Changed():
                     self._tell(machine, effect, at)
-                    self._start(self._minutes.secured(), f"audit-{machine.robot_id}")
+                    self._sender.start(
+                        self._minutes.secured(), f"audit-{machine.robot_id}"
+                    )
                 case Closed():
                     self._minutes.closed(effect, at)
+
+    def _came_back(
+        self, machine: StopMachine, effects: list[Effect], at: Instant
+    ) -> None:
+        """A road took it or failed: its part of the command is news, too."""
+        self._perform(machine, effects, at)
+        self._show(machine)
+
+    def _show(self, machine: StopMachine) -> None:
+        self._hub.changed(f"robots/{machine.robot_id}")
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         command = self._command_of(machine, changed)
@@ -299,14 +292,14 @@ class Commander:
         desired = _JOURNALLED.get(changed.key)
         if desired is not None:
             by = "iveg" if command is None else command.requesters[0]
-            self._start(
+            self._sender.start(
                 self._journal.wanted(
                     machine.robot_id, desired, machine.hold_id, by, at
                 ),
                 f"journal-{machine.robot_id}",
             )
         self._log_line(machine, command, changed, at)
-        self._hub.changed(f"robots/{machine.robot_id}")
+        self._show(machine)
 
     def _note_end(self, command: Command, at: Instant) -> None:
         """A release or resume that came true has moved the STOP on, too."""
@@ -342,71 +335,20 @@ class Commander:
             LogEvent("command", f"log.stop.{changed.key}", slots, machine.robot_id), at
         )
 
-    async def _send_stop(self, machine: StopMachine, effect: SendStop) -> None:
-        port: Fleet | ContextBroker = (
-            self._fleet if effect.road == "direct" else self._broker
-        )
-        by = "iveg"
-        if machine.stop is not None:
-            by = machine.stop.command_id[-6:]
-        sending = port.stop(effect.robot_id, effect.hold_id, by)
-        await self._attempt(machine, effect.road, effect.hold_id, sending)
-
-    async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
-        """Once, and never without a trace: the audit row is on disk before it goes."""
-        await self._minutes.secured()
-        if machine.once is None or machine.once.command_id != effect.command_id:
-            # The disk took so long that a STOP has come, or taken its place.
-            return
-        if effect.kind == "release":
-            sending = self._broker.release(
-                effect.robot_id, effect.ids, effect.challenge
-            )
-        else:
-            sending = self._broker.resume(effect.robot_id, effect.challenge)
-        await self._attempt(machine, "fiware", effect.command_id, sending)
-
-    async def _attempt(
-        self,
-        machine: StopMachine,
-        road: SendRoad,
-        command_id: str,
-        sending: Coroutine[Any, Any, None],
-    ) -> None:
-        """Send and tell the machine how it went, whatever went wrong.
-
-        A road whose failure stayed untold would count as busy for ever.
-        """
-        ok = False
-        try:
-            await sending
-            ok = True
-        except HopError as error:
-            _log.info("STOP road %s: %s", road, error)
-        finally:
-            at = self._clock()
-            self._perform(machine, machine.sent(road, command_id, at, ok=ok), at)
-
-    async def _set_level(self, level: SetLevel) -> None:
-        try:
-            await self._fleet.set_level(level.robot_id, level.desired, level.ids)
-        except HopError as error:
-            # Published again when the broker is back (``broker_back``).
-            _log.info("level of %s not set: %s", level.robot_id, error)
-
-    def _start(self, work: Coroutine[Any, Any, None], name: str) -> None:
-        task = asyncio.get_running_loop().create_task(work, name=name)
-        self._tasks.add(task)
-        task.add_done_callback(self._finished)
-
-    def _finished(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
-        if not task.cancelled() and task.exception() is not None:
-            _log.error("%s failed", task.get_name(), exc_info=task.exception())
-
     async def close(self) -> None:
-        """Let what is being sent end."""
-        tasks = list(self._tasks)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        """End what is being sent."""
+        await self._sender.close()
+
+
+def _conditions_of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
+    """What is wrong with one robot's STOP."""
+    stop, robot_id = machine.stop, machine.robot_id
+    if stop is None:
+        return
+    age = round(now.mono - stop.times.requested.mono, 1)
+    slots: dict[str, Slot] = {"robot": robot_id, "age": age}
+    key = _ALARMS.get(machine.state)
+    if key is not None:
+        yield Condition("P1", key, robot_id, robot_id, slots)
+    if stop.reason == "moved" and machine.state in _NOT_AT_REST:
+        yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)

@@ -236,6 +236,65 @@ async def test_a_stop_that_does_not_come_true_is_a_grave_alarm(
     assert key in conditions_of(desk)
 
 
+async def test_a_held_robot_that_moves_is_a_grave_alarm_until_it_stands_again() -> None:
+    desk = Desk()
+    await press(desk)
+    await desk.stand()
+    for _ in range(3):
+        desk.drive("AGI", linear=0.4)
+    await desk.wait(0.1)
+    told = [one.condition for one in desk.assessor.alarms.waiting]
+    moved = [one for one in told if one.key == "alert.stop_moved"]
+    assert [(one.priority, one.subject) for one in moved] == [("P1", "AGI")]
+
+    desk.clock.now += 1.0
+    await desk.stand()
+    await desk.wait(0.1)
+
+    (alarm,) = (
+        one
+        for one in desk.assessor.alarms.waiting
+        if one.condition.key == "alert.stop_moved"
+    )
+    assert alarm.cleared is not None
+
+
+async def test_a_robot_that_was_merely_stopped_is_not_said_to_have_moved() -> None:
+    desk = Desk()
+    await press(desk)
+
+    await desk.wait(6.0)
+
+    assert "alert.stop_moved" not in conditions_of(desk)
+
+
+async def test_every_browser_gets_each_try_of_a_stop_that_nobody_answers() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.wait(2.0)
+    before = desk.hub.versions["robots/AGI"], command.tries
+
+    await desk.wait(3.0)
+
+    told = desk.hub.versions["robots/AGI"] - before[0]
+    assert command.tries - before[1] >= 6
+    assert told >= command.tries - before[1]
+
+
+async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> None:
+    desk = Desk()
+    await press(desk)
+    await desk.wait(2.0)
+    looker = desk.hub.join()
+    told = 0
+    for _ in range(100):
+        looker.dirty.clear()
+        await desk.wait(0.05)
+        told += "robots/AGI" in looker.dirty
+
+    assert 10 <= told <= 5 * 4
+
+
 # --- release ----------------------------------------------------------------------
 
 
