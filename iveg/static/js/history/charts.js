@@ -111,7 +111,8 @@ function dressed(trace, index, words) {
   if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
   const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
   const marker = { size: 9, symbol, ...trace.marker, color: colour };
-  return { ...trace, x, name, line, marker };
+  // What is newest lies on the edge, and would be cut in half there.
+  return { ...trace, x, name, line, marker, cliponaxis: false };
 }
 
 /**
@@ -140,6 +141,8 @@ function laidOut(layout, asked, words) {
     ...layout[`${name}axis`],
     title: { text: words.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
     gridcolor: token("--line"),
+    // Where lines are black for the sun, whole ones would outshout what was measured.
+    griddash: "1px,4px",
     zerolinecolor: token("--line-strong"),
     linecolor: token("--line-strong"),
     // Margins that follow their labels may chase each other (Plotly gives up with a

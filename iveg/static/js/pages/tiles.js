@@ -54,7 +54,7 @@ export function tilesOf(safety, waitedS, words) {
  * @param {Words} words @returns {Tile} */
 function latencyOf(it, aged, words) {
   const minutes = it.window_s / 60;
-  if (!it.count) return { value: "—", of: words.t("tiles.no_alerts", { minutes }) };
+  if (!it.count) return { value: "—", of: words.t("tiles.no_answers", { minutes }) };
   const slots = { ...it, minutes, age: aged(it.age_s) };
   return {
     value: words.t("tiles.latency_value", slots),
