@@ -11,13 +11,8 @@ import { readApi } from "../api.js";
 import { ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createPresser } from "./press.js";
-import {
-  doubtOf,
-  since,
-  stateOfCommand,
-  viewOfFleet,
-  viewOfRobot,
-} from "./stop_view.js";
+import { createLoudLines } from "./stop_loud.js";
+import { since, viewOfFleet, viewOfRobot } from "./stop_view.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Command} Command */
@@ -28,7 +23,6 @@ const STRIP_HOLDS = 4;
 
 const PHONE = matchMedia("(max-width: 767px)");
 const TICK_MS = 100;
-const ASK_EVERY_MS = 1000;
 /** How long after `pointerup` a click still belongs to the same gesture (ms). */
 const GESTURE_MS = 400;
 /** A robot's state may be a frame older than its command's own topic (ms). */
@@ -36,7 +30,6 @@ const SETTLE_MS = 800;
 const ACCEPTED_LIMIT_MS = 3000;
 /** HTTP status of a session that may only stop; a stranger's is 401. */
 const KNOWN_BUT_BLIND = 403;
-const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
 
 /**
  * @param {App} app
@@ -45,6 +38,7 @@ export function createStopPanel(app) {
   const { store, words, line } = app;
   const strip = need("#stops");
   const presser = createPresser(line, drawAll);
+  const loud = createLoudLines(app);
   /** @type {Map<string, {command: Command, heardMs: number}>} newest stop by robot */
   const commands = new Map();
   /** @type {Map<string, HTMLElement>} */
@@ -120,21 +114,6 @@ export function createStopPanel(app) {
     drawAll();
   }
 
-  /** Tries of a STOP that nobody answers are told to who asks. */
-  function ask() {
-    if (store.connection.state !== "open") return;
-    for (const { command } of commands.values()) {
-      if (LOUD.has(stateOfCommand(command) ?? "")) askOf(command);
-    }
-  }
-
-  /** @param {Command} command */
-  async function askOf({ command_id }) {
-    const path = `commands/${encodeURIComponent(command_id)}`;
-    const { status, body } = await readApi(path);
-    if (status === 200) take({ ...body, receivedAtMs: performance.now() });
-  }
-
   /** A session that is over may still stop for hours: the server says whether. */
   async function onConnection() {
     const isOver = store.connection.state === "signed-out";
@@ -182,7 +161,7 @@ export function createStopPanel(app) {
     const connection = store.connection.state;
     const fleet = { connection, press: pendingOf(null), nowMs: performance.now() };
     draw("fleet", viewOfFleet({ ...fleet, isBlind, robots }));
-    drawLoud(ids);
+    loud.draw(ids.map((id) => commands.get(id)?.command));
   }
 
   /** @param {string} id @param {View} view */
@@ -194,45 +173,6 @@ export function createStopPanel(app) {
     const who = need(".stop__who", control);
     setText(who, name);
     setHidden(who, view.state === "ready" || view.state === "late");
-  }
-
-  /** Full-width lines for what must not be overlooked. @param {string[]} ids */
-  function drawLoud(ids) {
-    const place = need("#p1");
-    const loud = ids
-      .map((id) => commands.get(id)?.command)
-      .filter((command) => LOUD.has(stateOfCommand(command ?? null) ?? ""));
-    while (place.children.length > loud.length) place.lastElementChild?.remove();
-    while (place.children.length < loud.length) place.append(make("p", "p1__line"));
-    loud.forEach((command, i) => {
-      setText(place.children[i], sentenceOf(/** @type {Command} */ (command)));
-    });
-  }
-
-  /** @param {Command} command */
-  function sentenceOf(command) {
-    const { robot, roads } = command;
-    const doubt = doubtOf(command, performance.now());
-    const state = String(stateOfCommand(command));
-    /** @param {string} road */
-    const roadSaid = (road) => words.t(`stop.road.${roads?.[road] ?? "unknown"}`);
-    return words.t(`stop.p1.${state}`, {
-      robot: command.robot_id,
-      seconds: since(
-        command.times.pressed ?? command.times.requested,
-        line.serverNow(),
-      ),
-      who: command.requesters.join(", "),
-      tries: command.tries,
-      report: doubt
-        ? words.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
-        : words.t("stop.p1.no_report"),
-      moved: doubt ? words.t("stop.p1.could", { distance: doubt.movedM }) : " ",
-      roads: words.t("stop.p1.roads", {
-        direct: roadSaid("direct"),
-        fiware: roadSaid("fiware"),
-      }),
-    });
   }
 
   /** Cards hold their robot's control on a phone and in a big fleet, else the strip. */
@@ -266,7 +206,6 @@ export function createStopPanel(app) {
   store.subscribe("connection", onConnection);
   words.onChange(drawAll);
   setInterval(drawAll, TICK_MS);
-  setInterval(ask, ASK_EVERY_MS);
   drawAll();
   return { place, commandOf: (/** @type {string} */ id) => commands.get(id)?.command };
 }

@@ -1,0 +1,54 @@
+/**
+ * The full-width lines for a STOP that must not be overlooked, one a robot.
+ *
+ * Each says what a person at the greenhouse needs: who pressed and when, how often it
+ * was tried, how old the robot's last word is and how far it may have driven since.
+ */
+
+import { make, need, setText } from "./dom.js";
+import { doubtOf, since, stateOfCommand } from "./stop_view.js";
+
+/** @typedef {import("../protocol.js").Command} Command */
+
+const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
+
+/** @param {import("../main.js").App} app */
+export function createLoudLines({ words, line }) {
+  /** @param {(Command | undefined)[]} commands the newest STOP of each robot */
+  function draw(commands) {
+    const place = need("#p1");
+    const loud = commands.filter((command) =>
+      LOUD.has(stateOfCommand(command ?? null) ?? ""),
+    );
+    while (place.children.length > loud.length) place.lastElementChild?.remove();
+    while (place.children.length < loud.length) place.append(make("p", "p1__line"));
+    loud.forEach((command, i) => {
+      setText(place.children[i], sentenceOf(/** @type {Command} */ (command)));
+    });
+  }
+
+  /** @param {Command} command */
+  function sentenceOf(command) {
+    const { robot, roads, times } = command;
+    const doubt = doubtOf(command, performance.now());
+    const state = String(stateOfCommand(command));
+    /** @param {string} road */
+    const roadSaid = (road) => words.t(`stop.road.${roads?.[road] ?? "unknown"}`);
+    return words.t(`stop.p1.${state}`, {
+      robot: command.robot_id,
+      seconds: since(times.pressed ?? times.requested, line.serverNow()),
+      who: command.requesters.join(", "),
+      tries: command.tries,
+      report: doubt
+        ? words.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
+        : words.t("stop.p1.no_report"),
+      moved: doubt ? words.t("stop.p1.could", { distance: doubt.movedM }) : " ",
+      roads: words.t("stop.p1.roads", {
+        direct: roadSaid("direct"),
+        fiware: roadSaid("fiware"),
+      }),
+    });
+  }
+
+  return { draw };
+}
