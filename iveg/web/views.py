@@ -11,7 +11,7 @@ from iveg.domain.margins import least, margins_of
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.people import Person
 from iveg.domain.records import LogRecord
-from iveg.domain.stop import Command, StopMachine
+from iveg.domain.stop import STALE_S, Command, StopMachine
 from iveg.domain.world import RobotState, World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
@@ -52,7 +52,7 @@ class Views:
         return {
             "robot_id": robot_id,
             "link": robot.link(now),
-            "mode": self._mode(robot, machine),
+            "mode": self._mode(robot, machine, now),
             "pose": None
             if odometry is None
             else {
@@ -96,15 +96,19 @@ class Views:
         }
 
     def _mode(
-        self, robot: RobotState, machine: StopMachine
+        self, robot: RobotState, machine: StopMachine, now: Instant
     ) -> Literal["RUNNING", "SLOW", "STOPPED"]:
-        """What the robot says; while it says nothing, what it was told."""
-        if machine.wants_stop or (robot.safety is not None and robot.safety.holds):
-            return "STOPPED"
+        """What the robot has just said; while it says nothing, what it was told.
+
+        That a STOP is wanted is in ``stop_state``: here a robot stands by its own word
+        alone, and not by an old one.
+        """
         factor = self._assessor.mandates[robot.robot_id].speed_factor
-        if robot.safety is not None:
-            factor = robot.safety.speed_factor
-        if factor <= 0.0:
+        report, received = robot.safety, robot.safety_received
+        is_fresh = received is not None and now.mono - received.mono <= STALE_S
+        if report is not None and is_fresh:
+            factor = 0.0 if report.holds else report.speed_factor
+        if factor <= 0.0 or machine.state == "STANDING":
             return "STOPPED"
         return "SLOW" if factor < 1.0 else "RUNNING"
 

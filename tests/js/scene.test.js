@@ -1,3 +1,4 @@
+import { isSeenHeld } from "../../iveg/static/js/layers/robot.js";
 import { readPerson, readScene } from "../../iveg/static/js/scene.js";
 import { createStore } from "../../iveg/static/js/store.js";
 import { command, detection, person, robot, snapshot } from "./builders.js";
@@ -57,6 +58,27 @@ test("a stop that nobody confirmed widens with the last known speed", () => {
   });
   const store = storeOf({ robots: [robot({ stop })], commands: [stop] });
   near(readScene(store, 2000).robots[0].unsureM, 1.4);
+});
+
+test("a robot that drives on widens by its newest word, not by that of the last step", () => {
+  const step = command({
+    state: "STILL_MOVING",
+    robot: { v: 0.5, report_age_s: 0, moved_m: 0 },
+  });
+  const store = storeOf({ robots: [robot({ stop: step })], commands: [step] });
+  const newest = { ...step, robot: { v: 0.2, report_age_s: 0, moved_m: 0 } };
+  store.apply("robots/AGI", robot({ stop: newest }), 1500);
+  near(readScene(store, 2000).robots[0].unsureM, 0.1);
+});
+
+test("I12 a padlock is drawn from what a robot said just now alone", () => {
+  const store = storeOf({ robots: [robot({ mode: "STOPPED", age_s: 0 })] });
+  const seen = [0, 1500, 1600, 60_000].map((ms) =>
+    isSeenHeld(readScene(store, ms).robots[0]),
+  );
+  equal(seen, [true, true, false, false]);
+  equal(isSeenHeld({ mode: "RUNNING", ageS: 0 }), false);
+  equal(isSeenHeld({ mode: "STOPPED", ageS: Number.POSITIVE_INFINITY }), false);
 });
 
 test("a confirmed stop has no such disc", () => {

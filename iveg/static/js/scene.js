@@ -14,7 +14,7 @@
  *
  * @typedef {{
  *   id: string, slot: number, pose: Pose, link: import("./protocol.js").Link,
- *   ageS: number, mode: import("./protocol.js").Mode, factor: number, replay: boolean,
+ *   ageS: number, mode: import("./protocol.js").Mode, replay: boolean,
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
  *   unsureM: number,
@@ -106,7 +106,6 @@ function readRobot(robot, pose, store, nowMs) {
     link: linkOf(ageS),
     ageS,
     mode: robot.mode,
-    factor: robot.speed_factor ?? 1,
     replay: robot.replay,
     drive,
     length,
@@ -127,10 +126,14 @@ function readRobot(robot, pose, store, nowMs) {
  * @param {number} nowMs
  */
 function unsureDistance(robot, store, nowMs) {
-  const id = robot.stop?.command_id;
-  const stop = (id && store.get(`commands/${id}`)) || robot.stop;
+  const heardMs = robot.receivedAtMs ?? nowMs;
+  const step = robot.stop && store.get(`commands/${robot.stop.command_id}`);
+  // A step comes on its own topic; each try and each report on the robot's.
+  const isStepNewer = (step?.receivedAtMs ?? 0) > heardMs;
+  const stop = isStepNewer ? step : robot.stop;
   if (!stop?.robot || !UNSURE_STATES.has(stop.state)) return 0;
-  const waitedS = Math.max(0, nowMs - (stop.receivedAtMs ?? nowMs)) / 1000;
+  const saidMs = isStepNewer ? step.receivedAtMs : heardMs;
+  const waitedS = Math.max(0, nowMs - saidMs) / 1000;
   return (stop.robot.moved_m ?? 0) + Math.abs(stop.robot.v ?? 0) * waitedS;
 }
 

@@ -89,10 +89,33 @@ async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
     told = await get(desk, "/robots/AGI")
 
     assert isinstance(told, dict)
-    assert told["mode"] == "STOPPED"
+    assert (told["mode"], told["stop_state"]) == ("RUNNING", "SENT")
     assert told["stop"]["requested_by"] == "ana"
     assert told["stop"]["roads"]["direct"] in ("pending", "ok")
     assert not told["stop"]["challenge_fresh"]
+
+
+async def test_a_robot_is_stopped_when_it_says_so_and_not_when_it_was_asked() -> None:
+    desk = WebDesk()
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+    asked = desk.views.robot("AGI", desk.clock())["mode"]
+    hold_id = desk.commander.machine("AGI").hold_id or ""
+
+    desk.report("AGI", Hold(hold_id, "iveg", "remote"))
+
+    assert asked == "RUNNING"
+    assert desk.views.robot("AGI", desk.clock())["mode"] == "STOPPED"
+
+
+async def test_a_hold_that_was_last_reported_long_ago_stops_nothing_now() -> None:
+    desk = WebDesk()
+    desk.report("AGI", Hold("boot-1", "boot", "remote"))
+    modes = []
+    for age in (0.0, 1.5, 1.6, 60.0):
+        desk.clock.now = age
+        modes.append(desk.views.robot("AGI", desk.clock())["mode"] == "STOPPED")
+
+    assert modes == [True, True, False, False]
 
 
 async def test_the_fleet_is_a_page_of_robots() -> None:

@@ -17,6 +17,10 @@ import { circle, isolated, label, pill } from "./paint.js";
 /** A body is never drawn shorter than this (px), however far away the eye is. */
 const SHORTEST_PX = 20;
 const PADLOCK_PX = 12;
+/** A robot that was seen to be held longer ago than this may drive by now (s). */
+const HELD_FRESH_S = 1.5;
+/** What SLOW means, also of a robot that has not said yet how fast it may be. */
+const HALF_SPEED = 0.5;
 
 /** @param {Paint} paint */
 export function draw(paint) {
@@ -205,6 +209,14 @@ function drawHeading(ctx, length, width, hue, ink) {
 }
 
 /**
+ * Whether a padlock is true: the robot has said that it is held, and that was just now.
+ *
+ * @param {Pick<SceneRobot, "mode" | "ageS">} robot
+ */
+export const isSeenHeld = ({ mode, ageS }) =>
+  mode === "STOPPED" && ageS <= HELD_FRESH_S;
+
+/**
  * A dark octagon with a padlock: held, and not by accident.
  *
  * @param {Paint} paint
@@ -252,7 +264,7 @@ function drawWords(paint, robot, length) {
     colour: isLost ? theme.muted : theme.text,
   });
   let x = ctx.measureText(robot.id).width / 2 + 6;
-  if (robot.mode === "STOPPED") drawPadlock(paint, -x - PADLOCK_PX, y);
+  if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
   for (const [text, fill] of tagsOf(paint, robot)) {
     x += pill(paint, text, x, y, fill, theme.bg) + 4;
   }
@@ -269,7 +281,7 @@ function tagsOf({ theme, words }, robot) {
   if (robot.link === "LATE") tags.push([words.age(robot.ageS), theme.alarm[1]]);
   if (robot.link === "LOST") tags.push([words.ago(robot.ageS), theme.muted]);
   if (robot.mode === "SLOW" && robot.link !== "LOST") {
-    tags.push([words.percent(robot.factor), theme.text]);
+    tags.push([words.percent(HALF_SPEED), theme.text]);
   }
   if (robot.replay) tags.push([words.replay(), theme.muted]);
   return tags;

@@ -16,6 +16,8 @@ import { createRelease } from "./release.js";
 
 const TICK_MS = 200;
 const DEFAULT_MAX = 1;
+/** What SLOW means, also of a robot that has not said yet how fast it may be. */
+const HALF_SPEED = 0.5;
 const DEGREES = 180 / Math.PI;
 
 /** @param {App} app */
@@ -235,11 +237,11 @@ function createCard(app, card) {
  * @param {import("../i18n.js").Words} words
  */
 export function modeSaid(robot, words) {
-  const { mode = "UNKNOWN", stop, speed_factor } = robot ?? {};
+  const { mode = "UNKNOWN", stop } = robot ?? {};
   if (stop && stop.state !== "STANDING") {
     const state = words.t(`history.state.${stop.state}`);
     return words.t("robot.mode_stopping", { state });
   }
   if (mode !== "SLOW") return words.t(`robot.mode.${mode}`);
-  return words.t("robot.mode_slow", { factor: speed_factor ?? 0.5 });
+  return words.t("robot.mode_slow", { factor: HALF_SPEED });
 }
