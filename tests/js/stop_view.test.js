@@ -1,5 +1,7 @@
+import { linkOf } from "../../iveg/static/js/clock.js";
 import {
   doubtOf,
+  STANDING_LIMIT_S,
   viewOfFleet,
   viewOfRobot,
 } from "../../iveg/static/js/panels/stop_view.js";
@@ -8,6 +10,9 @@ import { equal, test } from "./harness.js";
 
 /** @typedef {import("../../iveg/static/js/panels/stop_view.js").RobotFacts} RobotFacts */
 /** @typedef {import("../../iveg/static/js/panels/press.js").Pending} Pending */
+
+/** A robot that has just said that it stands. */
+const RESTS = { v: 0, report_age_s: 0.1, moved_m: 0 };
 
 /** @param {Partial<RobotFacts>} [changes] @returns {RobotFacts} */
 function facts(changes = {}) {
@@ -34,7 +39,8 @@ function pressed(changes = {}) {
 const stateOf = (changes) => viewOfRobot(facts(changes)).state;
 
 /** @param {string} state */
-const inState = (state) => stateOf({ command: command({ kind: "stop", state }) });
+const inState = (state) =>
+  stateOf({ command: command({ kind: "stop", state, robot: RESTS }) });
 
 test("a fresh robot that nobody stopped can be stopped", () => {
   equal(viewOfRobot(facts()), {
@@ -44,7 +50,7 @@ test("a fresh robot that nobody stopped can be stopped", () => {
   });
 });
 
-test("a late robot's control says how late", () => {
+test("I12 a late robot's control says how late", () => {
   const view = viewOfRobot(facts({ link: "LATE", ageS: 2.2 }));
   equal(view, {
     state: "late",
@@ -53,7 +59,7 @@ test("a late robot's control says how late", () => {
   });
 });
 
-test("without a link to robot or server a control does not look as if it worked", () => {
+test("I12 without a link to robot or server a control does not look as if it worked", () => {
   equal(stateOf({ link: "LOST", ageS: 9 }), "lost");
   equal(stateOf({ link: "UNKNOWN", ageS: Number.POSITIVE_INFINITY }), "lost");
   equal(stateOf({ connection: "lost" }), "lost");
@@ -85,8 +91,13 @@ test("what is not known of a silent robot grows while nobody hears of it", () =>
   equal(doubtOf(command({ robot: null }), 10_000), null);
 });
 
-test("a standstill of before the server was lost is not shown as one of now", () => {
-  const standing = command({ kind: "stop", state: "STANDING", standstill_ms: 412 });
+test("I12 a standstill of before the server was lost is not shown as one of now", () => {
+  const standing = command({
+    kind: "stop",
+    state: "STANDING",
+    robot: RESTS,
+    standstill_ms: 412,
+  });
   equal(stateOf({ connection: "lost", command: standing }), "lost");
 });
 
@@ -111,13 +122,28 @@ test("a robot that moved while held is told apart from one that was asked to sto
   equal(stateOf({ command: again }), "moved");
   const braking = command({ kind: "stop", state: "DELIVERED", reason: "moved" });
   equal(stateOf({ command: braking }), "moved");
-  const standing = command({ kind: "stop", state: "STANDING", reason: "moved" });
+  const standing = command({
+    kind: "stop",
+    state: "STANDING",
+    robot: RESTS,
+    reason: "moved",
+  });
   equal(stateOf({ command: standing }), "standing");
 });
 
 test("a standstill says how long it took, when that is known", () => {
-  const timed = command({ kind: "stop", state: "STANDING", standstill_ms: 412 });
-  const adopted = command({ kind: "stop", state: "STANDING", standstill_ms: null });
+  const timed = command({
+    kind: "stop",
+    state: "STANDING",
+    robot: RESTS,
+    standstill_ms: 412,
+  });
+  const adopted = command({
+    kind: "stop",
+    state: "STANDING",
+    robot: RESTS,
+    standstill_ms: null,
+  });
   equal(viewOfRobot(facts({ command: timed })).slots, { ms: 412 });
   equal(viewOfRobot(facts({ command: adopted })).key, "stop.standing_untimed");
 });
@@ -166,7 +192,9 @@ function fleetOf(...robots) {
   return viewOfFleet({ ...shared, robots: views });
 }
 
-const standing = { command: command({ kind: "stop", state: "STANDING" }) };
+const standing = {
+  command: command({ kind: "stop", state: "STANDING", robot: RESTS }),
+};
 const unconfirmed = { command: command({ kind: "stop", state: "UNCONFIRMED" }) };
 
 test("the fleet stands only when every robot stands", () => {
@@ -182,4 +210,67 @@ test("the fleet can be stopped while one robot still runs", () => {
 test("the fleet's control is dead only when nobody can be reached", () => {
   equal(fleetOf({ link: "LOST" }, { link: "LOST" }).state, "lost");
   equal(fleetOf({ link: "LOST" }, {}).state, "ready");
+});
+
+const STATES = [null, "REQUESTED", "SENT", "DELIVERED", "STANDING", "UNCONFIRMED"];
+STATES.push("STILL_MOVING", "STALE", "RELEASING", "READY", "RUNNING");
+const AGES_S = [0, 0.5, 0.9, 1, 1.1, 1.4, 1.5, 1.6, 2.9, 3, 3.1, 10, 600];
+const CONNECTIONS = /** @type {const} */ (["open", "connecting", "lost", "signed-out"]);
+
+/** Every state at every age, whether the age grew on the server or in this browser. */
+function everything() {
+  const ages = [...AGES_S, Number.POSITIVE_INFINITY];
+  const all = STATES.flatMap((state) =>
+    ages.flatMap((ageS) =>
+      CONNECTIONS.map((connection) => ({ state, ageS, connection })),
+    ),
+  );
+  return all.flatMap(({ state, ageS, connection }) =>
+    [true, false].map((isServers) => {
+      const waitedS = isServers || !Number.isFinite(ageS) ? 0 : ageS;
+      const report_age_s = Number.isFinite(ageS) ? ageS - waitedS : null;
+      const robot = { ...RESTS, report_age_s };
+      const receivedAtMs = 10_000 - 1000 * waitedS;
+      const stop = state ? command({ state, robot, receivedAtMs }) : null;
+      return facts({ connection, command: stop, ageS, link: linkOf(ageS) });
+    }),
+  );
+}
+
+test("I12 no control is drawn as ready or standing from data older than its limit", () => {
+  const limits = new Map([
+    ["ready", 1],
+    ["standing", STANDING_LIMIT_S],
+  ]);
+  const cases = everything();
+  const shown = cases.map((one) => ({ one, state: viewOfRobot(one).state }));
+  const green = shown.filter(({ state }) => limits.has(state));
+  const wrong = green.filter(
+    ({ one, state }) =>
+      one.ageS > (limits.get(state) ?? 0) || one.connection === "lost",
+  );
+  equal(wrong, []);
+  equal([...new Set(green.map(({ state }) => state))].sort(), ["ready", "standing"]);
+});
+
+test("I12 a fleet of such robots is not drawn as ready or standing either", () => {
+  const wrong = everything()
+    .filter((one) => one.ageS > STANDING_LIMIT_S)
+    .map((one) => {
+      const { link, ageS, connection, nowMs } = one;
+      const robots = [{ view: viewOfRobot(one), link, ageS }];
+      return viewOfFleet({ connection, press: null, nowMs, robots }).state;
+    })
+    .filter((state) => state === "ready" || state === "standing");
+  equal(wrong, []);
+});
+
+test("I12 a standstill that nobody repeats becomes one of the past by itself", () => {
+  const stop = command({ kind: "stop", state: "STANDING", robot: RESTS });
+  stop.receivedAtMs = 7_000;
+  equal(viewOfRobot(facts({ command: stop })), {
+    state: "stale",
+    key: "stop.stale",
+    slots: { seconds: 3.1 },
+  });
 });

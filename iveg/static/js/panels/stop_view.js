@@ -65,6 +65,9 @@ const LOUDEST_FIRST = /** @type {StopState[]} */ ([
 /** Presses older than this without an answer are said to be so (ms). */
 export const TAKEN_LIMIT_MS = 500;
 
+/** A standstill that was last reported longer ago than this is one of the past (s). */
+export const STANDING_LIMIT_S = 1.5;
+
 /**
  * One robot's control.
  *
@@ -75,7 +78,7 @@ export function viewOfRobot(facts) {
   const robot = facts.robotId;
   if (facts.isBlind) return blind(facts.press, facts.nowMs, { robot });
   if (isCut(facts.connection)) return lost(facts.press, facts.nowMs);
-  const state = stateOfCommand(facts.command);
+  const state = shownState(facts);
   if (facts.press && (!state || GIVES_WAY.has(state))) {
     return viewOfPress(facts.press, facts.nowMs);
   }
@@ -139,6 +142,20 @@ export function stateOfCommand(command) {
   const state = BY_COMMAND[command.state] ?? null;
   const moved = command.reason === MOVED && MOVED_UNTIL.has(state ?? "");
   return moved ? "moved" : state;
+}
+
+/**
+ * A standstill is shown for as long as the robot's word of it is young: the browser
+ * counts by itself, for a server may hang as well as a robot.
+ *
+ * @param {RobotFacts} facts
+ * @returns {StopState | null}
+ */
+function shownState({ command, nowMs }) {
+  const state = stateOfCommand(command);
+  if (!command || state !== "standing") return state;
+  const ageS = doubtOf(command, nowMs)?.ageS ?? Number.POSITIVE_INFINITY;
+  return ageS > STANDING_LIMIT_S ? "stale" : "standing";
 }
 
 /**
