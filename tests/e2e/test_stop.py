@@ -3,19 +3,41 @@
 import re
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, WebSocketRoute, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import HELD_MS, let_go, open_menu
-from tests.e2e.reading import card, number, strip_stop, wait_for_mode
+from tests.e2e.reading import card, evaluate, number, strip_stop, wait_for_mode
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
 STANDING = re.compile(r"PARADO \([\d.]+ ms\)")
+_NOTE_WHEN = """([selector]) => {
+  const control = document.querySelector(selector);
+  const note = () => { window.__changedAt ??= Date.now(); };
+  const options = {attributes: true, attributeFilter: ['data-state']};
+  new MutationObserver(note).observe(control, options);
+}"""
 BOTH_STANDING = re.compile(r"PARADO \(2/2\)")
 WITHIN_MS = 8000
 """Braking, the window of 1.0 s in which standing is measured, and a busy machine."""
+
+
+class Line:
+    """A browser's live line, which a test can let die without closing it."""
+
+    is_dead = False
+
+    def join(self, page_end: WebSocketRoute) -> None:
+        """Carry what both ends say, for as long as the line lives."""
+        server_end = page_end.connect_to_server()
+        page_end.on_message(lambda said: self._carry(server_end, said))
+        server_end.on_message(lambda said: self._carry(page_end, said))
+
+    def _carry(self, to: WebSocketRoute, said: str | bytes) -> None:
+        if not self.is_dead:
+            to.send(said)
 
 
 @pytest.fixture(autouse=True)
@@ -71,13 +93,43 @@ def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
     assert after == before + 1
 
 
-def test_every_browser_sees_the_stop(page: Page, open_page: OpenPage) -> None:
+def test_i10_every_browser_shows_a_stop_within_a_second(
+    page: Page, open_page: OpenPage
+) -> None:
     other = open_page(390, 844)
-    other.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
+    other.wait_for_selector('[data-stop="AGI"][data-state="ready"]')
+    evaluate(other, _NOTE_WHEN, '[data-stop="AGI"]')
+    # The finger comes first; the control of this page changes in the same moment.
+    evaluate(page, _NOTE_WHEN, '#stops [data-stop="AGI"]')
 
     strip_stop(page, "AGI").click()
 
     wait_for_mode(other, "AGI", "STOPPED", seconds=5.0)
+    pressed, seen = (evaluate(one, "() => window.__changedAt") for one in (page, other))
+    assert seen - pressed < 1000.0
+
+
+def test_i10_a_browser_whose_line_is_dead_shows_itself_stale(
+    page: Page, open_page: OpenPage
+) -> None:
+    other = open_page(alone=True)
+    line = Line()
+    other.route_web_socket("**/live", line.join)
+    other.reload()
+    control = strip_stop(other, "AGI")
+    expect(control).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+
+    line.is_dead = True
+
+    # Half-open: nothing closes the socket, it only says nothing any more.
+    expect(control).not_to_have_attribute("data-state", "ready", timeout=2000)
+    expect(card(other, "AGI")).to_have_attribute(
+        "data-link", re.compile("LATE|LOST"), timeout=1000
+    )
+    expect(other.locator("#banner")).to_contain_text("Sin conexión", timeout=5000)
+    strip_stop(page, "AGI").click()
+    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
+    expect(control).to_have_attribute("data-state", "lost")
 
 
 def test_release_alone_moves_nothing_and_resume_drives_again(page: Page) -> None:

@@ -368,7 +368,7 @@ def test_the_order_of_effects_is_zero_disk_answer_report(events: list[Event]) ->
 
 
 @given(EVENTS)
-def test_nobody_is_locked_out_for_ever(events: list[Event]) -> None:
+def test_L2_nobody_is_locked_out_for_ever(events: list[Event]) -> None:
     world = played(events)
     world.alerts, world.mandates = (), {"AGI": CLEAR}
     world.full_speed()

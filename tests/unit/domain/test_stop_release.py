@@ -19,7 +19,7 @@ from tests.unit.domain.bench import (
 # --- RELEASING --------------------------------------------------------------------
 
 
-def test_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() -> None:
+def test_i2_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() -> None:
     bench = Bench()
     bench.press()
     bench.stand(BOOT_HOLD)
@@ -42,7 +42,7 @@ def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
 
 
 @pytest.mark.parametrize("seen", [(), ("id-1",), ("id-1", "boot-b1", "more")])
-def test_a_release_of_another_set_than_the_robot_reports_is_refused(
+def test_i2_a_release_of_another_set_than_the_robot_reports_is_refused(
     seen: tuple[str, ...],
 ) -> None:
     bench = Bench()
@@ -65,7 +65,7 @@ def test_a_person_may_name_local_holds_too_but_they_are_not_sent() -> None:
     assert once(effects)[0].ids == (bench.ours.id,)
 
 
-def test_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
+def test_i2_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
     bench = Bench()
     bench.report(RED_BUTTON)
 
@@ -73,7 +73,7 @@ def test_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
         bench.release(RED_BUTTON.id)
 
 
-def test_a_release_needs_a_fresh_report() -> None:
+def test_i2_a_release_needs_a_fresh_report() -> None:
     bench = Bench()
     bench.press()
     bench.stand()
@@ -83,7 +83,7 @@ def test_a_release_needs_a_fresh_report() -> None:
         bench.release(bench.ours.id)
 
 
-def test_a_release_needs_a_robot_at_rest() -> None:
+def test_i2_a_release_needs_a_robot_at_rest() -> None:
     bench = Bench()
     bench.report(BOOT_HOLD, linear=0.3)
 
@@ -91,7 +91,7 @@ def test_a_release_needs_a_robot_at_rest() -> None:
         bench.release(BOOT_HOLD.id)
 
 
-def test_a_release_needs_a_challenge() -> None:
+def test_i2_a_release_needs_a_challenge() -> None:
     bench = Bench()
     report = safety_report("AGI", BOOT_HOLD, challenge="")
     silent = type(report)("AGI", report.origin, 0.0, "hold", holds=(BOOT_HOLD,))
@@ -104,7 +104,7 @@ def test_a_release_needs_a_challenge() -> None:
 @pytest.mark.parametrize(
     "state", ["REQUESTED", "SENT", "DELIVERED", "UNCONFIRMED", "STALE", "READY"]
 )
-def test_a_release_is_refused_unless_the_robot_is_known_to_stand(state: str) -> None:
+def test_i2_a_release_is_refused_unless_the_robot_is_known_to_stand(state: str) -> None:
     bench = IN_STATE[state]()
     assert bench.state == state
 
@@ -422,7 +422,7 @@ def test_a_stop_that_others_join_is_not_closed() -> None:
     assert closed(bench.press("ben")) == {}
 
 
-def test_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> None:
+def test_i2_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> None:
     bench = IN_STATE["REQUESTED"]().stand()
     bench.press("ben")
 
