@@ -70,6 +70,7 @@ CASES = (
     Case("commands", "/commands", 768, 1024, "dark", "en", "#orders-rows tbody tr"),
     Case("fleet", "/fleet", 1440, 900, "light", "en", "#machines tbody tr"),
     Case("climate", "/climate", 768, 1024, "sunlight", "es", "#trend-co2 .main-svg"),
+    Case("history", "/history", 1440, 900, "dark", "es", "#chart-stops .main-svg"),
     Case("settings", "/settings", 390, 844, "light", "es", "#class-save"),
 )
 
@@ -200,7 +201,11 @@ def _difference(judge: Page, one: bytes, other: bytes) -> tuple[float, float]:
 
 
 def _history() -> Iterator[Record]:
-    for n in range(0, 900, 2):
+    """A day; nothing within a second of where the last 15 minutes begin or end.
+
+    They are asked for by the page's clock, and ``_settle`` lets it run a little.
+    """
+    for n in range(2, 900, 2):
         slow = 0.5 if 300 <= n < 420 else 1.0
         for robot, speed in (("AGI", 0.8), ("AGII", 0.6)):
             yield odometry_record(
@@ -217,7 +222,8 @@ def _history() -> Iterator[Record]:
         }
         yield climate_record(at=at, **air)
     yield from (
-        detection_record(at=NOW - 60 * n, probability=0.5 + n / 30) for n in range(15)
+        detection_record(at=NOW - 60 * n - 30, probability=0.5 + n / 30)
+        for n in range(15)
     )
     yield decision_record(
         started_at=NOW - 600, ended_at=NOW - 480, links=json.dumps(_CHAIN)
