@@ -1,7 +1,7 @@
 import { coverOf } from "../../iveg/static/js/layers/scalebar.js";
 import { createMap } from "../../iveg/static/js/map.js";
 import { createStore } from "../../iveg/static/js/store.js";
-import { screenY } from "../../iveg/static/js/viewport.js";
+import { screenX, screenY } from "../../iveg/static/js/viewport.js";
 import { detection, person, robot, STAMP, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
@@ -21,6 +21,12 @@ function mapOnPage() {
 }
 
 const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+
+/** Sizes are told after a frame, and drawn in the next. */
+async function settled() {
+  await frame();
+  await frame();
+}
 
 /** The whole picture. @param {HTMLCanvasElement} canvas */
 function fingerprint(canvas) {
@@ -82,6 +88,42 @@ test("a map opens with the whole house in view, above the bar of its scale", asy
   equal(screenY(map.view(), 10) >= 0, true);
   equal(screenY(map.view(), 0) <= coverOf({ height: 400 }).top, true);
   map.destroy();
+});
+
+test("the house lies beside tools that grow, until it is moved", async () => {
+  const { canvas, store, map } = mapOnPage();
+  map.destroy();
+  const tools = document.createElement("div");
+  tools.dataset.overMap = "";
+  document.body.append(tools);
+  const { left, top } = canvas.getBoundingClientRect();
+  /** Down the right edge. @param {number} width (px) */
+  const widen = (width) => {
+    const place = {
+      left: `${left + 600 - width}px`,
+      top: `${top}px`,
+      width: `${width}px`,
+    };
+    Object.assign(tools.style, { position: "absolute", height: "300px", ...place });
+    return settled();
+  };
+  await widen(60);
+  const again = createMap(canvas, store, { storage: null });
+  const edge = () => screenX(again.view(), 20);
+  store.apply("snapshot", snapshot());
+  await settled();
+  near(edge(), 600 - 60 - 8);
+
+  await widen(150);
+  near(edge(), 600 - 150 - 8);
+
+  again.zoomBy(1);
+  const moved = edge();
+  await widen(170);
+  near(edge(), moved);
+  again.fit();
+  near(edge(), 600 - 170 - 8);
+  again.destroy();
 });
 
 test("every layer shows, and its switch takes it off the picture", async () => {
