@@ -17,12 +17,12 @@
  */
 
 import { createCamera } from "./camera.js";
+import { createCovers, onResize } from "./covers.js";
 import { listen } from "./gestures.js";
 import { believedBy, hears } from "./layers/belief.js";
 import { laidTo, lengthOf } from "./layers/measure.js";
 import { browserStorage, createChoices } from "./layers/memory.js";
 import { pick } from "./layers/pick.js";
-import { coverOf } from "./layers/scalebar.js";
 import { readTheme } from "./layers/theme.js";
 import { createTrails } from "./layers/trail.js";
 import { createWords } from "./layers/words.js";
@@ -285,55 +285,4 @@ function leaveTrail(trails, store, topic, data) {
 function every(ms, fn) {
   const timer = setInterval(fn, ms);
   return () => clearInterval(timer);
-}
-
-/**
- * What lies over the map (`data-over-map` beside it, and the bar of its scale), each at
- * its largest since the house was fitted: counts come and go, and a house that moved
- * with them could not be watched.
- *
- * @param {HTMLCanvasElement} canvas
- * @param {() => void} onGrowth
- */
-function createCovers(canvas, onGrowth) {
-  const house = canvas.parentElement;
-  /** @type {HTMLElement[]} */
-  const over = [...(house?.querySelectorAll("[data-over-map]") ?? [])].map(asElement);
-  /** @type {Map<Element, import("./viewport.js").Rect>} */
-  const largest = new Map();
-
-  function measure() {
-    const { left: x, top: y } = canvas.getBoundingClientRect();
-    for (const element of over) {
-      const now = element.getBoundingClientRect();
-      if (!now.width || !now.height) continue;
-      const was = largest.get(element);
-      largest.set(element, {
-        left: Math.min(now.left - x, was?.left ?? Number.POSITIVE_INFINITY),
-        top: Math.min(now.top - y, was?.top ?? Number.POSITIVE_INFINITY),
-        right: Math.max(now.right - x, was?.right ?? 0),
-        bottom: Math.max(now.bottom - y, was?.bottom ?? 0),
-      });
-    }
-    onGrowth();
-  }
-
-  return {
-    now: () => [...largest.values(), coverOf({ height: canvas.clientHeight })],
-    forget() {
-      largest.clear();
-      measure();
-    },
-    end: onResize(over, measure),
-  };
-}
-
-/** @param {Element} element */
-const asElement = (element) => /** @type {HTMLElement} */ (element);
-
-/** @param {HTMLElement[]} elements @param {() => void} fn */
-function onResize(elements, fn) {
-  const observer = new ResizeObserver(fn);
-  for (const element of elements) observer.observe(element);
-  return () => observer.disconnect();
 }
