@@ -77,9 +77,10 @@ class Decision:
 
     @property
     def judged(self) -> bool:
-        """Whether the robot was fast enough for a slow-down to be seen."""
+        """Whether the robot drove fast and evenly enough for a slow-down to be seen."""
         crossing = self.crossing
-        return crossing.speed_before > JUDGED_ABOVE and not crossing.already_slow
+        hidden = crossing.already_slow or crossing.speeding_up
+        return crossing.speed_before > JUDGED_ABOVE and not hidden
 
     def published(self, at: Instant) -> "Decision":
         """The mandate went out."""

@@ -22,6 +22,8 @@ RELEASE_M, RELEASE_S = 0.3, 1.0
 SILENCE_S = 1.0
 _NOT_FAR_M = 0.01
 """So far outside a ring nobody can be inside, whatever rounding does."""
+SPEEDING_UP = 0.05
+"""Faster than in the mean of its last second by more than this (m/s)."""
 OBSERVER_FORGOTTEN_S = 600.0
 """A robot that has not looked for ten minutes is no longer one of the fleet's eyes."""
 
@@ -60,6 +62,8 @@ class Crossing:
         outside_since: When it was first found outside (monotonic, s).
         already_slow: It was slowed for something else: no slow-down will be seen.
         ahead: It had judged this very hazard itself and said so before.
+        speeding_up: It had not reached the speed that it wanted, so half of that may
+            be more than half of what it drove.
         in_sight: Whether the robot saw it itself, or had a line of sight to the centre
             at the trigger.
     """
@@ -74,6 +78,7 @@ class Crossing:
     distance_m: float
     already_slow: bool = False
     ahead: bool = False
+    speeding_up: bool = False
     outside_since: float | None = None
 
 
@@ -182,6 +187,7 @@ class Mandates:
             distance_m=distance,
             already_slow=_is_slow_already(robot, hazard, speed),
             ahead=_is_ahead(robot, hazard),
+            speeding_up=robot.speed_gained() > SPEEDING_UP,
         )
 
     def _leave(

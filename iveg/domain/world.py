@@ -35,6 +35,7 @@ STANDING_SPEED = 0.02
 """Below this (m/s and rad/s) a robot stands (safety.md §2.2)."""
 REPLAY_TASK = "replay"
 _HISTORY = 128
+GAIN_OVER_S = 1.0
 
 
 @dataclass(slots=True)
@@ -68,6 +69,9 @@ class RobotState:
     clock: ClockEstimate = field(default_factory=ClockEstimate)
     _orders: dict[type[Observation], Order] = field(default_factory=dict)
     _poses: deque[tuple[float, Pose2D]] = field(
+        default_factory=lambda: deque(maxlen=_HISTORY)
+    )
+    _speeds: deque[tuple[float, float]] = field(
         default_factory=lambda: deque(maxlen=_HISTORY)
     )
 
@@ -115,6 +119,19 @@ class RobotState:
             return poses[0][1]
         (before, earlier), (after, later) = poses[index - 1], poses[index]
         return earlier.interpolate(later, (stamp_s - before) / (after - before))
+
+    def speed_gained(self) -> float:
+        """How much faster it is than in the mean of its last second (m/s)."""
+        if self.odometry is None or not self._speeds:
+            return 0.0
+        mean = sum(speed for _, speed in self._speeds) / len(self._speeds)
+        return abs(self.odometry.twist.linear_x) - mean
+
+    def remember_speed(self, at: float, speed: float) -> None:
+        """Keep a speed (m/s) for a second; ``at`` monotonic (s)."""
+        self._speeds.append((at, abs(speed)))
+        while at - self._speeds[0][0] > GAIN_OVER_S:
+            self._speeds.popleft()
 
     def judge(
         self, observation: Observation, origin: Origin, *, asked: bool = False
@@ -210,6 +227,7 @@ def _update(robot: RobotState, received: Received, delay: float) -> None:
             robot.pose_at = _newer(robot.pose_at, seen_at)
             moment = observation.origin.stamp_s
             robot.remember_pose(at.wall if moment is None else moment, observation.pose)
+            robot.remember_speed(seen_at.mono, observation.twist.linear_x)
         case LaserScan():
             robot.scan, robot.scan_received = observation, seen_at
             robot.scan_pose = robot.pose_at_stamp(observation.origin.stamp_s)

@@ -25,7 +25,11 @@ LOOK = Sighting("AGI", 1.0, 0.0, 0.9, START, "farmer", 0.94)
 
 
 def crossing(
-    *, speed: float = 0.8, already_slow: bool = False, sighting: Sighting | None = LOOK
+    *,
+    speed: float = 0.8,
+    already_slow: bool = False,
+    speeding_up: bool = False,
+    sighting: Sighting | None = LOOK,
 ) -> Crossing:
     hazard = Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0, sighting)
     if sighting is None:
@@ -40,6 +44,7 @@ def crossing(
         in_sight=False,
         distance_m=1.43,
         already_slow=already_slow,
+        speeding_up=speeding_up,
     )
 
 
@@ -112,9 +117,15 @@ def test_a_peers_own_odometry_needs_no_detection() -> None:
 
 
 @pytest.mark.parametrize(
-    "parts", [{"speed": 0.2}, {"speed": 0.0}, {"already_slow": True}]
+    "parts",
+    [
+        {"speed": 0.2},
+        {"speed": 0.0},
+        {"already_slow": True},
+        {"speeding_up": True},
+    ],
 )
-def test_a_robot_that_was_slow_already_has_nothing_to_show(
+def test_a_robot_that_was_slow_or_speeding_up_has_nothing_to_show(
     parts: dict[str, object],
 ) -> None:
     assert verdicts(decision(**parts), 3.0)["observed"] == "n/a"

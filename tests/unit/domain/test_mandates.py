@@ -418,3 +418,21 @@ def test_a_robot_that_names_no_alert_was_not_ahead_of_a_peers_own_ring() -> None
     mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
     assert mine.crossing.already_slow
     assert not mine.crossing.ahead
+
+
+@pytest.mark.parametrize(
+    ("speeds", "speeding_up"),
+    [([0.8] * 7, False), ([0.4, 0.5, 0.6, 0.7, 0.8], True), ([1.0, 0.9, 0.8], False)],
+)
+def test_half_of_a_speed_that_still_grows_is_not_what_will_be_seen(
+    speeds: list[float], speeding_up: bool
+) -> None:
+    scene = watching(Scene())
+    for speed in speeds:
+        scene.now += 0.2
+        scene.drive("AGI", 0.0, linear=speed)
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert mine.crossing.speeding_up is speeding_up
