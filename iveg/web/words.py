@@ -42,7 +42,9 @@ class Words:
         if isinstance(value, str) or form is None:
             return str(value)
         if form == "percent":
-            return f"{value * 100:.0f} %"
+            # As browsers write it: Spanish keeps the sign on the number's line.
+            sign = "\u00a0%" if self.language == "es" else "%"
+            return f"{value * 100:.0f}{sign}"
         number = f"{value:.{int(form)}f}"
         return number.replace(".", ",") if self.language == "es" else number
 

@@ -144,8 +144,8 @@ def test_no_control_is_called_an_emergency_stop() -> None:
 
 def test_numbers_are_written_as_the_reader_writes_them() -> None:
     words = {"n": "{value:1} m, {share:percent}"}
-    assert Words("es", words).say("n", value=1.43, share=0.94) == "1,4 m, 94 %"
-    assert Words("en", words).say("n", value=1.43, share=0.94) == "1.4 m, 94 %"
+    assert Words("es", words).say("n", value=1.43, share=0.94) == "1,4 m, 94\u00a0%"
+    assert Words("en", words).say("n", value=1.43, share=0.94) == "1.4 m, 94%"
 
 
 @pytest.mark.parametrize(

@@ -223,7 +223,7 @@ async def test_about_tells_the_rule_that_is_in_force_now(
     browser: httpx.AsyncClient,
 ) -> None:
     html = (await browser.get("/about", headers={"Accept-Language": "en"})).text
-    assert "75 %" in html
+    assert "75%" in html
     assert "2.5 m" in html
 
 
