@@ -18,9 +18,9 @@ const who = (
 });
 
 test("of words that would lie on each other the newest stand", () => {
-  const old = who(60, 1);
+  const old = who(58, 1);
   const fresh = who(5, 2);
-  const far = who(90, 9);
+  const far = who(59, 9);
   equal(worded(paint([old, fresh, far])), [fresh, far]);
 });
 
@@ -31,4 +31,8 @@ test("from near everybody has words", () => {
 
 test("who is seen now needs no age", () => {
   equal(worded(paint([who(0, 1, "seen")])), []);
+});
+
+test("after a minute somebody is a trace without words", () => {
+  equal(worded(paint([who(60, 1), who(61, 9)])).length, 1);
 });

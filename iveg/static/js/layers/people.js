@@ -2,7 +2,8 @@
  * People, and peers seen by robots, with the ring that the rule keeps around them.
  *
  * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
- * marker alone: nobody knows where the person is now.
+ * marker alone: nobody knows where the person is now.  After a minute it is a trace
+ * without words, so that the traces of a morning do not hide who is there.
  */
 
 import { screenX, screenY } from "../viewport.js";
@@ -14,6 +15,10 @@ import { circle, isolated, label } from "./paint.js";
  */
 
 const WORDS_FROM_SCALE = 24;
+
+/** Somebody last seen longer ago than this is a trace (s). */
+const TRACE_AFTER_S = 60;
+const TRACE_PX = 4;
 
 /** Words nearer to each other than this would be read as one (px). */
 const WORDS_ACROSS_PX = 92;
@@ -35,7 +40,9 @@ export function draw(paint) {
  * @param {Paint} paint
  */
 export function worded({ scene, view }) {
-  const unseen = scene.people.filter(({ stage }) => stage !== "seen");
+  const unseen = scene.people.filter(
+    (person) => person.stage !== "seen" && !isTrace(person),
+  );
   /** @type {ScenePerson[]} */
   const chosen = [];
   for (const person of unseen.sort((a, b) => a.ageS - b.ageS)) {
@@ -54,8 +61,21 @@ function drawPerson(paint, person) {
   const { ctx, view } = paint;
   ctx.translate(screenX(view, person.x), screenY(view, person.y));
   if (person.stage !== "last_seen") drawRing(paint, person);
-  if (person.peer) drawPeer(paint, person);
+  if (isTrace(person)) drawTrace(paint);
+  else if (person.peer) drawPeer(paint, person);
   else drawFigure(paint, person);
+}
+
+/** @param {Pick<ScenePerson, "stage" | "ageS">} person */
+const isTrace = ({ stage, ageS }) => stage === "last_seen" && ageS > TRACE_AFTER_S;
+
+/** @param {Paint} paint */
+function drawTrace({ ctx, theme }) {
+  ctx.globalAlpha = 0.55;
+  ctx.fillStyle = theme.muted;
+  circle(ctx, 0, 0, TRACE_PX);
+  ctx.fill();
+  ctx.globalAlpha = 1;
 }
 
 /** How long ago somebody was seen. @param {Paint} paint @param {ScenePerson} person */
