@@ -35,13 +35,19 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+def scenario() -> str:
+    """What the robots and people of a module do."""
+    return "demo"
+
+
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory, scenario: str) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving; shared by the tests of a module."""
     with site(tmp_path_factory.mktemp("iveg")) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
-        place.start("emulator")
+        place.start("emulator", "--scenario", scenario)
         place.wait_until_live()
         yield place
 
