@@ -58,14 +58,17 @@ def visit(page: Page, route: str) -> None:
 
 COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
   .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
-  .filter((stop) => {
+  .map((stop) => {
     if (!stop.closest('#stops')) stop.scrollIntoView({block: 'center'});
     const box = stop.getBoundingClientRect();
     const x = box.x + box.width / 2, y = box.y + box.height / 2;
-    return !stop.contains(document.elementFromPoint(x, y));
-  }).map((stop) => stop.dataset.stop)"""
-"""Which visible STOPs a finger at their centre would miss.  Those of cards may have to
-be scrolled to; those of the strip are always in sight."""
+    const hit = document.elementFromPoint(x, y);
+    if (stop.contains(hit)) return null;
+    const over = hit ? `${hit.tagName} ${hit.id} ${hit.className}` : 'nothing';
+    return `${stop.dataset.stop} of ${stop.className} at ${x}, ${y}: ${over}`;
+  }).filter((said) => said !== null)"""
+"""Which visible STOPs a finger at their centre would miss, and what it would hit.
+Those of cards may have to be scrolled to; those of the strip are always in sight."""
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""

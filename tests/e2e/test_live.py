@@ -166,7 +166,7 @@ def test_nothing_serious_stands_in_the_way_of_assistive_technology(
 def test_a_stranger_is_shown_the_way_in_and_nothing_else(
     open_page: OpenPage, stack: Site
 ) -> None:
-    page = open_page()
+    page = open_page(alone=True)
     page.context.clear_cookies()
 
     answer = page.request.get(stack.url, headers={"Accept": "text/html"})

@@ -13,7 +13,14 @@ import pytest
 from playwright import sync_api
 from playwright.sync_api import Browser, Page, expect
 
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, strip_stop, visit
+from tests.e2e.reading import (
+    COVERED_STOPS,
+    OVERFLOW,
+    card,
+    evaluate,
+    strip_stop,
+    visit,
+)
 from tests.processes import Program, Site, until
 
 pytestmark = pytest.mark.e2e
@@ -39,8 +46,12 @@ METER = re.compile(r"^\d,\d\d m/s de \d,\d m/s; límite \d,\d\d m/s$")
 
 @pytest.fixture(scope="module")
 def only(browser: Browser, stack: Site) -> Iterator[Page]:
-    """One signed-in page for all: drawing four maps at once would prove no more."""
-    context = browser.new_context(locale="es-ES")
+    """One signed-in page for all: drawing four maps at once would prove no more.
+
+    Nothing slides: a drawer on its way out of a window that has just been made wider
+    would be found over a card.
+    """
+    context = browser.new_context(locale="es-ES", reduced_motion="reduce")
     context.set_default_timeout(15_000)
     page = context.new_page()
     page.goto(stack.sign_in_link)
@@ -171,6 +182,7 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 ) -> None:
     visit(only, "/")
     only.locator("#map").scroll_into_view_if_needed()
+    only.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
     before = _pixels(only)
 
     _newest(stack, "serve").kill()
