@@ -182,7 +182,6 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 ) -> None:
     visit(only, "/")
     only.locator("#map").scroll_into_view_if_needed()
-    only.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]', state="attached")
     before = _pixels(only)
 
     _newest(stack, "serve").kill()
