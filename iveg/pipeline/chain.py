@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.observations import Instant, Origin
+from iveg.domain.probe import ProbeLag
 
 HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
@@ -25,7 +26,6 @@ GRACE_S = 6.0
 """After the start nobody is accused for this long."""
 SLOW_S = 1.0
 """A canary or an answer that takes longer is late."""
-_REMEMBERED = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Chain:
         canary_at: When the newest canary came back (s, monotonic).
         stored_at: When the newest canary that Orion has was sent (s, monotonic).
         notified_at: When the newest notification of any kind came (s, monotonic).
-        lag_s: How long the newest canary took (s).
+        probe: How far the whole chain is behind.
         database: The recorder's state.
     """
 
@@ -69,27 +69,22 @@ class Chain:
         self.canary_at: float | None = None
         self.stored_at: float | None = None
         self.notified_at: float | None = None
-        self.lag_s: float | None = None
+        self.probe = ProbeLag()
         self.database: HopState = "unknown"
-        self._sung: dict[Origin, float] = {}
 
     # --- the canary ---------------------------------------------------------------
 
     def sing(self, origin: Origin, now: Instant) -> None:
         """A canary leaves."""
-        self._sung[_count(origin)] = now.mono
-        if len(self._sung) > _REMEMBERED:
-            del self._sung[next(iter(self._sung))]
+        self.probe.sent(origin, now)
 
     def hear(self, origin: Origin, now: Instant) -> None:
         """A canary has come back as a notification."""
-        left = self._sung.get(_count(origin))
-        if left is not None:
-            self.lag_s = now.mono - left
+        self.probe.returned(origin, now)
 
     def find(self, origin: Origin) -> None:
         """Orion has this canary; one of an earlier life of iVeg proves nothing."""
-        left = self._sung.get(_count(origin))
+        left = self.probe.sent_at(origin)
         if left is not None:
             self.stored_at = left
 
@@ -143,8 +138,9 @@ class Chain:
             return Hop("iot_agent", known, age, lost)
         if self.agent_slow or self.agent_warning:
             return Hop("iot_agent", "late", age, self.agent_slow or self.agent_warning)
-        if self.lag_s is not None and self.lag_s > SLOW_S:
-            detail = f"a measure takes {self.lag_s:.1f} s to come back"
+        lag = self.probe.lag(now)
+        if lag is not None and lag > SLOW_S:
+            detail = f"a measure takes {lag:.1f} s to come back"
             return Hop("iot_agent", "late", age, detail)
         return Hop("iot_agent", "ok", age)
 
@@ -167,11 +163,6 @@ class Chain:
 
     def _starting(self, now: Instant) -> bool:
         return now.mono - self._start.mono < GRACE_S
-
-
-def _count(origin: Origin) -> Origin:
-    """What names a canary; stamps may be reprinted on the way."""
-    return Origin(origin.boot, origin.seq)
 
 
 def _newest(one: float | None, other: float | None) -> float | None:

@@ -1,0 +1,90 @@
+"""How far the FIWARE chain is behind, told by iVeg's own probes alone.
+
+A probe goes out every two seconds and comes back through broker, agent and Orion.  The
+newest that came back says how long the chain took then; the oldest that is still out
+says how long it takes at least now, so a chain that stops is not taken for a fast one::
+
+    sent    1    2    3    4    5
+    back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind, growing
+
+One that is passed by a later one counts no more: it may be lost for ever.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from iveg.domain.observations import Instant, Origin
+
+_KEPT = 600
+"""Probes remembered: twenty minutes of them, at one in two seconds."""
+_GROWS_S, _GROWS_WITHIN_S = 0.5, 10.0
+
+
+@dataclass(slots=True)
+class ProbeLag:
+    """Matches probes that come back with the moments when they left.
+
+    All moments are iVeg's own monotonic clock; what a probe carries is never a time.
+    """
+
+    _sent: dict[Origin, float] = field(default_factory=dict)
+    _out: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    _newest: float = float("-inf")
+    _back: deque[tuple[float, float]] = field(
+        default_factory=lambda: deque(maxlen=_KEPT)
+    )
+
+    def sent(self, origin: Origin, now: Instant) -> None:
+        """A probe leaves."""
+        self._sent[_count(origin)] = now.mono
+        self._out.append(now.mono)
+        if len(self._sent) > _KEPT:
+            del self._sent[next(iter(self._sent))]
+
+    def returned(self, origin: Origin, now: Instant) -> None:
+        """A probe has come back; one of an earlier life of iVeg proves nothing."""
+        left = self.sent_at(origin)
+        if left is None or left <= self._newest:
+            return
+        self._newest = left
+        while self._out and self._out[0] <= left:
+            self._out.popleft()
+        self._back.append((now.mono, now.mono - left))
+        while len(self._back) > 2 and self._back[1][0] <= now.mono - _GROWS_WITHIN_S:
+            self._back.popleft()
+
+    def sent_at(self, origin: Origin) -> float | None:
+        """When this probe left (monotonic, s); None for one that is not ours."""
+        return self._sent.get(_count(origin))
+
+    @property
+    def is_known(self) -> bool:
+        """Whether a probe has come back; until then ``lag`` only says "at least"."""
+        return bool(self._back)
+
+    def lag(self, now: Instant) -> float | None:
+        """How far the chain is behind (s); None before the first probe left."""
+        known = [self._back[-1][1]] if self._back else []
+        if self._out:
+            known.append(max(0.0, now.mono - self._out[0]))
+        return max(known, default=None)
+
+    def grows(self, now: Instant) -> bool:
+        """Whether the lag is larger than it was ten seconds ago, or at first."""
+        lag = self.lag(now)
+        if lag is None:
+            return False
+        return lag > self._earlier(now) + _GROWS_S
+
+    def _earlier(self, now: Instant) -> float:
+        """The lag ten seconds ago, as far as it is known (s)."""
+        before = now.mono - _GROWS_WITHIN_S
+        past = [transit for at, transit in self._back if at <= before]
+        if past:
+            return past[-1]
+        return self._back[0][1] if self._back else 0.0
+
+
+def _count(origin: Origin) -> Origin:
+    """What names a probe; stamps may be reprinted on the way."""
+    return Origin(origin.boot, origin.seq)
