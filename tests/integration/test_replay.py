@@ -4,7 +4,6 @@ import asyncio
 import gzip
 import itertools
 import logging
-import os
 from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 
@@ -22,11 +21,11 @@ from iveg.domain.observations import (
 from iveg.emulator.replay import run_replay
 from tests import data
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
+from tests.data.recorded import emulated_logs, real_log
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 from tests.processes import Site
 
 AISLE = Path(data.__file__).parent / "aisle.jsonl"
-REAL = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
 @pytest.fixture
@@ -66,6 +65,12 @@ def replay(
 
 def farthest(cloud: Cloud, robot_id: str = "AGI") -> float:
     return max((o.pose.x for o in cloud.of(robot_id, Odometry)), default=-1.0)
+
+
+def driven(cloud: Cloud, robot_id: str) -> float:
+    """How far from where it began a robot has been (m)."""
+    poses = [odometry.pose for odometry in cloud.of(robot_id, Odometry)]
+    return max((pose.distance_to(poses[0].x, poses[0].y) for pose in poses), default=0)
 
 
 async def test_a_log_is_played_to_its_end_and_the_robot_then_stands(
@@ -181,23 +186,36 @@ async def test_what_cannot_be_played_is_refused_with_one_sentence(
         )
 
 
-async def test_the_logs_of_the_real_robot_play_together_and_cleanly(
+@pytest.fixture
+def two_logs(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, ...]:
+    """Two robots' recordings: the emulator's or, by their names, real ones."""
+    if request.param == "emulated":
+        return emulated_logs(tmp_path)
+    return tuple(real_log(name) for name in request.param)
+
+
+@pytest.mark.parametrize(
+    ("two_logs", "beams"),
+    [("emulated", 720), (("orchard_d1", "orchard_d2"), 897)],
+    indirect=["two_logs"],
+)
+async def test_the_logs_of_two_robots_play_together_and_cleanly(
     address: BrokerAddress,
     cloud: Cloud,
     tmp_path: Path,
     caplog: pytest.LogCaptureFixture,
+    two_logs: tuple[Path, ...],
+    beams: int,
 ) -> None:
-    files = tuple(REAL / f"orchard_d{n}.jsonl.gz" for n in (1, 2))
-    if not all(file.exists() for file in files) and "CI" not in os.environ:
-        pytest.skip("the recorded logs are not beside the repository")
-
     both = ("AGI", "AGII")
     with caplog.at_level(logging.WARNING):
-        async with running(replay(address, tmp_path, *files, robots=both, speed=5.0)):
-            await until(lambda: farthest(cloud, "AGI") > 5.0)
-            await until(lambda: farthest(cloud, "AGII") > 5.0)
+        async with running(
+            replay(address, tmp_path, *two_logs, robots=both, speed=10.0)
+        ):
+            await until(lambda: driven(cloud, "AGI") > 5.0)
+            await until(lambda: driven(cloud, "AGII") > 5.0)
 
-    assert cloud.of("AGI", LaserScan)[-1].ranges.size == 897
+    assert cloud.of("AGI", LaserScan)[-1].ranges.size == beams
     assert cloud.problems == []
     assert caplog.records == []
 

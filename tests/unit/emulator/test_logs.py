@@ -2,7 +2,6 @@ import gzip
 import json
 import logging
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,9 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry
 from iveg.emulator.logs import LogReader
 from tests import data
+from tests.data.recorded import ROBOTS, emulated_logs, real_log
 
 DATA = Path(data.__file__).parent
-REAL = Path(__file__).resolve().parents[4] / "shared" / "data"
 ODOM = '{"t":0,"kind":"odom","x":1,"y":2,"yaw":0.5,"v":0.3,"w":-0.1}'
 
 
@@ -168,18 +167,32 @@ def test_the_synthetic_log_of_these_tests_is_clean(
     assert caplog.records == []
 
 
-@pytest.mark.parametrize("name", ["orchard_d1", "orchard_d2", "orchard_d3"])
-def test_the_logs_of_the_real_robot_read_without_a_complaint(
-    name: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    file = REAL / f"{name}.jsonl.gz"
-    if not file.exists() and "CI" not in os.environ:
-        pytest.skip("the recorded logs are not beside the repository")
+@pytest.fixture
+def robots_log(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """The emulator's recording of a robot, or a real one by its name."""
+    if request.param in ROBOTS:
+        return emulated_logs(tmp_path)[ROBOTS.index(request.param)]
+    return real_log(request.param)
 
-    entries = list(LogReader(file).entries())
+
+@pytest.mark.parametrize(
+    ("robots_log", "beams", "lines"),
+    [
+        ("AGI", 720, 100),
+        ("AGII", 720, 100),
+        ("orchard_d1", 897, 1_000),
+        ("orchard_d2", 897, 1_000),
+        ("orchard_d3", 897, 1_000),
+    ],
+    indirect=["robots_log"],
+)
+def test_the_log_of_a_robot_reads_without_a_complaint(
+    robots_log: Path, beams: int, lines: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    entries = list(LogReader(robots_log).entries())
     scans = [e.observation for e in entries if isinstance(e.observation, LaserScan)]
 
     assert caplog.records == []
-    assert len(scans) * 2 == len(entries) > 1_000
-    assert {scan.ranges.size for scan in scans} == {897}
+    assert len(scans) * 2 == len(entries) >= lines
+    assert {scan.ranges.size for scan in scans} == {beams}
     assert np.isfinite(scans[0].ranges).any()
