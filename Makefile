@@ -6,22 +6,25 @@ RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 export PYTHONPATH := $(CURDIR)
 
-.PHONY: demo test setup format check bench deep chaos soak migration lock clean
+.NOTPARALLEL:
+.PHONY: test-needs check-needs demo test setup format check bench deep chaos soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
-test: $(DEV) ; $(BIN)/python -m pytest
+test: test-needs $(DEV) ; $(BIN)/python -m pytest
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
-check: $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
-bench: $(DEV) ; $(BIN)/python -m benchmarks
+check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
+bench: test-needs $(DEV) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
-chaos: $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) $(BIN)/python -m pytest tests/chaos/test_kills.py
+chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) $(BIN)/python -m pytest tests/chaos/test_kills.py
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
 lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock
 clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output
 
-$(BIN)/python: ; $(PYTHON) -m venv $(VENV)
+# The system's part: installed on Debian, named elsewhere.
+test-needs check-needs: ; @PYTHON=$(PYTHON) .ci/setup venv $(@:-needs=)
+$(BIN)/python: ; PYTHON=$(PYTHON) .ci/setup venv && $(PYTHON) -m venv $(VENV)
 $(RUN): requirements/run.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 $(DEV): requirements/dev.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@ $(RUN)
 node_modules: package.json ; npm install --silent --no-audit --no-fund --no-package-lock && touch $@
