@@ -4,13 +4,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
+# A module of tests and what it starts stay together; most of its time is waiting.
+WORKERS ?= 3
+SIDE_BY_SIDE := -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 export PYTHONPATH := $(CURDIR)
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo test setup format check bench deep chaos soak migration lock clean
+.PHONY: test-needs check-needs demo test quick setup format check bench deep chaos soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
-test: test-needs $(DEV) ; $(BIN)/python -m pytest
+test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
+quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 IVEG_STOP_RUNS=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real"
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check

@@ -15,13 +15,13 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from shutil import which
 from urllib.parse import urlsplit
 
 from playwright.async_api import Browser, async_playwright
 from websockets.asyncio.server import ServerConnection, serve
 
 from benchmarks.process import Usage, machine, percentile, print_table
+from tests.browsers import chromium
 from tests.processes import Site, children_of, site
 
 ROUNDS, SECONDS, WARM_UP_S = 3, 10.0, 2.0
@@ -159,7 +159,7 @@ async def _measure(place: Site, pid: int) -> Result:
         async_playwright() as playwright,
     ):
         browser = await playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(_FLAGS)
+            executable_path=chromium(), args=list(_FLAGS)
         )
         for _ in range(ROUNDS):
             _add(dashboard, await _watch_dashboard(browser, place))

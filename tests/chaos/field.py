@@ -14,7 +14,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from tests.brokers import MOSQUITTO, PLAIN
-from tests.processes import Program, Site, free_ports, until
+from tests.ports import free_ports
+from tests.processes import Program, Site, until
 
 _CONF = f"""{PLAIN}connection fiware
 address 127.0.0.1:{{south}}

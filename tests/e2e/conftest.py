@@ -1,37 +1,23 @@
-"""A real browser before a real iVeg, its parts in processes of their own.
-
-Playwright's synchronous driver keeps an event loop of its own in the thread, so it
-lives for one module at a time and leaves asynchronous tests elsewhere alone.
-"""
+"""A real browser before a real iVeg, its parts in processes of their own."""
 
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from shutil import which
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page
 
+from tests.browsers import running_browser
 from tests.processes import Site, site
 
-_FLAGS = (
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 OpenPage = Callable[..., Page]
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """The system's Chromium, or Playwright's own where there is none."""
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(_FLAGS)
-        )
+    with running_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture(scope="module")

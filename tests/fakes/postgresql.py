@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import socket
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +11,8 @@ from types import TracebackType
 from typing import Self
 
 import psycopg
+
+from tests.ports import free_ports
 
 _WAIT_S = 30
 
@@ -29,9 +30,7 @@ class PostgreSQL:
 
     def __init__(self, directory: Path, bin_: Path) -> None:
         self._data, self._bin, self._directory = directory / "data", bin_, directory
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self._port = int(probe.getsockname()[1])
+        (self._port,) = free_ports(1)
 
     def __enter__(self) -> Self:
         self._run(

@@ -20,7 +20,7 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi import codec
 from tests.brokers import broker_on
-from tests.processes import free_ports
+from tests.ports import free_ports
 
 T = TypeVar("T")
 

@@ -25,7 +25,8 @@ from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
 from iveg.settings import Settings
-from tests.processes import ROOT, children_of, free_ports
+from tests.ports import free_ports
+from tests.processes import ROOT, children_of
 
 SPY = "spy"
 """Hears and says everything; only the tests know it."""

@@ -20,7 +20,8 @@ from iveg.embedded.iot_agent import Faults
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.settings import Settings
 from tests.integration.emulator_cloud import until
-from tests.processes import Site, free_ports
+from tests.ports import free_ports
+from tests.processes import Site
 from tests.processes import until as wait_for
 
 SHORT_S, LONG_S = 0.5, 20.0

@@ -23,7 +23,8 @@ from iveg.adapters.mqtt import BrokerAddress
 from iveg.adapters.subscriptions import WANTED
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.integration.gate import Gate, Mood, bridge, gate
-from tests.processes import Program, Site, free_ports, site, until
+from tests.ports import free_ports
+from tests.processes import Program, Site, site, until
 
 # The gate installs Mosquitto: without it there, these tests fail instead of hiding.
 pytestmark = [

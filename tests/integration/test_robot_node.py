@@ -26,7 +26,7 @@ from iveg.domain.profiles import RobotProfile
 from iveg.ngsi import codec
 from iveg.robot.node import RobotNode
 from tests.brokers import broker_on
-from tests.processes import free_ports
+from tests.ports import free_ports
 
 
 @pytest.fixture

@@ -4,21 +4,16 @@ from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from shutil import which
 from threading import Thread
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
+
+from tests.browsers import running_browser
 
 _ROOT = Path(__file__).parents[2]
 _MODULES = sorted(path.name for path in (_ROOT / "tests/js").glob("*.test.js"))
-BROWSER_FLAGS = (
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 _POLICY = (
     "default-src 'self'; img-src data:; connect-src 'self' {connect}; "
     "require-trusted-types-for 'script'"
@@ -69,12 +64,8 @@ def files() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(BROWSER_FLAGS)
-        )
+    with running_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture

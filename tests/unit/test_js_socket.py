@@ -7,19 +7,19 @@ from functools import partial
 from http import HTTPStatus
 from http.server import ThreadingHTTPServer
 from pathlib import Path
-from shutil import which
 from socket import SHUT_RDWR
 from threading import Event, Thread
 from time import time
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import Server, ServerConnection, serve
 
-from tests.unit.test_js_modules import BROWSER_FLAGS, Files
+from tests.browsers import running_browser
+from tests.unit.test_js_modules import Files
 
 _ROOT = Path(__file__).parents[2]
 _RECOVERY_MS = 3000
@@ -132,12 +132,8 @@ def files() -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(BROWSER_FLAGS)
-        )
+    with running_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import logging
-import socket
 from collections.abc import AsyncIterator, Callable
 
 import aiomqtt
@@ -16,12 +15,7 @@ from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Origin
 from iveg.embedded.mqtt_broker import mqtt_broker
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+from tests.ports import free_ports
 
 
 async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
@@ -125,7 +119,7 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
 
 
 async def test_publishing_while_away_fails_loudly() -> None:
-    link = Heard(free_port()).link
+    link = Heard(free_ports(1)[0]).link
 
     with pytest.raises(HopError, match="not connected"):
         await link.publish("/a", b"1")
@@ -134,7 +128,7 @@ async def test_publishing_while_away_fails_loudly() -> None:
 async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    port = free_port()
+    port = free_ports(1)[0]
     heard = Heard(port, "/a")
     async with contextlib.AsyncExitStack() as first:
         await first.enter_async_context(mqtt_broker("127.0.0.1", port))
@@ -153,7 +147,7 @@ async def test_f1_a_broker_that_goes_and_comes_back_is_found_again(
 async def test_a_broker_that_is_not_there_yet_is_told_once_and_found_when_it_comes(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    port = free_port()
+    port = free_ports(1)[0]
     heard = Heard(port)
     async with running(heard.link):
         await until(lambda: losses_told(caplog))

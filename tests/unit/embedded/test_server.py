@@ -10,7 +10,7 @@ import pytest
 
 from iveg.domain.errors import SettingsError
 from iveg.embedded.server import embedded_fiware, serve_fiware
-from tests.processes import free_ports
+from tests.ports import free_ports
 
 LOOPBACK = ("127.0.0.1", 0)
 ELSEWHERE = ("0.0.0.0", 0)  # noqa: S104 - refused, which is the point

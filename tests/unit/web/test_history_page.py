@@ -4,13 +4,12 @@ import re
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from shutil import which
 from threading import Thread
 
 import pytest
 import uvicorn
 from fastapi import FastAPI, WebSocket
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, expect
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocketDisconnect
 
@@ -26,6 +25,7 @@ from iveg.web.contexts import Site
 from iveg.web.openapi import describe_api
 from iveg.web.pages import Pages, router
 from iveg.web.security import SecurityHeaders
+from tests.browsers import running_browser
 from tests.fakes.records import (
     command_record,
     decision_record,
@@ -35,12 +35,6 @@ from tests.fakes.records import (
 
 pytestmark = pytest.mark.e2e
 
-_FLAGS = (
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
 _SITE = Site(
     greenhouse="mvsim-20x20",
     robots=("AGI", "AGII"),
@@ -118,12 +112,8 @@ async def _say_nothing(websocket: WebSocket) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(
-            executable_path=which("chromium"), args=list(_FLAGS)
-        )
+    with running_browser() as found:
         yield found
-        found.close()
 
 
 @pytest.fixture

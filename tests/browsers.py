@@ -1,0 +1,35 @@
+"""The browser of the tests: the system's Chromium, or Playwright's own without one."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from shutil import which
+
+from playwright.sync_api import Browser, sync_playwright
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+def chromium() -> str | None:
+    """Where the system's is; None without one, or where a snap confines it."""
+    found = which("chromium")
+    is_snap = found is not None and Path(found).resolve().name == "snap"
+    return None if is_snap else found
+
+
+@contextmanager
+def running_browser() -> Iterator[Browser]:
+    """One that ends with the block.
+
+    Playwright's synchronous driver keeps an event loop of its own in the thread, so it
+    lives for one module at a time and leaves asynchronous tests elsewhere alone.
+    """
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
+        yield found
+        found.close()
