@@ -1,0 +1,427 @@
+"""The door to DDS, the network of ROS 2: raw payloads in and out, and who is there.
+
+Speaks through Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else
+imports it.  Payloads stay bytes here: DDS checks them against the type, and
+``iveg.ros2.cdr`` reads the few that are wanted.  Of Cyclone's threads none calls iVeg;
+one thread of ours waits for what must be answered at once and wakes the event loop.
+"""
+
+import asyncio
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from types import TracebackType
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import (
+    DDSException,
+    InstanceState,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import IdlStruct, make_idl_struct, types
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy
+from cyclonedds.qos import Qos as DdsQos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from iveg.domain.errors import HopError
+from iveg.ros2.names import Qos, dds_topic, dds_type, ros_topic, ros_type
+from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
+
+_LEASE = "3 s"
+"""How long others remember a participant that died without a word."""
+_MOST_PARTICIPANTS = 60
+_WAIT_MS = 250
+_REARM_S = 0.002
+_MOST_TAKEN = 200
+
+
+@dataclass(frozen=True, slots=True)
+class DdsNetwork:
+    """Which part of which network.
+
+    Attributes:
+        domain: 0 to 232, as ``ROS_DOMAIN_ID``.
+        interface: Network interface such as ``lo``; empty: Cyclone's choice.
+        peers: Addresses to ask instead of the whole network; none: multicast.
+        uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
+    """
+
+    domain: int = 0
+    interface: str = ""
+    peers: tuple[str, ...] = ()
+    uri: str = ""
+
+    def config(self) -> str:
+        """Cyclone's configuration, one fragment after the other."""
+        return ",".join(part for part in (self.uri, self._own()) if part)
+
+    def _own(self) -> str:
+        general = discovery = ""
+        if self.interface:
+            name = quoteattr(self.interface)
+            general += f"<Interfaces><NetworkInterface name={name}/></Interfaces>"
+        if self.peers:
+            general += "<AllowMulticast>false</AllowMulticast>"
+            peers = "".join(f"<Peer address={quoteattr(one)}/>" for one in self.peers)
+            discovery = (
+                "<ParticipantIndex>auto</ParticipantIndex>"
+                f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}"
+                f"</MaxAutoParticipantIndex><Peers>{peers}</Peers>"
+            )
+        discovery += f"<LeaseDuration>{_LEASE}</LeaseDuration>"
+        return (
+            f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
+            f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """One message; ``sent_s`` is its writer's clock (Unix s)."""
+
+    payload: bytes
+    sent_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A writer or reader that somebody has on the domain.
+
+    Attributes:
+        topic: ROS name.
+        type: ROS name, such as ``nav_msgs/msg/Odometry``.
+        key: Names it for ever.
+        own: It is this participant's.
+    """
+
+    topic: str
+    type: str
+    qos: Qos
+    writes: bool
+    key: str
+    own: bool
+
+
+class Dds:
+    """One participant of a domain; use it with ``with``.
+
+    Args:
+        network: Where.
+
+    Raises:
+        HopError: no participant can be made there.
+    """
+
+    def __init__(self, network: DdsNetwork) -> None:
+        self._watches: list[_Watch] = []
+        self._topics: dict[tuple[str, str], Topic] = {}
+        self._endpoints: dict[str, Endpoint] = {}
+        try:
+            _configure(network)
+            self._participant = DomainParticipant(network.domain)
+        except DDSException as error:
+            detail = f"no participant on domain {network.domain}: {error.msg}"
+            raise HopError("dds", detail) from error
+        self._guid = str(self._participant.guid)
+        self._discovery = [
+            (BuiltinDataReader(self._participant, topic), writes)
+            for topic, writes in (
+                (BuiltinTopicDcpsPublication, True),
+                (BuiltinTopicDcpsSubscription, False),
+            )
+        ]
+
+    def __enter__(self) -> "Dds":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave; nothing is called afterwards."""
+        for watch in self._watches:
+            watch.stop()
+        self._watches.clear()
+        # Cyclone's Python has no other word for "delete this and all that is in it".
+        self._participant.__del__()
+
+    # --- endpoints of ours --------------------------------------------------------
+
+    def reader(self, name: str, message: type[Message], qos: Qos) -> "DdsReader":
+        """Subscribe to a topic by its full ROS name."""
+        reader = DataReader(self._participant, self._topic(name, message), _qos(qos))
+        return DdsReader(reader)
+
+    def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
+        """Publish on a topic by its full ROS name."""
+        topic = self._topic(name, message)
+        return DdsWriter(DataWriter(self._participant, topic, _qos(qos)), topic)
+
+    def _topic(self, name: str, message: type[Message]) -> Topic:
+        key = name, message.ROS
+        if key not in self._topics:
+            kind = _raw(message)
+            self._topics[key] = Topic(self._participant, dds_topic(name), kind)
+        return self._topics[key]
+
+    def watch(
+        self, readers: Sequence["DdsReader"], on_data: Callable[[], None]
+    ) -> None:
+        """Call ``on_data`` in the running loop soon after any of these has news.
+
+        It is called again 2 ms later at the earliest, however much comes.
+        """
+        loop = asyncio.get_running_loop()
+        self._watches.append(_Watch(self._participant, readers, loop, on_data))
+
+    # --- endpoints of others ------------------------------------------------------
+
+    def endpoints(self) -> tuple[Endpoint, ...]:
+        """All ROS writers and readers on the domain, this participant's among them."""
+        for reader, writes in self._discovery:
+            for sample in reader.take(_MOST_TAKEN):
+                self._note(sample, writes)
+        return tuple(self._endpoints.values())
+
+    def _note(self, sample: Any, writes: bool) -> None:
+        key = str(sample.key)
+        if sample.sample_info.instance_state != InstanceState.Alive:
+            self._endpoints.pop(key, None)
+            return
+        topic = ros_topic(sample.topic_name)
+        if topic is None:
+            return
+        self._endpoints[key] = Endpoint(
+            topic,
+            ros_type(sample.type_name),
+            _read_qos(sample.qos),
+            writes,
+            key,
+            str(sample.participant_key) == self._guid,
+        )
+
+
+class DdsReader:
+    """A subscription."""
+
+    def __init__(self, reader: DataReader) -> None:
+        self.entity = reader
+
+    def take(self) -> list[Arrived]:
+        """Everything that waits, oldest first.
+
+        Raises:
+            HopError: DDS refuses.
+        """
+        try:
+            samples = self.entity.take(_MOST_TAKEN)
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
+        return [
+            Arrived(sample.payload, sample.sample_info.source_timestamp / 1e9)
+            for sample in samples
+            if sample.sample_info.valid_data
+        ]
+
+    @property
+    def writers(self) -> int:
+        """How many writers serve it."""
+        return len(self.entity.get_matched_publications())
+
+
+class DdsWriter:
+    """A publication."""
+
+    def __init__(self, writer: DataWriter, topic: Topic) -> None:
+        self._writer = writer
+        self._new = topic.data_type
+
+    def write(self, payload: bytes) -> None:
+        """Send a message with its encapsulation.
+
+        Raises:
+            HopError: DDS refuses.
+        """
+        try:
+            self._writer.write(self._new(payload))
+        except DDSException as error:
+            raise HopError("dds", error.msg) from error
+
+    @property
+    def readers(self) -> int:
+        """How many readers it serves."""
+        return len(self._writer.get_matched_subscriptions())
+
+
+# --- Cyclone's side ----------------------------------------------------------------
+
+_configured: dict[int, tuple[str, Domain]] = {}
+"""Cyclone takes one configuration a domain and process, at its first participant."""
+
+
+def _configure(network: DdsNetwork) -> None:
+    config = network.config()
+    known = _configured.get(network.domain)
+    if known is None:
+        _configured[network.domain] = config, Domain(network.domain, config)
+    elif known[0] != config:
+        raise HopError("dds", f"domain {network.domain} is configured otherwise")
+
+
+class _Payload:
+    """What Cyclone's Python takes for a sample: the bytes, as they are on the wire."""
+
+    def __init__(self, payload: bytes) -> None:
+        self.payload = payload
+        self.sample_info: Any = None
+
+    def serialize(self, **_: object) -> bytes:
+        return self.payload
+
+    @classmethod
+    def deserialize(cls, data: bytes, **_: object) -> "_Payload":
+        return cls(data)
+
+    @classmethod
+    def deserialize_key(cls, data: bytes, **_: object) -> "_Payload":
+        return cls(data)
+
+
+@cache
+def _raw(message: type[Message]) -> type[IdlStruct]:
+    """A type that DDS announces and checks, and whose samples stay bytes."""
+    kind = _idl(message)
+    for name in ("__init__", "serialize", "deserialize", "deserialize_key"):
+        setattr(kind, name, _Payload.__dict__[name])
+    return kind
+
+
+@cache
+def _nested(message: type[Message]) -> type[IdlStruct]:
+    return _idl(message)
+
+
+def _idl(message: type[Message]) -> type[IdlStruct]:
+    members = {name: _idl_type(kind) for name, kind in fields_of(message)}
+    typename = dds_type(message.ROS).replace("::", ".")
+    kind: type[IdlStruct] = make_idl_struct(
+        message.__name__, typename, members, dataclassify=False
+    )
+    return kind
+
+
+def _idl_type(kind: One | Many | Text | Structure) -> Any:
+    match kind:
+        case One("boolean"):
+            return bool
+        case One(primitive):
+            return getattr(types, primitive)
+        case Many(primitive, None):
+            return types.sequence[getattr(types, primitive)]
+        case Many(primitive, count):
+            return types.array[getattr(types, primitive), count]
+        case Text():
+            return str
+        case Structure(message, many):
+            nested = _nested(message)
+            return types.sequence[nested] if many else nested
+
+
+def _qos(qos: Qos) -> DdsQos:
+    reliability = (
+        Policy.Reliability.Reliable(duration(milliseconds=100))
+        if qos.reliable
+        else Policy.Reliability.BestEffort
+    )
+    durability = (
+        Policy.Durability.TransientLocal
+        if qos.transient_local
+        else Policy.Durability.Volatile
+    )
+    history = Policy.History.KeepLast(qos.depth)
+    return DdsQos(
+        reliability,
+        durability,
+        history,
+        # Who comes late gets as many as whoever was there could have kept.
+        Policy.DurabilityService(0, history, -1, -1, -1),
+        # ROS 2 sends and takes plain CDR of version 1.
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        # Its endpoints call the members of a type as they please, or tell no type.
+        Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
+    )
+
+
+def _read_qos(qos: DdsQos) -> Qos:
+    history = qos[Policy.History]
+    return Qos(
+        isinstance(qos[Policy.Reliability], Policy.Reliability.Reliable),
+        qos[Policy.Durability] != Policy.Durability.Volatile,
+        getattr(history, "depth", 0),
+    )
+
+
+class _Watch:
+    """A thread that waits for news and wakes the loop, which lets it wait again."""
+
+    def __init__(
+        self,
+        participant: DomainParticipant,
+        readers: Iterable[DdsReader],
+        loop: asyncio.AbstractEventLoop,
+        on_data: Callable[[], None],
+    ) -> None:
+        self._waitset = WaitSet(participant)
+        mask = SampleState.NotRead | ViewState.Any | InstanceState.Any
+        self._conditions = [ReadCondition(one.entity, mask) for one in readers]
+        for condition in self._conditions:
+            self._waitset.attach(condition)
+        self._loop, self._on_data = loop, on_data
+        self._ended = threading.Event()
+        self._rearmed = threading.Event()
+        self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Wait for nothing more."""
+        self._ended.set()
+        self._rearmed.set()
+        self._thread.join()
+
+    def _wait(self) -> None:
+        while not self._ended.is_set():
+            if not self._waitset.wait(duration(milliseconds=_WAIT_MS)):
+                continue
+            self._rearmed.clear()
+            if self._ended.is_set():
+                return
+            try:
+                self._loop.call_soon_threadsafe(self._tell)
+            except RuntimeError:  # the loop has closed
+                return
+            self._rearmed.wait()
+
+    def _tell(self) -> None:
+        if self._ended.is_set():
+            return
+        self._on_data()
+        self._loop.call_later(_REARM_S, self._rearmed.set)

@@ -1,0 +1,1 @@
+"""The language of ROS 2: messages, their bytes, and names on DDS; no I/O."""

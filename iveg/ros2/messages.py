@@ -1,0 +1,496 @@
+"""The ROS 2 messages that iVeg reads and writes, field for field as ROS defines them.
+
+Layouts are those of ROS 2 Humble and later (``vision_msgs`` 4).  Units and frames are
+those of REP-103 and REP-105.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.ros2.schema import Boolean, Float32, Float64, Int32, Many, Uint8, Uint32
+
+Floats = Annotated[NDArray[np.float32], Many("float32")]
+Doubles = Annotated[NDArray[np.float64], Many("float64")]
+Octets = Annotated[NDArray[np.uint8], Many("uint8")]
+Covariance = Annotated[NDArray[np.float64], Many("float64", 36)]
+Nine = Annotated[NDArray[np.float64], Many("float64", 9)]
+Twelve = Annotated[NDArray[np.float64], Many("float64", 12)]
+
+
+def _zeros(count: int) -> NDArray[np.float64]:
+    return np.zeros(count)
+
+
+def _none() -> NDArray[np.float32]:
+    return np.zeros(0, np.float32)
+
+
+# --- std_msgs, builtin_interfaces --------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Time:
+    """Seconds and the rest since 1970 (s, ns)."""
+
+    ROS: ClassVar[str] = "builtin_interfaces/msg/Time"
+    sec: Int32 = 0
+    nanosec: Uint32 = 0
+
+    @classmethod
+    def of(cls, seconds: float) -> "Time":
+        """The stamp of a Unix time (s)."""
+        whole = math.floor(seconds)
+        return cls(whole, min(999_999_999, round((seconds - whole) * 1e9)))
+
+    @property
+    def seconds(self) -> float:
+        """Unix time (s)."""
+        return self.sec + self.nanosec / 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """How long (s, ns)."""
+
+    ROS: ClassVar[str] = "builtin_interfaces/msg/Duration"
+    sec: Int32 = 0
+    nanosec: Uint32 = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """When something was measured and in which frame it is."""
+
+    ROS: ClassVar[str] = "std_msgs/msg/Header"
+    stamp: Time = Time()
+    frame_id: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ColorRGBA:
+    """Each 0 to 1."""
+
+    ROS: ClassVar[str] = "std_msgs/msg/ColorRGBA"
+    r: Float32 = 0.0
+    g: Float32 = 0.0
+    b: Float32 = 0.0
+    a: Float32 = 1.0
+
+
+# --- geometry_msgs, tf2_msgs -------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """(m)."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Point"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Vector3:
+    """(m), (m/s) or (rad/s)."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Vector3"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Quaternion:
+    """A turn; the default is none."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Quaternion"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+    z: Float64 = 0.0
+    w: Float64 = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position and orientation."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Pose"
+    position: Point = Point()
+    orientation: Quaternion = Quaternion()
+
+
+@dataclass(frozen=True, slots=True)
+class PoseStamped:
+    """A pose in the header's frame."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/PoseStamped"
+    header: Header = Header()
+    pose: Pose = Pose()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseWithCovariance:
+    """A pose and how sure it is."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/PoseWithCovariance"
+    pose: Pose = Pose()
+    covariance: Covariance = field(default_factory=lambda: _zeros(36))
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocities: along and about the axes."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Twist"
+    linear: Vector3 = Vector3()
+    angular: Vector3 = Vector3()
+
+
+@dataclass(frozen=True, slots=True)
+class TwistStamped:
+    """A twist in the header's frame."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/TwistStamped"
+    header: Header = Header()
+    twist: Twist = Twist()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwistWithCovariance:
+    """A twist and how sure it is."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/TwistWithCovariance"
+    twist: Twist = Twist()
+    covariance: Covariance = field(default_factory=lambda: _zeros(36))
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Where one frame is in another."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/Transform"
+    translation: Vector3 = Vector3()
+    rotation: Quaternion = Quaternion()
+
+
+@dataclass(frozen=True, slots=True)
+class TransformStamped:
+    """Where ``child_frame_id`` is in the header's frame."""
+
+    ROS: ClassVar[str] = "geometry_msgs/msg/TransformStamped"
+    header: Header = Header()
+    child_frame_id: str = ""
+    transform: Transform = Transform()
+
+
+@dataclass(frozen=True, slots=True)
+class TFMessage:
+    """What ``/tf`` and ``/tf_static`` carry."""
+
+    ROS: ClassVar[str] = "tf2_msgs/msg/TFMessage"
+    transforms: tuple[TransformStamped, ...] = ()
+
+
+# --- nav_msgs ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Odometry:
+    """Pose of ``child_frame_id`` in the header's frame; the twist in the child's."""
+
+    ROS: ClassVar[str] = "nav_msgs/msg/Odometry"
+    header: Header = Header()
+    child_frame_id: str = ""
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """The way that navigation means to go."""
+
+    ROS: ClassVar[str] = "nav_msgs/msg/Path"
+    header: Header = Header()
+    poses: tuple[PoseStamped, ...] = ()
+
+
+# --- sensor_msgs -------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaserScan:
+    """One sweep; ``ranges`` of shape (n,), (m)."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/LaserScan"
+    header: Header = Header()
+    angle_min: Float32 = 0.0
+    angle_max: Float32 = 0.0
+    angle_increment: Float32 = 0.0
+    time_increment: Float32 = 0.0
+    scan_time: Float32 = 0.0
+    range_min: Float32 = 0.0
+    range_max: Float32 = 0.0
+    ranges: Floats = field(default_factory=_none)
+    intensities: Floats = field(default_factory=_none)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BatteryState:
+    """Volts, °C, amperes, ampere hours; ``percentage`` 0 to 1, NaN when unknown."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/BatteryState"
+    header: Header = Header()
+    voltage: Float32 = 0.0
+    temperature: Float32 = 0.0
+    current: Float32 = 0.0
+    charge: Float32 = 0.0
+    capacity: Float32 = 0.0
+    design_capacity: Float32 = 0.0
+    percentage: Float32 = 0.0
+    power_supply_status: Uint8 = 0
+    power_supply_health: Uint8 = 0
+    power_supply_technology: Uint8 = 0
+    present: Boolean = True
+    cell_voltage: Floats = field(default_factory=_none)
+    cell_temperature: Floats = field(default_factory=_none)
+    location: str = ""
+    serial_number: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """Rows of ``step`` bytes each; depth pictures are ``16UC1`` (mm), ``32FC1`` (m)."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/Image"
+    header: Header = Header()
+    height: Uint32 = 0
+    width: Uint32 = 0
+    encoding: str = ""
+    is_bigendian: Uint8 = 0
+    step: Uint32 = 0
+    data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+
+@dataclass(frozen=True, slots=True)
+class RegionOfInterest:
+    """A part of a picture (pixels)."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/RegionOfInterest"
+    x_offset: Uint32 = 0
+    y_offset: Uint32 = 0
+    height: Uint32 = 0
+    width: Uint32 = 0
+    do_rectify: Boolean = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraInfo:
+    """A camera's numbers; ``p`` is the projection of the rectified picture."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
+    header: Header = Header()
+    height: Uint32 = 0
+    width: Uint32 = 0
+    distortion_model: str = ""
+    d: Doubles = field(default_factory=lambda: _zeros(0))
+    k: Nine = field(default_factory=lambda: _zeros(9))
+    r: Nine = field(default_factory=lambda: _zeros(9))
+    p: Twelve = field(default_factory=lambda: _zeros(12))
+    binning_x: Uint32 = 0
+    binning_y: Uint32 = 0
+    roi: RegionOfInterest = RegionOfInterest()
+
+
+@dataclass(frozen=True, slots=True)
+class PointField:
+    """One number of each point; ``datatype`` 7 is float32."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/PointField"
+    name: str = ""
+    offset: Uint32 = 0
+    datatype: Uint8 = 7
+    count: Uint32 = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointCloud2:
+    """``width`` × ``height`` points of ``point_step`` bytes each."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/PointCloud2"
+    header: Header = Header()
+    height: Uint32 = 1
+    width: Uint32 = 0
+    fields: tuple[PointField, ...] = ()
+    is_bigendian: Boolean = False
+    point_step: Uint32 = 0
+    row_step: Uint32 = 0
+    data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
+    is_dense: Boolean = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompressedImage:
+    """A part of ``Marker`` that iVeg leaves empty."""
+
+    ROS: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+    header: Header = Header()
+    format: str = ""
+    data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+
+# --- vision_msgs -------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectHypothesis:
+    """What it may be; ``score`` 0 to 1."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesis"
+    class_id: str = ""
+    score: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ObjectHypothesisWithPose:
+    """What it may be, and where."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesisWithPose"
+    hypothesis: ObjectHypothesis = ObjectHypothesis()
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+
+
+@dataclass(frozen=True, slots=True)
+class BoundingBox3D:
+    """A box about its centre; ``size`` (m)."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/BoundingBox3D"
+    center: Pose = Pose()
+    size: Vector3 = Vector3()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection3D:
+    """One seen thing."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Detection3D"
+    header: Header = Header()
+    results: tuple[ObjectHypothesisWithPose, ...] = ()
+    bbox: BoundingBox3D = BoundingBox3D()
+    id: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection3DArray:
+    """One look of a detector that knows depth."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
+    header: Header = Header()
+    detections: tuple[Detection3D, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Point2D:
+    """(pixels)."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Point2D"
+    x: Float64 = 0.0
+    y: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PicturePose:
+    """``vision_msgs/Pose2D``: pixels and a turn (rad)."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Pose2D"
+    position: Point2D = Point2D()
+    theta: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BoundingBox2D:
+    """A box about its centre (pixels)."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/BoundingBox2D"
+    center: PicturePose = PicturePose()
+    size_x: Float64 = 0.0
+    size_y: Float64 = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection2D:
+    """One thing seen in a picture."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Detection2D"
+    header: Header = Header()
+    results: tuple[ObjectHypothesisWithPose, ...] = ()
+    bbox: BoundingBox2D = BoundingBox2D()
+    id: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection2DArray:
+    """One look of a detector that knows no depth."""
+
+    ROS: ClassVar[str] = "vision_msgs/msg/Detection2DArray"
+    header: Header = Header()
+    detections: tuple[Detection2D, ...] = ()
+
+
+# --- visualization_msgs ------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class UVCoordinate:
+    """A part of ``Marker`` that iVeg leaves empty."""
+
+    ROS: ClassVar[str] = "visualization_msgs/msg/UVCoordinate"
+    u: Float32 = 0.0
+    v: Float32 = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshFile:
+    """A part of ``Marker`` that iVeg leaves empty."""
+
+    ROS: ClassVar[str] = "visualization_msgs/msg/MeshFile"
+    filename: str = ""
+    data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marker:
+    """Something that RViz draws; ``type`` 3 is a cylinder, 9 a text."""
+
+    ROS: ClassVar[str] = "visualization_msgs/msg/Marker"
+    header: Header = Header()
+    ns: str = ""
+    id: Int32 = 0
+    type: Int32 = 0
+    action: Int32 = 0
+    pose: Pose = Pose()
+    scale: Vector3 = Vector3()
+    color: ColorRGBA = ColorRGBA()
+    lifetime: Duration = Duration()
+    frame_locked: Boolean = False
+    points: tuple[Point, ...] = ()
+    colors: tuple[ColorRGBA, ...] = ()
+    texture_resource: str = ""
+    texture: CompressedImage = field(default_factory=CompressedImage)
+    uv_coordinates: tuple[UVCoordinate, ...] = ()
+    text: str = ""
+    mesh_resource: str = ""
+    mesh_file: MeshFile = field(default_factory=MeshFile)
+    mesh_use_embedded_materials: Boolean = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerArray:
+    """What RViz draws at once."""
+
+    ROS: ClassVar[str] = "visualization_msgs/msg/MarkerArray"
+    markers: tuple[Marker, ...] = ()

@@ -1,0 +1,79 @@
+"""How ROS 2 names appear on DDS, and which quality of service ROS asks for by default.
+
+Source: ROS 2 design, "Topic and Service name mapping to DDS", and the profiles of
+``rmw`` and ``tf2_ros``.
+"""
+
+import re
+from dataclasses import dataclass, replace
+
+from iveg.domain.errors import UnreadableError
+
+_PREFIX = "rt"
+_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """What an endpoint asks for or offers.
+
+    Attributes:
+        reliable: What was lost is sent again; else best effort.
+        transient_local: Who comes late gets what was said before; else volatile.
+        depth: Newest messages that wait to be read.
+    """
+
+    reliable: bool = True
+    transient_local: bool = False
+    depth: int = 10
+
+    def hears(self, offered: "Qos") -> bool:
+        """Whether a reader that asks for this is served by such a writer."""
+        return (offered.reliable or not self.reliable) and (
+            offered.transient_local or not self.transient_local
+        )
+
+    def newest(self, depth: int = 1) -> "Qos":
+        """The same with another depth."""
+        return replace(self, depth=depth)
+
+
+DEFAULT = Qos()
+SENSOR_DATA = Qos(reliable=False, depth=5)
+TF = Qos(depth=100)
+TF_STATIC = Qos(transient_local=True, depth=100)
+
+
+def full_name(name: str, namespace: str = "") -> str:
+    """A topic's full ROS name: ``odom`` is below the namespace, ``/odom`` is not.
+
+    Raises:
+        UnreadableError: not a name of a ROS topic.
+    """
+    if _NAME.fullmatch(name) is None:
+        raise UnreadableError("bad_topic", f"{name!r} is not a ROS topic")
+    if name.startswith("/"):
+        return name
+    inside = namespace.strip("/")
+    return f"/{inside}/{name}" if inside else f"/{name}"
+
+
+def dds_topic(name: str) -> str:
+    """The DDS topic of a full ROS name: ``/odom`` → ``rt/odom``."""
+    return _PREFIX + name
+
+
+def ros_topic(dds: str) -> str | None:
+    """The ROS name of a DDS topic; None for what is not a ROS topic."""
+    return dds.removeprefix(_PREFIX) if dds.startswith(_PREFIX + "/") else None
+
+
+def dds_type(ros: str) -> str:
+    """The DDS type: ``nav_msgs/msg/Odometry`` → ``nav_msgs::msg::dds_::Odometry_``."""
+    *package, name = ros.split("/")
+    return "::".join((*package, "dds_", name + "_"))
+
+
+def ros_type(dds: str) -> str:
+    """The ROS name of a DDS type; a type of another origin stays as it is."""
+    return dds.replace("::dds_::", "::").removesuffix("_").replace("::", "/")

@@ -1,0 +1,150 @@
+"""Two processes over DDS, unicast on loopback: qualities of service, who is there."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from iveg.domain.errors import HopError
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as m
+from iveg.ros2.names import Qos
+from tests.dds import Dds, DdsReader, free_domain, loopback
+from tests.processes import ROOT, until
+
+RELIABLE, BEST_EFFORT = names.DEFAULT, names.SENSOR_DATA
+KEPT = names.TF_STATIC
+
+
+@pytest.fixture(scope="module")
+def domain() -> int:
+    return free_domain()
+
+
+@pytest.fixture(scope="module")
+def talker(domain: int) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.integration.dds_talker", str(domain)],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        start_new_session=True,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait(10)
+
+
+@pytest.fixture
+def dds(domain: int, talker: subprocess.Popen[bytes]) -> Iterator[Dds]:
+    with Dds(loopback(domain)) as found:
+        yield found
+
+
+def heard(reader: DdsReader) -> list[float] | None:
+    """Numbers that wait; None when there are none."""
+    found = [cdr.read(m.Twist, one.payload).linear.x for one in reader.take()]
+    return found or None
+
+
+@pytest.mark.parametrize(
+    ("topic", "asked"),
+    [
+        ("/best_effort", BEST_EFFORT),
+        ("/reliable", BEST_EFFORT),
+        ("/reliable", RELIABLE),
+        ("/kept", KEPT),
+    ],
+)
+def test_a_reader_hears_a_writer_that_offers_what_it_asks(
+    dds: Dds, topic: str, asked: Qos
+) -> None:
+    reader = dds.reader(topic, m.Twist, asked)
+
+    found = until(lambda: heard(reader), 10.0, f"a message on {topic}")
+
+    assert found == sorted(found)
+
+
+def test_who_comes_late_gets_what_was_kept(dds: Dds) -> None:
+    kept = dds.reader("/kept", m.Twist, KEPT)
+
+    numbers = until(lambda: heard(kept), 10.0, "what was kept")
+
+    assert numbers == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("topic", "asked"), [("/best_effort", RELIABLE), ("/reliable", KEPT)]
+)
+def test_a_reader_that_asks_for_more_than_is_offered_hears_nothing_and_shows_it(
+    dds: Dds, topic: str, asked: Qos
+) -> None:
+    reader = dds.reader(topic, m.Twist, asked)
+    other = dds.reader(topic, m.Twist, BEST_EFFORT)
+
+    until(lambda: heard(other), 10.0, f"a message on {topic}")
+    offered = next(one for one in dds.endpoints() if one.topic == topic and one.writes)
+
+    assert reader.writers == 0
+    assert not asked.hears(offered.qos)
+
+
+def test_endpoints_have_the_names_of_ros_and_say_whose_they_are(dds: Dds) -> None:
+    writer = dds.writer("/ours", m.TwistStamped, RELIABLE)
+
+    def foreign() -> bool:
+        return {"/best_effort", "/reliable", "/kept"} <= {
+            one.topic for one in dds.endpoints() if one.writes and not one.own
+        }
+
+    until(foreign, 10.0, "the talker's topics")
+    ours = [one for one in dds.endpoints() if one.own and one.topic == "/ours"]
+
+    assert writer.readers == 0
+    assert [(one.type, one.writes) for one in ours] == [
+        ("geometry_msgs/msg/TwistStamped", True)
+    ]
+
+
+def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> None:
+    """DDS checks payloads against the type before anybody reads them."""
+    with Dds(loopback(domain)) as other:
+        writer = other.writer("/short", m.Twist, RELIABLE)
+        reader = dds.reader("/short", m.Twist, RELIABLE)
+        until(lambda: writer.readers == 1 and reader.writers == 1, 10.0, "both met")
+
+        with pytest.raises(HopError):
+            writer.write(cdr.write(m.Vector3()))
+
+        assert reader.take() == []
+
+
+def test_a_domain_that_was_opened_otherwise_is_refused(domain: int) -> None:
+    with Dds(loopback(domain)), pytest.raises(HopError, match="otherwise"):
+        Dds(type(loopback(domain))(domain, "lo", ("127.0.0.2",)))
+
+
+def test_a_network_interface_that_does_not_exist_is_named() -> None:
+    unused = free_domain()
+
+    with pytest.raises(HopError, match="no participant"):
+        Dds(type(loopback(0))(unused, "iveg-none"))
+
+
+def test_a_process_that_was_killed_is_gone_within_seconds(
+    dds: Dds, talker: subprocess.Popen[bytes]
+) -> None:
+    until(lambda: bool(_topics(dds)), 10.0, "the talker")
+
+    os.kill(talker.pid, signal.SIGKILL)
+
+    until(lambda: not _topics(dds), 8.0, "its writers are forgotten")
+
+
+def _topics(dds: Dds) -> set[str]:
+    return {one.topic for one in dds.endpoints() if one.writes and not one.own}

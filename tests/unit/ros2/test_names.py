@@ -1,0 +1,60 @@
+"""Names and qualities of service as ROS 2 puts them on DDS."""
+
+import pytest
+
+from iveg.domain.errors import UnreadableError
+from iveg.ros2 import messages, names
+from iveg.ros2.names import Qos
+
+
+def test_a_topic_gets_the_prefix_of_ros() -> None:
+    assert names.dds_topic("/agi/odom") == "rt/agi/odom"
+    assert names.ros_topic("rt/agi/odom") == "/agi/odom"
+
+
+@pytest.mark.parametrize("foreign", ["rq/agi/list", "ros_discovery_info", "rtodom"])
+def test_what_is_no_topic_of_ros_has_no_name_there(foreign: str) -> None:
+    assert names.ros_topic(foreign) is None
+
+
+def test_a_type_gets_the_module_and_the_underscore_of_ros() -> None:
+    dds = "nav_msgs::msg::dds_::Odometry_"
+
+    assert names.dds_type(messages.Odometry.ROS) == dds
+    assert names.ros_type(dds) == "nav_msgs/msg/Odometry"
+
+
+@pytest.mark.parametrize(
+    ("name", "namespace", "full"),
+    [
+        ("odom", "", "/odom"),
+        ("odom", "/agi", "/agi/odom"),
+        ("camera/depth", "agi/", "/agi/camera/depth"),
+        ("/tf", "/agi", "/tf"),
+    ],
+)
+def test_a_relative_name_is_below_the_namespace(
+    name: str, namespace: str, full: str
+) -> None:
+    assert names.full_name(name, namespace) == full
+
+
+@pytest.mark.parametrize("name", ["", "/", "a//b", "1odom", "odom/", "a b", "~/odom"])
+def test_what_cannot_name_a_topic_is_refused(name: str) -> None:
+    with pytest.raises(UnreadableError, match="bad_topic"):
+        names.full_name(name)
+
+
+@pytest.mark.parametrize(
+    ("asked", "offered", "heard"),
+    [
+        (Qos(reliable=False), Qos(reliable=True), True),
+        (Qos(reliable=True), Qos(reliable=False), False),
+        (Qos(transient_local=True), Qos(), False),
+        (Qos(), Qos(transient_local=True), True),
+    ],
+)
+def test_a_reader_is_served_by_a_writer_that_offers_no_less(
+    asked: Qos, offered: Qos, *, heard: bool
+) -> None:
+    assert asked.hears(offered) is heard
