@@ -115,8 +115,8 @@ class Dss:
         self.recorder = Recorder(url, journal_file(url, directory))
         self.queries = Queries(url)
         self.minutes = Minutes(self.hub, self.recorder, start)
-        world = World(settings.robots)
         self.chain = Chain(start)
+        world = World(settings.robots, self.chain.probe)
         self.ingest = Ingest(world.robots.__contains__, self._rejected)
         self.journal = FileJournal(directory / "commands.jsonl")
         self._direct = DirectReader(

@@ -10,7 +10,8 @@ from iveg.domain.world import RobotState
 
 EXPECTED = "alert.person_slowed"
 """The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
-CLOCK_OFFSET_S = 0.25
+ESTIMATED_SHOWN_AFTER_S = 5.0
+"""So long a robot may take to say that it is a recording."""
 UNREADABLE_SHOWN_S = 10.0
 
 
@@ -40,10 +41,23 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
         moving = not robot.stands
         key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
         yield Condition("P1" if moving else "P2", key, name, name, slots)
-    offset = robot.clock.offset_s
-    if offset is not None and abs(offset) > CLOCK_OFFSET_S:
+    offset = robot.clock.warning(now)
+    if offset is not None:
         slots = {**slots, "offset": round(offset, 2)}
         yield Condition("P3", "alert.clock_offset", name, name, slots)
     unreadable = robot.unreadable_at
     if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
         yield Condition("P3", "alert.unreadable_detection", name, name, slots)
+
+
+def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
+    """Robots whose age is only estimated: one notice names them all."""
+    names = [
+        robot.robot_id
+        for robot in robots
+        if robot.estimated_since is not None
+        and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
+    ]
+    if names:
+        slots: dict[str, Slot] = {"robots": ", ".join(names)}
+        yield Condition("P3", "alert.age_estimated", "fleet", None, slots)

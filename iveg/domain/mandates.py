@@ -257,11 +257,13 @@ def hazards_of(
                 person.decision_id,
             )
     for peer in world.robots.values():
-        age = peer.age_s(now)
+        since = peer.likely_pose_at()
         # A recording cannot yield, and nobody yields to it.
-        if peer.odometry is None or age is None or age > RING_S or peer.is_replay:
+        if peer.odometry is None or since is None or peer.is_replay:
             continue
-        if peer.stands and age <= SILENCE_S:
+        age = max(0.0, now.mono - since)
+        known = peer.age_s(now)
+        if age > RING_S or (peer.stands and known is not None and known <= SILENCE_S):
             continue
         pose = peer.odometry.pose
         yield Hazard(

@@ -31,6 +31,14 @@ class Instant:
 
 
 @dataclass(frozen=True, slots=True)
+class FeedbackRef:
+    """One feedback message of iVeg: its boot, and its place in the count."""
+
+    boot: str
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
 class Origin:
     """Who counts this message and where it stands in the count (interfaces.md §1).
 
@@ -39,12 +47,18 @@ class Origin:
         seq: One more for each message of a topic; None when the sender is silent.
         stamp: The robot's clock, exactly as sent; for display and clock offset only.
         stamp_s: The same as Unix seconds; None where it cannot be read.
+        mono: The robot's monotonic seconds since this boot, one axis for all topics.
+        echoes: The sender tells what it has heard; its age can be proven.
+        heard: The newest feedback that it had heard; None before the first.
     """
 
     boot: str | None = None
     seq: int | None = None
     stamp: str | None = None
     stamp_s: float | None = None
+    mono: float | None = None
+    echoes: bool = False
+    heard: FeedbackRef | None = None
 
 
 @dataclass(frozen=True, slots=True)

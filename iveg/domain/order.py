@@ -1,23 +1,20 @@
-"""Order and clocks of what one robot sends (safety.md §3.1, §3.2).
+"""Order of what one robot sends (docs/interfaces.md §1).
 
-Newest wins: nothing waits for a message that is late.  A robot's stamp says how long a
-message travelled, relative to its fastest one; it never decides which is newer.
+Newest wins: nothing waits for a message that is late, and no stamp ever decides which
+is newer.
 """
 
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Literal
 
-from iveg.domain.observations import Instant, Origin
+from iveg.domain.observations import Origin
 
 Verdict = Literal["new", "late", "duplicate"]
 
 _REMEMBERED_SEQS = 128
 _REMEMBERED_BOOTS = 16
 _GROWN_TO_RETURN = 5
-_BUCKET_S, _BUCKETS = 5.0, 12
-_JUMP_S = 10.0
-"""No message travels that much longer than another: the clock was set (fault F16)."""
 
 
 @dataclass(slots=True)
@@ -80,37 +77,3 @@ class Order:
         self.boot, self.seq, self._returning = boot, seq, None
         self._recent.clear()
         self._recent.append(seq)
-
-
-@dataclass(slots=True)
-class ClockEstimate:
-    """Offset of a robot's clock against ours, by the fastest message of a minute.
-
-    The minimum of (arrival - stamp) over 60 s is the offset plus the shortest path
-    delay; what a message took beyond it is its own delay (the min-filter of NTP).
-    """
-
-    _buckets: deque[tuple[float, float]] = field(
-        default_factory=lambda: deque(maxlen=_BUCKETS)
-    )
-
-    def observe(self, origin: Origin, at: Instant) -> float:
-        """Take one message in; return its extra delay (s), 0 without a stamp."""
-        if origin.stamp_s is None:
-            return 0.0
-        transit = at.wall - origin.stamp_s
-        if self._buckets and abs(transit - self._least()) > _JUMP_S:
-            self._buckets.clear()
-        if not self._buckets or at.mono - self._buckets[-1][0] > _BUCKET_S:
-            self._buckets.append((at.mono, transit))
-        elif transit < self._buckets[-1][1]:
-            self._buckets[-1] = (self._buckets[-1][0], transit)
-        return max(0.0, transit - self._least())
-
-    def _least(self) -> float:
-        return min(transit for _, transit in self._buckets)
-
-    @property
-    def offset_s(self) -> float | None:
-        """How far the robot's clock is behind ours (s); None without stamps."""
-        return self._least() if self._buckets else None

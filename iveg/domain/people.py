@@ -290,10 +290,11 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
         return one
     nearest: tuple[float, str] | None = None
     for peer in world.robots.values():
-        if peer is observer or peer.odometry is None or peer.pose_at is None:
+        since = peer.likely_pose_at()
+        if peer is observer or peer.odometry is None or since is None:
             continue
         reach = _PEER_GATE_M + profile_of(peer.robot_id).length / 2
-        reach += _GATE_SPEED * min(1.0, max(0.0, at.mono - peer.pose_at))
+        reach += _GATE_SPEED * min(1.0, max(0.0, at.mono - since))
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):
             nearest = (residual, peer.robot_id)

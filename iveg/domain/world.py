@@ -8,8 +8,11 @@ from bisect import bisect_left
 from collections import Counter, deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
+from iveg.domain.age import FeedbackLedger
+from iveg.domain.clocks import RobotClock
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import (
@@ -26,7 +29,8 @@ from iveg.domain.observations import (
     Road,
     SafetyReport,
 )
-from iveg.domain.order import ClockEstimate, Order, Verdict
+from iveg.domain.order import Order, Verdict
+from iveg.domain.probe import ProbeLag
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
@@ -35,6 +39,7 @@ STANDING_SPEED = 0.02
 """Below this (m/s and rad/s) a robot stands (safety.md §2.2)."""
 REPLAY_TASK = "replay"
 _HISTORY = 128
+_ASKED_AGE_S = LATE_S + 0.1
 GAIN_OVER_S = 1.0
 
 
@@ -43,9 +48,16 @@ class RobotState:
     """What is known of one robot.
 
     Attributes:
-        pose_at: Source moment of the newest odometry on our monotonic clock (s).
+        pose_at: The newest odometry was not measured before this moment (monotonic,
+            s): proven if the robot echoes, else estimated; None while neither is.
+        estimated_since: When odometry first came that proves nothing, if the newest
+            does not (monotonic, s).
+        unproven_since: When odometry first came whose age nobody knows (monotonic, s).
         heard_at: Arrival of the newest message of any kind (monotonic, s).
-        detections_at: Arrival of the newest detection frame (monotonic, s).
+        detections_at: Like ``pose_at``, of the newest detection frame.
+        sighted_at: The same of the frame that was taken last, newest or not; where
+            nothing is known, the moment that is likely.
+        scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
         unreadable_at: When a detection last could not be used (monotonic, s).
     """
 
@@ -53,12 +65,15 @@ class RobotState:
     odometry: Odometry | None = None
     odometry_received: Instant | None = None
     pose_at: float | None = None
+    estimated_since: float | None = None
+    unproven_since: float | None = None
     scan: LaserScan | None = None
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None
     frame: DetectionFrame | None = None
     frame_road: Road = "orion"
     detections_at: float | None = None
+    sighted_at: Instant | None = None
     unreadable_at: float | None = None
     safety: SafetyReport | None = None
     safety_received: Instant | None = None
@@ -66,7 +81,7 @@ class RobotState:
     navigation: Navigation | None = None
     command_status: str | None = None
     heard_at: float | None = None
-    clock: ClockEstimate = field(default_factory=ClockEstimate)
+    clock: RobotClock = field(default_factory=RobotClock)
     _orders: dict[type[Observation], Order] = field(default_factory=dict)
     _poses: deque[tuple[float, Pose2D]] = field(
         default_factory=lambda: deque(maxlen=_HISTORY)
@@ -76,14 +91,22 @@ class RobotState:
     )
 
     def age_s(self, now: Instant) -> float | None:
-        """Age of the pose (s); None before the first."""
+        """Age of the pose at most (s); None before the first, and while unknown."""
         return None if self.pose_at is None else max(0.0, now.mono - self.pose_at)
 
+    def likely_pose_at(self) -> float | None:
+        """``pose_at``; where nobody knows it, when the pose came (monotonic, s)."""
+        if self.pose_at is None and self.odometry_received is not None:
+            return self.odometry_received.mono
+        return self.pose_at
+
     def link(self, now: Instant) -> Link:
-        """LIVE, LATE or LOST by the age of the pose (product.md §2)."""
+        """LIVE, LATE or LOST by the age of the pose (docs/safety.md, "Age")."""
         age = self.age_s(now)
         if age is None:
-            return "UNKNOWN"
+            since = self.unproven_since
+            lost = since is not None and now.mono - since > LATE_S
+            return "LOST" if lost else "UNKNOWN"
         if age <= LIVE_S:
             return "LIVE"
         return "LATE" if age <= LATE_S else "LOST"
@@ -156,9 +179,18 @@ class RobotState:
 
 
 class World:
-    """All robots of the fleet and the air around them."""
+    """All robots of the fleet and the air around them.
 
-    def __init__(self, robot_ids: Sequence[str]) -> None:
+    Args:
+        probe: Tells how late FIWARE is; without one nobody asks.
+
+    Attributes:
+        ledger: When iVeg's own feedback was composed, which robots echo.
+    """
+
+    def __init__(self, robot_ids: Sequence[str], probe: ProbeLag | None = None) -> None:
+        self.ledger = FeedbackLedger()
+        self._probe = probe
         self.robots = {robot_id: RobotState(robot_id) for robot_id in robot_ids}
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
@@ -198,14 +230,61 @@ class World:
         self.counters[f"{type(observation).__name__}.{verdict}"] += 1
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
-        if received.asked:
-            delay = _age_when_asked(origin, at)
-        else:
+        if not received.asked:
             robot.heard_at = at.mono
-            delay = robot.clock.observe(origin, at)
+        likely = self._likely_age(robot, received, origin)
+        if isinstance(observation, DetectionFrame):
+            seen_at = self._measured_at(origin, received, likely)
+            if seen_at is None:
+                # A person counts, though nobody can prove how fresh the look is.
+                seen_at = at.mono - (likely or 0.0)
+            robot.sighted_at = _dated(at, seen_at)
         if verdict == "new":
-            _update(robot, received, delay)
+            _update(robot, received, self._measured_at(origin, received, likely))
         return verdict
+
+    def _likely_age(
+        self, robot: RobotState, received: Received, origin: Origin
+    ) -> float | None:
+        """How old a message was when it came, by its stamp and our probe (s)."""
+        at = received.at
+        if received.asked:
+            return _age_when_asked(origin, at)
+        lag: float | None = 0.0
+        if self._probe is not None:
+            lag = self._probe.lag(at) if self._probe.is_known else None
+        kind = type(received.observation)
+        return robot.clock.delay(kind, origin, at, received.road, lag)
+
+    def _measured_at(
+        self, origin: Origin, received: Received, likely: float | None
+    ) -> float | None:
+        """The moment that a message was not measured before (monotonic, s).
+
+        Of a robot that echoes only a proof counts.
+        """
+        at = received.at
+        if not origin.echoes:
+            return None if likely is None else at.mono - likely
+        proven = self.ledger.composed_at(origin.heard)
+        if proven is None or not received.asked:
+            return proven
+        return min(proven, at.mono - _ASKED_AGE_S)
+
+    def age_then(self, received: Received) -> float:
+        """How old the newest of its kind was at most when it came (s).
+
+        Infinite where nobody knows, and for odometry whose age is only estimated: an
+        estimate proves nothing.
+        """
+        observation, moment = received.observation, None
+        if isinstance(observation, SafetyReport):
+            reported = self.robot(observation.robot_id).safety_received
+            moment = None if reported is None else reported.mono
+        elif isinstance(observation, Odometry):
+            robot = self.robot(observation.robot_id)
+            moment = robot.pose_at if robot.estimated_since is None else None
+        return inf if moment is None else max(0.0, received.at.mono - moment)
 
     def live_robots(self) -> Iterable[RobotState]:
         """Robots that are not recordings."""
@@ -215,29 +294,34 @@ class World:
 def _age_when_asked(origin: Origin, at: Instant) -> float:
     """How old Orion's answer is at least (s): nothing that was asked for looks live."""
     told = 0.0 if origin.stamp_s is None else at.wall - origin.stamp_s
-    return max(told, LATE_S + 0.1)
+    return max(told, _ASKED_AGE_S)
 
 
-def _update(robot: RobotState, received: Received, delay: float) -> None:
+def _update(robot: RobotState, received: Received, moment: float | None) -> None:
+    """Take the newest of its kind in; ``moment`` is when it was measured, or None."""
     observation, at = received.observation, received.at
-    seen_at = at.later(-delay)
     match observation:
         case Odometry():
-            robot.odometry, robot.odometry_received = observation, at
-            robot.pose_at = _newer(robot.pose_at, seen_at)
-            moment = observation.origin.stamp_s
-            robot.remember_pose(at.wall if moment is None else moment, observation.pose)
-            robot.remember_speed(seen_at.mono, observation.twist.linear_x)
+            _drive(robot, observation, at, moment)
         case LaserScan():
-            robot.scan, robot.scan_received = observation, seen_at
+            robot.scan, robot.scan_received = observation, _dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.stamp_s)
         case DetectionFrame():
+            robot.detections_at = _not_before(
+                robot.detections_at, robot.frame, observation.origin, moment
+            )
             robot.frame, robot.frame_road = observation, received.road
-            robot.detections_at = _newer(robot.detections_at, seen_at)
             if observation.unreadable:
                 robot.unreadable_at = at.mono
         case SafetyReport():
-            robot.safety, robot.safety_received = observation, seen_at
+            known = robot.safety_received
+            moment = _not_before(
+                None if known is None else known.mono,
+                robot.safety,
+                observation.origin,
+                moment,
+            )
+            robot.safety, robot.safety_received = observation, _dated(at, moment)
             robot.safety_road = received.road
         case Navigation():
             robot.navigation = observation
@@ -245,6 +329,45 @@ def _update(robot: RobotState, received: Received, delay: float) -> None:
             robot.command_status = getattr(observation, "status", robot.command_status)
 
 
-def _newer(before: float | None, seen_at: Instant) -> float:
-    """What is newer by its order cannot be older than what was known before it."""
-    return seen_at.mono if before is None else max(before, seen_at.mono)
+def _drive(
+    robot: RobotState, odometry: Odometry, at: Instant, moment: float | None
+) -> None:
+    """Take the newest odometry in."""
+    origin, pose = odometry.origin, odometry.pose
+    moment = _not_before(robot.pose_at, robot.odometry, origin, moment)
+    robot.pose_at = moment
+    robot.unproven_since = _since(robot.unproven_since, at, holds=moment is None)
+    robot.estimated_since = _since(robot.estimated_since, at, holds=not origin.echoes)
+    robot.odometry, robot.odometry_received = odometry, at
+    robot.remember_pose(at.wall if origin.stamp_s is None else origin.stamp_s, pose)
+    likely = at.mono if moment is None else moment
+    robot.remember_speed(likely, odometry.twist.linear_x)
+
+
+def _since(before: float | None, at: Instant, *, holds: bool) -> float | None:
+    """When something began that holds now (monotonic, s)."""
+    if not holds:
+        return None
+    return at.mono if before is None else before
+
+
+def _not_before(
+    known: float | None,
+    before: Odometry | DetectionFrame | SafetyReport | None,
+    origin: Origin,
+    moment: float | None,
+) -> float | None:
+    """The moment of the newest; it was measured after the one before it was.
+
+    That holds within a boot, and where messages are counted.
+    """
+    if known is None or before is None:
+        return moment
+    if origin.seq is None or origin.boot is None or origin.boot != before.origin.boot:
+        return moment
+    return known if moment is None else max(known, moment)
+
+
+def _dated(at: Instant, moment: float | None) -> Instant | None:
+    """A monotonic moment on both clocks."""
+    return None if moment is None else at.later(moment - at.mono)

@@ -178,6 +178,7 @@ class ReplayedRobot:
             slow_s=settings.slow_s,
             stand_s=settings.stand_s,
             uplink=settings.uplink,
+            echoes=False,
         )
 
     async def run(self) -> None:

@@ -35,12 +35,24 @@ class Wire(BaseModel):
     )
 
 
+Count = Annotated[int, Field(ge=0, le=2**53)]
+
+
+class HeardValue(Wire):
+    """The newest feedback of iVeg that a robot has heard."""
+
+    boot: Text
+    seq: Count
+
+
 class OriginFields(Wire):
-    """Identity and order that each robot message carries."""
+    """Identity and order that each robot message carries; ``heard`` may be ``null``."""
 
     boot: Text | None = None
-    seq: int | None = Field(default=None, ge=0, le=2**53)
+    seq: Count | None = None
     stamp: Text | None = None
+    mono: Annotated[float, Field(ge=0, le=1e12)] | None = None
+    heard: HeardValue | None = None
 
 
 class OdometryValue(OriginFields):

@@ -230,6 +230,7 @@ class Assessor:
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
+        yield from conditions.of_fleet(self.world.live_robots(), now)
 
     def close_earlier(
         self,

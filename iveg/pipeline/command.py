@@ -184,8 +184,11 @@ class Commander:
 
     # --- what comes back ----------------------------------------------------------
 
-    def take(self, received: Received) -> None:
-        """Show a robot's machine what arrived; only what is new gets here."""
+    def take(self, received: Received, age_s: float = 0.0) -> None:
+        """Show a robot's machine what arrived; only what is new gets here.
+
+        It was at most ``age_s`` old when it came; infinite where nobody knows.
+        """
         observation, at = received.observation, received.at
         machine = self.machines.get(getattr(observation, "robot_id", ""))
         if machine is None:
@@ -194,14 +197,19 @@ class Commander:
         match observation:
             case SafetyReport():
                 effects = machine.reported(
-                    observation, at, received.road, self._new_id()
+                    observation, at, received.road, self._new_id(), age_s
                 )
             case CommandAnswer():
                 effects = machine.answered(observation, at, received.road)
             case Odometry():
                 twist = observation.twist
                 effects = machine.odometry(
-                    twist.linear_x, twist.angular_z, at, self._new_id()
+                    twist.linear_x,
+                    twist.angular_z,
+                    at,
+                    self._new_id(),
+                    observation.origin,
+                    age_s,
                 )
         self._perform(machine, effects, at)
 

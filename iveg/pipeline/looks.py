@@ -71,11 +71,7 @@ class Looks:
     def _look(
         self, frame: DetectionFrame, received: Received, rule: Rule
     ) -> list[Placed]:
-        delay = 0.0
-        robot = self._world.robot(frame.robot_id)
-        if robot.detections_at is not None:
-            delay = max(0.0, received.at.mono - robot.detections_at)
-        seen_at = received.at.later(-delay)
+        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
         for one in placed:
             self._describe(one, frame, received)

@@ -62,7 +62,7 @@ class RuleLoop:
                 continue
             # The second road's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
-                self._commander.take(received)
+                self._commander.take(received, self._assessor.world.age_then(received))
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)

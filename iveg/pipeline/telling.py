@@ -13,6 +13,9 @@ from iveg.pipeline.ports import Fleet
 class Teller:
     """Writes the feedback and hands it to the fleet.
 
+    One count goes over all topics of a boot of iVeg, so that what a robot echoes names
+    one message (docs/interfaces.md §4).
+
     Args:
         other: The stamp of each robot's newest confident object of another class.
         stamp: Writes a wall-clock moment the way the wire does.
@@ -46,7 +49,11 @@ class Teller:
             for robot in self._world.robots.values()
             if robot.safety is not None and robot.safety.origin.seq is not None
         }
-        for robot in self._world.robots.values():
+        robots = self._world.robots
+        first, last = self._seq + 1, self._seq + len(robots)
+        # Before anybody can have heard it: a moment too early makes ages no younger.
+        self._world.ledger.composed(self._boot, first, last, now.mono)
+        for robot in robots.values():
             self._seq += 1
             self._fleet.tell(self._feedback(robot, alerts, mandates, seen, now))
 

@@ -21,6 +21,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
     Hold,
+    Instant,
     LaserScan,
     Navigation,
     Odometry,
@@ -29,6 +30,7 @@ from iveg.domain.observations import (
 from iveg.domain.profiles import RobotProfile
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
+from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.gate import REST
 from iveg.robot.hold_file import read_holds, write_holds
@@ -58,6 +60,8 @@ class RobotNode:
         held: Nobody is at the robot while it starts: ``release_locally`` does nothing
             before ``run``.
         on_link_loss: What ``stand_s`` of silence does.
+        echoes: It tells iVeg what it has heard, which proves the age of what it says;
+            what a recording says was measured long ago.
     """
 
     def __init__(
@@ -74,6 +78,7 @@ class RobotNode:
         uplink: Form = "per-topic",
         held: bool = False,
         on_link_loss: Literal["stop", "slow"] = "stop",
+        echoes: bool = True,
     ) -> None:
         self.boot = secrets.token_hex(4)
         self.clock_offset_s = 0.0
@@ -83,6 +88,8 @@ class RobotNode:
         self.counters: Counter[str] = Counter()
         self._id = robot_id
         self._drive = drive
+        self._started = clock.now().mono
+        self._echo = Echo()
         self._nobody_there = held
         self._command_topic = names.command_topic(apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
@@ -102,6 +109,7 @@ class RobotNode:
             self._link.offer,
             form=uplink,
             first_report=1 + secrets.randbelow(2**31),
+            echo=self._echo if echoes else None,
         )
         limits = Limits(
             profile.max_speed, profile.max_turn, slow_s, stand_s, on_link_loss
@@ -185,7 +193,7 @@ class RobotNode:
                 self._machine.odometry(observation.pose, observation.twist, now.mono)
             )
         if self._link.connected and not self.mute:
-            self._uplink.send(observation, now.wall + self.clock_offset_s)
+            self._uplink.send(observation, self._own(now))
 
     def wish(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
@@ -221,6 +229,7 @@ class RobotNode:
             # Counts as no feedback: the watchdog does the rest.
             self.counters[error.reason] += 1
             return
+        self._echo.take(feedback.origin)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now))
 
@@ -244,13 +253,14 @@ class RobotNode:
             "%s: %s %s %s", self._id, answer.result, answer.id or "", answer.why or ""
         )
         if not self.mute:
-            self._lane.answer(self._uplink.answer(answer, self._wall()))
+            self._lane.answer(self._uplink.answer(answer, self._own(clock.now())))
 
     def _report(self, report: SafetyReport) -> None:
         if not self.mute:
-            seq, message = self._uplink.report(report, self._wall())
+            seq, message = self._uplink.report(report, self._own(clock.now()))
             self._machine.reported(seq, clock.now().mono)
             self._lane.report(message)
 
-    def _wall(self) -> float:
-        return clock.now().wall + self.clock_offset_s
+    def _own(self, now: Instant) -> Instant:
+        """The moment on the robot's own clocks: since its boot, and its wall clock."""
+        return Instant(now.mono - self._started, now.wall + self.clock_offset_s)

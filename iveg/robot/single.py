@@ -14,9 +14,9 @@ from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
     Odometry,
-    Origin,
 )
 from iveg.ngsi import names
+from iveg.ngsi.codec.fields import write_origin
 
 
 class SinglePayload:
@@ -40,7 +40,7 @@ class SinglePayload:
 
     def write(self, odometry: Odometry) -> bytes:
         """The bytes of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
-        origin = _fields(odometry.origin)
+        origin = write_origin(odometry.origin)
         payload: dict[str, object] = {
             "pose": {
                 "x": round(odometry.pose.x, 4),
@@ -89,7 +89,3 @@ def _swept(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
             **origin,
         },
     }
-
-
-def _fields(origin: Origin) -> dict[str, object]:
-    return {"boot": origin.boot, "seq": origin.seq, "stamp": origin.stamp}

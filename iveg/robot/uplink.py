@@ -13,6 +13,7 @@ from typing import Literal
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    Instant,
     LaserScan,
     Navigation,
     Odometry,
@@ -20,6 +21,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec, names
+from iveg.robot.echo import Echo
 from iveg.robot.lane import Message
 from iveg.robot.single import SinglePayload
 
@@ -46,6 +48,9 @@ class Uplink:
         form: One message a topic, or Algorithm 1's single payload.
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
+        echo: What was heard of iVeg; None proves no age, as recordings cannot.
+
+    Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
     """
 
     def __init__(
@@ -57,50 +62,52 @@ class Uplink:
         *,
         form: Form = "per-topic",
         first_report: int = 1,
+        echo: Echo | None = None,
     ) -> None:
         self._id = robot_id
         self._apikey = apikey
         self._boot = boot
         self._offer = offer
+        self._echo = echo
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({"_safety": first_report - 1})
         self.sent: Counter[str] = Counter()
         """Messages made, by device suffix; the single payload's is empty."""
 
-    def send(self, observation: Sensed, wall: float) -> None:
-        """Send what a sensor said; ``wall`` is the robot's clock (Unix s)."""
+    def send(self, observation: Sensed, at: Instant) -> None:
+        """Send what a sensor said at this moment."""
         if self._single is not None and not isinstance(observation, Navigation):
-            self._send_single(self._single, observation, wall)
+            self._send_single(self._single, observation, at)
             return
         suffix = _SUFFIX[type(observation)]
         stamped = replace(
-            observation, robot_id=self._id, origin=self._origin(suffix, wall)
+            observation, robot_id=self._id, origin=self._origin(suffix, at)
         )
         self._emit(suffix, _written(stamped))
 
-    def report(self, report: SafetyReport, wall: float) -> tuple[int, Message]:
+    def report(self, report: SafetyReport, at: Instant) -> tuple[int, Message]:
         """The message of a safety report, and the ``seq`` that it carries."""
-        origin = self._origin("_safety", wall)
+        origin = self._origin("_safety", at)
         payload = codec.write_safety(replace(report, origin=origin))
         self.sent["_safety"] += 1
         return origin.seq or 0, Message(self._topic("_safety"), payload)
 
-    def answer(self, answer: CommandAnswer, wall: float) -> Message:
+    def answer(self, answer: CommandAnswer, at: Instant) -> Message:
         """The message of an answer on ``cmdexe``."""
-        origin = self._origin(_ANSWERS, wall)
+        origin = self._origin(_ANSWERS, at)
         self.sent[_ANSWERS] += 1
         topic = names.answer_topic(self._apikey, self._id)
         return Message(topic, codec.write_answer(replace(answer, origin=origin)))
 
     def _send_single(
-        self, single: SinglePayload, observation: Sensed, wall: float
+        self, single: SinglePayload, observation: Sensed, at: Instant
     ) -> None:
         if isinstance(observation, LaserScan):
             single.scan = observation
         elif isinstance(observation, DetectionFrame):
             single.look(observation)
         elif isinstance(observation, Odometry):
-            origin = self._origin("", wall)
+            origin = self._origin("", at)
             self._emit("", single.write(replace(observation, origin=origin)))
 
     def _emit(self, suffix: str, payload: bytes) -> None:
@@ -110,10 +117,18 @@ class Uplink:
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)
 
-    def _origin(self, suffix: str, wall: float) -> Origin:
+    def _origin(self, suffix: str, at: Instant) -> Origin:
         self._next[suffix] += 1
-        stamp = codec.format_stamp(wall)
-        return Origin(self._boot, self._next[suffix], stamp, wall)
+        echo = self._echo
+        return Origin(
+            self._boot,
+            self._next[suffix],
+            codec.format_stamp(at.wall),
+            at.wall,
+            at.mono,
+            echoes=echo is not None,
+            heard=None if echo is None else echo.heard,
+        )
 
 
 def _written(observation: Sensed) -> bytes:

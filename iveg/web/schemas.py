@@ -161,6 +161,7 @@ class RobotJson(TypedDict):
     stamp: str | None
     received_at: str | None
     age_s: float | None
+    age_estimated: bool
     speed_factor: float | None
     applied: AppliedJson | None
     mandate: MandateJson

@@ -5,6 +5,7 @@ What is asked of the whole pipeline stands in ``views``; here nothing is looked 
 
 import json
 from dataclasses import asdict
+from math import isfinite
 from typing import Any
 
 from iveg.domain.alarms import Alarm, Occurrence
@@ -27,8 +28,7 @@ from iveg.web import schemas
 
 def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJson:
     """One command with the robot's last word."""
-    report, report_at = machine.report, machine.report_at
-    report_age = None if report_at is None else now.mono - report_at.mono
+    report, age = machine.report, machine.evidence_age(now)
     times = of.times
     return {
         "command_id": of.command_id,
@@ -55,10 +55,10 @@ def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJ
         "roads": dict(of.roads.items()),
         "robot": {
             "v": 0.0 if report is None else report.linear,
-            "report_age_s": rounded(report_age),
+            "report_age_s": rounded(age) if isfinite(age) else None,
             "moved_m": round(machine.moved_m(now), 2),
         },
-        "challenge_fresh": report_age is not None and report_age <= FRESH_S,
+        "challenge_fresh": machine.report_age(now) <= FRESH_S,
     }
 
 

@@ -69,6 +69,7 @@ class Views:
             "stamp": None if odometry is None else odometry.origin.stamp,
             "received_at": shapes.moment(received),
             "age_s": None if age is None else round(age, 3),
+            "age_estimated": robot.estimated_since is not None,
             "speed_factor": None if safety is None else safety.speed_factor,
             "applied": self._applied(robot, now),
             "mandate": {
@@ -88,7 +89,7 @@ class Views:
             "stop_state": machine.state,
             "navigation": shapes.navigation(robot),
             "replay": robot.is_replay,
-            "clock_offset_s": shapes.rounded(robot.clock.offset_s),
+            "clock_offset_s": shapes.rounded(robot.clock.offset_s(now)),
             "road": robot.frame_road,
             "profile": shapes.profile(robot_id),
             "margin": shapes.margin(least(margins_of([robot], self._people(), now))),

@@ -2,6 +2,7 @@
 
 import math
 import unicodedata
+from dataclasses import replace
 
 import numpy as np
 import orjson
@@ -17,6 +18,7 @@ from iveg.domain.observations import (
     CommandAnswer,
     Detection,
     DetectionFrame,
+    FeedbackRef,
     Hold,
     LaserScan,
     Navigation,
@@ -42,6 +44,23 @@ def stamped(boot: str, seq: int, wall: float) -> Origin:
 
 
 origins = st.builds(stamped, texts, st.integers(0, 2**53), walls)
+told_monos = st.none() | thousandths(0, 1e9)
+heard = st.none() | st.builds(FeedbackRef, texts, st.integers(0, 2**53))
+
+
+@given(origins, told_monos, st.booleans(), heard)
+def test_what_proves_an_age_survives_the_wire(
+    origin: Origin, mono: float | None, echoes: bool, told: FeedbackRef | None
+) -> None:
+    said = replace(origin, mono=mono, echoes=echoes, heard=told if echoes else None)
+    one = Odometry("AGI", said, Pose2D(0.0, 0.0, 0.0), Twist2D(0.0, 0.0))
+
+    (read,) = codec.read_measure("AGI_odom", codec.write_odometry(one)).observations
+
+    assert isinstance(read, Odometry)
+    assert read.origin == said
+
+
 metres = thousandths(-1000, 1000)
 poses = st.builds(Pose2D, metres, metres, thousandths(-3.14, 3.14))
 twists = st.builds(Twist2D, thousandths(-3, 3), thousandths(-3, 3))

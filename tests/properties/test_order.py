@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.observations import Odometry
-from iveg.domain.order import ClockEstimate, Order
+from iveg.domain.order import Order
 from iveg.domain.world import World
-from tests.builders import START, at, odometry, origin, received
+from tests.builders import odometry, origin, received
 
 seqs = st.lists(st.integers(0, 500), min_size=1, max_size=200)
 stamps = st.floats(-2e9, 2e9)
@@ -46,25 +46,3 @@ def test_no_stamp_ever_orders_anything(arrived: list[tuple[int, float]]) -> None
         stamped = origin(seq)
         off = type(stamped)(stamped.boot, seq, "whenever", stamp_s)
         assert told.judge(off) == silent.judge(type(stamped)(stamped.boot, seq))
-
-
-@given(st.lists(stamps, min_size=1, max_size=100))
-def test_no_stamp_ages_a_message_by_more_than_a_network_can(
-    stamped: list[float],
-) -> None:
-    clock = ClockEstimate()
-    for number, stamp_s in enumerate(stamped):
-        one = type(origin())("a", number, "whenever", stamp_s)
-        assert 0.0 <= clock.observe(one, at(0.1 * number)) <= 10.0
-
-
-@given(st.lists(st.floats(0.0, 5.0), min_size=2, max_size=100))
-def test_the_age_never_comes_out_younger_than_the_fastest_message(
-    delays: list[float],
-) -> None:
-    clock = ClockEstimate()
-    for number, delay in enumerate(delays):
-        sent = START.wall + 0.1 * number
-        moment = type(START)(START.mono + 0.1 * number + delay, sent + delay)
-        extra = clock.observe(type(origin())("a", number, "t", sent), moment)
-        assert extra <= delay + 1e-6

@@ -86,6 +86,8 @@ class RobotRig:
 
     def boot(self, now: float) -> None:
         self.name = f"b{next(self.boots)}"
+        self.booted = now
+        self.odometry_seq = itertools.count(1)
         self.machine = SafetyMachine(
             "AGI",
             self.name,
@@ -94,8 +96,11 @@ class RobotRig:
             fresh=lambda: f"n{next(self.names)}",
         )
 
-    def stamp(self) -> Origin:
-        return Origin(self.name, next(self.seq))
+    def stamp(self, now: float) -> Origin:
+        return Origin(self.name, next(self.seq), mono=now - self.booted)
+
+    def odometry_stamp(self, now: float) -> Origin:
+        return Origin(self.name, next(self.odometry_seq), mono=now - self.booted)
 
 
 class StopOverBadRoads(RuleBasedStateMachine):
@@ -115,6 +120,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.reported_released: set[str] = set()
         self.episode: str | None = None
         self.history: dict[str, Command] = {}
+        self.measured: dict[tuple[str | None, int | None], float] = {}
         self.restart()
 
     # --- both sides ---------------------------------------------------------------
@@ -131,7 +137,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.history.clear()
         self.order, self.asked, self.sent_once = Order(), 0, 0
         self.samples: list[tuple[float, SafetyReport]] = []
-        self.moved_at = self.last_send = float("-inf")
+        self.moved_at = self.last_send = self.heard_at = float("-inf")
         self.releasing_since: float | None = None
         self.episode = None
 
@@ -207,7 +213,8 @@ class StopOverBadRoads(RuleBasedStateMachine):
             run.append(when)
         assert len(run) >= 5, "I3: five samples"
         assert run[0] - run[-1] >= 1.0 - 1e-9, "I3: over a second"
-        assert self.now - self.moved_at >= 0.5 - 1e-9, "I3: odometry agrees"
+        assert run[0] - self.moved_at >= 0.5 - 1e-9, "I3: odometry agrees"
+        assert self.now - run[0] <= 1.5 + 1e-9, "I3: it stands now, not once"
 
     def carry(self, effects: tuple[robot.Effect, ...]) -> None:
         """Do what the robot's machine wants; its words go out on both roads."""
@@ -220,7 +227,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
                 self._say(effect)
 
     def _say(self, effect: robot.Answer | robot.Report) -> None:
-        origin = self.rig.stamp()
+        origin = self.rig.stamp(self.now)
         if isinstance(effect, robot.Answer):
             payload = codec.write_answer(replace(effect.answer, origin=origin))
             reading = codec.read_answer("AGI", payload)
@@ -228,6 +235,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
             payload = codec.write_safety(replace(effect.report, origin=origin))
             reading = codec.read_measure("AGI_safety", payload)
             self.rig.machine.reported(origin.seq or 0, self.now)
+            self.measured[origin.boot, origin.seq] = self.now
         for road in UP:
             for observation in reading.observations:
                 self.roads[road].put(observation)
@@ -264,15 +272,20 @@ class StopOverBadRoads(RuleBasedStateMachine):
 
     def _odometry(self, speed: float) -> None:
         self.moved_at = self.now if speed >= 0.02 else self.moved_at
-        self.perform(self.iveg.odometry(speed, 0.0, self.at(), self.new_id()))
+        origin = self.rig.odometry_stamp(self.now)
+        new_id = self.new_id()
+        self.perform(self.iveg.odometry(speed, 0.0, self.at(), new_id, origin))
 
     def hear(self, word: object, road: Road) -> None:
         if isinstance(word, CommandAnswer):
             self.perform(self.iveg.answered(word, self.at(), road))
         if isinstance(word, SafetyReport) and self.order.judge(word.origin) == "new":
-            self.samples.append((self.now, word))
+            measured = self.measured[word.origin.boot, word.origin.seq]
+            self.samples.append((measured, word))
+            self.heard_at = self.now
             self.reported_released |= set(word.released)
-            self.perform(self.iveg.reported(word, self.at(), road, self.new_id()))
+            new_id, age_s = self.new_id(), self.now - measured
+            self.perform(self.iveg.reported(word, self.at(), road, new_id, age_s))
 
     def run_for(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK_S)):
@@ -338,7 +351,9 @@ class StopOverBadRoads(RuleBasedStateMachine):
     def _ask(self, asking: Callable[[], list[Effect]]) -> None:
         self.asking = True
         stood = self.samples and _rests(self.samples[-1][1])
-        fresh = self.samples and self.now - self.samples[-1][0] <= 1.0
+        fresh = (
+            self.now - self.heard_at <= 1.0 and self.now - self.samples[-1][0] <= 1.5
+        )
         try:
             effects = asking()
         except CommandRefusedError:

@@ -15,8 +15,8 @@ from iveg.domain.stop.effects import (
     SendStop,
     SetLevel,
 )
-from iveg.domain.stop.episode import UNCONFIRMED_S
-from iveg.domain.stop.machine import STALE_S, StopMachine
+from iveg.domain.stop.episode import STALE_S, UNCONFIRMED_S
+from iveg.domain.stop.machine import StopMachine
 from iveg.domain.stop.people import CRAWL_SPEED, FRESH_S, RELEASE_S
 from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
 from iveg.domain.stop.standstill import (

@@ -4,6 +4,8 @@ What people, robots and time do to an episode is in ``people``, ``words`` and
 ``machine``; all of them take the steps that are here.
 """
 
+from math import isfinite
+
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold, Instant, SafetyReport
 from iveg.domain.stop.commands import Command, Press, Times
@@ -13,6 +15,8 @@ from iveg.domain.stop.standstill import Standstill
 from iveg.domain.stop.table import STEPS, State
 
 UNCONFIRMED_S = 1.0
+STALE_S = 1.5
+"""A standstill that was measured longer ago may be over (docs/safety.md, "Age")."""
 PLAIN = Press()
 
 
@@ -21,7 +25,8 @@ class Episode:
 
     Attributes:
         stop: The STOP of this episode; ``once`` the release or resume under way.
-        report: The robot's last word, which came at ``report_at``.
+        report: The robot's last word, which came at ``report_at`` and was at most
+            ``report_age_then`` old then (s).
         deadline: When the present state has lasted too long (monotonic s).
         joined_at: When somebody last joined the STOP (monotonic s).
         speed: Last measured (m/s).
@@ -34,6 +39,7 @@ class Episode:
         self.once: Command | None = None
         self.report: SafetyReport | None = None
         self.report_at: Instant | None = None
+        self.report_age_then = 0.0
         self.sends = Sends(direct=direct)
         self.standstill = Standstill()
         self.deadline = 0.0
@@ -67,11 +73,16 @@ class Episode:
             return float("inf")
         return now.mono - self.report_at.mono
 
+    def evidence_age(self, now: Instant) -> float:
+        """How old the robot's last word is at most, its way included (s)."""
+        return self.report_age(now) + self.report_age_then
+
     def moved_m(self, now: Instant) -> float:
         """How far it may have driven since its last word (m)."""
         if self.report_at is None:
             return 0.0
-        return self.speed * max(0.0, self.report_age(now))
+        age = self.evidence_age(now)
+        return self.speed * max(0.0, age if isfinite(age) else self.report_age(now))
 
     # --- its steps ----------------------------------------------------------------
 

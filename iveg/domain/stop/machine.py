@@ -10,15 +10,22 @@ a STOP under a new id.
 """
 
 from collections.abc import Iterable
+from math import inf
 
-from iveg.domain.observations import CommandAnswer, Instant, Road, SafetyReport
+from iveg.domain.observations import (
+    CommandAnswer,
+    Instant,
+    Origin,
+    Road,
+    SafetyReport,
+)
 from iveg.domain.stop import people, words
 from iveg.domain.stop.commands import Command, Press
 from iveg.domain.stop.effects import Effect
-from iveg.domain.stop.episode import PLAIN, Episode
+from iveg.domain.stop.episode import PLAIN, STALE_S, Episode
 from iveg.domain.stop.table import SendRoad
 
-STALE_S = 1.5
+_UNKNOWN = Origin()
 
 
 class StopMachine(Episode):
@@ -109,16 +116,27 @@ class StopMachine(Episode):
         return words.answered(self, answer, at, road, news=news)
 
     def reported(
-        self, report: SafetyReport, at: Instant, road: Road, new_id: str
+        self,
+        report: SafetyReport,
+        at: Instant,
+        road: Road,
+        new_id: str,
+        age_s: float = 0.0,
     ) -> list[Effect]:
-        """The robot's safety report, new by (boot, seq), on either road."""
-        return words.reported(self, report, at, road, new_id)
+        """The robot's safety report, new by (boot, seq), ``age_s`` old at most."""
+        return words.reported(self, report, at, road, new_id, age_s)
 
     def odometry(
-        self, linear: float, angular: float, at: Instant, new_id: str
+        self,
+        linear: float,
+        angular: float,
+        at: Instant,
+        new_id: str,
+        origin: Origin = _UNKNOWN,
+        age_s: float = inf,
     ) -> list[Effect]:
-        """A fresh speed; three moving ones in a row contradict a standstill."""
-        return words.moved(self, linear, angular, at, new_id)
+        """A speed, proven to be no older than ``age_s``; see ``words.moved``."""
+        return words.moved(self, linear, angular, at, new_id, origin, age_s)
 
     # --- time ---------------------------------------------------------------------
 
@@ -136,7 +154,7 @@ class StopMachine(Episode):
                 return [self.enter("UNCONFIRMED", "unconfirmed")]
             case "DELIVERED" if late:
                 return [self.enter("STILL_MOVING", "still_moving")]
-            case "STANDING" if self.report_age(now) > STALE_S:
+            case "STANDING" if self.evidence_age(now) > STALE_S:
                 self.standstill.forget()
                 self.sends.direct_now(now)
                 return [self.enter("STALE", "stale")]

@@ -11,7 +11,7 @@ from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.stop.commands import Command, Press, Times
 from iveg.domain.stop.effects import Changed, Effect, SendOnce
-from iveg.domain.stop.episode import Episode
+from iveg.domain.stop.episode import STALE_S, Episode
 from iveg.domain.stop.table import State
 from iveg.domain.world import STANDING_SPEED
 
@@ -55,7 +55,7 @@ def drill(
     """
     if episode.state != "RUNNING":
         raise _refused(episode, "Drill", f"its state is {episode.state}")
-    if episode.report is None or episode.report_age(at) > FRESH_S:
+    if episode.report is None or not _is_fresh(episode, at):
         raise _refused(episode, "Drill", "its report is not fresh")
     if max(episode.speed, abs(episode.report.linear)) > CRAWL_SPEED:
         raise _refused(episode, "Drill", "it is moving")
@@ -101,13 +101,18 @@ def _may(
     report = episode.report
     if episode.state not in allowed:
         raise _refused(episode, asked, f"its state is {episode.state}")
-    if report is None or episode.report_age(at) > FRESH_S:
+    if report is None or not _is_fresh(episode, at):
         raise _refused(episode, asked, "its report is not fresh")
     if not stands(report):
         raise _refused(episode, asked, "it is moving")
     if report.challenge is None:
         raise _refused(episode, asked, "it gave no challenge")
     return report
+
+
+def _is_fresh(episode: Episode, at: Instant) -> bool:
+    """Whether the robot's last word has just come, and was not old when it came."""
+    return episode.report_age(at) <= FRESH_S and episode.evidence_age(at) <= STALE_S
 
 
 def stands(report: SafetyReport) -> bool:

@@ -1,50 +1,150 @@
 """Standing still, measured: what safety reports show and odometry does not contradict.
 
-Five samples at rest over at least a second, none more than half a second after the
-one before; a moving wheel in the last half second contradicts them (safety.md §2.3).
+Five samples at rest over at least a second, none more than half a second after the one
+before.  Both are measured on the robot's own monotonic clock where it tells it, so that
+neither a burst nor a gap on the way makes or breaks a rest::
+
+    odometry that moves      before the rest began     changes nothing, however late
+                             later, once               no standstill for half a second
+                             later, three in a row     contradicts the standstill
+                             nobody can say when       counts as later
+
+Two moments can be compared within one boot, if every topic's moments and stamps rise
+with its count.  No wall clock ever protects a standstill.
 """
 
-from iveg.domain.observations import Instant
+from dataclasses import dataclass, field
+from math import inf
+
+from iveg.domain.observations import Instant, Origin
 
 STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
 """So many samples at rest, over so long, none later than this after the one before."""
 MOVED_SAMPLES = 3
+_UNKNOWN = Origin()
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """When something was measured: on the robot's clock if that can be compared.
+
+    Attributes:
+        boot: Of the robot; None where its clock says nothing.
+        at: Seconds: since that boot, else of iVeg's monotonic clock at arrival.
+    """
+
+    boot: str | None
+    at: float
+
+    def since(self, earlier: "Moment") -> float | None:
+        """Seconds from one moment to this; None where they cannot be compared."""
+        return self.at - earlier.at if self.boot == earlier.boot else None
+
+
+@dataclass(slots=True)
+class Topic:
+    """The count of one topic, and whether its moments and stamps rise with it."""
+
+    _newest: Origin = field(default=_UNKNOWN)
+
+    def moment(self, origin: Origin, arrived: Instant) -> Moment:
+        """When a message of this topic was measured."""
+        before, self._newest = self._newest, origin
+        if origin.boot is None or origin.seq is None or origin.mono is None:
+            return Moment(None, arrived.mono)
+        if before.boot == origin.boot and not _rises(before, origin):
+            return Moment(None, arrived.mono)
+        return Moment(origin.boot, origin.mono)
+
+
+def _rises(before: Origin, after: Origin) -> bool:
+    """Whether count and moment rise, and the stamp, which is coarser, does not fall."""
+    counts = (before.seq or 0) < (after.seq or 0)
+    moments = before.mono is None or after.mono is None or before.mono < after.mono
+    stamps = (
+        before.stamp_s is None
+        or after.stamp_s is None
+        or before.stamp_s <= after.stamp_s
+    )
+    return counts and moments and stamps
 
 
 class Standstill:
     """Counts samples at rest and samples that move.
 
     Attributes:
-        since: The first sample of the present rest.
+        since: Arrival of the first sample of the present rest.
     """
 
     def __init__(self) -> None:
         self.since: Instant | None = None
+        self._began: Moment | None = None
+        self._stood: tuple[Moment, Instant] | None = None
         self._count = 0
-        self._newest = float("-inf")
+        self._newest = Moment(None, float("-inf"))
         self._moving_samples = 0
+        self._moved: Moment | None = None
         self._moved_at = float("-inf")
+        self._reports, self._odometry = Topic(), Topic()
 
     def forget(self) -> None:
         """What was measured does not count any more."""
-        self.since, self._count = None, 0
+        self._stood = None
+        self._begin_anew()
 
-    def rested(self, at: Instant) -> bool:
+    def _begin_anew(self) -> None:
+        self.since, self._began, self._count = None, None, 0
+
+    def rested(self, at: Instant, origin: Origin = _UNKNOWN) -> bool:
         """One more report at rest; whether the rest is a standstill."""
-        if at.mono - self._newest > STANDING_FRESH_S:
+        moment = self._reports.moment(origin, at)
+        gap = moment.since(self._newest)
+        if gap is None or gap > STANDING_FRESH_S:
             # Nobody knows what it did in the gap.
-            self.forget()
-        if self.since is None:
-            self.since = at
-        self._newest = at.mono
+            self._begin_anew()
+        if self.since is None or self._began is None:
+            self.since, self._began = at, moment
+        self._newest = moment
         self._count += 1
-        long_enough = at.mono - self.since.mono >= STANDING_S
-        contradicted = at.mono - self._moved_at < STANDING_FRESH_S
-        return self._count >= STANDING_SAMPLES and long_enough and not contradicted
+        measured = (
+            self._count >= STANDING_SAMPLES
+            and (moment.since(self._began) or 0.0) >= STANDING_S
+            and not self._moved_lately(moment, at)
+        )
+        if measured and self._stood is None:
+            self._stood = self._began, self.since
+        return measured
 
-    def odometry(self, at: Instant, *, moves: bool) -> bool:
-        """One sample of odometry; whether several in a row have moved."""
+    def _moved_lately(self, moment: Moment, at: Instant) -> bool:
+        """Whether a wheel moved in the last half second."""
+        if self._moved is None:
+            return False
+        ago = moment.since(self._moved)
+        # Where the robot's clock does not tell, the arrival must.
+        ago = at.mono - self._moved_at if ago is None else ago
+        return ago < STANDING_FRESH_S
+
+    def odometry(
+        self, at: Instant, origin: Origin = _UNKNOWN, age_s: float = inf, *, moves: bool
+    ) -> bool | None:
+        """One sample of odometry, proven to be no older than ``age_s``.
+
+        Returns:
+            Whether several in a row have moved; None for one from before the rest,
+            which says nothing of it.
+        """
+        moment = self._odometry.moment(origin, at)
+        if self._is_before_the_rest(moment, at.mono - age_s):
+            return None
         self._moving_samples = self._moving_samples + 1 if moves else 0
         if moves:
-            self._moved_at = at.mono
+            self._moved, self._moved_at = moment, at.mono
         return self._moving_samples >= MOVED_SAMPLES
+
+    def _is_before_the_rest(self, moment: Moment, not_before: float) -> bool:
+        """Whether the robot's own clock says so, and nothing proves it wrong."""
+        began, since = self._stood or (self._began, self.since)
+        if began is None or since is None or moment.boot is None:
+            return False
+        after = moment.since(began)
+        return after is not None and after <= 0.0 and not_before <= since.mono

@@ -14,7 +14,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop.commands import Command, Times
 from iveg.domain.stop.effects import Effect, SetLevel
-from iveg.domain.stop.episode import Episode
+from iveg.domain.stop.episode import STALE_S, Episode
 from iveg.domain.stop.people import stands
 from iveg.domain.stop.table import State
 from iveg.domain.world import STANDING_SPEED
@@ -104,10 +104,16 @@ def _note_answer(times: Times, at: Instant, road: Road) -> None:
 
 
 def reported(
-    episode: Episode, report: SafetyReport, at: Instant, road: Road, new_id: str
+    episode: Episode,
+    report: SafetyReport,
+    at: Instant,
+    road: Road,
+    new_id: str,
+    age_s: float,
 ) -> list[Effect]:
-    """The robot's safety report, new by (boot, seq), on either road."""
+    """The robot's safety report, new by (boot, seq), ``age_s`` old at most."""
     episode.report, episode.report_at = report, at
+    episode.report_age_then = age_s
     episode.speed = abs(report.linear)
     if episode.state in ("RUNNING", "READY"):
         return _reported_free(episode, report, at)
@@ -130,16 +136,20 @@ def _reported_stopped(
     _note_answer(episode.stop.times, at, road)
     effects = _delivered(episode, at)
     if stands(report):
-        return [*effects, *_rested(episode, episode.stop, at)]
+        return [*effects, *_rested(episode, episode.stop, report, at)]
     episode.standstill.forget()
     return [*effects, *(episode.begin("iveg", at, new_id, "moved") if stood else [])]
 
 
-def _rested(episode: Episode, stop: Command, at: Instant) -> list[Effect]:
+def _rested(
+    episode: Episode, stop: Command, report: SafetyReport, at: Instant
+) -> list[Effect]:
     """One more sample at rest; five over a second are a standstill."""
-    measured = episode.standstill.rested(at)
+    measured = episode.standstill.rested(at, report.origin)
     if not measured or episode.state == "STANDING":
         return []
+    if episode.evidence_age(at) > STALE_S:
+        return []  # it stood; nobody knows whether it stands
     if stop.times.standing is None:
         stop.times.standing = first = episode.standstill.since
         assert first is not None  # noqa: S101 - a rest has a first sample
@@ -188,11 +198,19 @@ def _reported_releasing(episode: Episode, report: SafetyReport) -> list[Effect]:
 
 
 def moved(
-    episode: Episode, linear: float, angular: float, at: Instant, new_id: str
+    episode: Episode,
+    linear: float,
+    angular: float,
+    at: Instant,
+    new_id: str,
+    origin: Origin,
+    age_s: float,
 ) -> list[Effect]:
-    """A fresh speed; three moving ones in a row contradict a standstill."""
+    """A speed; three moving ones in a row, measured later, contradict a standstill."""
     moves = max(abs(linear), abs(angular)) >= STANDING_SPEED
-    contradicted = episode.standstill.odometry(at, moves=moves)
+    contradicted = episode.standstill.odometry(at, origin, age_s, moves=moves)
+    if contradicted is None:
+        return []
     episode.speed = abs(linear)
     if episode.state == "STANDING" and contradicted:
         return episode.begin("iveg", at, new_id, "moved")

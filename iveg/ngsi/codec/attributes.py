@@ -215,10 +215,17 @@ def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> Detection
     return DetectionFrame(robot_id, _stamped(attributes), found, 1 - len(found))
 
 
+_PROOF = ("mono", "heard")
+
+
 def _stamped(attributes: Mapping[str, Any]) -> Origin:
-    return read_origin(
-        payloads.OriginFields.model_validate({"stamp": attributes.get("timestamp")})
-    )
+    """The message's own stamp, and what proves its age, which stands at the pose."""
+    pose = attributes.get("pose")
+    if not isinstance(pose, dict):
+        pose = {}
+    fields = {key: pose[key] for key in _PROOF if key in pose}
+    fields["stamp"] = attributes.get("timestamp")
+    return read_origin(payloads.OriginFields.model_validate(fields))
 
 
 _READERS: Mapping[str, _Reader] = {

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import Any
 
-from iveg.domain.observations import Hold, Origin
+from iveg.domain.observations import FeedbackRef, Hold, Origin
 from iveg.ngsi import payloads
 
 
@@ -26,14 +26,36 @@ def parse_stamp(text: str) -> float | None:
 
 
 def read_origin(value: payloads.OriginFields) -> Origin:
-    """Which boot, which message, when."""
+    """Which boot, which message, when, and what its sender had heard."""
     stamp_s = None if value.stamp is None else parse_stamp(value.stamp)
-    return Origin(value.boot, value.seq, value.stamp, stamp_s)
+    heard = value.heard
+    return Origin(
+        value.boot,
+        value.seq,
+        value.stamp,
+        stamp_s,
+        value.mono,
+        # A robot that has heard nothing yet says so with ``null``.
+        echoes="heard" in value.model_fields_set,
+        heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
+    )
 
 
 def write_origin(origin: Origin) -> dict[str, Any]:
     """The inverse of :func:`read_origin`."""
-    return {"boot": origin.boot, "seq": origin.seq, "stamp": origin.stamp}
+    fields: dict[str, Any] = {
+        "boot": origin.boot,
+        "seq": origin.seq,
+        "stamp": origin.stamp,
+    }
+    if origin.mono is not None:
+        fields["mono"] = round(origin.mono, 6)
+    if origin.echoes:
+        heard = origin.heard
+        fields["heard"] = (
+            None if heard is None else {"boot": heard.boot, "seq": heard.seq}
+        )
+    return fields
 
 
 def read_holds(values: Iterable[payloads.HoldValue]) -> tuple[Hold, ...]:

@@ -55,6 +55,18 @@ export function linkOfRobot(robot, nowMs = performance.now()) {
 }
 
 /**
+ * An age in words, marked where the robot proves nothing and it is only estimated.
+ *
+ * @param {{age_estimated?: boolean} | null | undefined} robot
+ * @param {string} said
+ * @param {{t: (key: string, slots: {said: string}) => string}} words
+ * @returns {string}
+ */
+export function aboutAge(robot, said, words) {
+  return robot?.age_estimated ? words.t("robot.age_about", { said }) : said;
+}
+
+/**
  * The server's clock as the browser sees it, from pings.
  *
  * Of the last eight round trips the shortest counts: its answer spent the least time

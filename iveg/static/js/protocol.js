@@ -24,7 +24,8 @@
  * @typedef {Aged & {
  *   robot_id: string, link: Link, mode: Mode, pose: Pose | null,
  *   twist: {linear: number, angular: number} | null,
- *   stamp: string | null, received_at: string | null, speed_factor: number | null,
+ *   stamp: string | null, received_at: string | null, age_estimated?: boolean,
+ *   speed_factor: number | null,
  *   applied: {reason: string, cause: string | null, age_s: number,
  *     feedback_age_s: number | null} | null,
  *   mandate: {speed_factor: number, reason: string, cause: string | null,

@@ -1,10 +1,10 @@
-"""Order by (boot, seq) alone, and clocks that may be years off."""
+"""Order by (boot, seq) alone."""
 
 import pytest
 
 from iveg.domain.observations import Origin
-from iveg.domain.order import ClockEstimate, Order
-from tests.builders import START, at, origin
+from iveg.domain.order import Order
+from tests.builders import START, origin
 
 YEARS_S = 5 * 365 * 86400.0
 
@@ -109,58 +109,3 @@ def test_a_stamp_years_off_orders_nothing() -> None:
 
     assert order.judge(origin(2, wall=START.wall)) == "new"
     assert order.judge(origin(1, wall=START.wall + 2 * YEARS_S)) == "duplicate"
-
-
-# --- clocks -----------------------------------------------------------------------
-
-
-def test_the_offset_is_the_least_of_a_minute() -> None:
-    clock = ClockEstimate()
-    for number, delay in enumerate((0.30, 0.02, 0.25, 0.40)):
-        clock.observe(origin(wall=START.wall + number - delay), at(number))
-
-    assert clock.offset_s == pytest.approx(0.02)
-
-
-def test_what_a_message_took_beyond_the_fastest_is_its_delay() -> None:
-    clock = ClockEstimate()
-    clock.observe(origin(wall=START.wall - 0.02), at(0.0))
-
-    assert clock.observe(origin(wall=START.wall + 1 - 0.5), at(1.0)) == pytest.approx(
-        0.48
-    )
-
-
-def test_the_fastest_message_of_more_than_a_minute_ago_is_forgotten() -> None:
-    clock = ClockEstimate()
-    clock.observe(origin(wall=START.wall - 0.01), at(0.0))
-    for second in range(1, 130):
-        clock.observe(origin(wall=START.wall + second - 0.2), at(second))
-
-    assert clock.offset_s == pytest.approx(0.2)
-
-
-def test_without_a_stamp_nothing_is_learnt_and_nothing_added() -> None:
-    clock = ClockEstimate()
-
-    assert clock.observe(Origin("a", 1), at(0.0)) == 0.0
-    assert clock.offset_s is None
-
-
-@pytest.mark.parametrize("jump_s", [YEARS_S, -86400.0])
-def test_f16_a_clock_that_jumps_ages_nothing(jump_s: float) -> None:
-    clock = ClockEstimate()
-    clock.observe(origin(wall=START.wall), at(0.0))
-
-    jumped = clock.observe(origin(wall=START.wall + 1 + jump_s), at(1.0))
-    back = clock.observe(origin(wall=START.wall + 2), at(2.0))
-
-    assert (jumped, back) == (0.0, 0.0)
-
-
-def test_the_offset_of_a_jumped_clock_is_shown_at_once() -> None:
-    clock = ClockEstimate()
-    clock.observe(origin(wall=START.wall), at(0.0))
-    clock.observe(origin(wall=START.wall + 1 + 60.0), at(1.0))
-
-    assert clock.offset_s == pytest.approx(-60.0)

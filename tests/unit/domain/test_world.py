@@ -4,17 +4,22 @@ from dataclasses import replace
 
 import pytest
 
+from iveg.domain.alerts import Rule
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.geometry import Pose2D
+from iveg.domain.mandates import hazards_of
 from iveg.domain.observations import (
     Canary,
     Climate,
     CommandStatus,
+    FeedbackRef,
     Navigation,
     Observation,
     Origin,
     Received,
 )
+from iveg.domain.people import People
+from iveg.domain.probe import ProbeLag
 from iveg.domain.world import RobotState, World
 from tests.builders import (
     START,
@@ -94,6 +99,131 @@ def test_a_robot_stands_below_two_centimetres_a_second(
     assert world.robot("AGI").stands is stands
 
 
+# --- proven ages ------------------------------------------------------------------
+
+
+def echoing(seq: int, heard: int | None, boot: str = "boot-a") -> Origin:
+    """Of a robot that tells which feedback of ``iveg`` it had heard, if any."""
+    ref = None if heard is None else FeedbackRef("iveg", heard)
+    return replace(origin(seq, boot=boot), echoes=True, heard=ref)
+
+
+def world_that_told(*moments: float) -> World:
+    """Feedback 1, 2, … was composed at these moments (s)."""
+    world = World(["AGI", "AGII"])
+    for seq, moment in enumerate(moments, start=1):
+        world.ledger.composed("iveg", seq, seq, at(moment).mono)
+    return world
+
+
+def test_a_pose_is_as_old_as_the_feedback_that_its_robot_had_heard() -> None:
+    world = world_that_told(0.0, 5.0)
+    world.apply(received(odometry(origin=echoing(1, heard=1)), after=6.0))
+
+    robot = world.robot("AGI")
+    assert (robot.age_s(at(6.0)), robot.link(at(6.0))) == (6.0, "LOST")
+    assert robot.estimated_since is None
+
+
+def test_a_report_and_a_look_are_as_old_as_what_their_robot_had_heard() -> None:
+    world = world_that_told(0.0, 5.0)
+    report = safety_report(origin=echoing(1, heard=1))
+    world.apply(received(report, after=6.0))
+    world.apply(received(detection_frame(origin=echoing(1, heard=2)), after=6.0))
+
+    robot = world.robot("AGI")
+    assert robot.safety_received == at(0.0)
+    assert robot.detections_at == at(5.0).mono
+    assert robot.sighted_at == at(5.0)
+    assert world.age_then(received(report, after=6.0)) == 6.0
+
+
+@pytest.mark.parametrize("heard", [None, 3])
+def test_while_nothing_is_proven_the_age_is_unknown_and_lost_after_three_seconds(
+    heard: int | None,
+) -> None:
+    world = world_that_told(0.0)
+    for second in range(5):
+        one = odometry(origin=echoing(second + 1, heard=heard))
+        world.apply(received(one, after=float(second)))
+
+    robot = world.robot("AGI")
+    assert robot.age_s(at(3.0)) is None
+    assert [robot.link(at(s)) for s in (3.0, 3.1)] == ["UNKNOWN", "LOST"]
+
+
+def test_what_is_newer_is_no_older_than_what_was_proven_before() -> None:
+    world = world_that_told(0.0, 5.0)
+    world.apply(received(odometry(origin=echoing(1, heard=2)), after=5.1))
+    world.apply(received(odometry(origin=echoing(2, heard=1)), after=5.2))
+
+    assert world.robot("AGI").age_s(at(5.2)) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("heard", [1, None])
+def test_another_boot_inherits_no_proof(heard: int | None) -> None:
+    world = world_that_told(0.0, 5.0)
+    world.apply(received(odometry(origin=echoing(1, heard=2)), after=5.1))
+    world.apply(received(odometry(origin=echoing(1, heard=heard, boot="b")), after=5.2))
+
+    assert world.robot("AGI").link(at(5.2)) in ("LOST", "UNKNOWN")
+
+
+def test_a_robot_that_moves_is_a_hazard_though_nobody_knows_how_old_its_pose_is() -> (
+    None
+):
+    world = world_that_told(0.0)
+    world.apply(received(odometry("AGII", 1.0, origin=echoing(1, heard=None))))
+
+    found = hazards_of(world, People(), Rule(), at(0.5))
+
+    assert [hazard.cause for hazard in found] == ["AGII"]
+
+
+def test_an_old_look_makes_an_old_sighting_even_when_it_is_late() -> None:
+    world = world_that_told(0.0, 20.0)
+    world.apply(received(detection_frame(origin=echoing(9, heard=2)), after=20.1))
+    world.apply(received(detection_frame(origin=echoing(3, heard=1)), after=20.2))
+
+    assert world.robot("AGI").sighted_at == at(0.0)
+    assert world.robot("AGI").detections_at == at(20.0).mono
+
+
+# --- estimated ages ---------------------------------------------------------------
+
+
+def world_behind(*probes: tuple[float, float]) -> World:
+    """Probes of ours left and came back at these moments (s)."""
+    lag = ProbeLag()
+    for seq, (left, back) in enumerate(probes):
+        lag.sent(Origin("iveg", seq), at(left))
+        lag.returned(Origin("iveg", seq), at(back))
+    return World(["AGI"], lag)
+
+
+def test_what_fiware_alone_brings_is_no_younger_than_the_lag_of_our_probe() -> None:
+    world = world_behind((-25.0, 0.0))
+    world.apply(received(odometry()))
+
+    robot = world.robot("AGI")
+    assert robot.age_s(at(0.0)) == 25.0
+    assert robot.estimated_since == START.mono
+
+
+def test_before_our_first_probe_came_back_nobody_knows_what_fiware_brings() -> None:
+    world = world_behind()
+    world.apply(received(odometry()))
+
+    assert world.robot("AGI").link(at(0.0)) == "UNKNOWN"
+
+
+def test_an_estimate_proves_nothing_of_odometry() -> None:
+    world = world_with(odometry())
+
+    assert world.age_then(received(odometry())) == float("inf")
+    assert world.age_then(received(safety_report())) == float("inf")
+
+
 # --- what was asked of Orion ------------------------------------------------------
 
 
@@ -165,7 +295,7 @@ def test_what_was_asked_is_no_sign_of_life() -> None:
     world.apply(asked(odometry()))
 
     assert world.robot("AGI").heard_at is None
-    assert world.robot("AGI").clock.offset_s is None
+    assert world.robot("AGI").clock.offset_s(at(0.0)) is None
 
 
 # --- what a message changes -------------------------------------------------------

@@ -118,6 +118,23 @@ def test_a_seq_beyond_what_numbers_hold_is_refused() -> None:
     assert codec.read_measure("AGI_odom", payload).problems
 
 
+@pytest.mark.parametrize(
+    "proof",
+    [
+        {"mono": -1.0},
+        {"mono": "soon"},
+        {"heard": 7},
+        {"heard": {"boot": "b"}},
+        {"heard": {"boot": "b", "seq": -1}},
+        {"heard": {"boot": None, "seq": 1}},
+    ],
+)
+def test_a_proof_of_age_that_is_none_is_refused(proof: dict[str, object]) -> None:
+    payload = orjson.dumps({"base_pose_ground_truth": {**pose_value(), **proof}})
+
+    assert codec.read_measure("AGI_odom", payload).problems
+
+
 # --- size and depth (F26, F28) ----------------------------------------------------
 
 

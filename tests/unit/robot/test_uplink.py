@@ -9,6 +9,8 @@ import pytest
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    FeedbackRef,
+    Instant,
     LaserScan,
     Navigation,
     Odometry,
@@ -16,17 +18,18 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
+from iveg.robot.echo import Echo
 from iveg.robot.uplink import Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
 
-WALL = START.wall
+AT = Instant(7.25, START.wall)
 BLANK = Origin()
 
 
 class Wire:
     """Keeps what an uplink offered."""
 
-    def __init__(self, form: str = "per-topic") -> None:
+    def __init__(self, form: str = "per-topic", echo: Echo | None = None) -> None:
         self.sent: list[tuple[str, bytes]] = []
         self.uplink = Uplink(
             "AGI",
@@ -35,6 +38,7 @@ class Wire:
             lambda topic, payload: self.sent.append((topic, payload)),
             form="single" if form == "single" else "per-topic",
             first_report=700,
+            echo=echo,
         )
 
     def read(self) -> list[object]:
@@ -61,21 +65,23 @@ def test_each_sensor_has_its_topic_and_each_message_its_origin(
     observation: Odometry | LaserScan | DetectionFrame | Navigation, topic: str
 ) -> None:
     wire = Wire()
-    wire.uplink.send(replace(observation, robot_id=""), WALL)
-    wire.uplink.send(observation, WALL + 1.0)
+    wire.uplink.send(replace(observation, robot_id=""), AT)
+    wire.uplink.send(observation, AT.later(1.0))
     assert [where for where, _ in wire.sent] == [topic, topic]
     first, second = wire.read()
     assert isinstance(first, type(observation))
     assert isinstance(second, type(observation))
     assert first.robot_id == "AGI"
-    assert first.origin == Origin("boot-a", 1, "2023-11-14T22:13:20.000Z", WALL)
+    assert first.origin == Origin(
+        "boot-a", 1, "2023-11-14T22:13:20.000Z", AT.wall, AT.mono
+    )
     assert second.origin.seq == 2
 
 
 def test_every_topic_counts_for_itself() -> None:
     wire = Wire()
-    wire.uplink.send(odometry(origin=BLANK), WALL)
-    wire.uplink.send(scan(origin=BLANK), WALL)
+    wire.uplink.send(odometry(origin=BLANK), AT)
+    wire.uplink.send(scan(origin=BLANK), AT)
     read = wire.read()
     assert [one.origin.seq for one in read if hasattr(one, "origin")] == [1, 1]
 
@@ -84,9 +90,7 @@ def test_a_report_tells_its_place_in_the_count() -> None:
     wire = Wire()
     seqs = []
     for _ in range(2):
-        seq, message = wire.uplink.report(
-            SafetyReport("AGI", BLANK, 0.5, "person"), WALL
-        )
+        seq, message = wire.uplink.report(SafetyReport("AGI", BLANK, 0.5, "person"), AT)
         seqs.append(seq)
         (said,) = codec.read_measure("AGI_safety", message.payload).observations
         assert isinstance(said, SafetyReport)
@@ -97,7 +101,7 @@ def test_a_report_tells_its_place_in_the_count() -> None:
 
 def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
     wire = Wire()
-    message = wire.uplink.answer(CommandAnswer("AGI", BLANK, "01A", "LATCHED"), WALL)
+    message = wire.uplink.answer(CommandAnswer("AGI", BLANK, "01A", "LATCHED"), AT)
     assert message.topic == "/iveg/AGI/cmdexe"
     (said,) = codec.read_answer("AGI", message.payload).observations
     assert isinstance(said, CommandAnswer)
@@ -105,10 +109,53 @@ def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
     assert (said.origin.boot, said.origin.seq) == ("boot-a", 1)
 
 
+@pytest.mark.parametrize("form", ["per-topic", "single"])
+def test_every_message_tells_what_had_been_heard_when_it_was_measured(
+    form: str,
+) -> None:
+    echo = Echo()
+    wire = Wire(form, echo)
+    wire.uplink.send(odometry(origin=BLANK), AT)
+    echo.take(Origin("iveg", 41))
+    for one in (scan(origin=BLANK), detection_frame("AGI", detection(), origin=BLANK)):
+        wire.uplink.send(one, AT)
+    wire.uplink.send(odometry(origin=BLANK), AT)
+
+    first, *others = [one.origin for one in wire.read() if hasattr(one, "origin")]
+
+    assert (first.echoes, first.heard, first.mono) == (True, None, AT.mono)
+    assert len(others) == 3
+    assert {(one.echoes, one.heard) for one in others} == {
+        (True, FeedbackRef("iveg", 41))
+    }
+
+
+def test_a_report_tells_what_had_been_heard() -> None:
+    echo = Echo()
+    echo.take(Origin("iveg", 41))
+    _, message = Wire(echo=echo).uplink.report(
+        SafetyReport("AGI", BLANK, 1.0, "clear"), AT
+    )
+
+    (said,) = codec.read_measure("AGI_safety", message.payload).observations
+
+    assert isinstance(said, SafetyReport)
+    assert (said.origin.heard, said.origin.mono) == (FeedbackRef("iveg", 41), AT.mono)
+
+
+def test_a_recording_proves_nothing() -> None:
+    wire = Wire()
+    wire.uplink.send(odometry(origin=BLANK), AT)
+
+    (said,) = wire.read()
+    assert isinstance(said, Odometry)
+    assert not said.origin.echoes
+
+
 def test_counters_tell_what_left() -> None:
     wire = Wire()
-    wire.uplink.send(odometry(origin=BLANK), WALL)
-    wire.uplink.report(SafetyReport("AGI", BLANK, 1.0, "clear"), WALL)
+    wire.uplink.send(odometry(origin=BLANK), AT)
+    wire.uplink.report(SafetyReport("AGI", BLANK, 1.0, "clear"), AT)
     assert wire.uplink.sent == {"_odom": 1, "_safety": 1}
 
 
@@ -117,10 +164,10 @@ def test_counters_tell_what_left() -> None:
 
 def test_the_single_payload_leaves_once_an_odometry_tick() -> None:
     wire = Wire("single")
-    wire.uplink.send(scan(origin=BLANK), WALL)
-    wire.uplink.send(detection_frame("AGI", detection(), origin=BLANK), WALL)
+    wire.uplink.send(scan(origin=BLANK), AT)
+    wire.uplink.send(detection_frame("AGI", detection(), origin=BLANK), AT)
     assert wire.sent == []
-    wire.uplink.send(odometry(origin=BLANK), WALL)
+    wire.uplink.send(odometry(origin=BLANK), AT)
     ((topic, payload),) = wire.sent
     assert topic == "/iveg/AGI/attrs"
     fields = {"class", "conf", "position_3D", "pose", "laser_scan", "timestamp"}
@@ -131,9 +178,9 @@ def test_iveg_reads_pose_scan_and_detection_from_the_single_payload() -> None:
     wire = Wire("single")
     sweep = scan(ranges=[1.0, np.inf, 2.0], angle_min=-1.0, origin=BLANK)
     found = detection("farmer", 3.0, 4.0, probability=0.9)
-    wire.uplink.send(sweep, WALL)
-    wire.uplink.send(detection_frame("AGI", found, origin=BLANK), WALL)
-    wire.uplink.send(odometry(x=1.0, y=2.0, yaw=0.5, origin=BLANK), WALL)
+    wire.uplink.send(sweep, AT)
+    wire.uplink.send(detection_frame("AGI", found, origin=BLANK), AT)
+    wire.uplink.send(odometry(x=1.0, y=2.0, yaw=0.5, origin=BLANK), AT)
     pose, swept, looked = wire.read()
     assert isinstance(pose, Odometry)
     assert (pose.pose.x, pose.pose.y, pose.origin.seq) == (1.0, 2.0, 1)
@@ -148,8 +195,8 @@ def test_iveg_reads_pose_scan_and_detection_from_the_single_payload() -> None:
 def test_a_detection_in_base_link_travels_in_map() -> None:
     wire = Wire("single")
     ahead = replace(detection(x=2.0), frame_id="base_link")
-    wire.uplink.send(detection_frame("AGI", ahead, origin=BLANK), WALL)
-    wire.uplink.send(odometry(x=5.0, y=5.0, yaw=np.pi / 2, origin=BLANK), WALL)
+    wire.uplink.send(detection_frame("AGI", ahead, origin=BLANK), AT)
+    wire.uplink.send(odometry(x=5.0, y=5.0, yaw=np.pi / 2, origin=BLANK), AT)
     position = orjson.loads(wire.sent[0][1])["position_3D"]
     assert (position["x"], position["y"]) == pytest.approx((5.0, 7.0))
 
@@ -162,31 +209,31 @@ def test_several_detections_of_one_look_take_turns_surest_first() -> None:
         detection(probability=0.95),
         origin=BLANK,
     )
-    wire.uplink.send(look, WALL)
+    wire.uplink.send(look, AT)
     for _ in range(3):
-        wire.uplink.send(odometry(origin=BLANK), WALL)
+        wire.uplink.send(odometry(origin=BLANK), AT)
     told = [orjson.loads(payload).get("conf") for _, payload in wire.sent]
     assert told == [0.95, 0.81, None]
 
 
 def test_a_look_that_saw_nothing_is_said_once() -> None:
     wire = Wire("single")
-    wire.uplink.send(detection_frame("AGI", origin=BLANK), WALL)
+    wire.uplink.send(detection_frame("AGI", origin=BLANK), AT)
     for _ in range(2):
-        wire.uplink.send(odometry(origin=BLANK), WALL)
+        wire.uplink.send(odometry(origin=BLANK), AT)
     looks = [one for one in wire.read() if isinstance(one, DetectionFrame)]
     assert [look.detections for look in looks] == [()]
 
 
 def test_a_scan_travels_once() -> None:
     wire = Wire("single")
-    wire.uplink.send(scan(origin=BLANK), WALL)
+    wire.uplink.send(scan(origin=BLANK), AT)
     for _ in range(2):
-        wire.uplink.send(odometry(origin=BLANK), WALL)
+        wire.uplink.send(odometry(origin=BLANK), AT)
     assert sum(isinstance(one, LaserScan) for one in wire.read()) == 1
 
 
 def test_intent_keeps_its_own_topic_in_the_single_form() -> None:
     wire = Wire("single")
-    wire.uplink.send(Navigation("", BLANK, "drive"), WALL)
+    wire.uplink.send(Navigation("", BLANK, "drive"), AT)
     assert wire.sent[0][0] == "/iveg/AGI_nav/attrs"

@@ -2,7 +2,7 @@
  * The Fleet page: the chain as a diagram, each robot, and each of its devices.
  */
 
-import { ageOf, linkOfRobot } from "../clock.js";
+import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { modeSaid } from "../panels/robots.js";
 import { judgeChain } from "./chain.js";
@@ -125,7 +125,7 @@ function ageSaid(age, words) {
 /** @param {Robot} robot @param {Words} words @returns {(string | Node)[]} */
 function machineCells(robot, words) {
   const link = linkOfRobot(robot);
-  const age = ageSaid(ageOf(robot), words);
+  const age = aboutAge(robot, ageSaid(ageOf(robot), words), words);
   const { profile, navigation, clock_offset_s, holds } = robot;
   const sources = holds.map(({ source }) => words.t(`release.hold_source.${source}`));
   return [

@@ -4,7 +4,7 @@
  * Ages are counted here, by the browser's clock, so that silence shows by itself.
  */
 
-import { ageOf, linkOfRobot } from "../clock.js";
+import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
 import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
@@ -151,7 +151,7 @@ function createCard(app, card) {
     readout("yaw", pose && pose.yaw * DEGREES, 1, "deg");
     readout("v", twist?.linear, 2, "ms");
     readout("w", twist?.angular, 2, "rads");
-    const said = Number.isFinite(ageS) ? agoOf(ageS) : "";
+    const said = Number.isFinite(ageS) ? aboutAge(robot, agoOf(ageS), words) : "";
     for (const age of ages) setText(age, said);
     setText(fields.age, said);
   }

@@ -1,0 +1,46 @@
+"""How old a robot's message is at most: proven by what the robot had heard of iVeg.
+
+Robots tell in every message the newest feedback that they have heard.  What was
+measured after that feedback arrived was measured after it left, so the message is at
+most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of the
+robot is asked and no delay is guessed (docs/safety.md, "Age").
+"""
+
+from bisect import bisect_right
+
+from iveg.domain.observations import FeedbackRef
+
+_APART_S = 0.05
+"""Moments closer than this share the earlier one, so that ages come out older."""
+_KEPT = 18_000
+"""Moments that are remembered at least: fifteen minutes of them, at that distance."""
+
+
+class FeedbackLedger:
+    """Remembers when each feedback message was composed."""
+
+    def __init__(self) -> None:
+        self._boot: str | None = None
+        self._firsts: list[int] = []
+        self._moments: list[float] = []
+        self._last = -1
+
+    def composed(self, boot: str, first: int, last: int, now: float) -> None:
+        """Feedback ``first`` to ``last`` is composed now (monotonic, s)."""
+        self._boot, self._last = boot, last
+        if self._moments and now - self._moments[-1] < _APART_S:
+            return
+        self._firsts.append(first)
+        self._moments.append(now)
+        if len(self._moments) > 2 * _KEPT:
+            del self._firsts[:_KEPT], self._moments[:_KEPT]
+
+    def composed_at(self, heard: FeedbackRef | None) -> float | None:
+        """When that feedback was composed, or earlier (monotonic, s).
+
+        None where nothing is proven: of another boot of iVeg, never sent, forgotten.
+        """
+        if heard is None or heard.boot != self._boot or heard.seq > self._last:
+            return None
+        index = bisect_right(self._firsts, heard.seq) - 1
+        return None if index < 0 else self._moments[index]

@@ -1,0 +1,169 @@
+"""How late a robot's messages are, estimated from its clock (docs/safety.md, "Age").
+
+A stamp says how long a message travelled, relative to the fastest one of the same boot
+and transport within a minute (the minimum filter of NTP).  Seen from one side a delay
+that stays the same and a clock that is off look alike, so this is an estimate: it
+serves robots that prove nothing, and the display of the offset.
+
+::
+
+    stamps fall while seq rises, or  ──> unknown until five    ──> a new filter
+    a message beats the fastest by       messages agree            begins
+    more than half a second
+
+A delay lets no stamp fall: that a transport is slow is never taken for a clock that
+was set.  Moments are iVeg's monotonic clock, which nobody sets.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from iveg.domain.observations import Instant, Origin, Road
+
+_BUCKET_S, _BUCKETS = 5.0, 12
+STEP_S = 0.5
+"""A clock that leaps by less is corrected within a minute, unnoticed."""
+AGREE = 5
+"""So many messages of one transport and boot must agree before a leap is believed."""
+_DIRECT_FRESH_S = 10.0
+_TOLERANCE_S = 0.25
+OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
+_MAX_FILTERS = 8
+
+_Kind = type
+_Place = tuple[int | None, float]
+
+
+@dataclass(slots=True)
+class ClockFilter:
+    """The fastest message of the last minute, of one transport and one boot."""
+
+    _buckets: deque[tuple[float, float]] = field(
+        default_factory=lambda: deque(maxlen=_BUCKETS)
+    )
+    _newest: dict[_Kind, _Place] = field(default_factory=dict)
+    _suspects: list[float] = field(default_factory=list)
+    _suspected_by: _Kind | None = None
+    seen_at: float = float("-inf")
+
+    def observe(self, kind: _Kind, origin: Origin, now: float) -> float | None:
+        """Take one message in; ``kind`` says whose count its ``seq`` belongs to.
+
+        Returns:
+            What it took beyond the fastest one (s), 0 without a stamp; None while
+            nobody can say, because its clock seems to have been set.
+        """
+        if origin.stamp_s is None:
+            return 0.0
+        transit, self.seen_at = now - origin.stamp_s, now
+        is_next, fell = self._place(kind, origin.seq, origin.stamp_s)
+        least = self.least
+        if least is None:
+            self._note(now, transit)
+            return 0.0
+        leaps = transit < least - STEP_S or (fell and transit > least + STEP_S)
+        if leaps or self._is_suspect(transit):
+            return self._suspect(kind, transit, now)
+        if is_next and kind is self._suspected_by:
+            # The very sender is back where it was: one stamp was wrong.
+            self._forget_suspects()
+        self._note(now, transit)
+        return max(0.0, transit - least)
+
+    @property
+    def least(self) -> float | None:
+        """Arrival less stamp of the fastest message (s); None before the first."""
+        return min((transit for _, transit in self._buckets), default=None)
+
+    def _place(self, kind: _Kind, seq: int | None, stamp_s: float) -> tuple[bool, bool]:
+        """Whether it is the newest of its kind, and its stamp fell all the same."""
+        before, last = self._newest.get(kind, (None, float("-inf")))
+        if seq is not None and before is not None and seq <= before:
+            return False, False
+        self._newest[kind] = seq, stamp_s
+        return True, stamp_s < last - STEP_S
+
+    def _is_suspect(self, transit: float) -> bool:
+        return bool(self._suspects) and abs(transit - self._suspects[0]) <= STEP_S
+
+    def _suspect(self, kind: _Kind, transit: float, now: float) -> float | None:
+        """One more message of a clock that was set, or only seems to have been."""
+        if not self._is_suspect(transit):
+            self._forget_suspects()
+        if not self._suspects:
+            self._suspected_by = kind
+        self._suspects.append(transit)
+        if len(self._suspects) < AGREE:
+            return None
+        least = min(self._suspects)
+        self._buckets.clear()
+        self._forget_suspects()
+        self._note(now, least)
+        return transit - least
+
+    def _forget_suspects(self) -> None:
+        self._suspects.clear()
+        self._suspected_by = None
+
+    def _note(self, now: float, transit: float) -> None:
+        buckets = self._buckets
+        if not buckets or now - buckets[-1][0] > _BUCKET_S:
+            buckets.append((now, transit))
+        elif transit < buckets[-1][1]:
+            buckets[-1] = (buckets[-1][0], transit)
+
+
+@dataclass(slots=True)
+class RobotClock:
+    """All that is estimated of one robot's clock: a filter a transport and boot."""
+
+    _filters: dict[tuple[Road, str | None], ClockFilter] = field(default_factory=dict)
+    _warned: tuple[float, float] = (float("-inf"), 0.0)
+
+    def delay(
+        self, kind: _Kind, origin: Origin, at: Instant, road: Road, lag: float | None
+    ) -> float | None:
+        """How old a message was when it arrived (s), estimated; None unknown.
+
+        ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
+        back: what FIWARE alone brings is never younger.
+        """
+        key = road, origin.boot
+        if key not in self._filters:
+            while len(self._filters) >= _MAX_FILTERS:
+                del self._filters[next(iter(self._filters))]
+            self._filters[key] = ClockFilter()
+        own = self._filters[key].observe(kind, origin, at.mono)
+        if road == "mqtt":
+            return own
+        against_direct = self._against_direct(origin, at.mono)
+        if against_direct is not None:
+            return max(against_direct, lag or 0.0)
+        return None if own is None or lag is None else max(own, lag)
+
+    def _against_direct(self, origin: Origin, now: float) -> float | None:
+        """The delay against the fastest direct message, while there are such (s)."""
+        direct = self._filters.get(("mqtt", origin.boot))
+        if direct is None or origin.stamp_s is None or direct.least is None:
+            return None
+        beyond = now - origin.stamp_s - direct.least
+        # Faster than the fastest direct one: the clock was set in between.
+        if now - direct.seen_at > _DIRECT_FRESH_S or beyond < -_TOLERANCE_S:
+            return None
+        return max(0.0, beyond)
+
+    def offset_s(self, now: Instant) -> float | None:
+        """How far the robot's clock is behind ours (s), by direct messages alone."""
+        direct = [one for (road, _), one in self._filters.items() if road == "mqtt"]
+        newest = max(direct, key=lambda one: one.seen_at, default=None)
+        if newest is None or newest.least is None:
+            return None
+        return newest.least + now.wall - now.mono
+
+    def warning(self, now: Instant) -> float | None:
+        """The offset to warn of (s); a warning lasts a minute, so that none flaps."""
+        offset = self.offset_s(now)
+        if offset is not None and abs(offset) > OFFSET_WARN_S:
+            self._warned = (now.mono + _WARNED_S, offset)
+        until, told = self._warned
+        return told if now.mono < until else None

@@ -1,0 +1,225 @@
+"""Delays and offsets that are estimated from stamps."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.clocks import RobotClock
+from iveg.domain.observations import Instant, Odometry, Origin, Road, SafetyReport
+from tests.builders import START, at, origin
+
+HOUR_S = 3600.0
+YEARS_S = 5 * 365 * 86400.0
+
+
+class Robot:
+    """A robot whose messages travel as long as a test wants."""
+
+    def __init__(self, ahead_s: float = 0.0) -> None:
+        self.estimate = RobotClock()
+        self.ahead_s = ahead_s
+        self.seq = 0
+
+    def send(
+        self,
+        sent: float,
+        delay: float = 0.0,
+        road: Road = "mqtt",
+        *,
+        lag: float | None = 0.0,
+        kind: type = Odometry,
+        boot: str = "boot-a",
+    ) -> float | None:
+        """A message leaves at ``sent`` (s); returns its estimated delay."""
+        self.seq += 1
+        one = origin(self.seq, boot=boot, after=sent + self.ahead_s)
+        return self.estimate.delay(kind, one, at(sent + delay), road, lag)
+
+    def send_many(self, first: float, count: int, delay: float = 0.0) -> None:
+        for number in range(count):
+            self.send(first + 0.1 * number, delay)
+
+    def offset(self, now: float) -> float | None:
+        return self.estimate.offset_s(at(now))
+
+
+# --- delays -----------------------------------------------------------------------
+
+
+def test_what_a_message_took_beyond_the_fastest_is_its_delay() -> None:
+    robot = Robot()
+    robot.send(0.0, 0.02)
+
+    assert robot.send(1.0, 0.5) == pytest.approx(0.48)
+
+
+@pytest.mark.parametrize("delay", [0.001, 9.0, 25.0, 60.0])
+def test_a_slow_transport_is_never_taken_for_a_clock(delay: float) -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20, 0.001)
+
+    found = [
+        robot.send(2.0 + 0.1 * n - delay, delay, "orion", lag=None) for n in range(20)
+    ]
+
+    assert found == [pytest.approx(delay - 0.001, abs=1e-6)] * 20
+    assert robot.offset(4.0) == pytest.approx(0.001, abs=1e-6)
+
+
+def test_fiware_alone_is_never_younger_than_the_lag_of_our_probe() -> None:
+    robot = Robot()
+
+    found = [robot.send(0.1 * n, 25.0, "orion", lag=24.5) for n in range(20)]
+
+    assert found == [24.5] * 20
+
+
+def test_fiware_alone_is_unknown_until_a_probe_came_back() -> None:
+    assert Robot().send(0.0, 25.0, "orion", lag=None) is None
+
+
+def test_direct_messages_of_long_ago_do_not_date_what_fiware_brings() -> None:
+    robot = Robot()
+    robot.send(0.0, 0.001)
+
+    assert robot.send(50.0, 9.0, "orion", lag=8.0) == 8.0
+
+
+def test_the_fastest_message_of_more_than_a_minute_ago_is_forgotten() -> None:
+    robot = Robot()
+    robot.send(0.0, 0.01)
+    for second in range(1, 130):
+        robot.send(float(second), 0.2)
+
+    assert robot.offset(130.0) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("road", "delay"), [("mqtt", 0.0), ("orion", 4.0)])
+def test_without_a_stamp_only_the_lag_is_known(road: Road, delay: float) -> None:
+    robot = RobotClock()
+
+    assert robot.delay(Odometry, Origin("a", 1), at(0.0), road, 4.0) == delay
+    assert robot.offset_s(at(0.0)) is None
+
+
+# --- clocks that are set ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("step_s", [HOUR_S, -HOUR_S, YEARS_S, -YEARS_S, 5.0, -5.0])
+def test_f16_a_clock_that_was_set_is_believed_when_five_agree(step_s: float) -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20)
+    robot.ahead_s = step_s
+
+    found = [robot.send(2.0 + 0.1 * n) for n in range(6)]
+
+    assert found == [*[None] * 4, 0.0, pytest.approx(0.0, abs=1e-6)]
+    assert robot.offset(2.6) == pytest.approx(-step_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("off_s", [HOUR_S, -HOUR_S])
+def test_one_wrong_stamp_changes_nothing(off_s: float) -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20)
+    robot.ahead_s = off_s
+    robot.send(2.0)
+    robot.ahead_s = 0.0
+
+    assert robot.send(2.1) == pytest.approx(0.0, abs=1e-6)
+    assert robot.offset(2.2) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_set_clock_is_found_though_messages_of_before_still_arrive() -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20)
+    found = []
+    for number in range(5):
+        robot.ahead_s = -HOUR_S
+        found.append(robot.send(2.0 + 0.1 * number))
+        robot.ahead_s = 0.0
+        robot.send(1.9, 0.2 + 0.1 * number, kind=SafetyReport)
+
+    assert found == [None, None, None, None, 0.0]
+
+
+def test_a_backlog_that_drains_at_once_ages_each_message_by_what_it_waited() -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20)
+
+    found = [robot.send(2.0 + 0.1 * n, 10.0 - 0.1 * n) for n in range(100)]
+
+    assert found == [pytest.approx(10.0 - 0.1 * n, abs=1e-6) for n in range(100)]
+
+
+def test_our_own_wall_clock_ages_nothing_when_it_is_set() -> None:
+    robot = Robot()
+    robot.send_many(0.0, 20)
+    moment = at(2.0)
+
+    jumped = Instant(moment.mono, moment.wall + HOUR_S)
+    one = origin(99, after=2.0)
+
+    found = robot.estimate.delay(Odometry, one, jumped, "mqtt", 0.0)
+    assert found == pytest.approx(0.0, abs=1e-6)
+    assert robot.estimate.offset_s(jumped) == pytest.approx(HOUR_S)
+
+
+# --- the offset -------------------------------------------------------------------
+
+
+def test_the_offset_is_the_least_of_a_minute_of_direct_messages() -> None:
+    robot = Robot()
+    for number, delay in enumerate((0.30, 0.02, 0.25, 0.40)):
+        robot.send(float(number), delay)
+        robot.send(float(number), 7.0, "orion")
+
+    assert robot.offset(4.0) == pytest.approx(0.02)
+
+
+def test_fiware_tells_no_offset() -> None:
+    robot = Robot(ahead_s=-9.0)
+    robot.send(0.0, 1.0, "orion")
+
+    assert robot.offset(1.0) is None
+
+
+def test_a_new_boot_has_a_clock_of_its_own() -> None:
+    robot = Robot()
+    robot.send_many(0.0, 5)
+    robot.ahead_s = 7.0
+    robot.send(1.0, boot="boot-b")
+
+    assert robot.offset(1.0) == pytest.approx(-7.0)
+
+
+def test_boots_that_are_long_gone_are_forgotten() -> None:
+    robot = Robot()
+    for number in range(100):
+        robot.send(0.0, boot=f"boot-{number}")
+
+    assert len(robot.estimate._filters) == 8
+
+
+@pytest.mark.parametrize(
+    ("ahead", "told"), [(0.24, False), (-0.24, False), (0.3, True), (-0.3, True)]
+)
+def test_a_clock_a_quarter_second_off_is_told(ahead: float, *, told: bool) -> None:
+    robot = Robot(ahead)
+    robot.send(0.0)
+
+    assert (robot.estimate.warning(at(0.0)) is not None) is told
+
+
+def test_a_warning_lasts_a_minute_so_that_none_flaps() -> None:
+    robot = Robot(0.3)
+    robot.send(0.0)
+    robot.estimate.warning(at(0.0))
+    robot.estimate = replace(robot.estimate, _filters={})
+
+    told = [robot.estimate.warning(at(s)) is not None for s in (1.0, 59.0, 61.0)]
+
+    assert told == [True, True, False]
+
+
+def test_nothing_is_told_of_a_clock_that_nobody_heard() -> None:
+    assert RobotClock().warning(START) is None

@@ -1,0 +1,182 @@
+"""A rest that is measured on the robot's clock, and what contradicts it."""
+
+import pytest
+
+from iveg.domain.observations import Instant, Origin
+from iveg.domain.stop.standstill import Standstill
+from tests.builders import START, at
+
+HOUR_S = 3600.0
+SECONDS = [0.2 * number for number in range(6)]
+
+
+def said(
+    mono: float, *, boot: str = "a", clock_off: float = 0.0, with_mono: bool = True
+) -> Origin:
+    """A message measured at this moment of the robot's (s)."""
+    stamp_s = START.wall + mono + clock_off
+    seq = 1 + round(1000 * mono)
+    return Origin(boot, seq, "t", stamp_s, mono if with_mono else None)
+
+
+def stood(late: float = 0.0) -> Standstill:
+    """At rest from 10.0 to 11.0 on the robot's clock; reports come ``late``."""
+    rest = Standstill()
+    found = [rest.rested(arrived(10.0 + s, late), said(10.0 + s)) for s in SECONDS]
+    assert found == [False] * 5 + [True]
+    return rest
+
+
+def arrived(mono: float, late: float = 0.0) -> Instant:
+    return at(mono + late)
+
+
+def moving(
+    rest: Standstill, *moments: float, late: float = 0.0, boot: str = "a"
+) -> list[bool | None]:
+    """What moving samples of odometry come to, measured at these moments."""
+    return [
+        rest.odometry(arrived(mono, late), said(mono, boot=boot), moves=True)
+        for mono in moments
+    ]
+
+
+# --- the rest ---------------------------------------------------------------------
+
+
+def test_reports_that_come_all_at_once_tell_the_rest_that_they_measured() -> None:
+    rest = Standstill()
+
+    found = [rest.rested(at(30.0), said(10.0 + s)) for s in SECONDS]
+
+    assert found == [False] * 5 + [True]
+
+
+def test_a_gap_in_what_was_measured_begins_anew_though_none_was_in_arrival() -> None:
+    rest = Standstill()
+    measured = [10.0, 10.2, 10.4, 11.0, 11.2, 11.4, 11.6, 11.8, 12.0]
+
+    found = [rest.rested(at(0.2 * n), said(mono)) for n, mono in enumerate(measured)]
+
+    assert found == [False] * 8 + [True]
+
+
+def test_reports_that_came_close_together_prove_no_second() -> None:
+    rest = Standstill()
+
+    found = [rest.rested(at(10.0 * n), said(10.0 + 0.05 * n)) for n in range(20)]
+
+    assert found == [False] * 20
+
+
+def test_moments_that_do_not_rise_prove_no_rest() -> None:
+    rest = Standstill()
+    stuck = [Origin("a", seq, mono=5.0) for seq in range(3)]
+
+    found = [rest.rested(at(0.5 * n), one) for n, one in enumerate(stuck)]
+
+    assert found == [False] * 3
+
+
+def test_a_clock_that_is_set_back_does_not_hide_a_rest_for_long() -> None:
+    rest = stood()
+
+    found = [
+        rest.rested(arrived(11.2 + s), said(11.2 + s, clock_off=-HOUR_S))
+        for s in [*SECONDS, 1.2]
+    ]
+
+    assert found == [False] * 6 + [True]
+
+
+# --- motion -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("late", [0.0, 2.0, 60.0])
+def test_motion_from_before_the_rest_changes_nothing_however_late(late: float) -> None:
+    rest = stood()
+
+    found = moving(rest, *(9.0 + 0.1 * n for n in range(11)), late=late)
+
+    assert found == [None] * 11
+    assert rest.rested(arrived(11.2), said(11.2))
+
+
+def test_later_motion_contradicts_with_three_samples() -> None:
+    assert moving(stood(), 11.1, 11.2, 11.3) == [False, False, True]
+
+
+def test_motion_during_the_rest_contradicts_though_it_comes_late() -> None:
+    assert moving(stood(), 10.5, 10.6, 10.7, late=5.0) == [False, False, True]
+
+
+def test_a_rest_that_goes_on_after_a_gap_does_not_excuse_motion_in_the_gap() -> None:
+    rest = stood()
+    rest.rested(arrived(12.0), said(12.0))
+
+    assert moving(rest, 11.5, 11.6, 11.7, late=2.0) == [False, False, True]
+
+
+@pytest.mark.parametrize("step_s", [HOUR_S, -HOUR_S])
+def test_no_wall_clock_protects_a_standstill(step_s: float) -> None:
+    rest = stood()
+
+    found = [
+        rest.odometry(arrived(mono), said(mono, clock_off=step_s), moves=True)
+        for mono in (11.1, 11.2, 11.3)
+    ]
+
+    assert found == [False, False, True]
+
+
+def test_a_clock_that_is_set_back_makes_its_sample_count_as_later() -> None:
+    rest = stood()
+    rest.odometry(arrived(9.0), said(9.0), moves=True)
+
+    back = rest.odometry(arrived(9.1, 5.0), said(9.1, clock_off=-HOUR_S), moves=True)
+
+    assert back is False
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [Origin(), said(9.0, with_mono=False), said(9.0, boot="b"), Origin("a", None)],
+)
+def test_motion_that_cannot_be_compared_contradicts(origin: Origin) -> None:
+    rest = stood()
+
+    found = [
+        rest.odometry(arrived(11.0 + 0.1 * number), origin, moves=True)
+        for number in range(3)
+    ]
+
+    assert found == [False, False, True]
+
+
+def test_moments_that_lie_are_found_out_by_what_the_robot_had_heard() -> None:
+    rest = stood()
+
+    found = [
+        rest.odometry(arrived(12.0 + s), said(1.0 + s), 0.2, moves=True)
+        for s in (0.0, 0.1, 0.2)
+    ]
+
+    assert found == [False, False, True]
+
+
+def test_one_sample_that_moved_delays_a_standstill_by_half_a_second() -> None:
+    rest = Standstill()
+    for s in SECONDS[:5]:
+        rest.rested(arrived(10.0 + s), said(10.0 + s))
+    moving(rest, 10.9)
+
+    found = [rest.rested(arrived(10.0 + s), said(10.0 + s)) for s in (1.0, 1.2, 1.4)]
+
+    assert found == [False, False, True]
+
+
+def test_what_was_forgotten_protects_nothing() -> None:
+    rest = stood()
+    rest.forget()
+
+    assert moving(rest, 9.0, 9.1, 9.2, late=5.0) == [False, False, True]
