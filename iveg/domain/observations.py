@@ -200,7 +200,12 @@ class CommandStatus:
 
 @dataclass(frozen=True, slots=True)
 class CommandAnswer:
-    """The robot's own answer on ``cmdexe`` (or ``cmd_info``)."""
+    """The robot's own answer on ``cmdexe`` (or ``cmd_info``).
+
+    Attributes:
+        attempt: Of the release or resume that is answered; None for a STOP, and from
+            robots of the earlier version.
+    """
 
     robot_id: str
     origin: Origin
@@ -210,6 +215,7 @@ class CommandAnswer:
     challenge: str | None = None
     linear: float = 0.0
     why: str | None = None
+    attempt: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,6 +155,7 @@ class AnswerValue(OriginFields):
     ch: Text | None = None
     v: Speed = 0.0
     why: Text | None = None
+    attempt: Text | None = None
 
 
 class ClimateValue(Wire):

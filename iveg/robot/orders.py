@@ -24,17 +24,24 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Lift exactly these holds."""
+    """Lift exactly these holds.
+
+    Attributes:
+        attempt: Names the order; its copies have the same.  None from the earlier
+            version.
+    """
 
     ids: tuple[str, ...]
     challenge: str
+    attempt: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """Drive again after a release."""
+    """Drive again after a release; ``attempt`` as in ``Release``."""
 
     challenge: str
+    attempt: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,21 +113,32 @@ def _release_or_resume(message: object) -> Order:
     if not isinstance(command, dict) or len(command) != 1:
         return Unusable("malformed")
     release, resume = command.get("release"), command.get("resume")
-    if isinstance(release, dict) and release.keys() == {"ids", "ch"}:
-        return _release(release["ids"], release["ch"])
-    if isinstance(resume, dict) and resume.keys() == {"ch"}:
-        challenge = resume["ch"]
-        if isinstance(challenge, str) and challenge:
-            return Resume(challenge)
+    if isinstance(release, dict) and release.keys() - {"attempt"} == {"ids", "ch"}:
+        return _release(release)
+    if isinstance(resume, dict) and resume.keys() - {"attempt"} == {"ch"}:
+        return _resume(resume)
     return Unusable("malformed")
 
 
-def _release(ids: object, challenge: object) -> Order:
-    if not isinstance(challenge, str) or not challenge:
+def _release(asked: dict[str, object]) -> Order:
+    ids, challenge = asked["ids"], asked["ch"]
+    if not isinstance(challenge, str) or not challenge or not _has_good_name(asked):
         return Unusable("malformed")
     if not isinstance(ids, list) or not 0 < len(ids) <= _MAX_NAMED:
         return Unusable("malformed")
     named = tuple(one for one in ids if isinstance(one, str) and one)
-    return (
-        Release(named, challenge) if len(named) == len(ids) else Unusable("malformed")
-    )
+    if len(named) != len(ids):
+        return Unusable("malformed")
+    return Release(named, challenge, _usable_id(asked.get("attempt")))
+
+
+def _resume(asked: dict[str, object]) -> Order:
+    challenge = asked["ch"]
+    if not isinstance(challenge, str) or not challenge or not _has_good_name(asked):
+        return Unusable("malformed")
+    return Resume(challenge, _usable_id(asked.get("attempt")))
+
+
+def _has_good_name(asked: dict[str, object]) -> bool:
+    """Whether an order has no attempt at all or one that can be answered."""
+    return "attempt" not in asked or _usable_id(asked["attempt"]) is not None

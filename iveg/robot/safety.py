@@ -23,6 +23,7 @@ from typing import Literal
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
+from iveg.robot.attempts import Attempts, Verdict
 from iveg.robot.caps import FREE, Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
@@ -70,6 +71,7 @@ class SafetyMachine:
         self._resumed = False
         self._resumed_by: str | None = None
         self._challenge, self._challenge_at = fresh(), now
+        self._attempts = Attempts()
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
         self._reported: SafetyReport | None = None
@@ -144,10 +146,8 @@ class SafetyMachine:
         order = read_order(payload)
         if isinstance(order, Stop):
             answer = self._stop(order.id, now)
-        elif isinstance(order, Release):
-            answer = self._release(order, now)
-        elif isinstance(order, Resume):
-            answer = self._resume(order, now)
+        elif isinstance(order, Release | Resume):
+            answer = self._attempt(order, now)
         else:
             answer = self._answer(None, "REFUSED", order.why)
         self._judge(now)
@@ -207,18 +207,34 @@ class SafetyMachine:
                 return hold
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
-    def _release(self, order: Release, now: float) -> CommandAnswer:
+    def _attempt(self, order: Release | Resume, now: float) -> CommandAnswer:
+        """The first copy of an order is judged; every other is answered alike."""
+        verdict = self._attempts.recall(order.attempt)
+        if verdict is None:
+            if isinstance(order, Release):
+                verdict = self._release(order, now)
+            else:
+                verdict = self._resume(order, now)
+            self._attempts.note(order.attempt, verdict)
+        return self._answer(
+            verdict.answered, verdict.code, verdict.why, attempt=order.attempt
+        )
+
+    def _release(self, order: Release, now: float) -> Verdict:
+        first = order.ids[0]
+        if set(order.ids) <= set(self._holds.released):
+            # The same release again: nothing left to lift, answered alike.
+            return Verdict(first, "RELEASED")
         why = self._why_not_release(order, now)
         if why is not None:
-            return self._refuse(order.ids[0], order.challenge, why, now)
+            return self._refuse(first, order.challenge, why, now)
         self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
-        return self._answer(order.ids[0], "RELEASED")
+        self._renew_challenge(now)
+        return Verdict(first, "RELEASED")
 
     def _why_not_release(self, order: Release, now: float) -> str | None:
         """The code that a release is refused with; None when it is perfect."""
         remote = self._holds.remote
-        if set(order.ids) <= set(self._holds.released):
-            return None  # the same release again: nothing left to lift, answered alike
         if not remote:
             return "not_held"
         if not remote <= set(order.ids):
@@ -227,15 +243,16 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: Resume, now: float) -> CommandAnswer:
+    def _resume(self, order: Resume, now: float) -> Verdict:
         if self._resumed and order.challenge == self._resumed_by:
-            return self._answer(None, "RESUMED")
+            return Verdict(None, "RESUMED")
         why = self._why_not_resume(order)
         if why is not None:
             return self._refuse(None, order.challenge, why, now)
         self._let_go()
         self._resumed_by = order.challenge
-        return self._answer(None, "RESUMED")
+        self._renew_challenge(now)
+        return Verdict(None, "RESUMED")
 
     def _why_not_resume(self, order: Resume) -> str | None:
         if self._holds.holds:
@@ -246,14 +263,19 @@ class SafetyMachine:
 
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
-    ) -> CommandAnswer:
+    ) -> Verdict:
         """Refuse; a copy that comes later, when all would be right, finds it spent."""
         if challenge == self._challenge:
             self._renew_challenge(now)
-        return self._answer(answered, "REFUSED", why)
+        return Verdict(answered, "REFUSED", why)
 
     def _answer(
-        self, answered: str | None, code: AnswerCode, why: str | None = None
+        self,
+        answered: str | None,
+        code: AnswerCode,
+        why: str | None = None,
+        *,
+        attempt: str | None = None,
     ) -> CommandAnswer:
         return CommandAnswer(
             self._id,
@@ -264,6 +286,7 @@ class SafetyMachine:
             self._challenge,
             self._judgement.twist.linear_x,
             why,
+            attempt,
         )
 
     # --- judgement ----------------------------------------------------------------

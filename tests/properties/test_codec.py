@@ -166,6 +166,7 @@ def test_navigation_comes_back_as_it_went(value: Navigation) -> None:
         maybe,
         thousandths(-3, 3),
         maybe,
+        maybe,
     )
 )
 def test_answers_come_back_as_they_went(value: CommandAnswer) -> None:

@@ -1,6 +1,7 @@
 """The robot's invariants R1-R10 (safety.md §2.6), under everything a network can do."""
 # ruff: noqa: N802 - each test bears the name of its invariant
 
+import itertools
 from dataclasses import replace
 
 import orjson
@@ -322,6 +323,59 @@ def test_R9_commands_delivered_again_never_make_a_waiting_robot_run(
     for which in order:
         world.again(which)
     assert world.state != "RUNNING"
+
+
+@given(EVENTS, st.lists(st.integers(0, 40), max_size=20))
+def test_R9_the_copies_of_an_attempt_are_answered_alike_and_change_nothing(
+    events: list[Event], copies: list[int]
+) -> None:
+    world = played(events)
+    for which in copies:
+        world.again(which)
+    verdicts = Verdicts()
+    for one in world.transitions:
+        verdicts.watch(one)
+    assert all(len(answers) == 1 for answers in verdicts.first.values())
+
+
+class Verdicts:
+    """What each attempt was answered first, in one life of the robot."""
+
+    def __init__(self) -> None:
+        self.first: dict[str, list[str]] = {}
+        self.delivered: set[bytes] = set()
+
+    def watch(self, one: Transition) -> None:
+        if one.did in ("reboot", "cut"):
+            self.first.clear()
+        attempt = attempt_of(one)
+        if attempt is None:
+            return
+        known = self.first.setdefault(attempt, one.answers)
+        assert one.answers == known
+        if one.payload in self.delivered:
+            assert {hold for hold in one.lost if hold.ack != "auto"} == set()
+        self.delivered.add(one.payload or b"")
+
+
+def attempt_of(one: Transition) -> str | None:
+    """The attempt that a release or resume names."""
+    try:
+        (asked,) = orjson.loads(one.payload or b"")["cmd"].values()
+        named = asked["attempt"]
+    except (orjson.JSONDecodeError, KeyError, TypeError, ValueError, AttributeError):
+        return None
+    return named if isinstance(named, str) else None
+
+
+@given(EVENTS)
+def test_R9_an_order_that_succeeds_spends_its_challenge(events: list[Event]) -> None:
+    world = played(events)
+    for one, then in itertools.pairwise(world.transitions):
+        acted = one.answers in (["RELEASED"], ["RESUMED"]) and (
+            one.challenge.encode() in (one.payload or b"")
+        )
+        assert not acted or then.challenge != one.challenge
 
 
 @given(EVENTS)

@@ -174,6 +174,7 @@ def command_answer(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswe
         value.ch,
         value.v,
         value.why,
+        value.attempt,
     )
 
 

@@ -13,14 +13,27 @@ def write_stop(hold_id: str, by: str) -> dict[str, Any]:
     return {"stop": {"id": hold_id, "by": by}}
 
 
-def write_release(hold_ids: Iterable[str], challenge: str) -> dict[str, Any]:
-    """The value of ``cmd`` that lifts exactly these holds."""
-    return {"release": {"ids": list(hold_ids), "ch": challenge}}
+def write_release(
+    hold_ids: Iterable[str], challenge: str, attempt: str | None = None
+) -> dict[str, Any]:
+    """The value of ``cmd`` that lifts exactly these holds.
+
+    Args:
+        hold_ids: Every remote hold of the robot.
+        challenge: The robot's newest.
+        attempt: Names this order, so that its copies are known for what they are;
+            without one it is an order of the earlier version.
+    """
+    return {"release": {"ids": list(hold_ids), "ch": challenge, **_named(attempt)}}
 
 
-def write_resume(challenge: str) -> dict[str, Any]:
-    """The value of ``cmd`` that lets a released robot drive."""
-    return {"resume": {"ch": challenge}}
+def write_resume(challenge: str, attempt: str | None = None) -> dict[str, Any]:
+    """The value of ``cmd`` that lets a released robot drive; as ``write_release``."""
+    return {"resume": {"ch": challenge, **_named(attempt)}}
+
+
+def _named(attempt: str | None) -> dict[str, str]:
+    return {} if attempt is None else {"attempt": attempt}
 
 
 def write_command(value: Mapping[str, Any]) -> bytes:

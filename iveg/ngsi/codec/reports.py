@@ -131,6 +131,7 @@ def write_answer(value: CommandAnswer) -> bytes:
                 "boot": value.origin.boot,
                 "seq": value.origin.seq,
                 "why": value.why,
+                "attempt": value.attempt,
             }
         }
     )

@@ -179,11 +179,17 @@ class World(Rig):
         ids = {"fewer": remote[1:], "all": everything}.get(kind, remote)
         old = next((c for c in self.challenges if c != self.machine.challenge), "none")
         ch = old if kind == "old" else self.machine.challenge
-        self.deliver(release(ids or ["nobody"], ch))
+        self.deliver(release(ids or ["nobody"], ch, self.attempt()))
 
     def ask_resume(self, kind: str) -> None:
         old = next((c for c in self.challenges if c != self.machine.challenge), "none")
-        self.deliver(resume(old if kind == "old" else self.machine.challenge))
+        ch = old if kind == "old" else self.machine.challenge
+        self.deliver(resume(ch, self.attempt()))
+
+    def attempt(self) -> str | None:
+        """A name for an order; every third comes from an iVeg that gives none."""
+        number = len(self.commands)
+        return f"t{number}" if number % 3 else None
 
     def again(self, which: int) -> None:
         for payload in self.commands[which % max(1, len(self.commands)) :][:1]:

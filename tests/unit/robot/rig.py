@@ -35,12 +35,12 @@ def person(
     )
 
 
-def release(ids: list[str], challenge: str) -> bytes:
-    return codec.write_command(codec.write_release(ids, challenge))
+def release(ids: list[str], challenge: str, attempt: str | None = None) -> bytes:
+    return codec.write_command(codec.write_release(ids, challenge, attempt))
 
 
-def resume(challenge: str) -> bytes:
-    return codec.write_command(codec.write_resume(challenge))
+def resume(challenge: str, attempt: str | None = None) -> bytes:
+    return codec.write_command(codec.write_resume(challenge, attempt))
 
 
 def stop(hold_id: str) -> bytes:

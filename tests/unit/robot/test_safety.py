@@ -5,6 +5,7 @@ import pytest
 from iveg.domain.feedback import CLEAR, Mandate
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold
+from iveg.robot.attempts import ATTEMPTS_KEPT
 from iveg.robot.effects import Answer, Drive, Persist, Report
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
@@ -294,6 +295,95 @@ def test_an_old_resume_does_not_resume_the_next_release() -> None:
     assert rig.state == "READY"
 
 
+def test_the_answer_to_an_order_names_its_attempt() -> None:
+    rig = Rig().run(0.5)
+    lifted = rig.command(release(["boot-b1"], rig.machine.challenge, "01TRY"))
+    resumed = rig.command(resume(rig.machine.challenge, "01GO"))
+    assert (lifted.result, lifted.attempt) == ("RELEASED", "01TRY")
+    assert (resumed.result, resumed.attempt) == ("RESUMED", "01GO")
+    assert rig.stop("01STOP").attempt is None
+
+
+def test_the_second_copy_of_a_release_is_answered_alike_after_a_new_stop() -> None:
+    rig = Rig().run(0.5)
+    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
+    rig.command(order)
+    rig.stop("01NEW")
+    rig.run(0.5)
+    answer = rig.command(order)
+    assert (answer.result, answer.attempt) == ("RELEASED", "01TRY")
+    assert [hold.id for hold in rig.holds] == ["01NEW"]
+
+
+def test_the_second_copy_of_a_resume_is_answered_alike_and_resumes_nothing() -> None:
+    rig = Rig().run(0.5)
+    rig.release()
+    order = resume(rig.machine.challenge, "01GO")
+    rig.command(order)
+    rig.stop("01NEW")
+    rig.run(0.5)
+    rig.release()
+    assert rig.command(order).result == "RESUMED"
+    assert rig.state == "READY"
+
+
+def test_a_refused_attempt_stays_refused_when_all_would_be_right() -> None:
+    rig = Rig(speed=Twist2D(0.0, 0.05), obeys=False).run(0.5)
+    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
+    first = rig.command(order)
+    rig.speed = REST
+    rig.run(1.0)
+    again = rig.command(order)
+    assert (first.why, again.why) == ("not_standing", "not_standing")
+    assert again.attempt == "01TRY"
+    assert rig.holds
+
+
+def test_an_order_spends_its_challenge_when_it_succeeds() -> None:
+    rig = Rig().run(0.5)
+    before = rig.machine.challenge
+    rig.release()
+    between = rig.machine.challenge
+    rig.resume()
+    assert len({before, between, rig.machine.challenge}) == 3
+
+
+def test_an_attempt_that_is_forgotten_cannot_act_either() -> None:
+    rig = Rig().run(0.5)
+    order = release(["boot-b1"], rig.machine.challenge, "01TRY")
+    rig.command(order)
+    for number in range(ATTEMPTS_KEPT):
+        rig.command(resume("none", f"t{number}"))
+    rig.stop("01NEW")
+    rig.run(0.5)
+    rig.command(order)
+    assert [hold.id for hold in rig.holds] == ["01NEW"]
+
+
+def test_an_attempt_of_before_a_reboot_does_not_lift_the_hold_of_the_boot() -> None:
+    rig = Rig().run(0.5)
+    rig.stop("01STOP")
+    rig.run(0.5)
+    order = release(["01STOP", "boot-b1"], rig.machine.challenge, "01TRY")
+    rig.boot = "b2"
+    rig.machine = rig.start()
+    rig.run(0.5)
+    answer = rig.command(order)
+    assert (answer.result, answer.why) == ("REFUSED", "holds_missing")
+    assert {hold.id for hold in rig.holds} == {"01STOP", "boot-b2"}
+
+
+@pytest.mark.parametrize("attempt", [b'""', b"null", b"7", b'"a;b"', b'["01TRY"]'])
+def test_an_order_whose_attempt_cannot_be_answered_is_malformed(attempt: bytes) -> None:
+    rig = Rig().run(0.5)
+    payload = (
+        b'{"cmd": {"release": {"ids": ["boot-b1"], "ch": "%s", "attempt": %s}}}'
+        % (rig.machine.challenge.encode(), attempt)
+    )
+    assert rig.command(payload).why == "malformed"
+    assert rig.holds
+
+
 def test_a_copy_of_a_resume_that_came_too_early_does_not_count() -> None:
     rig = Rig().run(0.5)
     early = resume(rig.machine.challenge)
@@ -355,9 +445,10 @@ def test_the_challenge_changes_every_five_seconds_until_the_robot_runs() -> None
     rig.run(5.1)
     third = rig.machine.challenge
     rig.resume()
+    fourth = rig.machine.challenge
     rig.run(11.0)
-    assert len({first, second, third}) == 3
-    assert rig.machine.challenge == third
+    assert len({first, second, third, fourth}) == 4
+    assert rig.machine.challenge == fourth
 
 
 def test_a_new_hold_brings_a_new_challenge_and_a_repeated_one_does_not() -> None:
