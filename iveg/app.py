@@ -172,6 +172,8 @@ class Dss:
             clock.now,
             direct=settings.stop_direct,
             drills=Drills(settings.drill_days),
+            agent_lag_s=self.chain.probe.lag,
+            fiware_is_cut=self.chain.is_cut,
         )
         self.loop = RuleLoop(
             self.ingest,

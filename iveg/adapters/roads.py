@@ -3,8 +3,8 @@
 They share nothing, so that what breaks one leaves the other alone.
 """
 
-from collections.abc import Iterable
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
 
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
@@ -30,6 +30,21 @@ class MqttRoad:
         payload = codec.write_command(codec.write_stop(hold_id, by))
         await self._link.publish(topic, payload, qos=1)
 
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
+        """Publish a release, once."""
+        await self._once(robot_id, codec.write_release(ids, challenge, attempt))
+
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
+        """Publish a resume, once."""
+        await self._once(robot_id, codec.write_resume(challenge, attempt))
+
+    async def _once(self, robot_id: str, value: Mapping[str, Any]) -> None:
+        """At QoS 0, so that no client sends it again after a lost connection."""
+        topic = names.command_topic(self._apikey, robot_id)
+        await self._link.publish(topic, codec.write_command(value), qos=0)
+
     async def set_level(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
     ) -> None:
@@ -49,10 +64,14 @@ class OrionRoad:
         """Ask for a STOP; Orion's 204 is no evidence."""
         await self._orion.update_command(robot_id, codec.write_stop(hold_id, by))
 
-    async def release(self, robot_id: str, ids: Iterable[str], challenge: str) -> None:
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
         """Ask for a release, once."""
-        await self._orion.update_command(robot_id, codec.write_release(ids, challenge))
+        value = codec.write_release(ids, challenge, attempt)
+        await self._orion.update_command(robot_id, value)
 
-    async def resume(self, robot_id: str, challenge: str) -> None:
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
         """Ask for a resume, once."""
-        await self._orion.update_command(robot_id, codec.write_resume(challenge))
+        value = codec.write_resume(challenge, attempt)
+        await self._orion.update_command(robot_id, value)

@@ -109,6 +109,11 @@ class Chain:
             hop.state == "ok" for hop in self.hops(now) if hop.name != "database"
         )
 
+    def is_cut(self, now: Instant) -> bool:
+        """Whether it is known that Orion's commands do not reach the robots."""
+        down = {hop.name for hop in self.hops(now) if hop.state == "down"}
+        return not down.isdisjoint(("mqtt", "iot_agent"))
+
     def _mqtt(self, now: Instant) -> Hop:
         if self.mqtt_connected:
             self._was_connected = True

@@ -5,7 +5,7 @@ module stands between the two and tells people, disk and browsers how far it has
 """
 
 import asyncio
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -30,6 +30,7 @@ from iveg.domain.stop import (
     SendStop,
     SetLevel,
     StopMachine,
+    Wanted,
 )
 from iveg.domain.stop.drills import Drills
 from iveg.pipeline.minutes import Minutes
@@ -58,7 +59,21 @@ _NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALARMS}
 
 
 class Commander:
-    """Keeps one STOP machine a robot and does what they ask."""
+    """Keeps one STOP machine a robot and does what they ask.
+
+    Args:
+        robots: The fleet.
+        fleet: Straight to the robots; ``broker`` through Orion.
+        journal: Outlives a crash.
+        minutes: Tells people and the history.
+        hub: Tells browsers.
+        new_id: Makes ULIDs.
+        clock: Reads both clocks.
+        direct: Whether orders go straight to the robots, too.
+        drills: When each robot's STOP was last proved.
+        agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
+        fiware_is_cut: Whether the agent or its broker is known to pass nothing on.
+    """
 
     def __init__(
         self,
@@ -73,6 +88,8 @@ class Commander:
         *,
         direct: bool = True,
         drills: Drills | None = None,
+        agent_lag_s: Callable[[Instant], float | None] = lambda _: None,
+        fiware_is_cut: Callable[[Instant], bool] = lambda _: False,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, direct=direct) for robot_id in robots
@@ -80,7 +97,10 @@ class Commander:
         self.commands: dict[str, Command] = {}
         self.drills = drills or Drills()
         self._presses = Presses()
-        self._sender = Sender(fleet, broker, minutes, clock, self._came_back)
+        self._sender = Sender(
+            fleet, broker, journal, minutes, clock, self._came_back, fiware_is_cut
+        )
+        self._agent_lag_s = agent_lag_s
         self._journal = journal
         self._minutes = minutes
         self._hub = hub
@@ -133,7 +153,7 @@ class Commander:
         await asyncio.gather(
             self._minutes.secured(),
             *(
-                self._journal.wanted(one.robot_id, "stopped", one.command_id, by, at)
+                self._journal.wanted(one.robot_id, "stopped", one.hold_id, by, at)
                 for one in stands
             ),
         )
@@ -200,7 +220,9 @@ class Commander:
                     observation, at, received.road, self._new_id(), age_s
                 )
             case CommandAnswer():
-                effects = machine.answered(observation, at, received.road)
+                effects = machine.answered(
+                    observation, at, received.road, self._new_id()
+                )
             case Odometry():
                 twist = observation.twist
                 effects = machine.odometry(
@@ -218,14 +240,13 @@ class Commander:
         for machine in self.machines.values():
             self._perform(machine, machine.tick(now, self._new_id()), now)
 
-    def restore(self, wanted: Mapping[str, str], now: Instant) -> None:
-        """After a restart: every robot that was to stand is stopped again, newly."""
-        for robot_id, by in wanted.items():
+    def restore(self, wanted: Mapping[str, Wanted], now: Instant) -> None:
+        """After a restart: every robot that was to stand is stopped again."""
+        for robot_id, one in wanted.items():
             machine = self.machines.get(robot_id)
             if machine is None:
                 continue
-            effects = machine.press(by, now, self._new_id(), key="reasserted")
-            self._perform(machine, effects, now)
+            self._perform(machine, machine.restore(one, now, self._new_id()), now)
 
     def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
         """Close the rows that an earlier run left open; nobody follows them any more.
@@ -241,7 +262,7 @@ class Commander:
             # One that waited for its resume had been released: nothing took its place.
             stood = row.kind == "stop" and row.state != "READY"
             if machine is not None and machine.wants_stop and stood:
-                heir = machine.hold_id
+                heir = None if machine.stop is None else machine.stop.command_id
             self._minutes.left_over(row, heir, now)
         self._sender.start(self._minutes.secured(), "audit-earlier")
 
@@ -263,10 +284,14 @@ class Commander:
         for effect in effects:
             match effect:
                 case SendStop():
+                    self._note_lag(machine, at)
                     self._sender.send(machine, effect)
                     # A silent robot says nothing that would carry the new count.
                     self._show(machine)
-                case SendOnce() | SetLevel():
+                case SendOnce():
+                    self._note_lag(machine, at)
+                    self._sender.send(machine, effect)
+                case SetLevel():
                     self._sender.send(machine, effect)
                 case Changed():
                     self._tell(machine, effect, at)
@@ -275,6 +300,12 @@ class Commander:
                     )
                 case Closed():
                     self._minutes.closed(effect, at)
+
+    def _note_lag(self, machine: StopMachine, at: Instant) -> None:
+        """How far the agent is behind while an order is being sent through it."""
+        sent = machine.once or machine.stop
+        if sent is not None:
+            sent.agent_lag_s = self._agent_lag_s(at)
 
     def _came_back(
         self, machine: StopMachine, effects: list[Effect], at: Instant

@@ -1,6 +1,6 @@
 """What the pipeline needs of the outside: a few verbs each."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol
 
 from iveg.domain.alerts import Rule
@@ -8,7 +8,27 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant
 
 
-class Fleet(Protocol):
+class OneShot(Protocol):
+    """Carries a release or a resume once; never retained, never sent again."""
+
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
+        """Send a release, once; ``attempt`` names it in the robot's answer.
+
+        Raises:
+            HopError: it was not taken.
+        """
+
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
+        """Send a resume, once.
+
+        Raises:
+            HopError: it was not taken.
+        """
+
+
+class Fleet(OneShot, Protocol):
     """Straight to the robots over MQTT."""
 
     def tell(self, feedback: Feedback) -> None:
@@ -31,17 +51,11 @@ class Fleet(Protocol):
         """
 
 
-class ContextBroker(Protocol):
+class ContextBroker(OneShot, Protocol):
     """Through Orion and the IoT Agent; an answer of 2xx is no evidence."""
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Ask for a STOP. Raises HopError."""
-
-    async def release(self, robot_id: str, ids: Iterable[str], challenge: str) -> None:
-        """Ask for a release, once. Raises HopError."""
-
-    async def resume(self, robot_id: str, challenge: str) -> None:
-        """Ask for a resume, once. Raises HopError."""
 
 
 class Journal(Protocol):
@@ -56,6 +70,20 @@ class Journal(Protocol):
         at: Instant,
     ) -> None:
         """Write down what is wanted of a robot; returns when it is on disk."""
+
+    async def named(
+        self,
+        robot_id: str,
+        hold_id: str,
+        ids: Sequence[str],
+        challenge: str,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Write down that a release is about to name these STOPs; likewise.
+
+        The robot is still to stand: only ``wanted`` with ``run`` ends that.
+        """
 
 
 class RuleStore(Protocol):

@@ -1,7 +1,7 @@
-"""Carries what a STOP machine wants sent, on both roads at once.
+"""Carries what a STOP machine wants sent, on both transports at once.
 
-Each send is a task of its own: nothing is awaited before its first byte is on its way,
-and nothing that fails on one road holds up the other.
+Each send is a task of its own: nothing is awaited before a STOP's first byte is on its
+way, and nothing that fails on one transport holds up the other.
 """
 
 import asyncio
@@ -14,34 +14,48 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop import (
     Effect,
     SendOnce,
-    SendRoad,
     SendStop,
     SetLevel,
     StopMachine,
+    Transport,
 )
 from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.ports import Clock, ContextBroker, Fleet
+from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Journal, OneShot
 
 _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
 
 
 class Sender:
-    """The way out: STOPs, releases, resumes and levels, each in its own task."""
+    """The way out: STOPs, releases, resumes and levels, each in its own task.
+
+    Args:
+        fleet: Straight to the robots.
+        broker: Through Orion.
+        journal: Knows what a release names before it goes.
+        minutes: Holds the audit row of a release before it goes.
+        clock: Reads both clocks.
+        came_back: Told how each send went.
+        fiware_is_cut: Whether the agent or its broker is known to pass nothing on.
+    """
 
     def __init__(
         self,
         fleet: Fleet,
         broker: ContextBroker,
+        journal: Journal,
         minutes: Minutes,
         clock: Clock,
         came_back: CameBack,
+        fiware_is_cut: Callable[[Instant], bool],
     ) -> None:
         self._fleet = fleet
         self._broker = broker
+        self._journal = journal
         self._minutes = minutes
         self._clock = clock
         self._came_back = came_back
+        self._fiware_is_cut = fiware_is_cut
         self._levels: dict[str, SetLevel] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -83,52 +97,73 @@ class Sender:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    # --- the roads ----------------------------------------------------------------
+    # --- the transports -----------------------------------------------------------
 
     async def _send_stop(self, machine: StopMachine, effect: SendStop) -> None:
-        port: Fleet | ContextBroker = (
-            self._fleet if effect.road == "direct" else self._broker
-        )
-        by = "iveg"
-        if machine.stop is not None:
-            by = machine.stop.command_id[-6:]
+        port = self._port(effect.road)
+        by = effect.command_id[-6:]
         sending = port.stop(effect.robot_id, effect.hold_id, by)
-        await self._attempt(machine, effect.road, effect.hold_id, sending)
+        await self._attempt(machine, effect.road, effect.command_id, sending)
+
+    def _port(self, transport: Transport) -> Fleet | ContextBroker:
+        return self._fleet if transport == "direct" else self._broker
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
         """Once, and never without a trace: the audit row is on disk before it goes."""
-        await self._minutes.secured()
+        await asyncio.gather(self._minutes.secured(), self._note_named(machine, effect))
         if machine.once is None or machine.once.command_id != effect.command_id:
             # The disk took so long that a STOP has come, or taken its place.
             return
-        if effect.kind == "release":
-            sending = self._broker.release(
-                effect.robot_id, effect.ids, effect.challenge
+        for transport in effect.transports:
+            sending = self._once(self._port(transport), effect)
+            self.start(
+                self._attempt(machine, transport, effect.command_id, sending),
+                f"{effect.kind}-{transport}-{effect.robot_id}",
             )
-        else:
-            sending = self._broker.resume(effect.robot_id, effect.challenge)
-        await self._attempt(machine, "fiware", effect.command_id, sending)
+
+    async def _note_named(self, machine: StopMachine, effect: SendOnce) -> None:
+        """The disk knows which STOPs a release names: none is asserted as new again."""
+        if machine.hold_id is None or not effect.ours:
+            return
+        by = "iveg" if machine.stop is None else machine.stop.requesters[0]
+        await self._journal.named(
+            effect.robot_id,
+            machine.hold_id,
+            effect.ours,
+            effect.challenge,
+            by,
+            self._clock(),
+        )
+
+    @staticmethod
+    def _once(port: OneShot, effect: SendOnce) -> Coroutine[Any, Any, None]:
+        robot_id, challenge = effect.robot_id, effect.challenge
+        if effect.kind == "resume":
+            return port.resume(robot_id, challenge, effect.command_id)
+        return port.release(robot_id, effect.ids, challenge, effect.command_id)
 
     async def _attempt(
         self,
         machine: StopMachine,
-        road: SendRoad,
+        transport: Transport,
         command_id: str,
         sending: Coroutine[Any, Any, None],
     ) -> None:
         """Send and tell the machine how it went, whatever went wrong.
 
-        A road whose failure stayed untold would count as busy for ever.
+        A transport whose failure stayed untold would count as busy for ever.
         """
         ok = False
         try:
             await sending
             ok = True
         except HopError as error:
-            _log.info("STOP road %s: %s", road, error)
+            _log.info("STOP road %s: %s", transport, error)
         finally:
             at = self._clock()
-            self._came_back(machine, machine.sent(road, command_id, at, ok=ok), at)
+            doubtful = transport == "fiware" and self._fiware_is_cut(at)
+            effects = machine.sent(transport, command_id, at, ok=ok, doubtful=doubtful)
+            self._came_back(machine, effects, at)
 
     def _start_level(self, level: SetLevel) -> None:
         self.start(self._set_level(level), f"level-{level.robot_id}")

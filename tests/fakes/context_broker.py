@@ -11,6 +11,7 @@ class FakeContextBroker:
 
     Attributes:
         asked: (what, robot, hold ids) in the order it was asked.
+        orders: (challenge, attempt) of each release and resume.
         in_flight: Requests that have not come back; ``most`` the most there ever were.
         fails: Raised by every request, if set.
         opened: Cleared, every request hangs until it is set.
@@ -18,6 +19,7 @@ class FakeContextBroker:
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, str, tuple[str, ...]]] = []
+        self.orders: list[tuple[str, str]] = []
         self.in_flight = self.most = 0
         self.fails: Exception | None = None
         self.opened = asyncio.Event()
@@ -26,10 +28,14 @@ class FakeContextBroker:
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port
         await self._ask("stop", robot_id, (hold_id,))
 
-    async def release(self, robot_id: str, ids: Iterable[str], challenge: str) -> None:  # noqa: ARG002 - the port
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
+        self.orders.append((challenge, attempt))
         await self._ask("release", robot_id, tuple(ids))
 
-    async def resume(self, robot_id: str, challenge: str) -> None:  # noqa: ARG002 - the port
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
+        self.orders.append((challenge, attempt))
         await self._ask("resume", robot_id, ())
 
     def refuse(self) -> None:

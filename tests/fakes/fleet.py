@@ -14,6 +14,8 @@ class FakeFleet:
     Attributes:
         told: Feedback in the order it was offered.
         stops: (robot, hold) in the order it was published.
+        asked: (what, robot, hold ids) of each release and resume.
+        orders: (challenge, attempt) of the same.
         levels: (robot, desired, ids) likewise.
         fails: Every publication is refused.
         opened: Cleared, every STOP hangs until it is set.
@@ -22,6 +24,8 @@ class FakeFleet:
     def __init__(self) -> None:
         self.told: list[Feedback] = []
         self.stops: list[tuple[str, str]] = []
+        self.asked: list[tuple[str, str, tuple[str, ...]]] = []
+        self.orders: list[tuple[str, str]] = []
         self.levels: list[tuple[str, str, tuple[str, ...]]] = []
         self.fails = False
         self.opened = asyncio.Event()
@@ -32,6 +36,18 @@ class FakeFleet:
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:  # noqa: ARG002 - the port
         self.stops.append((robot_id, hold_id))
+        await self._answer()
+
+    async def release(
+        self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
+    ) -> None:
+        self.asked.append(("release", robot_id, tuple(ids)))
+        self.orders.append((challenge, attempt))
+        await self._answer()
+
+    async def resume(self, robot_id: str, challenge: str, attempt: str) -> None:
+        self.asked.append(("resume", robot_id, ()))
+        self.orders.append((challenge, attempt))
         await self._answer()
 
     async def set_level(

@@ -1,6 +1,7 @@
 """A journal in memory, on a disk that can hang."""
 
 import asyncio
+from collections.abc import Sequence
 from typing import Literal
 
 from iveg.domain.observations import Instant
@@ -11,11 +12,13 @@ class FakeJournal:
 
     Attributes:
         lines: (robot, desired, hold, by) that have reached the disk.
+        named_lines: (robot, hold, named, challenge) likewise.
         opened: Cleared, the disk hangs until it is set.
     """
 
     def __init__(self) -> None:
         self.lines: list[tuple[str, str, str | None, str]] = []
+        self.named_lines: list[tuple[str, str, tuple[str, ...], str]] = []
         self.opened = asyncio.Event()
         self.opened.set()
 
@@ -29,3 +32,15 @@ class FakeJournal:
     ) -> None:
         await self.opened.wait()
         self.lines.append((robot_id, desired, hold_id, by))
+
+    async def named(
+        self,
+        robot_id: str,
+        hold_id: str,
+        ids: Sequence[str],
+        challenge: str,
+        by: str,  # noqa: ARG002 - the port
+        at: Instant,  # noqa: ARG002 - the port
+    ) -> None:
+        await self.opened.wait()
+        self.named_lines.append((robot_id, hold_id, tuple(ids), challenge))

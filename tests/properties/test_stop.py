@@ -36,6 +36,7 @@ from iveg.domain.stop import (
     SendStop,
     SetLevel,
     StopMachine,
+    Wanted,
 )
 from iveg.ngsi import codec
 from iveg.robot import effects as robot
@@ -114,6 +115,9 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.ids = itertools.count(1)
         self.level: tuple[str, ...] = ()
         self.journal = False
+        self.disk = Wanted("ana")
+        self.named: set[str] = set()
+        self.strange = False
         self.asking = False
         self.asked = self.sent_once = 0
         self.ended: set[str] = set()
@@ -145,13 +149,14 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self._keep_the_history()
         for effect in effects:
             if isinstance(effect, SendStop):
-                assert effect.hold_id not in self.ended, "an old id was sent again"
+                shown = {hold.id for hold in self.iveg.holds}
+                assert effect.hold_id not in self.ended - shown, "an old id came again"
                 assert effect.hold_id == self.iveg.hold_id
                 self.last_send = max(self.last_send, self.now)
                 payload = codec.write_command(codec.write_stop(effect.hold_id, "x"))
                 self.roads[effect.road].put(payload)
                 self.perform(
-                    self.iveg.sent(effect.road, effect.hold_id, self.at(), ok=True)
+                    self.iveg.sent(effect.road, effect.command_id, self.at(), ok=True)
                 )
             elif isinstance(effect, SendOnce):
                 self._send_once(effect)
@@ -168,29 +173,44 @@ class StopOverBadRoads(RuleBasedStateMachine):
     def _send_once(self, effect: SendOnce) -> None:
         assert self.asking, "I2, I6: nobody asked for this"
         self.sent_once += 1
+        challenge, attempt = effect.challenge, effect.command_id
         if effect.kind == "release":
-            value = codec.write_release(effect.ids, effect.challenge)
+            value = codec.write_release(effect.ids, challenge, attempt)
+            self.remember(effect)
         else:
-            value = codec.write_resume(effect.challenge)
-        self.roads["fiware"].put(codec.write_command(value))
+            value = codec.write_resume(challenge, attempt)
+        for transport in effect.transports:
+            self.roads[transport].put(codec.write_command(value))
+
+    def remember(self, effect: SendOnce) -> None:
+        """What the journal keeps of a release, before it goes."""
+        self.named |= set(effect.ours)
+        self.disk = replace(
+            self.disk,
+            named=(*self.disk.named, *effect.ours),
+            asked=effect.ours,
+            challenge=effect.challenge,
+        )
 
     def _changed(self, changed: Changed) -> None:
         self.releasing_since = self.now if changed.state == "RELEASING" else None
         if changed.state == "STANDING" and changed.key == "standing":
             self._i3_standing_is_measured()
         if changed.key == "adopted" or changed.state == "REQUESTED":
-            self._new_episode(changed)
+            self._new_episode()
         if changed.key in ("ready", "running"):
             self._i1_ended_by_the_robots_report()
             self.journal = False
+            self.disk = replace(self.disk, asked=(), challenge=None)
 
-    def _new_episode(self, changed: Changed) -> None:
+    def _new_episode(self) -> None:
         new = self.iveg.hold_id
         assert new is not None
         self.journal = True
+        self.disk = replace(self.disk, hold_id=new)
         if new == self.episode:
             return
-        assert changed.key == "adopted" or new not in self.ended
+        assert new not in self.ended - {hold.id for hold in self.iveg.holds}
         if self.episode is not None:
             self.ended.add(self.episode)
         self.episode = new
@@ -278,7 +298,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
 
     def hear(self, word: object, road: Road) -> None:
         if isinstance(word, CommandAnswer):
-            self.perform(self.iveg.answered(word, self.at(), road))
+            self.perform(self.iveg.answered(word, self.at(), road, self.new_id()))
         if isinstance(word, SafetyReport) and self.order.judge(word.origin) == "new":
             measured = self.measured[word.origin.boot, word.origin.seq]
             self.samples.append((measured, word))
@@ -389,7 +409,7 @@ class StopOverBadRoads(RuleBasedStateMachine):
         self.restart()
         self.episode = before if wanted else None
         if wanted:
-            again = self.iveg.press("ana", self.at(), self.new_id(), key="reasserted")
+            again = self.iveg.restore(self.disk, self.at(), self.new_id())
             self.perform(again)
 
     @rule()

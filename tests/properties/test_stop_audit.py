@@ -7,8 +7,7 @@ happened is read from the log and the roads of each life, what was kept from the
 
 import asyncio
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from random import Random
 
 import pytest
@@ -16,9 +15,10 @@ import pytest
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord, Record
+from iveg.domain.stop import Wanted
+from tests.fakes.journal import FakeJournal
 from tests.unit.pipeline.desk import Desk, settle
 
-Line = tuple[str, str, str | None, str]
 TOLD = (
     *("reasserted", "adopted", "releasing", "ready", "refused", "running"),
     *("unconfirmed", "still_moving", "stale", "moved", "release_unconfirmed"),
@@ -32,19 +32,24 @@ class Disk:
 
     commands: dict[str, CommandRecord] = field(default_factory=dict)
     events: dict[CommandEventRecord, None] = field(default_factory=dict)
-    wanted: dict[str, str] = field(default_factory=dict)
+    wanted: dict[str, Wanted] = field(default_factory=dict)
 
-    def take(self, records: list[Record], lines: Iterable[Line]) -> None:
+    def take(self, records: list[Record], journal: FakeJournal) -> None:
         for record in records:
             if isinstance(record, CommandRecord):
                 self.commands[record.command_id] = record
             elif isinstance(record, CommandEventRecord):
                 # The table's identity is the whole row, so a copy changes nothing.
                 self.events[record] = None
-        for robot_id, desired, _, by in lines:
+        for robot_id, desired, hold_id, by in journal.lines:
             self.wanted.pop(robot_id, None)
             if desired == "stopped":
-                self.wanted[robot_id] = by
+                self.wanted[robot_id] = Wanted(by, hold_id)
+        for robot_id, _, named, challenge in journal.named_lines:
+            if robot_id in self.wanted:
+                self.wanted[robot_id] = replace(
+                    self.wanted[robot_id], named=named, asked=named, challenge=challenge
+                )
 
     def left_open(self) -> list[CommandRecord]:
         """As ``Queries.open_commands``."""
@@ -176,7 +181,7 @@ def kept(disk: Disk) -> Counter[tuple[float, str]]:
 
 def die(life: Life) -> None:
     """The power goes: only what is on the disk stays."""
-    life.disk.take(life.sink.durable, life.journal.lines)
+    life.disk.take(life.sink.durable, life.journal)
 
 
 async def die_while_the_disk_hangs(life: Life) -> None:
@@ -249,8 +254,9 @@ async def test_after_a_restart_only_what_is_followed_is_open(seed: int) -> None:
     die(life)
     await life.commander.close()
 
-    followed = life.commander.machine("AGI").hold_id
-    assert {row.command_id for row in disk.left_open()} <= {followed}
+    stop = life.commander.machine("AGI").stop
+    followed = set() if stop is None else {stop.command_id}
+    assert {row.command_id for row in disk.left_open()} <= followed
     closing = Counter(
         one.command_id for one in disk.events if one.why.startswith("server restarted")
     )

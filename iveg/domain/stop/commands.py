@@ -7,8 +7,8 @@ t2 sent and t3 answered on each road, and t4 standing (safety.md §2.4).
 from dataclasses import dataclass, field
 from typing import Literal
 
-from iveg.domain.observations import Instant
-from iveg.domain.stop.table import SendRoad, State
+from iveg.domain.observations import Instant, Road
+from iveg.domain.stop.table import State, Transport
 
 CommandState = State | Literal["REPLACED", "EXPIRED"]
 """``REPLACED``: another command took its place.  ``EXPIRED``: a release or resume
@@ -68,6 +68,13 @@ class Times:
         doubted = pressed is None and press.pressed_at is not None
         return cls(at, pressed, doubted)
 
+    def note_word(self, at: Instant, road: Road) -> None:
+        """The robot has said, for the first time on this way, that it has it."""
+        if road == "mqtt":
+            self.answer_direct = self.answer_direct or at
+        else:
+            self.answer_fiware = self.answer_fiware or at
+
     def ms_from_press(self, at: Instant) -> float:
         """From the press, or the acceptance where it is unknown, to a moment (ms)."""
         lead = 0.0 if self.pressed is None else self.requested.wall - self.pressed
@@ -81,8 +88,14 @@ class Command:
     Attributes:
         reason: Why it began or ended as it did; None for a plain press.
         standstill_ms: First standing sample − press.
-        roads: ``pending``, ``ok``, ``failed`` or ``off``, each.
+        tries: How often it was sent before the robot stood; both transports at once
+            count once.
+        roads: Per transport ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
+            (docs/interfaces.md §8).
         drill: A STOP that somebody pressed to prove that it works.
+        held_as: The hold of an earlier STOP that this one holds on to.
+        agent_lag_s: How far the IoT Agent was behind when it was sent (s); None where
+            nobody knows.
     """
 
     command_id: str
@@ -94,7 +107,37 @@ class Command:
     tries: int = 0
     reason: str | None = None
     standstill_ms: float | None = None
-    roads: dict[SendRoad, str] = field(
+    roads: dict[Transport, str] = field(
         default_factory=lambda: {"direct": "pending", "fiware": "pending"}
     )
     drill: bool = False
+    held_as: str | None = None
+    agent_lag_s: float | None = None
+
+    @property
+    def hold_id(self) -> str | None:
+        """What this STOP is called at the robot; a release or resume holds nothing."""
+        return (self.held_as or self.command_id) if self.kind == "stop" else None
+
+    def note_sent(
+        self, transport: Transport, at: Instant, *, ok: bool, doubtful: bool
+    ) -> None:
+        """A transport took it or failed; taken is not yet arrived.
+
+        Only a broker's word that it has a STOP (PUBACK) says something; Orion's 204
+        and an order at QoS 0 say nothing until the robot answers.
+        """
+        if ok and transport == "direct":
+            self.times.sent_direct = self.times.sent_direct or at
+        elif ok:
+            self.times.sent_fiware = self.times.sent_fiware or at
+        confirms = transport == "direct" and self.kind == "stop"
+        if self.roads[transport] == "ok" and not confirms:
+            return  # The robot's answer was faster than the word of who took it.
+        taken = "ok" if confirms else "pending"
+        self.roads[transport] = ("unknown" if doubtful else taken) if ok else "failed"
+
+    def note_answer(self, at: Instant, road: Road) -> None:
+        """The robot's own answer to it has come."""
+        self.times.note_word(at, road)
+        self.roads["direct" if road == "mqtt" else "fiware"] = "ok"

@@ -4,27 +4,35 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.stop.commands import Command
-from iveg.domain.stop.table import SendRoad, State
+from iveg.domain.stop.table import State, Transport
 
 
 @dataclass(frozen=True, slots=True)
 class SendStop:
-    """Send this hold on this road, now."""
+    """Send this hold on this transport, now, for this command."""
 
     robot_id: str
     hold_id: str
-    road: SendRoad
+    road: Transport
+    command_id: str
 
 
 @dataclass(frozen=True, slots=True)
 class SendOnce:
-    """Send a release (with ids) or a resume (without), once, through Orion alone."""
+    """Send a release (with ids) or a resume (without), once on each transport.
+
+    Attributes:
+        command_id: Of the order; the attempt that its answers name.
+        ours: Those of ``ids`` that are STOPs of iVeg.
+    """
 
     robot_id: str
     command_id: str
     kind: Literal["release", "resume"]
     challenge: str
+    transports: tuple[Transport, ...]
     ids: tuple[str, ...] = ()
+    ours: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

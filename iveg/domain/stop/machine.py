@@ -5,8 +5,8 @@ keeps every step between the two apart, so the page never shows a wish as a resu
 steps are drawn in ``table``.
 
 STOP is a level: it is sent again until the robot reports our own hold, for ever.  A
-RELEASE is an edge: sent once, for the holds that a person saw; unconfirmed it becomes
-a STOP under a new id.
+RELEASE is an edge: sent once on each transport, for the holds that a person saw;
+unconfirmed it becomes a STOP.
 """
 
 from collections.abc import Iterable
@@ -19,11 +19,12 @@ from iveg.domain.observations import (
     Road,
     SafetyReport,
 )
-from iveg.domain.stop import people, words
+from iveg.domain.stop import people, releasing, words
 from iveg.domain.stop.commands import Command, Press
 from iveg.domain.stop.effects import Effect
-from iveg.domain.stop.episode import PLAIN, STALE_S, Episode
-from iveg.domain.stop.table import SendRoad
+from iveg.domain.stop.episode import FRESH_S, PLAIN, STALE_S, Episode
+from iveg.domain.stop.table import Transport
+from iveg.domain.stop.wanted import Wanted
 
 _UNKNOWN = Origin()
 
@@ -53,6 +54,10 @@ class StopMachine(Episode):
         """STOP: always accepted; a press during an episode joins it."""
         return people.press(self, by, at, new_id, key, press)
 
+    def restore(self, wanted: Wanted, at: Instant, new_id: str) -> list[Effect]:
+        """STOP once more what an earlier run had stopped."""
+        return people.restore(self, wanted, at, new_id)
+
     def drill(self, by: str, at: Instant, new_id: str, press: Press) -> list[Effect]:
         """Press STOP to prove that it works, on a robot that hardly moves.
 
@@ -80,25 +85,34 @@ class StopMachine(Episode):
         """
         return people.resume(self, by, at, new_id)
 
-    # --- roads --------------------------------------------------------------------
+    # --- transports ---------------------------------------------------------------
 
     def sent(
-        self, road: SendRoad, command_id: str, at: Instant, *, ok: bool
+        self,
+        road: Transport,
+        command_id: str,
+        at: Instant,
+        *,
+        ok: bool,
+        doubtful: bool = False,
     ) -> list[Effect]:
-        """A road took our message (PUBACK, 2xx) or failed; neither is evidence."""
+        """A transport took our message (PUBACK, 2xx) or failed; neither is evidence.
+
+        Args:
+            road: The transport.
+            command_id: What was sent.
+            at: This moment.
+            ok: Whether it was taken.
+            doubtful: It is known that what lies behind does not pass anything on.
+        """
         command = self._command(command_id)
         if command is None:
             return []
         if road == "fiware" and command is self.stop:
             self.sends.came_back(at)
-        command.roads[road] = "ok" if ok else "failed"
-        if not ok:
+        command.note_sent(road, at, ok=ok, doubtful=doubtful)
+        if not ok or doubtful:
             return []
-        times = command.times
-        if road == "direct":
-            times.sent_direct = times.sent_direct or at
-        else:
-            times.sent_fiware = times.sent_fiware or at
         return [self.enter("SENT", "sent")] if self.state == "REQUESTED" else []
 
     def _command(self, command_id: str) -> Command | None:
@@ -110,10 +124,12 @@ class StopMachine(Episode):
 
     # --- what comes back ----------------------------------------------------------
 
-    def answered(self, answer: CommandAnswer, at: Instant, road: Road) -> list[Effect]:
+    def answered(
+        self, answer: CommandAnswer, at: Instant, road: Road, new_id: str
+    ) -> list[Effect]:
         """The robot's own answer on ``cmdexe`` or ``cmd_info``."""
         news = self._heard.is_news(answer.origin)
-        return words.answered(self, answer, at, road, news=news)
+        return words.answered(self, answer, at, road, new_id, news=news)
 
     def reported(
         self,
@@ -149,6 +165,8 @@ class StopMachine(Episode):
 
     def _overdue(self, now: Instant, new_id: str) -> list[Effect]:
         late = now.mono >= self.deadline
+        if self._is_doubtful(now):
+            return self.begin("iveg", now, new_id, "release_unconfirmed")
         match self.state:
             case "REQUESTED" | "SENT" if late:
                 return [self.enter("UNCONFIRMED", "unconfirmed")]
@@ -156,8 +174,15 @@ class StopMachine(Episode):
                 return [self.enter("STILL_MOVING", "still_moving")]
             case "STANDING" if self.evidence_age(now) > STALE_S:
                 self.standstill.forget()
-                self.sends.direct_now(now)
+                self.sends.direct_now()
                 return [self.enter("STALE", "stale")]
-            case "RELEASING" if late:
-                return self.begin("iveg", now, new_id, "release_unconfirmed")
+            case "RELEASING" if late and self.attempt is not None:
+                return releasing.unconfirmed(self, self.attempt, now, new_id)
         return []
+
+    def _is_doubtful(self, now: Instant) -> bool:
+        """Whether a hold that may have been lifted goes unreported for too long."""
+        if self.doubt is None or not self.wants_stop or self.state == "RELEASING":
+            return False
+        heard_at = float("-inf") if self.report_at is None else self.report_at.mono
+        return now.mono - max(heard_at, self.begun_at) > FRESH_S

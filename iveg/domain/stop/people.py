@@ -9,13 +9,14 @@ from typing import Literal
 
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Instant, SafetyReport
+from iveg.domain.stop.attempt import Attempt
 from iveg.domain.stop.commands import Command, Press, Times
 from iveg.domain.stop.effects import Changed, Effect, SendOnce
-from iveg.domain.stop.episode import STALE_S, Episode
-from iveg.domain.stop.table import State
+from iveg.domain.stop.episode import FRESH_S, MOST_HOLDS, STALE_S, Episode
+from iveg.domain.stop.table import State, Transport
+from iveg.domain.stop.wanted import Wanted
 from iveg.domain.world import STANDING_SPEED
 
-FRESH_S = 1.0
 RELEASE_S = 2.0
 UNSEEN_S = 2.0
 """A release is confirmed by holding a control this long; a STOP that joined in that
@@ -33,7 +34,22 @@ def press(
         episode.joined_at = at.mono
         effects = [] if episode.state == "STANDING" else episode.send_now(at)
         return [*effects, *_join(episode, stop, by)]
-    return episode.begin(by, at, new_id, key, press)
+    return episode.again(by, at, new_id, key, press)
+
+
+def restore(episode: Episode, wanted: Wanted, at: Instant, new_id: str) -> list[Effect]:
+    """STOP once more what an earlier run had stopped.
+
+    A hold that no release ever named cannot have been lifted, so asserting it again
+    adds none.  One that was named may have been: the robot would answer RELEASED and
+    hold nothing, so the hold is a new one; unless there are so many that theirs is
+    asserted until the robot's word, or its silence, decides.
+    """
+    kept, doubt = wanted.hold_id, None
+    if kept is not None and kept in wanted.named:
+        many = len(wanted.asked) >= MOST_HOLDS
+        kept, doubt = (kept, wanted.challenge) if many else (None, None)
+    return episode.begin(wanted.by, at, new_id, "reasserted", kept=kept, doubt=doubt)
 
 
 def _join(episode: Episode, stop: Command, by: str) -> list[Effect]:
@@ -135,8 +151,19 @@ def _send_once(
 ) -> list[Effect]:
     robot_id, challenge = episode.robot_id, report.challenge or ""
     once = Command(new_id, robot_id, kind, "RELEASING", Times(at), [by], tries=1)
-    once.roads["direct"] = "off"
-    episode.once = once
+    transports: tuple[Transport, ...] = ("direct", "fiware")
+    if not episode.sends.has_direct:
+        transports, once.roads["direct"] = ("fiware",), "off"
+    episode.attempt = Attempt(once, challenge, ids)
     episode.deadline = at.mono + RELEASE_S
-    changed = episode.enter("RELEASING", "releasing")
-    return [SendOnce(robot_id, new_id, kind, challenge, ids), changed]
+    ours = tuple(hold.id for hold in report.holds if hold.source == "iveg")
+    sending = SendOnce(
+        robot_id,
+        new_id,
+        kind,
+        challenge,
+        transports,
+        ids,
+        tuple(one for one in ours if one in ids),
+    )
+    return [sending, episode.enter("RELEASING", "releasing")]

@@ -26,7 +26,9 @@ State = Literal[
     "RELEASING",
     "READY",
 ]
-SendRoad = Literal["direct", "fiware"]
+Transport = Literal["direct", "fiware"]
+"""How an order gets to a robot: straight over MQTT, or through Orion and the agent."""
+SendRoad = Transport
 
 STEPS: Mapping[State, frozenset[State]] = {
     "RUNNING": frozenset({"REQUESTED", "DELIVERED", "RELEASING"}),

@@ -12,11 +12,11 @@ from iveg.domain.observations import (
     Road,
     SafetyReport,
 )
+from iveg.domain.stop import releasing
 from iveg.domain.stop.commands import Command, Times
 from iveg.domain.stop.effects import Effect, SetLevel
 from iveg.domain.stop.episode import STALE_S, Episode
 from iveg.domain.stop.people import stands
-from iveg.domain.stop.table import State
 from iveg.domain.world import STANDING_SPEED
 
 ASSUMED_BRAKING = 0.5
@@ -47,41 +47,32 @@ class Heard:
 
 
 def answered(
-    episode: Episode, answer: CommandAnswer, at: Instant, road: Road, *, news: bool
+    episode: Episode,
+    answer: CommandAnswer,
+    at: Instant,
+    road: Road,
+    new_id: str,
+    *,
+    news: bool,
 ) -> list[Effect]:
     """The robot's own answer on ``cmdexe`` or ``cmd_info``."""
-    if episode.state == "RELEASING" and episode.once is not None:
-        if answer.result == "REFUSED" and not news:
-            # The other road's copy of a refusal that a person has seen already.
+    attempt = episode.attempt
+    if attempt is not None:
+        # Without an attempt, a copy of a refusal that was seen already is none of this.
+        unknown = answer.attempt is None and answer.result == "REFUSED" and not news
+        if unknown or not attempt.is_meant_by(answer):
             return []
-        return _answered_once(episode, episode.once, answer, at, road)
+        return releasing.answered(episode, attempt, answer, at, road)
+    if episode.wants_stop and answer.result == "RELEASED":
+        # It will never hold by that name again: only a new one can.
+        ours = answer.id == episode.hold_id
+        return _lifted(episode, at, new_id) if ours else []
     if episode.stop is None or answer.result != "LATCHED":
         return []
     if episode.hold_id not in {answer.id, *(hold.id for hold in answer.holds)}:
         return []
-    _note_answer(episode.stop.times, at, road)
+    episode.stop.note_answer(at, road)
     return _delivered(episode, at)
-
-
-def _answered_once(
-    episode: Episode, once: Command, answer: CommandAnswer, at: Instant, road: Road
-) -> list[Effect]:
-    if answer.result not in ("REFUSED", "RELEASED", "RESUMED"):
-        return []
-    _note_answer(once.times, at, road)
-    if answer.result != "REFUSED":
-        return []
-    once.reason = answer.why
-    changed = episode.enter(_before(episode, once), "refused", answer.why)
-    episode.once = None
-    return [changed]
-
-
-def _before(episode: Episode, once: Command) -> State:
-    """Where a refused release or resume came from."""
-    if episode.stop is None:
-        return "RUNNING"
-    return "STANDING" if once.kind == "release" else "READY"
 
 
 def _delivered(episode: Episode, at: Instant) -> list[Effect]:
@@ -91,13 +82,6 @@ def _delivered(episode: Episode, at: Instant) -> list[Effect]:
     # From the robot's word on: before it, a robot out of reach could not brake.
     episode.deadline = at.mono + braking
     return [episode.enter("DELIVERED", "delivered")]
-
-
-def _note_answer(times: Times, at: Instant, road: Road) -> None:
-    if road == "mqtt":
-        times.answer_direct = times.answer_direct or at
-    else:
-        times.answer_fiware = times.answer_fiware or at
 
 
 # --- reports ----------------------------------------------------------------------
@@ -117,8 +101,8 @@ def reported(
     episode.speed = abs(report.linear)
     if episode.state in ("RUNNING", "READY"):
         return _reported_free(episode, report, at)
-    if episode.state == "RELEASING":
-        return _reported_releasing(episode, report)
+    if episode.attempt is not None:
+        return releasing.reported(episode, episode.attempt, report)
     return _reported_stopped(episode, report, at, road, new_id)
 
 
@@ -129,16 +113,23 @@ def _reported_stopped(
     stood = episode.state in ("STANDING", "STALE")
     if episode.hold_id not in {hold.id for hold in report.holds}:
         episode.standstill.forget()
-        # A name that was released never holds again: only a new one can.
         if stood or episode.hold_id in report.released:
-            return episode.begin("iveg", at, new_id, "moved")
+            return _lifted(episode, at, new_id)
         return []
-    _note_answer(episode.stop.times, at, road)
+    if report.challenge != episode.doubt:
+        episode.doubt = None
+    episode.stop.times.note_word(at, road)
     effects = _delivered(episode, at)
     if stands(report):
         return [*effects, *_rested(episode, episode.stop, report, at)]
     episode.standstill.forget()
-    return [*effects, *(episode.begin("iveg", at, new_id, "moved") if stood else [])]
+    return [*effects, *(episode.again("iveg", at, new_id, "moved") if stood else [])]
+
+
+def _lifted(episode: Episode, at: Instant, new_id: str) -> list[Effect]:
+    """The hold is lost, and nobody has asked for that."""
+    key = "moved" if episode.doubt is None else "release_unconfirmed"
+    return episode.again("iveg", at, new_id, key)
 
 
 def _rested(
@@ -170,28 +161,13 @@ def _adopt(episode: Episode, hold_id: str, at: Instant) -> list[Effect]:
     closed = episode.close("adopted")
     times = Times(at)
     episode.stop = Command(hold_id, robot_id, "stop", "DELIVERED", times, ["iveg"])
+    episode.doubt = None
     episode.standstill.forget()
     episode.sends.begin()
     episode.sends.now(at)
     episode.deadline = at.mono + BRAKING_CAP_S
     level = SetLevel(robot_id, "stopped", (hold_id,))
     return [level, *closed, episode.enter("DELIVERED", "adopted")]
-
-
-def _reported_releasing(episode: Episode, report: SafetyReport) -> list[Effect]:
-    assert episode.once is not None  # noqa: S101 - RELEASING has one
-    if episode.once.kind == "resume":
-        drives = not report.holds and report.speed_factor > 0
-        return episode.finish("running") if drives else []
-    ours = episode.hold_id
-    if ours is None and any(hold.ack == "remote" for hold in report.holds):
-        return []
-    held = {hold.id for hold in report.holds}
-    if ours is not None and (ours in held or ours not in report.released):
-        return []
-    changed = episode.enter("READY", "ready")
-    episode.once = None
-    return [SetLevel(episode.robot_id, "run", ()), changed]
 
 
 # --- odometry ---------------------------------------------------------------------
@@ -213,5 +189,5 @@ def moved(
         return []
     episode.speed = abs(linear)
     if episode.state == "STANDING" and contradicted:
-        return episode.begin("iveg", at, new_id, "moved")
+        return episode.again("iveg", at, new_id, "moved")
     return []

@@ -8,6 +8,7 @@ import orjson
 import pytest
 
 from iveg.adapters.journal import FileJournal
+from iveg.domain.stop import Wanted
 from tests.builders import START
 
 
@@ -28,7 +29,7 @@ async def test_what_was_wanted_last_is_wanted_after_a_restart(tmp_path: Path) ->
     )
     journal.close()
 
-    assert FileJournal(path).read() == {"AGI": "ana"}
+    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
 
 
 async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
@@ -43,8 +44,61 @@ async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
         "desired": "stopped",
         "hold_id": "01A",
         "by": "ana",
+        "named": [],
+        "ch": None,
     }
     journal.close()
+
+
+async def test_what_a_release_has_named_is_known_and_still_wanted(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    await journal.named("AGI", "01A", ["01A", "01B"], "c1", "ana", START)
+    await journal.wanted("AGI", "stopped", "01C", "iveg", START)
+    journal.close()
+
+    assert FileJournal(path).read() == {
+        "AGI": Wanted("iveg", "01C", ("01A", "01B"), ("01A", "01B"), "c1")
+    }
+
+
+async def test_a_release_that_came_true_is_over_but_its_names_stay_known(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    await journal.named("AGI", "01A", ["01A"], "c1", "ana", START)
+    await journal.wanted("AGI", "run", None, "ana", START)
+    await journal.wanted("AGI", "stopped", "01B", "ben", START)
+    journal.close()
+
+    assert FileJournal(path).read() == {"AGI": Wanted("ben", "01B", named=("01A",))}
+
+
+async def test_of_the_names_the_last_sixty_four_are_kept(tmp_path: Path) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    for number in range(70):
+        await journal.named("AGI", "01A", ["01A", f"n{number}"], "c", "ana", START)
+    journal.close()
+
+    named = FileJournal(path).read()["AGI"].named
+    assert len(named) == 64
+    assert named[-2:] == ("01A", "n69")
+
+
+def test_a_hold_that_an_earlier_version_wrote_down_may_have_been_named(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    path.write_bytes(
+        b'{"at": 1, "robot_id": "AGI", "desired": "stopped", "hold_id": "01A",'
+        b' "by": "ana"}\n'
+    )
+
+    assert FileJournal(path).read() == {"AGI": Wanted("ana", None)}
 
 
 def test_without_a_file_nothing_is_wanted(tmp_path: Path) -> None:
@@ -61,7 +115,10 @@ async def test_a_line_that_a_crash_cut_short_hurts_no_other(
 
     (await write(path, ("AGII", "stopped"))).close()
 
-    assert FileJournal(path).read() == {"AGI": "ana", "AGII": "ana"}
+    assert FileJournal(path).read() == {
+        "AGI": Wanted("ana", "01A"),
+        "AGII": Wanted("ana", "01A"),
+    }
     assert "line 2: not readable, skipped" in caplog.text
 
 
@@ -86,7 +143,7 @@ async def test_a_line_that_says_nothing_releases_nothing(
     with path.open("ab") as file:
         file.write(line + b"\n")
 
-    assert FileJournal(path).read() == {"AGI": "ana"}
+    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
 
 
 async def test_lines_of_many_at_once_are_whole(tmp_path: Path) -> None:

@@ -44,16 +44,19 @@ async def orion(
     ("what", "value"),
     [
         ("stop", {"stop": {"id": "01A", "by": "x"}}),
-        ("release", {"release": {"ids": ["01A", "boot-1"], "ch": "c"}}),
-        ("resume", {"resume": {"ch": "c"}}),
+        (
+            "release",
+            {"release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}},
+        ),
+        ("resume", {"resume": {"ch": "c", "attempt": "01T"}}),
     ],
 )
 async def test_a_command_is_one_attribute_alone(what: str, value: object) -> None:
     async with orion(b"204 No Content") as (road, asked):
         calls = {
             "stop": lambda: road.stop("AGI", "01A", "x"),
-            "release": lambda: road.release("AGI", ["01A", "boot-1"], "c"),
-            "resume": lambda: road.resume("AGI", "c"),
+            "release": lambda: road.release("AGI", ["01A", "boot-1"], "c", "01T"),
+            "resume": lambda: road.resume("AGI", "c", "01T"),
         }
         await calls[what]()
 

@@ -17,6 +17,7 @@ from iveg.domain.stop import (
 from tests.builders import at, safety_report
 
 BOOT_HOLD = Hold("boot-b1", "boot", "remote")
+CHALLENGE, NEXT_CHALLENGE = "0123456789abcdef", "fedcba9876543210"
 RED_BUTTON = Hold("hw-1", "hw", "local")
 
 
@@ -46,7 +47,8 @@ class Bench:
         return self.keep(self.machine.press(by, at(self.now), self.new_id()))
 
     def sent(self, road: SendRoad = "direct", *, ok: bool = True) -> list[Effect]:
-        command_id = self.machine.hold_id or ""
+        assert self.machine.stop is not None
+        command_id = self.machine.stop.command_id
         return self.keep(self.machine.sent(road, command_id, at(self.now), ok=ok))
 
     def report(
@@ -57,6 +59,7 @@ class Bench:
         factor: float = 0.0,
         released: tuple[str, ...] = (),
         road: Road = "mqtt",
+        challenge: str = CHALLENGE,
     ) -> list[Effect]:
         """The robot reports; without holds named, what it would by itself."""
         report = safety_report(
@@ -66,6 +69,7 @@ class Bench:
             angular=angular,
             speed_factor=factor,
             released=released,
+            challenge=challenge,
         )
         return self.keep(
             self.machine.reported(report, at(self.now), road, self.new_id())
@@ -78,12 +82,16 @@ class Bench:
         id: str | None = None,  # noqa: A002 - the wire's word
         why: str | None = None,
         seq: int | None = None,
+        attempt: str | None = None,
         road: Road = "mqtt",
     ) -> list[Effect]:
         number = next(self._answers) if seq is None else seq
         named = self.machine.hold_id if id is None else id
-        answer = CommandAnswer("AGI", Origin("b1", number), named, result, why=why)
-        return self.keep(self.machine.answered(answer, at(self.now), road))
+        origin = Origin("b1", number)
+        answer = CommandAnswer("AGI", origin, named, result, why=why, attempt=attempt)
+        return self.keep(
+            self.machine.answered(answer, at(self.now), road, self.new_id())
+        )
 
     def odometry(self, linear: float, angular: float = 0.0) -> list[Effect]:
         return self.keep(
@@ -111,6 +119,12 @@ class Bench:
     def ours(self) -> Hold:
         assert self.machine.hold_id is not None
         return Hold(self.machine.hold_id, "iveg", "remote")
+
+    @property
+    def attempt(self) -> str:
+        """Of the release or resume under way."""
+        assert self.machine.once is not None
+        return self.machine.once.command_id
 
     def stand(self, *also: Hold) -> "Bench":
         """Report our hold at rest until the machine believes it."""

@@ -65,6 +65,40 @@ def test_a_road_that_failed_does_not_make_it_sent() -> None:
     assert bench.machine.stop.roads["direct"] == "failed"
 
 
+def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
+    bench = Bench()
+    bench.press()
+
+    bench.sent("direct")
+    bench.sent("fiware")
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.roads == {"direct": "ok", "fiware": "pending"}
+
+
+def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() -> None:
+    bench = Bench()
+    bench.press()
+    bench.answer(road="orion")
+
+    bench.sent("fiware")
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.roads["fiware"] == "ok"
+
+
+def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None:
+    bench = Bench()
+    bench.press()
+    stop = bench.machine.stop
+    assert stop is not None
+
+    bench.machine.sent("fiware", stop.command_id, at(0.1), ok=True, doubtful=True)
+
+    assert stop.roads["fiware"] == "unknown"
+    assert bench.state == "REQUESTED"
+
+
 def test_the_first_time_of_each_road_is_kept() -> None:
     bench = Bench()
     bench.press()
@@ -88,6 +122,40 @@ def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> 
     times = [time for time, done in effects.items() if sends(done, "direct")]
 
     assert times == [0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+
+
+def test_a_robot_that_has_the_stop_is_sent_it_once_a_second_until_it_stands() -> None:
+    bench = Bench()
+    bench.press()
+    bench.sent("fiware")
+    bench.now = 0.05
+    bench.report(bench.ours, linear=0.8)
+    times = []
+    while bench.now < 4.0:
+        bench.now = round(bench.now + 0.05, 6)
+        times += [(bench.now, one.road) for one in sends(bench.tick())]
+
+    assert times == [(1.0, "direct"), (2.0, "direct"), (3.0, "direct"), (4.0, "direct")]
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.tries == 5
+
+
+def test_without_the_direct_transport_a_robot_that_has_it_is_still_sent_it() -> None:
+    bench = Bench(direct=False)
+    bench.press()
+    bench.sent("fiware")
+    bench.report(bench.ours, linear=0.8)
+
+    assert [one.road for one in sends(bench.wait(2.05))] == ["fiware"]
+
+
+def test_a_robot_that_stands_after_a_second_was_sent_two_stops() -> None:
+    bench = Bench()
+    bench.press()
+    bench.stand()
+
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.tries == 2
 
 
 def test_after_ten_seconds_direct_sends_come_every_second_without_end() -> None:

@@ -9,6 +9,7 @@ from tests.builders import at, safety_report
 from tests.unit.domain.bench import (
     BOOT_HOLD,
     IN_STATE,
+    NEXT_CHALLENGE,
     RED_BUTTON,
     Bench,
     levels,
@@ -29,7 +30,21 @@ def test_i2_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() ->
 
     (sent,) = once(effects)
     assert set(sent.ids) == {bench.ours.id, BOOT_HOLD.id}
+    assert sent.ours == (bench.ours.id,)
     assert sent.challenge == "0123456789abcdef"
+    assert sent.transports == ("direct", "fiware")
+
+
+def test_without_the_direct_transport_a_release_takes_the_other_alone() -> None:
+    bench = Bench(direct=False)
+    bench.press()
+    bench.stand()
+
+    (sent,) = once(bench.release(bench.ours.id))
+
+    assert sent.transports == ("fiware",)
+    assert bench.machine.once is not None
+    assert bench.machine.once.roads == {"direct": "off", "fiware": "pending"}
 
 
 def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
@@ -151,29 +166,211 @@ def test_the_answer_released_is_noted_and_decides_nothing() -> None:
 
 
 def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
-    bench = Bench()
-    bench.press()
-    bench.stand()
-    bench.release(bench.ours.id)
+    bench = released()
+    bench.answer("REFUSED", why="not_standing", attempt=bench.attempt)
 
-    effects = bench.answer("REFUSED", why="challenge")
+    effects = bench.report(bench.ours, challenge=NEXT_CHALLENGE)
 
     assert bench.state == "STANDING"
     (changed,) = (one for one in effects if isinstance(one, Changed))
-    assert (changed.key, changed.why) == ("refused", "challenge")
+    assert (changed.key, changed.why) == ("refused", "not_standing")
 
 
-def test_the_second_roads_copy_of_a_refusal_does_not_refuse_the_next_try() -> None:
+def test_the_refusal_of_one_copy_ends_nothing_while_another_may_act() -> None:
+    bench = released()
+
+    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
+    bench.report(bench.ours)
+
+    assert bench.state == "RELEASING"
+    bench.report(released=(bench.ours.id,), challenge=NEXT_CHALLENGE)
+    assert bench.state == "READY"
+
+
+def test_a_refusal_that_comes_after_the_report_ends_it_at_once() -> None:
+    bench = released()
+    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
+    assert bench.state == "RELEASING"
+
+    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
+
+    assert bench.state == "STANDING"
+
+
+def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next() -> None:
+    bench = released()
+    first = bench.attempt
+    bench.answer("REFUSED", why="challenge", attempt=first)
+    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
+    bench.release(bench.ours.id)
+
+    for road in ("mqtt", "orion"):
+        bench.answer("REFUSED", why="challenge", attempt=first, road=road)
+    bench.report(bench.ours, challenge="another")
+
+    assert bench.state == "RELEASING"
+    assert bench.machine.once is not None
+    assert bench.machine.once.times.answer_direct is None
+
+
+def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> None:
+    bench = released()
+    bench.answer("REFUSED", why="challenge", seq=9)
+    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
+    bench.release(bench.ours.id)
+
+    bench.answer("REFUSED", why="challenge", seq=9, road="orion")
+    bench.report(bench.ours, challenge="another")
+
+    assert bench.state == "RELEASING"
+
+
+@pytest.mark.parametrize(
+    ("result", "named"),
+    [("RELEASED", "01OTHER"), ("RESUMED", "id-1"), ("REFUSED", "01OTHER")],
+)
+def test_an_answer_without_an_attempt_is_matched_by_what_it_names(
+    result: str, named: str
+) -> None:
+    bench = released()
+
+    bench.answer(result, id=named)
+    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
+
+    assert bench.state == "RELEASING"
+    assert bench.machine.once is not None
+    assert bench.machine.once.times.answer_direct is None
+
+
+def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> None:
+    bench = released()
+    held = bench.ours
+    before = bench.machine.stop
+    bench.report(held, challenge=NEXT_CHALLENGE)
+
+    effects = bench.wait(2.05)
+
+    assert bench.state == "REQUESTED"
+    assert bench.changes()[-1] == "release_unconfirmed"
+    assert {one.hold_id for one in sends(effects)} == {held.id}
+    assert bench.machine.hold_id == held.id
+    assert bench.machine.stop is not before
+
+
+def test_an_unconfirmed_release_of_a_lost_name_keeps_what_is_held_in_its_place() -> (
+    None
+):
+    bench = released()
+    other = Hold("01OTHER", "iveg", "remote")
+    bench.report(other, challenge=NEXT_CHALLENGE)
+
+    bench.wait(2.05)
+
+    assert bench.machine.hold_id == "01OTHER"
+
+
+def test_a_hold_that_was_kept_is_measured_standing_again() -> None:
+    bench = released()
+    bench.report(bench.ours, challenge=NEXT_CHALLENGE)
+    bench.wait(2.05)
+
+    bench.stand()
+
+    assert bench.state == "STANDING"
+
+
+def test_a_fourth_hold_is_not_added_while_the_robot_reports_three() -> None:
+    bench = of_three()
+    bench.wait(1.5)
+    bench.report(*THREE)
+
+    effects = bench.wait(0.5)
+
+    assert bench.changes()[-1] == "release_unconfirmed"
+    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
+
+
+def test_a_press_during_a_release_of_three_adds_no_fourth() -> None:
+    bench = of_three()
+
+    effects = bench.press("ben")
+
+    assert bench.state == "REQUESTED"
+    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
+
+
+def test_a_hold_in_doubt_that_was_lifted_after_all_is_replaced_at_once() -> None:
+    bench = of_three()
+    bench.press("ben")
+
+    effects = bench.report(
+        released=tuple(hold.id for hold in THREE), challenge=NEXT_CHALLENGE
+    )
+
+    assert bench.changes()[-1] == "release_unconfirmed"
+    (named,) = {one.hold_id for one in sends(effects)}
+    assert named not in {hold.id for hold in THREE}
+
+
+def test_a_hold_in_doubt_is_replaced_when_the_robot_says_nothing_for_a_second() -> None:
+    bench = of_three()
+    bench.press("ben")
+    bench.report(*THREE)
+
+    bench.wait(0.95)
+    assert bench.machine.hold_id == THREE[-1].id
+    effects = bench.wait(0.15)
+
+    assert bench.machine.hold_id not in {hold.id for hold in THREE}
+    assert {one.hold_id for one in sends(effects)} >= {bench.machine.hold_id}
+
+
+def test_a_hold_in_doubt_is_certain_once_the_challenge_has_changed() -> None:
+    bench = of_three()
+    bench.press("ben")
+    bench.report(*THREE, challenge=NEXT_CHALLENGE)
+
+    bench.wait(5.0)
+
+    assert bench.machine.hold_id == THREE[-1].id
+
+
+def test_a_robot_with_three_holds_that_moves_gets_no_fourth() -> None:
+    bench = of_three(release=False)
+
+    effects = bench.report(*THREE, linear=0.3)
+
+    assert bench.changes()[-1] == "moved"
+    assert {one.hold_id for one in sends(effects)} == {THREE[-1].id}
+
+
+THREE = tuple(Hold(f"01HELD{n}", "iveg", "remote") for n in range(3))
+
+
+def of_three(*, release: bool = True) -> Bench:
+    """A standing robot that reports three STOPs, being released unless told not to."""
+    bench = Bench()
+    bench.report(*THREE)
+    for _ in range(15):
+        bench.report(*THREE)
+        bench.wait(0.1)
+    assert bench.state == "STANDING"
+    bench.report(*THREE)
+    for _ in range(release):
+        bench.release(*(hold.id for hold in THREE))
+        bench.report(*THREE)
+        bench.wait(0.05)
+        bench.report(*THREE)
+    return bench
+
+
+def released() -> Bench:
+    """A robot that stood and is being released."""
     bench = Bench()
     bench.press()
     bench.stand()
     bench.release(bench.ours.id)
-    bench.answer("REFUSED", why="challenge", seq=9)
-    bench.release(bench.ours.id)
-
-    bench.answer("REFUSED", why="challenge", seq=9, road="orion")
-
-    assert bench.state == "RELEASING"
+    return bench
 
 
 def test_i7_a_release_without_the_robots_word_becomes_a_stop_under_a_new_id() -> None:
@@ -233,7 +430,7 @@ def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
 
     assert bench.machine.once is not None
     assert bench.machine.once.times.sent_direct is None
-    assert bench.machine.once.roads["direct"] == "off"
+    assert bench.machine.once.roads["direct"] == "pending"
 
 
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
@@ -251,8 +448,8 @@ def test_such_a_release_that_is_refused_ends_where_it_began() -> None:
     bench.report(BOOT_HOLD)
     bench.release(BOOT_HOLD.id)
 
-    bench.answer("REFUSED", why="challenge")
-    bench.report(BOOT_HOLD)
+    bench.answer("REFUSED", id=BOOT_HOLD.id, why="challenge")
+    bench.report(BOOT_HOLD, challenge=NEXT_CHALLENGE)
 
     assert bench.state == "RUNNING"
     assert not bench.machine.wants_stop
@@ -305,7 +502,9 @@ def test_a_resume_that_is_refused_leaves_the_robot_ready() -> None:
     bench = Bench().ready()
     bench.resume()
 
-    bench.answer("REFUSED", why="challenge")
+    bench.answer("REFUSED", why="challenge", attempt=bench.attempt)
+    assert bench.state == "RELEASING"
+    bench.report(challenge=NEXT_CHALLENGE)
 
     assert bench.state == "READY"
 
@@ -351,8 +550,11 @@ def test_a_hold_of_iveg_that_nobody_here_asked_for_is_adopted(state: str) -> Non
     assert bench.state == "STANDING"
 
 
-def test_an_adopted_hold_is_sent_on_both_roads_like_any_other() -> None:
-    bench = Bench().ready()
+@pytest.mark.parametrize(("direct", "transport"), [(True, "direct"), (False, "fiware")])
+def test_an_adopted_hold_is_sent_like_any_other_that_the_robot_has(
+    direct: bool, transport: str
+) -> None:
+    bench = Bench(direct=direct).ready()
     bench.press()  # its FIWARE request is on its way for ever
     bench.stand()
     ours = bench.ours.id
@@ -362,7 +564,7 @@ def test_an_adopted_hold_is_sent_on_both_roads_like_any_other() -> None:
 
     effects = bench.wait(0.1)
 
-    assert {one.road for one in sends(effects)} == {"direct", "fiware"}
+    assert {one.road for one in sends(effects)} == {transport}
 
 
 def test_a_boot_hold_alone_is_not_adopted() -> None:

@@ -54,6 +54,8 @@ class Desk:
         direct: bool = True,
     ) -> None:
         self.clock = FakeClock()
+        self.lag_s: float | None = None
+        self.is_cut = False
         self.fleet = FakeFleet()
         self.broker = FakeContextBroker()
         self.journal = FakeJournal()
@@ -89,6 +91,8 @@ class Desk:
             self.ids,
             self.clock,
             direct=direct,
+            agent_lag_s=lambda _: self.lag_s,
+            fiware_is_cut=lambda _: self.is_cut,
         )
         self.loop = RuleLoop(
             self.ingest,
@@ -129,6 +133,7 @@ class Desk:
         linear: float = 0.0,
         released: tuple[str, ...] = (),
         decision_id: str | None = None,
+        challenge: str = "0123456789abcdef",
     ) -> None:
         report = safety_report(
             robot_id,
@@ -138,6 +143,7 @@ class Desk:
             linear=linear,
             released=released,
             decision_id=decision_id,
+            challenge=challenge,
             origin=self.next_origin(),
         )
         self.hear(report)

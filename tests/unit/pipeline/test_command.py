@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop import Command
+from iveg.domain.stop import Command, Wanted
 from tests.builders import safety_report
 from tests.fakes.records import command_record
 from tests.unit.pipeline.desk import Desk, conditions_of, settle
@@ -298,19 +298,93 @@ async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> 
 # --- release ----------------------------------------------------------------------
 
 
-async def test_i6_a_release_goes_through_orion_alone_and_once() -> None:
+async def test_i6_a_release_goes_once_on_each_transport_and_names_its_attempt() -> None:
     desk = Desk()
     command = await press(desk)
     await desk.stand()
     before = len(desk.fleet.stops)
 
-    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    once = await desk.commander.release(
+        "AGI", [command.command_id], "ana", desk.clock()
+    )
     await desk.wait(1.9)
 
-    assert [one for one in desk.broker.asked if one[0] == "release"] == [
-        ("release", "AGI", (command.command_id,))
-    ]
+    order = ("release", "AGI", (command.command_id,))
+    assert [one for one in desk.broker.asked if one[0] == "release"] == [order]
+    assert desk.fleet.asked == [order]
+    assert desk.fleet.orders == desk.broker.orders
+    assert desk.fleet.orders[0][1] == once.command_id
     assert len(desk.fleet.stops) == before
+
+
+async def test_without_the_direct_transport_a_release_goes_through_orion_alone() -> (
+    None
+):
+    desk = Desk(direct=False)
+    await released(desk)
+
+    assert len(desk.broker.orders) == 1
+    assert desk.fleet.asked == []
+
+
+async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.broker.opened.clear()
+
+    once = await desk.commander.release(
+        "AGI", [command.command_id], "ana", desk.clock()
+    )
+    await settle()
+
+    assert len(desk.fleet.asked) == 1
+    assert once.times.sent_direct is not None
+    assert once.roads == {"direct": "pending", "fiware": "pending"}
+    await desk.commander.close()
+
+
+async def test_the_journal_knows_what_a_release_names_before_it_goes_out() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.journal.opened.clear()
+
+    await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
+    await settle()
+    waiting = list(desk.fleet.asked)
+    desk.journal.opened.set()
+    await settle()
+
+    assert waiting == []
+    assert len(desk.fleet.asked) == 1
+    held = command.command_id
+    challenge = desk.fleet.orders[0][0]
+    assert desk.journal.named_lines == [("AGI", held, (held,), challenge)]
+
+
+async def test_an_order_remembers_how_far_the_agent_was_behind_when_it_left() -> None:
+    desk = Desk()
+    command = await press(desk)
+    await desk.stand()
+    desk.lag_s = 12.0
+
+    once = await desk.commander.release(
+        "AGI", [command.command_id], "ana", desk.clock()
+    )
+
+    assert (command.agent_lag_s, once.agent_lag_s) == (None, 12.0)
+
+
+async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
+    desk = Desk()
+    desk.is_cut = True
+    desk.fleet.fails = True
+
+    command = await press(desk)
+
+    assert command.roads == {"direct": "failed", "fiware": "unknown"}
+    assert command.state == "REQUESTED"
 
 
 async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
@@ -323,6 +397,7 @@ async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
     await desk.wait(5.0)
 
     assert len([one for one in desk.broker.asked if one[0] == "release"]) == 1
+    assert len(desk.fleet.asked) == 1
 
 
 async def test_the_journal_says_run_only_after_the_robot_reported_the_release() -> None:
@@ -352,16 +427,18 @@ async def test_an_unconfirmed_release_is_written_down_as_stopped() -> None:
     assert desk.journal.lines[-1][2] != command.command_id
 
 
-async def test_a_resume_goes_through_orion_alone_and_once() -> None:
+async def test_a_resume_goes_once_on_each_transport() -> None:
     desk = Desk()
     await released(desk)
 
-    await desk.commander.resume("AGI", "ana", desk.clock())
+    once = await desk.commander.resume("AGI", "ana", desk.clock())
     await desk.wait(1.9)
 
-    assert [one for one in desk.broker.asked if one[0] == "resume"] == [
-        ("resume", "AGI", ())
-    ]
+    order = ("resume", "AGI", ())
+    assert [one for one in desk.broker.asked if one[0] == "resume"] == [order]
+    assert [one for one in desk.fleet.asked if one[0] == "resume"] == [order]
+    assert desk.fleet.orders[-1] == desk.broker.orders[-1]
+    assert desk.fleet.orders[-1][1] == once.command_id
 
 
 async def test_a_refused_release_is_told_with_its_reason() -> None:
@@ -371,6 +448,8 @@ async def test_a_refused_release_is_told_with_its_reason() -> None:
     await desk.commander.release("AGI", [command.command_id], "ana", desk.clock())
 
     desk.answer("REFUSED", why="challenge")
+    held = Hold(command.command_id, "iveg", "remote")
+    desk.report("AGI", held, challenge="another")
 
     assert desk.sentences()[-1] == "log.stop.refused"
     assert '"why": "challenge"' in desk.minutes.lines[-1].slots
@@ -400,23 +479,58 @@ async def test_the_history_says_that_a_released_stop_is_over() -> None:
 # --- restart, broker back ---------------------------------------------------------
 
 
-async def test_a_restart_asserts_the_stop_again_under_a_new_id() -> None:
+async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> None:
     desk = Desk()
 
-    desk.commander.restore({"AGI": "ana"}, desk.clock())
+    desk.commander.restore({"AGI": Wanted("ana", "01HELD")}, desk.clock())
     await settle()
 
     machine = desk.commander.machine("AGI")
     assert machine.wants_stop
-    assert desk.fleet.stops == [("AGI", machine.hold_id)]
-    assert desk.journal.lines == [("AGI", "stopped", machine.hold_id, "ana")]
+    assert desk.fleet.stops == [("AGI", "01HELD")]
+    assert desk.journal.lines == [("AGI", "stopped", "01HELD", "ana")]
     assert desk.sentences() == ["log.stop.reasserted", "log.stop.sent"]
+    assert machine.stop is not None
+    assert machine.stop.command_id != "01HELD"
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [Wanted("ana"), Wanted("ana", "01HELD", named=("01HELD",), asked=("01HELD",))],
+)
+async def test_a_restart_never_asserts_a_hold_that_a_release_may_have_named(
+    wanted: Wanted,
+) -> None:
+    desk = Desk()
+
+    desk.commander.restore({"AGI": wanted}, desk.clock())
+    await settle()
+
+    ((_, asserted),) = desk.fleet.stops
+    assert asserted != "01HELD"
+    assert desk.journal.lines == [("AGI", "stopped", asserted, "ana")]
+
+
+async def test_a_restart_among_three_holds_that_were_named_waits_for_the_robot() -> (
+    None
+):
+    desk = Desk()
+    three = ("01A", "01B", "01C")
+    wanted = Wanted("ana", "01C", three, three, "0123456789abcdef")
+
+    desk.commander.restore({"AGI": wanted}, desk.clock())
+    await desk.wait(0.9)
+    before = {hold for _, hold in desk.fleet.stops}
+    await desk.wait(0.2)
+
+    assert before == {"01C"}
+    assert desk.fleet.stops[-1][1] not in three
 
 
 async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
     desk = Desk()
 
-    desk.commander.restore({"AGX": "ana"}, desk.clock())
+    desk.commander.restore({"AGX": Wanted("ana")}, desk.clock())
     await settle()
 
     assert desk.fleet.stops == []
@@ -424,7 +538,7 @@ async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
 
 async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> None:
     desk = Desk()
-    desk.commander.restore({"AGI": "ana"}, desk.clock())
+    desk.commander.restore({"AGI": Wanted("ana")}, desk.clock())
     await settle()
     before = len(desk.sink.records)
     left = (
@@ -436,7 +550,8 @@ async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> 
     desk.commander.close_earlier(left, desk.clock())
     await settle()
 
-    again = desk.commander.machine("AGI").hold_id
+    stop = desk.commander.machine("AGI").stop
+    again = None if stop is None else stop.command_id
     new = desk.sink.durable[before:]
     events = [one for one in new if isinstance(one, CommandEventRecord)]
     rows = [one for one in new if isinstance(one, CommandRecord)]
@@ -570,7 +685,7 @@ async def test_delivered_is_told_with_the_time_it_took() -> None:
 async def test_old_commands_make_room() -> None:
     desk = Desk()
     for _ in range(250):
-        desk.commander.restore({"AGII": "ana"}, desk.clock())
+        desk.commander.restore({"AGII": Wanted("ana")}, desk.clock())
         desk.report("AGII", released=(desk.commander.machine("AGII").hold_id or "",))
 
     assert len(desk.commander.commands) <= 200
