@@ -6,7 +6,7 @@ from iveg.domain.alarms import Condition
 from iveg.domain.decisions import Decision
 from iveg.domain.events import Slot
 from iveg.domain.observations import Instant
-from iveg.domain.world import RobotState
+from iveg.domain.world import STANDING_SPEED, RobotState
 
 EXPECTED = "alert.person_slowed"
 """The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
@@ -38,7 +38,7 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     slots: dict[str, Slot] = {"robot": robot.robot_id}
     name = robot.robot_id
     if robot.link(now) == "LOST":
-        moving = not robot.stands
+        moving = _was_moving(robot)
         key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
         yield Condition("P1" if moving else "P2", key, name, name, slots)
     offset = robot.clock.warning(now)
@@ -48,6 +48,14 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     unreadable = robot.unreadable_at
     if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
         yield Condition("P3", "alert.unreadable_detection", name, name, slots)
+
+
+def _was_moving(robot: RobotState) -> bool:
+    """What a robot did when last heard: its report may be newer than its odometry."""
+    report, at = robot.safety, robot.safety_received
+    if report is None or at is None or at.mono < (robot.pose_at or 0.0):
+        return not robot.stands
+    return max(abs(report.linear), abs(report.angular)) >= STANDING_SPEED
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:

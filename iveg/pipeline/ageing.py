@@ -57,13 +57,14 @@ class Ageing:
             return
         self._links[robot.robot_id] = link
         self._hub.changed(f"robots/{robot.robot_id}")
-        slots: dict[str, Slot] = {
-            "robot": robot.robot_id,
-            "age": round(robot.age_s(now) or 0.0, 1),
-        }
-        self._minutes.log(
-            LogEvent("link", f"log.link.{link.lower()}", slots, robot.robot_id), now
-        )
+        if link == "UNKNOWN":
+            # For as long as it takes to prove an age; if that fails, it is LOST.
+            return
+        age, slots = robot.age_s(now), dict[str, Slot](robot=robot.robot_id)
+        key = "log.link.unproven" if age is None else f"log.link.{link.lower()}"
+        if age is not None:
+            slots["age"] = round(age, 1)
+        self._minutes.log(LogEvent("link", key, slots, robot.robot_id), now)
 
     def _log_stage(self, person: Person, now: Instant) -> None:
         stage = person.stage(now)

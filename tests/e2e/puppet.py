@@ -16,8 +16,11 @@ import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.observations import Origin
 from iveg.ngsi import names
-from iveg.ngsi.codec import format_stamp
+from iveg.ngsi.codec import format_stamp, read_feedback
+from iveg.ngsi.codec.fields import write_origin
+from iveg.robot.echo import Echo
 from tests.processes import Site, site
 
 _APIKEY = "iveg"
@@ -51,8 +54,11 @@ class Puppet:
         self._boot = secrets.token_hex(4)
         self._seq = 0
         self._challenge = secrets.token_hex(8)
-        topic = names.command_topic(_APIKEY, self.robot_id)
-        self._link = MqttLink(self.address, self.robot_id, {topic: 1}, self._obey)
+        self._echo = Echo()
+        self._started = clock.now().mono
+        self._orders = names.command_topic(_APIKEY, self.robot_id)
+        topics = {self._orders: 1, names.FEEDBACK_FILTER: 1}
+        self._link = MqttLink(self.address, self.robot_id, topics, self._hear)
 
     async def live(self) -> None:
         """Report ten times a second until cancelled."""
@@ -65,9 +71,13 @@ class Puppet:
                     self._report()
                 await asyncio.sleep(_EVERY_S)
 
-    def _obey(self, _: str, payload: bytes) -> None:
-        if not self.answers:
-            return
+    def _hear(self, topic: str, payload: bytes) -> None:
+        if topic != self._orders:
+            self._echo.take(read_feedback(payload).origin)
+        elif self.answers:
+            self._obey(payload)
+
+    def _obey(self, payload: bytes) -> None:
         order = orjson.loads(payload).get(names.COMMAND, {})
         if "stop" in order:
             self._latch(order["stop"]["id"])
@@ -121,8 +131,17 @@ class Puppet:
 
     def _origin(self) -> dict[str, object]:
         self._seq += 1
-        stamp = format_stamp(clock.now().wall)
-        return {"boot": self._boot, "seq": self._seq, "stamp": stamp}
+        now = clock.now()
+        return write_origin(
+            Origin(
+                self._boot,
+                self._seq,
+                format_stamp(now.wall),
+                mono=now.mono - self._started,
+                echoes=True,
+                heard=self._echo.heard,
+            )
+        )
 
 
 @contextlib.contextmanager
