@@ -12,7 +12,8 @@ from iveg.domain.observations import Origin
 
 Verdict = Literal["new", "late", "duplicate"]
 
-_REMEMBERED_SEQS = 128
+_REMEMBERED_SEQS = 512
+"""Copies of the last ten seconds and more, at 30 Hz, are known for copies."""
 _REMEMBERED_BOOTS = 16
 _GROWN_TO_RETURN = 5
 

@@ -61,12 +61,21 @@ class Looks:
     def take(
         self, frame: DetectionFrame, received: Received, verdict: Verdict, rule: Rule
     ) -> None:
-        """A late look still saw somebody; a late answer of Orion's is yesterday's."""
-        if verdict == "new" or (verdict == "late" and not received.asked):
+        """A late look still saw somebody; a late answer of Orion's is yesterday's.
+
+        Later than a ring lives it protects nobody, and would only show ghosts.
+        """
+        late = verdict == "late" and not received.asked
+        if verdict == "new" or (late and self._age_s(frame, received) <= RING_S):
             placed = self._look(frame, received, rule)
             if verdict == "new":
                 self.placed[frame.robot_id] = placed
                 self._hub.changed(f"detections/{frame.robot_id}")
+
+    def _age_s(self, frame: DetectionFrame, received: Received) -> float:
+        """How old the look that has just come is (s)."""
+        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
+        return received.at.mono - seen_at.mono
 
     def _look(
         self, frame: DetectionFrame, received: Received, rule: Rule

@@ -43,30 +43,33 @@ class Moment:
 
 @dataclass(slots=True)
 class Topic:
-    """The count of one topic, and whether its moments and stamps rise with it."""
+    """The count of one topic, and whether its moments and stamps rise with it.
+
+    A stamp that falls makes one message incomparable, since clocks are set; a moment
+    that does not rise makes all of that boot so, since what is no clock cannot tell.
+    """
 
     _newest: Origin = field(default=_UNKNOWN)
+    _broken: str | None = None
 
     def moment(self, origin: Origin, arrived: Instant) -> Moment:
         """When a message of this topic was measured."""
         before, self._newest = self._newest, origin
+        unknown = Moment(None, arrived.mono)
         if origin.boot is None or origin.seq is None or origin.mono is None:
-            return Moment(None, arrived.mono)
-        if before.boot == origin.boot and not _rises(before, origin):
-            return Moment(None, arrived.mono)
-        return Moment(origin.boot, origin.mono)
+            return unknown
+        if before.boot == origin.boot:
+            if (before.mono or 0.0) >= origin.mono or (before.seq or 0) >= origin.seq:
+                self._broken = origin.boot
+            elif _fell(before.stamp_s, origin.stamp_s):
+                return unknown
+        return (
+            unknown if self._broken == origin.boot else Moment(origin.boot, origin.mono)
+        )
 
 
-def _rises(before: Origin, after: Origin) -> bool:
-    """Whether count and moment rise, and the stamp, which is coarser, does not fall."""
-    counts = (before.seq or 0) < (after.seq or 0)
-    moments = before.mono is None or after.mono is None or before.mono < after.mono
-    stamps = (
-        before.stamp_s is None
-        or after.stamp_s is None
-        or before.stamp_s <= after.stamp_s
-    )
-    return counts and moments and stamps
+def _fell(before: float | None, after: float | None) -> bool:
+    return before is not None and after is not None and after < before
 
 
 class Standstill:

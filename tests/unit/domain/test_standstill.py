@@ -153,6 +153,19 @@ def test_motion_that_cannot_be_compared_contradicts(origin: Origin) -> None:
     assert found == [False, False, True]
 
 
+def test_a_topic_whose_moments_fell_once_is_compared_no_more() -> None:
+    rest = stood()
+    again = [Origin("a", 20_000 + n, mono=1.0 + 0.1 * n) for n in range(4)]
+    rest.odometry(arrived(11.0), Origin("a", 19_999, mono=11.0), moves=False)
+
+    found = [
+        rest.odometry(arrived(11.1 + 0.1 * n), one, moves=True)
+        for n, one in enumerate(again)
+    ]
+
+    assert found == [False, False, True, True]
+
+
 def test_moments_that_lie_are_found_out_by_what_the_robot_had_heard() -> None:
     rest = stood()
 

@@ -1,10 +1,12 @@
 """Proven and estimated ages, from what arrives to what is said and done."""
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from iveg.domain.observations import (
+    DetectionFrame,
     FeedbackRef,
     Hold,
     Navigation,
@@ -12,7 +14,13 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from tests.builders import odometry, origin, safety_report
+from tests.builders import (
+    detection,
+    detection_frame,
+    odometry,
+    origin,
+    safety_report,
+)
 from tests.unit.pipeline.desk import Desk, conditions_of
 
 HOUR_S = 3600.0
@@ -32,7 +40,7 @@ class Robot:
         self.clock_off = 0.0
         self.frozen = False
         self._kept: list[Odometry] = []
-        self._seqs = {"odom": 0, "safety": 0}
+        self._seqs: Counter[str] = Counter()
 
     def _origin(self, topic: str) -> Origin:
         self._seqs[topic] += 1
@@ -249,3 +257,23 @@ async def test_a_link_that_nothing_proves_is_told_as_lost_and_said_why() -> None
     assert desk.world.robot("AGI").link(desk.clock()) == "LOST"
     told = [one for one in desk.sentences() if one.startswith("log.link")]
     assert told == ["log.link.unproven"]
+
+
+@pytest.mark.parametrize("late_s", [8.0, 20.0])
+async def test_what_the_agent_brings_late_shows_no_ghosts(late_s: float) -> None:
+    desk = Desk(("AGI",))
+    robot = Robot(desk)
+    late: list[tuple[float, DetectionFrame]] = []
+    for number in range(round(10 * late_s) + 100):
+        robot.live()
+        # Somebody walks by at 1.5 m/s, and is seen thirty times in three seconds.
+        walker = detection("farmer", 5.0 + 0.15 * number, 2.0)
+        seen = (walker,) if number < 30 else ()
+        look = detection_frame("AGI", *seen, origin=robot._origin("look"))
+        desk.hear(look)
+        late.append((desk.clock.now + late_s, look))
+        while late and late[0][0] <= desk.clock.now:
+            desk.hear(late.pop(0)[1], "orion")
+        await desk.wait(0.1)
+
+    assert len(desk.assessor.people.known) == 1
