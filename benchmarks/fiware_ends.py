@@ -15,6 +15,7 @@ import socket
 import sys
 import time
 
+import numpy as np
 import orjson
 import uvloop
 
@@ -36,7 +37,7 @@ _HELLO = b"\x10\x10\x00\x04MQTT\x04\x02\x00\x00\x00\x04load"
 def measures(robot: str) -> list[tuple[str, bytes]]:
     """What one robot sends at one tick: topic and payload."""
     draw = random.Random(robot)  # noqa: S311 - a benchmark
-    ranges = [round(draw.uniform(0.1, 12.0), 3) for _ in range(BEAMS)]
+    ranges = [_as_a_driver(draw.uniform(0.1, 12.0)) for _ in range(BEAMS)]
     origin: dict[str, object] = {
         "boot": "b00t",
         "seq": _BASE,
@@ -64,6 +65,14 @@ def measures(robot: str) -> list[tuple[str, bytes]]:
         ),
     ]
     return [(f"/iveg/{robot}_{kind}/attrs", orjson.dumps(what)) for kind, what in told]
+
+
+def _as_a_driver(metres: float) -> float:
+    """A float32 with the decimals that it has, as ``sensor_msgs/LaserScan`` is printed.
+
+    A scan of round millimetres is the easiest there is to print; no driver sends one.
+    """
+    return round(float(np.float32(metres)), 11)
 
 
 def publish_packet(topic: str, payload: bytes) -> bytes:

@@ -12,11 +12,11 @@ from typing import Any
 import orjson
 
 from iveg.embedded.orion_errors import bad_request, too_many
+from iveg.embedded.orion_numbers import print_value
 from iveg.embedded.orion_text import (
     UNRESTRICTED,
     check_name,
     holds_forbidden,
-    print_value,
     quoted,
 )
 

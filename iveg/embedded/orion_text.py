@@ -1,4 +1,4 @@
-"""How Orion writes values: nine decimals, no forbidden characters.
+"""What text Orion takes: JSON of a sane depth, no forbidden characters.
 
 Values are kept as the JSON text that Orion would print, made once when a measure
 arrives, so that a LiDAR sweep is neither walked nor written again for each subscriber.
@@ -16,11 +16,6 @@ FORBIDDEN = frozenset("<>\"'=;()")
 _SUSPECTS = tuple(bytes([code]) for code in b"<>'=;()\\")
 _ID_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
 _NAME_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
-_TO_ZERO = bytes.maketrans(b"123456789", b"000000000")
-_TEN_DECIMALS = b".0000000000"
-_EXPONENT = b"0e"
-_HUGE = 9.2e18
-_EXACT_DIGITS = b"0" * 16
 _MAX_DEPTH = 128
 UNRESTRICTED = "TextUnrestricted"
 
@@ -94,41 +89,3 @@ def check_name(name: str, what: str) -> None:
 def quoted(text: str) -> bytes:
     """A short text as JSON; names and types come again and again."""
     return orjson.dumps(text)
-
-
-def print_value(value: Any) -> bytes:
-    """The JSON text that Orion would print for a value."""
-    text = orjson.dumps(value)
-    digits = text.translate(_TO_ZERO)
-    if _TEN_DECIMALS in digits or _EXPONENT in digits or _EXACT_DIGITS in digits:
-        return orjson.dumps(_as_double(value))
-    if b".0" not in text and b"-0" not in text:
-        return text
-    if b'"' in text or b"-0" in text:
-        return orjson.dumps(_as_double(value))
-    # Numbers alone, such as a sweep: a trailing ".0" can only be an integer's.
-    return text.replace(b".0,", b",").replace(b".0]", b"]").removesuffix(b".0")
-
-
-def _as_double(value: Any) -> Any:
-    if isinstance(value, float):
-        return _number(value)
-    if isinstance(value, int) and not isinstance(value, bool):
-        return _number(float(value)) if abs(value) > 2**53 else value
-    if isinstance(value, dict):
-        return {key: _as_double(part) for key, part in value.items()}
-    if isinstance(value, list):
-        return [_as_double(part) for part in value]
-    return value
-
-
-def _number(value: float) -> float | int:
-    """A double as Orion's ``double2string`` leaves it.
-
-    At 9.2e18 it changes to an exponent and then strips the zeros at the end, which are
-    the exponent's: 1e20 becomes 1e+2.  A client must be able to meet that here.
-    """
-    if abs(value) >= _HUGE:
-        return float(f"{value:.17g}".rstrip("0"))
-    rounded = round(value, 9)
-    return int(rounded) if rounded.is_integer() else rounded

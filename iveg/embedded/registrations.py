@@ -16,7 +16,7 @@ import orjson
 from iveg.embedded.entities import Attribute, Change, default_type, metadata_json
 from iveg.embedded.notifier import Target, exchange
 from iveg.embedded.orion_errors import bad_request
-from iveg.embedded.orion_text import print_value
+from iveg.embedded.orion_numbers import print_value
 from iveg.embedded.outbox import AGENT
 from iveg.embedded.subscriptions import new_id
 

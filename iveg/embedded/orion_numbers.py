@@ -1,0 +1,117 @@
+"""How Orion prints numbers: at most nine decimals, and nonsense from 9.2e18 on.
+
+A LiDAR scan is 720 numbers of eleven decimals or more, thirty times a second and
+robot.  So long lists are rounded as arrays; Python looks only at a number whose tenth
+decimal lies so close to a half that doubles cannot tell, and at huge ones.
+"""
+
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_HUGE = 9.2e18
+_PLAIN = 1e15
+"""From 1e16 on orjson prints an exponent, which Orion does not."""
+_MANY = 16
+"""Fewer numbers are quicker one by one than as an array."""
+_SCALE = 1e9
+_DOUBT = 2.0**-51
+"""Share of a product that bounds its own rounding (2⁻⁵³) with room to spare."""
+_TO_ZERO = bytes.maketrans(b"123456789", b"000000000")
+_TEN_DECIMALS = b".0000000000"
+_EXPONENT = b"0e"
+_EXACT_DIGITS = b"0" * 16
+_OTHERS = (b'"', b"{", b"t", b"f")
+"""What begins every string, object, true and false."""
+
+
+def print_value(value: Any) -> bytes:
+    """The JSON text that Orion would print for a value."""
+    text = orjson.dumps(value)
+    digits = text.translate(_TO_ZERO)
+    if (
+        _TEN_DECIMALS in digits
+        # A search for two bytes is slow where one of them is everywhere.
+        or (b"e" in text and _EXPONENT in digits)
+        or _EXACT_DIGITS in digits
+        or (b"-" in text and b"-0" in text)
+    ):
+        printed = _print_array(value, text) if type(value) is list else b""
+        return printed or orjson.dumps(_as_double(value))
+    if b".0" not in text:
+        return text
+    if b'"' in text:
+        return orjson.dumps(_as_double(value))
+    return _without_point(text)
+
+
+def _print_array(values: list[Any], text: bytes) -> bytes:
+    """Print a long list of numbers and nulls; empty if it is another or one is huge.
+
+    Args:
+        values: The list.
+        text: The same as JSON, which tells at memory speed what is in it.
+    """
+    nested = text.find(b"[", 1) >= 0
+    if len(values) < _MANY or nested or any(mark in text for mark in _OTHERS):
+        return b""
+    given = np.array(values, dtype=np.float64)
+    if np.fmax.reduce(np.abs(given)) >= _PLAIN:
+        return b""
+    text = orjson.dumps(_nine_decimals(given), option=orjson.OPT_SERIALIZE_NUMPY)
+    return _without_point(text)
+
+
+def _nine_decimals(given: Floats) -> Floats:
+    """Round to the nearest nine decimals, as exactly as Python's ``round``.
+
+    The quotient of two whole numbers below 2⁵³ is the double nearest to the decimal,
+    so only the choice of the whole number can go wrong: where the product lies within
+    its own error of a half, and everywhere once that error is as large.
+    """
+    product = given * _SCALE
+    whole = np.rint(product)
+    doubt = np.abs(product - whole) + np.abs(product) * _DOUBT >= 0.5
+    # Adding zero makes a plain zero of the negative one.
+    rounded: Floats = whole / _SCALE + 0.0
+    for index in np.flatnonzero(doubt):
+        rounded[index] = round(float(given[index]), 9)
+    return rounded
+
+
+def _without_point(text: bytes) -> bytes:
+    """Print whole numbers as such: in a text of numbers ``.0`` ends nothing else."""
+    return text.replace(b".0,", b",").replace(b".0]", b"]").removesuffix(b".0")
+
+
+def _as_double(value: Any) -> Any:
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        return _number(float(value)) if abs(value) > 2**53 else value
+    if isinstance(value, dict):
+        return {key: _as_double(part) for key, part in value.items()}
+    if isinstance(value, list):
+        printed = b""
+        if len(value) >= _MANY:
+            printed = _print_array(value, orjson.dumps(value))
+        if printed:
+            return orjson.Fragment(printed)
+        return [_as_double(part) for part in value]
+    return value
+
+
+def _number(value: float) -> float | int:
+    """A double as Orion's ``double2string`` leaves it.
+
+    At 9.2e18 it changes to an exponent and then strips the zeros at the end, which are
+    the exponent's: 1e20 becomes 1e+2.  A client must be able to meet that here.
+    """
+    if abs(value) >= _HUGE:
+        return float(f"{value:.17g}".rstrip("0"))
+    rounded = round(value, 9)
+    return int(rounded) if rounded.is_integer() else rounded
