@@ -5,7 +5,7 @@
 
 import runpy
 
-BENCHMARKS = ("decision_cost", "lidar_cost", "fiware_road", "paint")
+BENCHMARKS = ("decision_cost", "lidar_cost", "emulator_cost", "fiware_road", "paint")
 
 
 def main() -> None:

@@ -5,7 +5,6 @@ scan travels once; "looked, saw nothing", which the paper cannot say, is said wi
 empty ``bounding_boxes`` beside it.  ``pose`` and ``lidar_header`` carry the origin.
 """
 
-import numpy as np
 import orjson
 
 from iveg.domain.geometry import Pose2D
@@ -16,7 +15,7 @@ from iveg.domain.observations import (
     Odometry,
 )
 from iveg.ngsi import names
-from iveg.ngsi.codec.fields import write_origin
+from iveg.ngsi.codec.fields import write_origin, write_ranges
 
 
 class SinglePayload:
@@ -77,7 +76,7 @@ def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
 
 def _swept(scan: LaserScan, origin: dict[str, object]) -> dict[str, object]:
     return {
-        "laser_scan": np.round(scan.ranges.astype(np.float64), 3),
+        "laser_scan": write_ranges(scan.ranges),
         names.LIDAR_HEADER: {
             "angle_min": scan.angle_min,
             "angle_increment": scan.angle_increment,

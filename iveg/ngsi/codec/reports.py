@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import numpy as np
 import orjson
 
 from iveg.domain.observations import (
@@ -16,7 +15,13 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import names
-from iveg.ngsi.codec.fields import rounded, without_none, write_hold, write_origin
+from iveg.ngsi.codec.fields import (
+    rounded,
+    without_none,
+    write_hold,
+    write_origin,
+    write_ranges,
+)
 
 
 def write_odometry(value: Odometry) -> bytes:
@@ -41,7 +46,7 @@ def write_scan(value: LaserScan) -> bytes:
     return _measure(
         value.origin,
         {
-            names.LIDAR: np.round(value.ranges.astype(np.float64), 3),
+            names.LIDAR: write_ranges(value.ranges),
             names.LIDAR_HEADER: {
                 "angle_min": value.angle_min,
                 "angle_increment": value.angle_increment,

@@ -17,6 +17,7 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
+from iveg.embedded.orion_numbers import print_value
 from iveg.ngsi import codec
 from iveg.robot.echo import Echo
 from iveg.robot.uplink import Uplink
@@ -157,6 +158,23 @@ def test_counters_tell_what_left() -> None:
     wire.uplink.send(odometry(origin=BLANK), AT)
     wire.uplink.report(SafetyReport("AGI", BLANK, 1.0, "clear"), AT)
     assert wire.uplink.sent == {"_odom": 1, "_safety": 1}
+
+
+@pytest.mark.parametrize("form", ["per-topic", "single"])
+def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
+    form: str,
+) -> None:
+    measured = np.random.default_rng(1).uniform(0.1, 30.0, 720).astype(np.float32)
+    wire = Wire(form)
+    wire.uplink.send(scan(ranges=measured.tolist(), origin=BLANK), WALL)
+    wire.uplink.send(odometry(origin=BLANK), WALL)
+    (payload,) = [one for _, one in wire.sent if b"lidar_header" in one]
+    told = orjson.loads(payload)
+    ranges = told.get("lidar_points") or told["laser_scan"]
+    by_orion = orjson.loads(print_value(ranges))
+    assert np.array_equal(np.array(ranges, np.float32), measured)
+    assert np.array_equal(np.array(by_orion, np.float32), measured)
+    assert sum(len(str(one).partition(".")[2]) >= 10 for one in ranges) > 600
 
 
 # --- the single payload -------------------------------------------------------------
