@@ -5,7 +5,14 @@
 
 import runpy
 
-BENCHMARKS = ("decision_cost", "lidar_cost", "emulator_cost", "fiware_road", "paint")
+BENCHMARKS = (
+    "decision_cost",
+    "lidar_cost",
+    "emulator_cost",
+    "fiware_road",
+    "notify_cost",
+    "paint",
+)
 
 
 def main() -> None:

@@ -117,7 +117,7 @@ class Dss:
         self.minutes = Minutes(self.hub, self.recorder, start)
         self.chain = Chain(start)
         world = World(settings.robots, self.chain.probe)
-        self.ingest = Ingest(world.robots.__contains__, self._rejected)
+        self.ingest = Ingest(world.robots.__contains__, self._rejected, world.is_past)
         self.journal = FileJournal(directory / "commands.jsonl")
         self._direct = DirectReader(
             settings.apikey,
@@ -356,11 +356,10 @@ def create_app(dss: Dss) -> FastAPI:
     encoder = live.Encoder(dss.views, dss.hub, clock.now, dss.health)
     settings = dss.settings
     tenant = settings.fiware_service, settings.fiware_servicepath
-    app.include_router(
-        notifications.router(
-            dss.ingest, dss.notify_secret, clock.now, dss.is_ours, tenant, dss.notified
-        )
+    orion = notifications.NotificationEndpoint(
+        dss.ingest, dss.notify_secret, clock.now, dss.is_ours, tenant, dss.notified
     )
+    app.router.routes.append(orion.route())
     app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))
     # Before the routes that would take ``latency`` for the name of a command.
     app.include_router(
@@ -403,6 +402,7 @@ def create_app(dss: Dss) -> FastAPI:
     app.add_middleware(SignInLink, door=dss.door, refusal=drawn.refused_link)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(security.SecurityHeaders)
+    app.add_middleware(notifications.NotificationsFirst, endpoint=orion)
     return app
 
 

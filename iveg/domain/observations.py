@@ -234,6 +234,19 @@ class Canary:
     origin: Origin
 
 
+@dataclass(frozen=True, slots=True)
+class Overtaken:
+    """A message that its stream is past: who said it, and nothing of what was said.
+
+    A twin or straggler changes no pose and no scan, so its numbers are not read.  Only
+    these two kinds: what a late detection saw may still protect somebody.
+    """
+
+    robot_id: str
+    origin: Origin
+    kind: "type[Odometry | LaserScan]"
+
+
 Observation = (
     Odometry
     | LaserScan
@@ -244,7 +257,13 @@ Observation = (
     | CommandAnswer
     | Climate
     | Canary
+    | Overtaken
 )
+
+
+def kind_of(observation: Observation) -> type[Observation]:
+    """Which stream of its robot an observation belongs to."""
+    return observation.kind if isinstance(observation, Overtaken) else type(observation)
 
 
 @dataclass(frozen=True, slots=True)

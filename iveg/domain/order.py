@@ -38,6 +38,10 @@ class Order:
         """Whether an old record must not even be judged: it is of another boot."""
         return self.boot is not None and origin.boot != self.boot
 
+    def is_past(self, boot: str, seq: int) -> bool:
+        """Whether :meth:`judge` will never call this message new."""
+        return boot == self.boot and seq <= self.seq
+
     def judge(self, origin: Origin) -> Verdict:
         """Say whether a message is newer than all before, and remember it.
 

@@ -25,9 +25,11 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
+    Overtaken,
     Received,
     Road,
     SafetyReport,
+    kind_of,
 )
 from iveg.domain.order import Order, Verdict
 from iveg.domain.probe import ProbeLag
@@ -163,10 +165,15 @@ class RobotState:
 
         What Orion kept of an earlier boot must not make the present one look old.
         """
-        order = self._orders.setdefault(type(observation), Order())
+        order = self._orders.setdefault(kind_of(observation), Order())
         if asked and order.knows_better_than(origin):
             return "late"
         return order.judge(origin)
+
+    def is_past(self, kind: type[Observation], boot: str, seq: int) -> bool:
+        """Whether a message of this identity cannot be news."""
+        order = self._orders.get(kind)
+        return order is not None and order.is_past(boot, seq)
 
     def remember_pose(self, moment: float, pose: Pose2D) -> None:
         """Keep a pose for ``pose_at_stamp``; a clock that jumps back starts anew."""
@@ -208,6 +215,13 @@ class World:
         except KeyError:
             raise UnknownRobotError(robot_id) from None
 
+    def is_past(
+        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+    ) -> bool:
+        """Whether a message can be told by its identity to be old or a twin."""
+        robot = self.robots.get(robot_id)
+        return robot is not None and robot.is_past(kind, boot, seq)
+
     def apply(self, received: Received) -> Verdict:
         """Take one observation in.
 
@@ -227,7 +241,10 @@ class World:
         robot = self.robot(observation.robot_id)
         origin = getattr(observation, "origin", Origin())
         verdict = robot.judge(observation, origin, asked=received.asked)
-        self.counters[f"{type(observation).__name__}.{verdict}"] += 1
+        if isinstance(observation, Overtaken) and verdict == "new":
+            # Its stream was past it, and has since met sixteen other boots.
+            verdict = "late"
+        self.counters[f"{kind_of(observation).__name__}.{verdict}"] += 1
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
         if not received.asked:
@@ -253,7 +270,7 @@ class World:
         lag: float | None = 0.0
         if self._probe is not None:
             lag = self._probe.lag(at) if self._probe.is_known else None
-        kind = type(received.observation)
+        kind = kind_of(received.observation)
         return robot.clock.delay(kind, origin, at, received.road, lag)
 
     def _measured_at(

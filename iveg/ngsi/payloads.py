@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 MAX_BEAMS = 4096
+MAX_RANGE_M = 1e6
 MAX_BOXES = 256
 MAX_PATH = 1024
 MAX_TEXT = 64
@@ -13,6 +14,9 @@ MAX_TEXT = 64
 
 def clean_text(text: str) -> str:
     """Text that is safe to keep and show: NFC, no control or format marks, short."""
+    if text.isascii() and text.isprintable():
+        # Nearly all is plain, and plain text needs no look at each character.
+        return text[:MAX_TEXT]
     kept = "".join(
         c
         for c in unicodedata.normalize("NFC", text[: 4 * MAX_TEXT])
@@ -78,7 +82,7 @@ class LidarHeaderValue(OriginFields):
 
 
 LidarPoints = Annotated[
-    list[Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] | None],
+    list[Annotated[float, Field(ge=0, le=MAX_RANGE_M, allow_inf_nan=False)] | None],
     Field(max_length=MAX_BEAMS),
 ]
 

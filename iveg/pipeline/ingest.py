@@ -13,8 +13,10 @@ from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    Observation,
     Received,
     SafetyReport,
+    kind_of,
 )
 
 _log = logging.getLogger(__name__)
@@ -30,14 +32,17 @@ class Ingest:
     Args:
         known: Whether a robot id belongs to the fleet.
         rejected: Called once for each new kind of rejection, with source and reason.
+        is_past: What need not be read; whoever reads messages asks it.
     """
 
     def __init__(
         self,
         known: Callable[[str], bool],
         rejected: Callable[[str, str], None] | None = None,
+        is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
     ) -> None:
         self._known = known
+        self.is_past = is_past
         self._rejected = rejected
         self._queue: deque[Received] = deque()
         self._wake = asyncio.Event()
@@ -50,7 +55,7 @@ class Ingest:
         if robot_id is not None and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
-        kind = type(received.observation).__name__
+        kind = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.
         way = "asked" if received.asked else received.road
         self.counters[f"{way}.{kind}"] += 1

@@ -248,7 +248,11 @@ def declared_action(route: Any) -> Action | None:
     """What a route, or its FastAPI context, declares; None when it forgot."""
     dependant = getattr(route, "dependant", None)
     if not isinstance(dependant, Dependant):
-        return None
+        # A plain ASGI endpoint says it itself.
+        action: Action | None = getattr(
+            getattr(route, "endpoint", None), "action", None
+        )
+        return action
     actions = [
         call.action for call in _calls(dependant) if isinstance(call, Requirement)
     ]

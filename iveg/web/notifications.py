@@ -1,65 +1,165 @@
-"""Orion → iVeg: authenticate, read, queue, answer at once (interfaces.md §2)."""
+"""Orion → iVeg: authenticate, read, queue, answer at once (interfaces.md §2).
 
-from collections.abc import Callable
-from typing import Annotated
+Hundreds come in a second, so this is plain ASGI beside the layers that pages need, with
+its own limit and secret.  What does not belong here, and everything that goes wrong, is
+answered as the rest of the application would.
+"""
 
-from fastapi import APIRouter, Depends, Header, Request
-from starlette.responses import Response
+from collections.abc import Callable, Mapping
+from typing import Final
 
+from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Instant, Received
 from iveg.ngsi.codec import read_notification
 from iveg.pipeline.ingest import Ingest
-from iveg.web.auth import NotifySecret, require
-from iveg.web.problems import Problem
+from iveg.web.auth import Action, NotifySecret
+from iveg.web.problems import Problem, problem_of
+from iveg.web.security import MAX_BODY, NOTIFICATIONS_PATH
 
-_TAKEN = Response(status_code=204)
+_TAKEN = (
+    {"type": "http.response.start", "status": 204, "headers": []},
+    {"type": "http.response.body", "body": b""},
+)
+_TOO_LONG = f"A body may have {MAX_BODY} bytes at most."
+_FORGED = Problem(401, "The notification secret is wrong.")
 
 
-def router(
-    ingest: Ingest,
-    secret: NotifySecret,
-    clock: Callable[[], Instant],
-    is_ours: Callable[[str], bool],
-    tenant: tuple[str, str],
-    heard: Callable[[Instant], None],
-) -> APIRouter:
-    """The notification endpoint.
+class NotificationEndpoint:
+    """Takes what Orion posts; an ASGI application.
 
-    ``is_ours`` says whether a subscription id is one that iVeg made, ``tenant`` which
-    Fiware service and path count; ``heard`` is told of each notification of Orion's.
+    Args:
+        ingest: Where observations go and what cannot be used is counted.
+        secret: What a notification must carry.
+        clock: Read once a notification.
+        is_ours: Whether a subscription id is one that iVeg made.
+        tenant: The Fiware service and path that count.
+        heard: Told of each notification of Orion's.
     """
-    routes = APIRouter()
 
-    @routes.post(
-        "/ngsi/notifications",
-        status_code=204,
-        dependencies=[Depends(require("open"))],
-        include_in_schema=False,
-    )
-    async def notify(
-        request: Request,
-        x_iveg_notify_token: Annotated[str | None, Header()] = None,
-        fiware_service: Annotated[str | None, Header()] = None,
-        fiware_servicepath: Annotated[str | None, Header()] = None,
-    ) -> Response:
-        """Take one notification; 204 also for what is not ours (counted)."""
-        at = clock()
-        if not secret.admits(x_iveg_notify_token):
-            source = request.client.host if request.client else "?"
-            ingest.reject(source, "forged_notification")
-            return Problem(401, "The notification secret is wrong.").response()
-        if (fiware_service or "", fiware_servicepath or "") != tenant:
-            ingest.reject(fiware_service or "?", "foreign_tenant")
-            return _TAKEN
-        subscription_id, reading = read_notification(await request.body())
-        if not is_ours(subscription_id):
-            ingest.reject(subscription_id, "unknown_subscription")
-            return _TAKEN
-        heard(at)
+    action: Final[Action] = "open"
+    """What it declares: nobody signs in here; the secret is its door."""
+
+    def __init__(
+        self,
+        ingest: Ingest,
+        secret: NotifySecret,
+        clock: Callable[[], Instant],
+        is_ours: Callable[[str], bool],
+        tenant: tuple[str, str],
+        heard: Callable[[Instant], None],
+    ) -> None:
+        self._ingest = ingest
+        self._secret = secret
+        self._clock = clock
+        self._is_ours = is_ours
+        self._tenant = tenant
+        self._heard = heard
+
+    def route(self) -> Route:
+        """Its place in the application's table of routes."""
+        return Route(
+            NOTIFICATIONS_PATH, self, methods=["POST"], include_in_schema=False
+        )
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        at = self._clock()
+        # Of a header that is there twice the first counts, as everywhere in Starlette.
+        headers = dict(reversed(scope["headers"]))
+        problem = self._refusal(scope, headers)
+        if problem is None and not self._is_foreign(headers):
+            try:
+                body = await _body(receive)
+            except _GoneError:
+                return
+            problem = self._take(body, at)
+        if problem is None:
+            for message in _TAKEN:
+                await send(message)
+        else:
+            await problem.response()(scope, receive, send)
+
+    def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
+        """Why the body is not even read."""
+        declared = headers.get(b"content-length", b"")
+        if declared.isdigit() and int(declared) > MAX_BODY:
+            # The unread body would be taken for the next request.
+            return Problem(413, _TOO_LONG, headers={"Connection": "close"})
+        given = headers.get(b"x-iveg-notify-token")
+        if self._secret.admits(None if given is None else given.decode("latin-1")):
+            return None
+        client = scope.get("client")
+        self._ingest.reject(client[0] if client else "?", "forged_notification")
+        return _FORGED
+
+    def _is_foreign(self, headers: Mapping[bytes, bytes]) -> bool:
+        """Whether it is of another tenant: taken, counted and ignored."""
+        service = headers.get(b"fiware-service", b"").decode("latin-1")
+        path = headers.get(b"fiware-servicepath", b"").decode("latin-1")
+        if (service, path) == self._tenant:
+            return False
+        self._ingest.reject(service or "?", "foreign_tenant")
+        return True
+
+    def _take(self, body: bytes | None, at: Instant) -> Problem | None:
+        if body is None:
+            return Problem(413, _TOO_LONG)
+        try:
+            subscription_id, reading = read_notification(body, self._ingest.is_past)
+        except UnreadableError as error:
+            return problem_of(error)
+        if not self._is_ours(subscription_id):
+            self._ingest.reject(subscription_id, "unknown_subscription")
+            return None
+        self._heard(at)
         for problem in reading.problems:
-            ingest.reject(problem.source, problem.reason, problem.detail)
+            self._ingest.reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
-            ingest.offer(Received(observation, at, "orion"))
-        return _TAKEN
+            self._ingest.offer(Received(observation, at, "orion"))
+        return None
 
-    return routes
+
+class NotificationsFirst:
+    """Middleware: hands notifications to their endpoint, and all else on.
+
+    Another method than POST goes on too, to be refused like everywhere.
+    """
+
+    def __init__(self, app: ASGIApp, endpoint: NotificationEndpoint) -> None:
+        self._app = app
+        self._endpoint = endpoint
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if (
+            scope["type"] == "http"
+            and scope["path"] == NOTIFICATIONS_PATH
+            and scope["method"] == "POST"
+        ):
+            await self._endpoint(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+
+class _GoneError(Exception):
+    """The sender hung up before its body was here."""
+
+
+async def _body(receive: Receive) -> bytes | None:
+    """The whole body; None where it is longer than a body may be."""
+    parts: list[bytes] = []
+    size = 0
+    while True:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            raise _GoneError
+        part = message.get("body", b"")
+        size += len(part)
+        if size > MAX_BODY:
+            return None
+        parts.append(part)
+        if not message.get("more_body", False):
+            return b"".join(parts) if len(parts) > 1 else part

@@ -1,9 +1,11 @@
 """The attributes of an entity, one reader each."""
 
+from array import array
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from iveg.domain.errors import UnreadableError
@@ -20,6 +22,7 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
+    Overtaken,
     SafetyReport,
 )
 from iveg.ngsi import names, payloads
@@ -29,15 +32,54 @@ from iveg.ngsi.codec.fields import read_holds, read_origin
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
 _Reader = Callable[[str, Any], Observation]
+IsPast = Callable[[str, type[Observation], str, int], bool]
+"""Whether robot, kind, boot and seq tell that a message cannot be news."""
 
 
-def read_attributes(robot_id: str, attributes: Mapping[str, Any]) -> Reading:
-    """Read every attribute of a robot that the contract knows; skip the others."""
+def read_attributes(
+    robot_id: str, attributes: Mapping[str, Any], is_past: IsPast | None = None
+) -> Reading:
+    """Read every attribute of a robot that the contract knows; skip the others.
+
+    Args:
+        robot_id: Whose they are.
+        attributes: By name.
+        is_past: Tells by its identity what need not be read; None reads all.
+    """
     readings = []
     for name, reader in _READERS.items():
-        if attributes.get(name) is not None:
+        if attributes.get(name) is None:
+            continue
+        old = (
+            None if is_past is None else _overtaken(robot_id, name, attributes, is_past)
+        )
+        if old is None:
             readings.append(read_one(robot_id, reader, attributes, name))
+        else:
+            readings.append(Reading((old,)))
     return merge(readings)
+
+
+def _overtaken(
+    robot_id: str, name: str, attributes: Mapping[str, Any], is_past: IsPast
+) -> Overtaken | None:
+    """What is left of a message that its stream is past; None where it may be news."""
+    if name not in _IDENTITY:
+        return None
+    kind, holder = _IDENTITY[name]
+    raw = attributes.get(holder)
+    if type(raw) is not dict:
+        return None
+    boot, seq = raw.get("boot"), raw.get("seq")
+    if type(boot) is not str or type(seq) is not int:
+        return None
+    if not is_past(robot_id, kind, payloads.clean_text(boot), seq):
+        return None
+    try:
+        origin = read_origin(payloads.OriginFields.model_validate(raw))
+    except ValidationError:
+        return None
+    return Overtaken(robot_id, origin, kind)
 
 
 def read_one(
@@ -72,8 +114,7 @@ def _scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
 
 
 def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
-    ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
-    ranges[np.isnan(ranges)] = np.inf
+    ranges = _ranges(points)
     if raw_header is None:
         return LaserScan(
             robot_id,
@@ -98,6 +139,33 @@ def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
     )
 
 
+def _ranges(points: Any) -> NDArray[np.float32]:
+    """A scan's numbers as one buffer; inf where nothing came back.
+
+    Raises:
+        ValidationError: not a list of at most 4,096 numbers and nulls in range.
+    """
+    if type(points) is list and 0 < len(points) <= payloads.MAX_BEAMS:
+        numbers = _plain_numbers(points)
+        if numbers is not None:
+            return numbers.astype(np.float32)
+    ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
+    ranges[np.isnan(ranges)] = np.inf
+    return ranges
+
+
+def _plain_numbers(points: list[Any]) -> NDArray[np.float64] | None:
+    """The numbers, where there is nothing to judge: no null, no bool, all in range."""
+    try:
+        numbers = np.frombuffer(array("d", points))
+    except (TypeError, OverflowError):
+        return None
+    # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
+    if not (numbers.min() >= 0.0 and numbers.max() <= payloads.MAX_RANGE_M):
+        return None
+    return None if np.any(numbers == 0.0) or np.any(numbers == 1.0) else numbers
+
+
 def _detections(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
     boxes = attributes[names.BOXES]
     if isinstance(boxes, dict):
@@ -119,7 +187,10 @@ def _detection(raw: Any) -> Detection | None:
         box = payloads.BoxValue.model_validate(raw)
     except ValidationError:
         return None
-    position = Box3D(**box.position.model_dump())
+    sides = box.position
+    position = Box3D(
+        sides.xmin, sides.xmax, sides.ymin, sides.ymax, sides.zmin, sides.zmax
+    )
     return Detection(box.class_id, box.probability, position, box.frame_id, box.det_id)
 
 
@@ -241,6 +312,13 @@ _READERS: Mapping[str, _Reader] = {
     "laser_scan": _single_scan,
     "class": _single_detection,
 }
+
+
+_IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan], str]] = {
+    names.ODOMETRY: (Odometry, names.ODOMETRY),
+    names.LIDAR: (LaserScan, names.LIDAR_HEADER),
+}
+"""Where telemetry says who counts it and how far."""
 
 
 def climate(_: str, attributes: Mapping[str, Any]) -> Climate:

@@ -12,6 +12,7 @@ from iveg.domain.observations import Observation
 from iveg.ngsi import payloads
 
 MAX_DEPTH = 32
+_CONTAINERS = frozenset({dict, list})
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,20 +48,28 @@ def load_json(body: bytes | str) -> Any:
         value = orjson.loads(body)
     except orjson.JSONDecodeError as error:
         raise UnreadableError("not_json", str(error)) from error
-    if _deeper_than(value, MAX_DEPTH):
+    if _brackets(body) > MAX_DEPTH and _deeper_than(value, MAX_DEPTH):
         raise UnreadableError("too_deep", f"more than {MAX_DEPTH} levels")
     return value
+
+
+def _brackets(body: bytes | str) -> int:
+    """How many could open: no text is deeper than that, and most have few."""
+    text = body.encode() if isinstance(body, str) else body
+    return text.count(b"[") + text.count(b"{")
 
 
 def _deeper_than(value: Any, limit: int) -> bool:
     if isinstance(value, dict):
         value = value.values()
-    elif isinstance(value, list):
-        if value and type(value[0]) in (float, int):
-            value = [part for part in value if type(part) in (dict, list)]
-    else:
+    elif not isinstance(value, list):
         return False
-    return limit == 0 or any(_deeper_than(part, limit - 1) for part in value)
+    if limit == 0:
+        return True
+    # A scan's numbers are passed over as one, not looked at each.
+    if _CONTAINERS.isdisjoint(map(type, value)):
+        return False
+    return any(_deeper_than(part, limit - 1) for part in value)
 
 
 def unread(source: str, reason: str, detail: str = "") -> Reading:

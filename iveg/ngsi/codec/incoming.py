@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
+    IsPast,
     canary,
     climate,
     command_answer,
@@ -21,8 +22,14 @@ from iveg.ngsi.codec.attributes import (
 from iveg.ngsi.codec.door import Reading, first_complaint, load_json, merge, unread
 
 
-def read_notification(body: bytes) -> tuple[str, Reading]:
+def read_notification(
+    body: bytes, is_past: IsPast | None = None
+) -> tuple[str, Reading]:
     """Read a notification, normalized or keyValues.
+
+    Args:
+        body: JSON.
+        is_past: Tells by its identity what need not be read; None reads all.
 
     Returns:
         The subscription's id and what its entities hold.
@@ -35,11 +42,11 @@ def read_notification(body: bytes) -> tuple[str, Reading]:
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
     return notification.subscriptionId, merge(
-        read_entity(entity) for entity in notification.data
+        read_entity(entity, is_past) for entity in notification.data
     )
 
 
-def read_entity(entity: Mapping[str, Any]) -> Reading:
+def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> Reading:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
     if not isinstance(entity_id, str) or not isinstance(entity_type, str):
@@ -52,7 +59,7 @@ def read_entity(entity: Mapping[str, Any]) -> Reading:
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
             return unread(payloads.clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes)
+        return read_attributes(entity_id, attributes, is_past)
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
     if (entity_id, entity_type) == (names.CANARY_ID, names.CANARY_TYPE):
@@ -70,7 +77,9 @@ def _attribute_value(attribute: Any) -> Any:
     return attribute
 
 
-def read_measure(device_id: str, payload: bytes) -> Reading:
+def read_measure(
+    device_id: str, payload: bytes, is_past: IsPast | None = None
+) -> Reading:
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
@@ -81,7 +90,7 @@ def read_measure(device_id: str, payload: bytes) -> Reading:
         return unread(device_id, error.reason, error.detail)
     if not isinstance(attributes, dict):
         return unread(device_id, "not_an_object")
-    return read_attributes(robot_id, attributes)
+    return read_attributes(robot_id, attributes, is_past)
 
 
 def read_answer(robot_id: str, payload: bytes) -> Reading:

@@ -166,8 +166,8 @@ def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
 ) -> None:
     measured = np.random.default_rng(1).uniform(0.1, 30.0, 720).astype(np.float32)
     wire = Wire(form)
-    wire.uplink.send(scan(ranges=measured.tolist(), origin=BLANK), WALL)
-    wire.uplink.send(odometry(origin=BLANK), WALL)
+    wire.uplink.send(scan(ranges=measured.tolist(), origin=BLANK), AT)
+    wire.uplink.send(odometry(origin=BLANK), AT)
     (payload,) = [one for _, one in wire.sent if b"lidar_header" in one]
     told = orjson.loads(payload)
     ranges = told.get("lidar_points") or told["laser_scan"]

@@ -60,17 +60,19 @@ class WebDesk(Desk):
             self.app.include_router(router)
         problems.install(self.app)
         self.app.add_middleware(security.BodyLimit)
+        orion = notifications.NotificationEndpoint(
+            self.ingest,
+            NotifySecret(SECRET),
+            self.clock,
+            "ours".__eq__,
+            ("agroconnect", "/greenhouse"),
+            self.heard.append,
+        )
+        self.app.router.routes.append(orion.route())
+        self.app.add_middleware(notifications.NotificationsFirst, endpoint=orion)
 
     def _routers(self) -> list[Any]:
         return [
-            notifications.router(
-                self.ingest,
-                NotifySecret(SECRET),
-                self.clock,
-                "ours".__eq__,
-                ("agroconnect", "/greenhouse"),
-                self.heard.append,
-            ),
             live.router(self.hub, self.encoder, self.snapshot, self.clock, self.stop),
             robots.router(self.views, self.clock, self.health),
             costmap.router(self.mapper, self.assessor, self.clock),

@@ -1,6 +1,9 @@
 """Orion's door: who comes in, what is answered, what becomes of it."""
 
+from collections.abc import AsyncIterator
+
 import pytest
+from starlette.types import Message
 
 from iveg.domain.observations import Odometry
 from tests.builders import notification, pose_value
@@ -148,3 +151,68 @@ async def test_a_signed_in_browser_is_not_orion() -> None:
         answer = await browser.post(URL, content=ours(), headers=TENANT)
 
     assert answer.status_code == 401
+
+
+async def test_a_body_without_a_length_is_413_as_soon_as_it_is_too_long() -> None:
+    desk = WebDesk()
+    sent = 0
+
+    async def endless() -> AsyncIterator[bytes]:
+        nonlocal sent
+        while True:
+            sent += 1
+            yield b" " * 65_536
+
+    async with desk.orion() as orion:
+        answer = await orion.post(URL, content=endless())
+
+    assert answer.status_code == 413
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert sent <= 18
+
+
+async def test_a_body_in_parts_is_one_notification() -> None:
+    desk = WebDesk()
+    whole = ours()
+
+    async def parts() -> AsyncIterator[bytes]:
+        for start in range(0, len(whole), 40):
+            yield whole[start : start + 40]
+
+    async with desk.orion() as orion:
+        answer = await orion.post(URL, content=parts())
+
+    assert answer.status_code == 204
+    assert len(list(desk.ingest.drain())) == 1
+
+
+@pytest.mark.parametrize("method", ["GET", "PUT", "DELETE"])
+async def test_only_a_post_is_a_notification(method: str) -> None:
+    async with WebDesk().orion() as orion:
+        answer = await orion.request(method, URL)
+
+    assert answer.status_code == 405
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+async def test_a_sender_who_hangs_up_half_way_is_no_notification() -> None:
+    desk = WebDesk()
+    came: list[Message] = [
+        {"type": "http.request", "body": ours()[:20], "more_body": True},
+        {"type": "http.disconnect"},
+    ]
+    answered: list[Message] = []
+    secret = {"X-Iveg-Notify-Token": SECRET, **TENANT}
+    head = [(name.lower().encode(), text.encode()) for name, text in secret.items()]
+    scope = {"type": "http", "method": "POST", "path": URL, "headers": head}
+
+    async def receive() -> Message:
+        return came.pop(0)
+
+    async def send(message: Message) -> None:
+        answered.append(message)
+
+    await desk.app(scope, receive, send)
+
+    assert answered == []
+    assert desk.heard == []
