@@ -14,6 +14,8 @@ import resource
 import socket
 import sys
 import time
+from contextlib import ExitStack
+from threading import Thread
 
 import numpy as np
 import orjson
@@ -31,7 +33,10 @@ _BASE = 10 ** (_WIDTH - 1)
 """Keeps every moment (µs) equally wide, so that it is patched in place."""
 _LEFT = re.compile(rb'"seq":(\d{16})')
 _LENGTH = re.compile(rb"content-length: *(\d+)", re.IGNORECASE)
-_HELLO = b"\x10\x10\x00\x04MQTT\x04\x02\x00\x00\x00\x04load"
+_FILTER = b"/iveg/+/attrs"
+_SUBSCRIBE = (
+    b"\x82" + bytes([len(_FILTER) + 5, 0, 1, 0, len(_FILTER)]) + _FILTER + b"\x00"
+)
 
 
 def measures(robot: str) -> list[tuple[str, bytes]]:
@@ -101,20 +106,41 @@ def send(port: int, robots: int, seconds: float) -> None:
         for index in range(robots)
     ]
     places = [[one.index(b"%d" % _BASE) for one in each] for each in packets]
-    with socket.create_connection((HOST, port)) as line:
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        line.sendall(_HELLO)
-        line.recv(4)
-        told = _drive(line, packets, places, seconds)
+    with ExitStack() as lines:
+        listener = lines.enter_context(_connected(port, "listener"))
+        listener.sendall(_SUBSCRIBE)
+        Thread(target=_hear, args=(listener,), daemon=True).start()
+        robots_lines = [
+            lines.enter_context(_connected(port, f"load{index}"))
+            for index in range(robots)
+        ]
+        told = _drive(robots_lines, packets, places, seconds)
         # A broker may forget what a client that has left said last.
         pause(_LINGER_S)
-        line.sendall(b"\xe0\x00")
+        for line in (*robots_lines, listener):
+            line.sendall(b"\xe0\x00")
     used = resource.getrusage(resource.RUSAGE_SELF)
     print(json.dumps({**told, "cpu_s": used.ru_utime + used.ru_stime}))
 
 
+def _connected(port: int, name: str) -> socket.socket:
+    line = socket.create_connection((HOST, port))
+    line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    head = b"\x00\x04MQTT\x04\x02\x00\x00" + len(name).to_bytes(2, "big")
+    body = head + name.encode()
+    line.sendall(b"\x10" + bytes([len(body)]) + body)
+    line.recv(4)
+    return line
+
+
+def _hear(line: socket.socket) -> None:
+    """What reads MQTT directly: hears every measure and does nothing with it."""
+    while line.recv(1 << 18):
+        pass
+
+
 def _drive(
-    line: socket.socket,
+    lines: list[socket.socket],
     packets: list[list[bytearray]],
     places: list[list[int]],
     seconds: float,
@@ -130,7 +156,7 @@ def _drive(
         latest = max(latest, time.perf_counter() - start - due)
         packet, place = packets[robot][topic], places[robot][topic]
         packet[place : place + _WIDTH] = b"%d" % (_BASE + _moment_us())
-        line.sendall(packet)
+        lines[robot].sendall(packet)
         count += 1
     spent = time.perf_counter() - start
     return {"count": count, "spent_s": spent, "latest_s": latest}

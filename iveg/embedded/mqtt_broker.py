@@ -17,6 +17,7 @@ from typing import Any
 from amqtt.broker import Broker
 
 from iveg.embedded.loopback import require_loopback
+from iveg.embedded.mqtt_telemetry import BoundedWriter, TelemetryReader, publish_packet
 
 for _name in ("amqtt", "transitions"):
     # Both tell every packet at INFO and DEBUG, which costs more than the packet.
@@ -101,10 +102,11 @@ async def _close(broker: "MqttBroker") -> None:
 
 
 class MqttBroker(Broker):  # type: ignore[misc]
-    """amqtt's broker with three things mended.
+    """amqtt's broker with four things mended.
 
     It looks up a topic's audience once and not for every message; it lets a neighbour
-    in the process listen; and it closes connections whose client went away rudely,
+    in the process listen; it takes and gives telemetry (QoS 0) without a task for each
+    message; and it closes connections whose client went away rudely,
     which amqtt leaves to the garbage collector.
     """
 
@@ -130,7 +132,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self, topic: str, payload: bytes, qos: int, *, retain: bool
     ) -> None:
         """Publish as a client would."""
-        await super()._broadcast_message(None, topic, payload, qos)
+        await self._spread(None, topic, payload, qos)
         if retain:
             await self.retain_message(None, topic, payload, qos)
 
@@ -149,8 +151,28 @@ class MqttBroker(Broker):  # type: ignore[misc]
                 listener(topic, payload)
             except Exception:
                 _log.exception("a message on %s could not be taken", topic)
-        if self._audience(topic):
-            await super()._broadcast_message(session, topic, payload, force_qos)
+        await self._spread(session, topic, payload, force_qos)
+
+    async def _spread(
+        self, session: Any, topic: str, payload: bytes, most: int | None
+    ) -> None:
+        """Write telemetry at once; what has to be confirmed goes amqtt's way."""
+        packet, confirmed = b"", False
+        for listener, wanted in self._audience(topic):
+            if wanted and most != 0:
+                confirmed = True
+                continue
+            packet = packet or publish_packet(topic, payload)
+            self._write(listener, packet)
+        if confirmed:
+            await super()._broadcast_message(session, topic, payload, most)
+
+    def _write(self, session: Any, packet: bytes) -> None:
+        handler = self._get_handler(session)
+        if handler is None or session.transitions.state != "connected":
+            return
+        if isinstance(handler.writer, BoundedWriter):
+            handler.writer.write_telemetry(packet)
 
     async def _run_broadcast(self, running_tasks: deque[asyncio.Task[Any]]) -> None:
         broadcast = await self._broadcast_queue.get()
@@ -160,6 +182,8 @@ class MqttBroker(Broker):  # type: ignore[misc]
             # Nobody here has a name, so nothing is kept for those who are away.
             if handler is None or session.transitions.state != "connected":
                 continue
+            if not min(wanted, most):
+                continue  # has been written already
             sending = handler.mqtt_publish(
                 topic, broadcast["data"], min(wanted, most), retain=False
             )
@@ -190,6 +214,19 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self._known_audience.clear()
         return int(super()._del_subscription(a_filter, session))
 
+    async def _take(self, topic: str, payload: bytes) -> None:
+        """A client published telemetry."""
+        await self._broadcast_message(None, topic, payload, 0)
+
+    async def _initialize_client_session(
+        self, reader: Any, writer: Any, remote_address: str, remote_port: int
+    ) -> Any:
+        admitted = await super()._initialize_client_session(
+            reader, writer, remote_address, remote_port
+        )
+        reader.admitted = True
+        return admitted
+
     async def stream_connected(
         self,
         reader: asyncio.StreamReader,
@@ -201,7 +238,11 @@ class MqttBroker(Broker):  # type: ignore[misc]
         assert task is not None  # noqa: S101 - asyncio starts servers' callbacks so
         self._open[task] = writer
         try:
-            await super().stream_connected(reader, writer, listener_name)
+            await self._client_connected(
+                listener_name,
+                TelemetryReader(reader, self._take),
+                BoundedWriter(writer),
+            )
         finally:
             writer.close()
             del self._open[task]

@@ -1,0 +1,178 @@
+"""The short way of telemetry, on real sockets, byte by byte."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import aiomqtt
+import pytest
+
+from iveg.embedded import mqtt_telemetry
+from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.embedded.mqtt_telemetry import TelemetryReader, publish_packet
+
+CONNACK = b"\x20\x02\x00\x00"
+PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"
+
+
+@pytest.fixture
+async def broker() -> AsyncIterator[MqttBroker]:
+    async with mqtt_broker("127.0.0.1", 0) as running:
+        yield running
+
+
+class Heard:
+    """What a neighbour hears, in order."""
+
+    def __init__(self, broker: MqttBroker) -> None:
+        self.messages: list[tuple[str, bytes]] = []
+        self._came = asyncio.Event()
+        broker.listen(self._hear)
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        self.messages.append((topic, payload))
+        self._came.set()
+
+    async def wait_for(self, count: int) -> list[tuple[str, bytes]]:
+        async with asyncio.timeout(5):
+            while len(self.messages) < count:
+                self._came.clear()
+                await self._came.wait()
+        return self.messages
+
+
+@asynccontextmanager
+async def line(
+    broker: MqttBroker, keep_alive_s: int = 0
+) -> AsyncIterator[tuple[asyncio.StreamReader, asyncio.StreamWriter]]:
+    """A client that has said CONNECT and nothing else."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    head = b"\x00\x04MQTT\x04\x02" + keep_alive_s.to_bytes(2, "big")
+    writer.write(b"\x10\x0e" + head + b"\x00\x02me")
+    assert await reader.readexactly(4) == CONNACK
+    try:
+        yield reader, writer
+    finally:
+        writer.close()
+        await writer.wait_closed()
+
+
+async def answered(reader: asyncio.StreamReader, count: int) -> bytes:
+    """The next bytes; none where the broker hung up."""
+    async with asyncio.timeout(5):
+        try:
+            return await reader.readexactly(count)
+        except (asyncio.IncompleteReadError, ConnectionError):
+            return b""
+
+
+@pytest.mark.parametrize("size", [0, 1, 100, 200, 20_000, 2_100_000])
+async def test_a_message_of_any_size_arrives_as_it_went(
+    broker: MqttBroker, size: int
+) -> None:
+    heard = Heard(broker)
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("a/b", b"x" * size))
+        assert await heard.wait_for(1) == [("a/b", b"x" * size)]
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 7])
+async def test_packets_that_come_in_pieces_or_together_are_the_same(
+    broker: MqttBroker, step: int
+) -> None:
+    heard = Heard(broker)
+    sent = [("a", b"1"), ("b", b""), ("é", b"2" * 200), ("c", b"3")]
+    stream = PINGREQ.join(publish_packet(*one) for one in sent)
+    async with line(broker) as (reader, writer):
+        for start in range(0, len(stream), step):
+            writer.write(stream[start : start + step])
+            await writer.drain()
+        assert await heard.wait_for(len(sent)) == sent
+        assert await answered(reader, 6) == 3 * PINGRESP
+
+
+async def test_a_packet_that_takes_longer_than_the_keep_alive_is_not_torn(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    packet = publish_packet("slow", b"payload")
+    async with line(broker, keep_alive_s=1) as (_, writer):
+        writer.write(packet[:5])
+        await asyncio.sleep(1.2)
+        writer.write(packet[5:] + publish_packet("next", b""))
+        assert await heard.wait_for(2) == [("slow", b"payload"), ("next", b"")]
+
+
+async def test_who_has_not_said_connect_publishes_nothing(broker: MqttBroker) -> None:
+    heard = Heard(broker)
+    _, stranger = await asyncio.open_connection("127.0.0.1", broker.port)
+    stranger.write(publish_packet("stranger", b"x" * 40) * 3)
+    await stranger.drain()
+    async with line(broker) as (_, writer):
+        writer.write(publish_packet("other", b""))
+        assert await heard.wait_for(1) == [("other", b"")]
+    stranger.close()
+    await stranger.wait_closed()
+
+
+@pytest.mark.parametrize("topic", [b"", b"a/+", b"#", b"$SYS/x", b"\0", b"\xff"])
+async def test_a_topic_that_nobody_may_publish_on_is_the_end_of_the_line(
+    broker: MqttBroker, topic: bytes
+) -> None:
+    heard = Heard(broker)
+    bad = b"\x30" + bytes([len(topic) + 3, 0, len(topic)]) + topic + b"1"
+    async with line(broker) as (reader, writer):
+        writer.write(bad + publish_packet("after", b"") + PINGREQ)
+        assert await answered(reader, 2) == b""
+    async with line(broker) as (_, other):
+        other.write(publish_packet("other", b""))
+        assert await heard.wait_for(1) == [("other", b"")]
+
+
+async def test_a_slow_listener_misses_telemetry_and_costs_no_memory(
+    broker: MqttBroker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mqtt_telemetry, "MOST_UNSENT", 100_000)
+    subscribe = b"\x82\x06\x00\x01\x00\x01n\x00"
+    async with (
+        line(broker) as (deaf, writer),
+        aiomqtt.Client("127.0.0.1", broker.port) as quick,
+    ):
+        writer.write(subscribe)
+        assert await deaf.readexactly(5) == b"\x90\x03\x00\x01\x00"
+        deaf._transport.pause_reading()  # type: ignore[attr-defined]
+        await quick.subscribe("n", qos=0)
+        messages = aiter(quick.messages)
+        for number in range(200):
+            await quick.publish("n", b"%d " % number + b"x" * 100_000, qos=0)
+            async with asyncio.timeout(5):
+                message = await anext(messages)
+            assert bytes(message.payload).startswith(b"%d " % number)
+        waiting = [
+            handler.writer._transport.get_write_buffer_size()
+            for _, handler in broker._sessions.values()
+        ]
+    assert max(waiting) <= 300_000
+
+
+class Taken:
+    def __init__(self) -> None:
+        self.messages: list[tuple[str, bytes]] = []
+
+    async def take(self, topic: str, payload: bytes) -> None:
+        self.messages.append((topic, payload))
+
+
+async def test_a_packet_that_says_more_than_it_holds_borrows_nothing() -> None:
+    stream, taken = asyncio.StreamReader(), Taken()
+    reader = TelemetryReader(stream, taken.take)
+    reader.admitted = True
+    stream.feed_data(b"\x82\x02\x00\x01" + publish_packet("a", b"1"))
+    assert await reader.read(4) == b"\x82\x02\x00\x01"[:4]
+    stream.feed_data(b"\x82\x01\x00" + publish_packet("b", b"2"))
+    assert await reader.read(2) == b"\x82\x01"
+    with pytest.raises(asyncio.IncompleteReadError):
+        await reader.read(2)
+    stream.feed_data(PINGREQ)
+    assert await reader.read(1) == PINGREQ[:1]
+    assert taken.messages == [("a", b"1"), ("b", b"2")]
