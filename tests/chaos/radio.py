@@ -1,7 +1,8 @@
 """A TCP proxy that stands where the radio does: late, lossy, and cut at any moment.
 
-Bytes keep their order, as TCP keeps it; what the network loses comes later, and what a
-reset takes is gone with its connection.  The emulator's own relay spoils what a robot
+Bytes keep their order, as TCP keeps it; what the network loses comes later, together
+with what was written behind it meanwhile, and what a reset takes is gone with its
+connection.  The emulator's own relay spoils what a robot
 says, packet by packet; this one spoils the connection, in both directions.
 """
 
@@ -24,7 +25,8 @@ class Weather:
 
     Attributes:
         late_s: Every piece takes this long, give or take ``jitter_s``.
-        lost: Share of the pieces that have to be sent again.
+        lost: Share of the pieces that have to be sent again; nothing is read behind
+            one meanwhile.
         reset: Chance of a connection, every two seconds, to be reset.
     """
 
@@ -34,11 +36,20 @@ class Weather:
     reset: float = 0.0
 
     def delay(self, rnd: Random) -> float:
-        """How long this piece takes (s)."""
-        late = self.late_s + rnd.uniform(-self.jitter_s, self.jitter_s)
+        """How long this piece takes when it is not lost (s)."""
+        return max(0.0, self.late_s + rnd.uniform(-self.jitter_s, self.jitter_s))
+
+    def repeat(self, rnd: Random) -> float:
+        """How long it takes until a piece has not been lost (s).
+
+        As with TCP, whose window closes, one loss holds up all that follows, and those
+        bytes then are one piece: how many pieces there are, and so how many are lost,
+        does not depend on how fast this machine reads.
+        """
+        waited = 0.0
         while rnd.random() < self.lost:
-            late += _AGAIN_S
-        return max(0.0, late)
+            waited += _AGAIN_S
+        return waited
 
 
 FAIR = Weather()
@@ -126,6 +137,7 @@ class Radio:
         last = 0.0
         try:
             while piece := await source.read(_CHUNK):
+                await asyncio.sleep(self.weather.repeat(self._rnd))
                 due = self._loop.time() + self.weather.delay(self._rnd)
                 last = max(last, due)
                 await pieces.put((last, piece))

@@ -1,4 +1,8 @@
-"""The browser's line to the server, against a server that goes away and comes back."""
+"""The browser's line to the server, against a server that goes away and comes back.
+
+The sockets are real; the clock of the page runs on by itself, and a test moves it ahead
+instead of waiting (``page.clock``).
+"""
 
 import json
 from collections.abc import Iterator
@@ -28,9 +32,22 @@ _CONNECT = """async ([url]) => {
     const {connect} = await import('/iveg/static/js/socket.js');
     const {createStore} = await import('/iveg/static/js/store.js');
     const store = createStore();
+    window.pongs = 0;
+    window.WebSocket = class extends WebSocket {
+        constructor(url) {
+            super(url);
+            this.addEventListener('message', ({data}) => {
+                if (JSON.parse(data).topic === 'pong') window.pongs += 1;
+            });
+        }
+    };
     const sight = Object.assign(new EventTarget(), {hidden: false});
     const line = connect({url, store, page: sight});
     Object.assign(window, {store, line, sight});
+}"""
+_WATCH = """() => {
+    window.states = [];
+    window.store.subscribe('connection', (it) => window.states.push(it.state));
 }"""
 
 
@@ -148,9 +165,11 @@ def live() -> Iterator[LiveServer]:
 def page(browser: Browser, files: str, live: LiveServer) -> Iterator[Page]:
     """A page whose line is open."""
     opened = browser.new_page()
+    opened.clock.install()
     opened.goto(files)
     opened.evaluate(_CONNECT, [live.url])
     _wait_for_state(opened, "open")
+    opened.evaluate(_WATCH)
     yield opened
     opened.close()
 
@@ -168,7 +187,7 @@ def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
 
     live.stop()
     _wait_for_state(page, "lost", _RECOVERY_MS)
-    page.wait_for_timeout(4000)  # long enough for the slowest pace of retries
+    page.clock.run_for(4000)  # long enough for the slowest pace of retries
     live.start()
 
     _wait_for_state(page, "open", _RECOVERY_MS)
@@ -180,20 +199,19 @@ def test_a_line_that_falls_silent_is_lost_within_three_seconds(
 ) -> None:
     live.answers = False
 
-    _wait_for_state(page, "lost", 3000)
+    page.clock.run_for(3000)
+
+    # It may have found the server again since.
+    assert "lost" in page.evaluate("() => window.states")
 
 
 def test_an_idle_line_that_answers_pings_stays_open(
     page: Page, live: LiveServer
 ) -> None:
-    page.evaluate(
-        """() => {
-            window.states = [];
-            window.store.subscribe('connection', (it) => window.states.push(it.state));
-        }"""
-    )
-
-    page.wait_for_timeout(3500)  # more than a lost line needs to be noticed
+    for _ in range(4):  # longer than a lost line needs to be noticed
+        pongs = page.evaluate("() => window.pongs")
+        page.clock.run_for(1000)
+        page.wait_for_function("pongs => window.pongs > pongs", arg=pongs)
 
     assert page.evaluate("() => window.states") == []
     assert live.attempts == 1
@@ -204,9 +222,7 @@ def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alarm(
 ) -> None:
     page.evaluate(
         """() => {
-            window.states = [];
             window.first = window.store.get('snapshot');
-            window.store.subscribe('connection', (it) => window.states.push(it.state));
             window.show = (isShown) => {
               window.sight.hidden = !isShown;
               window.sight.dispatchEvent(new Event('visibilitychange'));
@@ -215,7 +231,7 @@ def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alarm(
     )
 
     page.evaluate("() => window.show(false)")
-    page.wait_for_timeout(1200)  # hidden for longer than a glance elsewhere
+    page.clock.run_for(1200)  # hidden for longer than a glance elsewhere
     page.evaluate("() => window.show(true)")
 
     page.wait_for_function("() => window.store.get('snapshot') !== window.first")
@@ -234,7 +250,8 @@ def test_an_ended_session_is_told_and_not_tried_again(
     _wait_for_state(page, "signed-out")
 
     attempts = live.attempts
-    page.wait_for_timeout(1500)  # several retries long
+    page.clock.run_for(1500)  # several retries long
+    page.evaluate("() => fetch('/')")  # and what they would have asked is out
     assert live.attempts == attempts
 
 
@@ -269,7 +286,8 @@ def test_a_stop_that_a_dead_line_swallowed_is_sent_again(
 ) -> None:
     live.answers = False
     page.evaluate("() => window.line.sendStop(null, 'press-3', 12.5)")
-    _wait_for_state(page, "lost")
+    page.clock.run_for(3000)
+    assert "lost" in page.evaluate("() => window.states")
 
     live.answers = True
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TypeVar
 
 from iveg.domain.alerts import Rule
 from iveg.domain.geometry import Rectangle
@@ -16,7 +17,6 @@ from iveg.domain.observations import (
     Received,
     Road,
 )
-from iveg.domain.records import Record
 from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
@@ -40,6 +40,7 @@ from tests.fakes.ids import FakeIds
 from tests.fakes.journal import FakeJournal
 from tests.fakes.recorder import FakeRecorder
 
+OneRecord = TypeVar("OneRecord")
 FIELD = Greenhouse("field", Rectangle(-100, -100, 100, 100))
 
 
@@ -182,7 +183,7 @@ class Desk:
         """The sentences of the log, in order."""
         return [line.key for line in self.minutes.lines]
 
-    def records(self, kind: type[Record]) -> list[Record]:
+    def records(self, kind: type[OneRecord]) -> list[OneRecord]:
         return [one for one in self.sink.records if isinstance(one, kind)]
 
 
