@@ -93,6 +93,13 @@ def _parser() -> argparse.ArgumentParser:
         "--profile", default="simulation", choices=("simulation", "field", "perfect")
     )
     emulator.add_argument(
+        "--rate",
+        type=_positive,
+        default=30,
+        metavar="HZ",
+        help="of odometry, laser and camera each (default: 30)",
+    )
+    emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
     )
     emulator.add_argument(

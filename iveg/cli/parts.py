@@ -147,6 +147,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 stand_s=settings.feedback_stand_s,
                 state_directory=Path(directory),
                 held=options.held,
+                rate_hz=options.rate,
                 faults=read_words(options.fault, robots),
                 fault_port=options.fault_port,
             ),

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.ports import free_ports
-from tests.processes import Program, Site, until
+from tests.processes import EMULATOR, Program, Site, until
 
 _CONF = f"""{PLAIN}connection fiware
 address 127.0.0.1:{{south}}
@@ -60,7 +60,8 @@ class Field:
             # FIWARE has a broker of its own, behind the bridge.
             self._start_at(self._south, part)
         elif part == "emulator":
-            self._start_at(self.radio or self.port, part, *self._emulator)
+            broker = self.radio or self.port
+            self._start_at(broker, *EMULATOR, *self._emulator)
         else:
             self._start_at(self.port, part)
 

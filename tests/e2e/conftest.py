@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page
 
 from tests.browsers import running_browser
-from tests.processes import Site, site
+from tests.processes import EMULATOR, Site, site
 
 OpenPage = Callable[..., Page]
 
@@ -33,7 +33,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory, scenario: str) -> Iterator[S
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
-        place.start("emulator", "--scenario", scenario)
+        place.start(*EMULATOR, "--scenario", scenario)
         place.wait_until_live()
         yield place
 

@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import card, wait_for_mode
-from tests.processes import Program, Site
+from tests.processes import EMULATOR, Program, Site
 
 pytestmark = pytest.mark.e2e
 
@@ -18,7 +18,7 @@ def mended(stack: Site) -> Iterator[None]:
     yield
     for word in ("fiware", "serve", "emulator"):
         if _program(stack, word).process.poll() is not None:
-            stack.start(word)
+            stack.start(*(EMULATOR if word == "emulator" else (word,)))
     stack.wait_until_live(deadline_s=60.0)
 
 

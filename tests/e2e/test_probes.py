@@ -16,7 +16,7 @@ import iveg
 from iveg.adapters.mqtt import BrokerAddress
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import evaluate, visit
-from tests.processes import Site, site, until
+from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.e2e
 
@@ -36,7 +36,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         probed.start("fiware").wait_until_ready()
         probed.start("serve")
         probed.wait_until_served()
-        probed.start("emulator")
+        probed.start(*EMULATOR)
         probed.wait_until_live()
         yield probed
 

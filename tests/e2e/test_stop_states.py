@@ -16,7 +16,7 @@ from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import ask, let_go, look, open_menu
 from tests.e2e.puppet import CRUISE, Puppet, puppet
 from tests.e2e.reading import card, evaluate, strip_stop
-from tests.processes import Program, Site, site, until
+from tests.processes import EMULATOR, Program, Site, site, until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.slow]
 
@@ -43,7 +43,7 @@ def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()
-        place.start("emulator", "--robots", "1")
+        place.start(*EMULATOR, "--robots", "1")
         place.wait_until_live(robots=1)
         yield place
 
@@ -287,7 +287,6 @@ def test_f37_who_stops_while_another_holds_the_release_wins(
     expect(release).to_be_enabled()
     release.hover()
     other.mouse.down()
-    other.wait_for_timeout(1000)
     strip_stop(page, "AGV").click()
     result = card(other, "AGV").locator('[data-part="result"]')
     expect(result).to_have_text(

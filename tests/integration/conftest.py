@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import Site, site
+from tests.processes import EMULATOR, Site, site
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def served(fiware: Site) -> Site:
 @pytest.fixture
 def driving(served: Site) -> Site:
     """FIWARE, dashboard and two emulated robots, each a process of its own."""
-    served.start("emulator")
+    served.start(*EMULATOR)
     served.wait_until_live()
     return served
 

@@ -24,7 +24,7 @@ from iveg.adapters.subscriptions import WANTED
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.integration.gate import Gate, Mood, bridge, gate
 from tests.ports import free_ports
-from tests.processes import Program, Site, site, until
+from tests.processes import EMULATOR, Program, Site, site, until
 
 # The gate installs Mosquitto: without it there, these tests fail instead of hiding.
 pytestmark = [
@@ -168,7 +168,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
         made.start_fiware()
         made.start_dashboard()
         made.api = stack.enter_context(place.api())
-        place.start("emulator")
+        place.start(*EMULATOR)
         place.wait_until_live()
         yield made
         assert "Traceback" not in made.dashboard.text()

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, TypeVar
 import httpx
 import pytest
 
-from tests.processes import Site, site, until
+from tests.processes import EMULATOR, Site, site, until
 
 pytestmark = pytest.mark.slow
 Row = dict[str, Any]
@@ -108,7 +108,7 @@ def start_together(running: Mapping[str, Stage]) -> None:
         stage.place.wait_until_served()
     for name, stage in running.items():
         words = ("--scenario", name, "--seed", "3", "--profile", "perfect")
-        stage.place.start("emulator", *words)
+        stage.place.start(*EMULATOR, *words)
     for name, stage in running.items():
         stage.wait(partial(everybody_live, stage), f"{name} is on stage")
 

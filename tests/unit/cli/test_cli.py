@@ -59,6 +59,7 @@ def test_a_bad_setting_stops_the_start_with_one_sentence(
     [
         [],
         ["dance"],
+        ["emulator", "--rate", "0"],
         ["emulator", "--robots", "0"],
         ["emulator", "--robots", "101"],
         ["emulator", "--profile", "dream"],
