@@ -10,7 +10,7 @@ SIDE_BY_SIDE := -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 export PYTHONPATH := $(CURDIR)
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo test quick setup format check bench deep chaos soak migration lock clean
+.PHONY: test-needs check-needs demo test quick setup format check bench deep chaos mutants soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
@@ -21,6 +21,7 @@ check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/
 bench: test-needs $(DEV) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
 chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) $(BIN)/python -m pytest tests/chaos/test_kills.py
+mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
 lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock

@@ -65,6 +65,17 @@ def test_the_mandate_names_its_cause_distance_and_decision() -> None:
     assert mandate.decision_id == scene.changes[0].crossing.decision_id
 
 
+def test_of_one_person_seen_at_two_places_the_nearer_counts() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5))
+    scene.look("AGII", person(1.9))
+
+    mandate = scene.judge()["AGI"]
+
+    assert len(scene.everyone) == 1
+    assert mandate.distance_m == pytest.approx(1.5)
+
+
 def test_two_decisions_of_one_moment_have_different_names() -> None:
     scene = watching(Scene())
     scene.drive("AGII", 3.0)

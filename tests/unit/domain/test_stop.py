@@ -4,7 +4,7 @@ import pytest
 
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Road
-from iveg.domain.stop import SendRoad, SendStop
+from iveg.domain.stop import Changed, SendRoad, SendStop
 from tests.builders import at
 from tests.unit.domain.bench import (
     RED_BUTTON,
@@ -417,6 +417,8 @@ def test_fresh_odometry_that_moves_contradicts_the_report() -> None:
         bench.odometry(0.3)
         bench.now += 0.1
 
+    states = [effect.state for effect in bench.log if isinstance(effect, Changed)]
+    assert "STANDING" not in states
     assert bench.state == "DELIVERED"
 
 

@@ -1,0 +1,191 @@
+"""Seeded mistakes in STOP, the rule and freshness: the tests must notice every one.
+
+``make mutants`` makes each in a copy of the tree, runs the tests that are there to
+catch it and expects them to fail.  A mutant names its text, not its file, so that code
+may move; ``tests/architecture/test_proofs.py`` says when the text itself has changed.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.processes import ROOT
+
+_COPIED = ("iveg", "tests", "migrations", "docs", "pyproject.toml")
+_FAILED = 1
+"""Exit status of pytest where tests ran and some failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mutant:
+    """One mistake.
+
+    Attributes:
+        says: What is wrong with it.
+        right: Text that stands once in ``iveg``; ``wrong`` takes its place.
+        tests: Files or folders below ``tests`` of which one test at least must fail.
+    """
+
+    says: str
+    right: str
+    wrong: str
+    tests: tuple[str, ...]
+
+    @property
+    def file(self) -> Path:
+        """Where it is, relative to the root of the tree."""
+        found = [
+            file
+            for file in sorted((ROOT / "iveg").rglob("*.py"))
+            if self.right in file.read_text()
+        ]
+        if len(found) != 1 or found[0].read_text().count(self.right) != 1:
+            raise LookupError(f"stands not once in iveg: {self.right!r}")
+        return found[0].relative_to(ROOT)
+
+
+MUTANTS = (
+    Mutant(
+        "STOP: standing is believed before it has lasted",
+        ">= STANDING_SAMPLES and long_enough and",
+        ">= STANDING_SAMPLES and",
+        ("unit/domain/test_stop.py",),
+    ),
+    Mutant(
+        "STOP: odometry that still moves does not contradict a standstill",
+        "and long_enough and not contradicted",
+        "and long_enough",
+        ("unit/domain/test_stop.py",),
+    ),
+    Mutant(
+        "STOP: a robot lets go whoever knows one of its holds",
+        "if not remote <= set(order.ids):",
+        "if not remote & set(order.ids):",
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "STOP: an old release is as good as a new one",
+        "if order.challenge != self._challenge:",
+        "if not order.challenge:",
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "STOP: a robot that still moves may be released",
+        'return None if self._judgement.stands(now) else "not_standing"',
+        "return None",
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "STOP: a robot that was stopped while it drove drives on when it is released",
+        'if hold.ack != "auto":',
+        'if hold.ack == "local":',
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "STOP: holds are forgotten by a reboot",
+        '_SURVIVES_REBOOT = frozenset({"iveg", "hw", "bumper"})',
+        '_SURVIVES_REBOOT = frozenset({"hw", "bumper"})',
+        ("unit/robot",),
+    ),
+    Mutant(
+        "rule: exactly the threshold is no longer enough",
+        "if confidence < self.threshold_of(class_):",
+        "if confidence <= self.threshold_of(class_):",
+        ("unit/domain",),
+    ),
+    Mutant(
+        "rule: exactly on the ring is outside",
+        "elif depth <= 0.0:",
+        "elif depth < 0.0:",
+        ("unit/domain/test_mandates.py",),
+    ),
+    Mutant(
+        "rule: two rings slow a robot by the one that is farther away",
+        "if cause not in nearest or depth < nearest[cause][0]:",
+        "if cause not in nearest or depth > nearest[cause][0]:",
+        ("unit/domain/test_mandates.py",),
+    ),
+    Mutant(
+        "rule: a robot is let go on the border, at every flutter",
+        "    if depth > RELEASE_M:",
+        "    if depth > 0.0:",
+        ("unit/domain/test_mandates.py",),
+    ),
+    Mutant(
+        "freshness: any feedback is fresh when it comes, however old its evidence",
+        "evidence = None if seen is None else self._sent.get(seen)",
+        "evidence = now",
+        ("unit/robot/test_watchdog.py",),
+    ),
+    Mutant(
+        "freshness: a robot without a pose of its own drives as if it had one",
+        "if motion is None or now - motion.at > POSE_STAND_S:",
+        "if motion is None:",
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "freshness: a message that comes again is news",
+        "if origin.seq <= self.seq:",
+        "if origin.seq < self.seq - 1:",
+        ("unit/domain/test_order.py",),
+    ),
+    Mutant(
+        "freshness: a robot that is not seen keeps its speed",
+        "if age is None or age > SILENCE_S:",
+        "if age is None:",
+        ("unit/domain/test_mandates.py",),
+    ),
+)
+
+
+def is_caught(mutant: Mutant) -> bool:
+    """Whether a test fails with the mistake; tests that cannot run catch nothing."""
+    with tempfile.TemporaryDirectory(prefix="iveg-mutant-") as name:
+        tree = Path(name)
+        for part in _COPIED:
+            _copy(ROOT / part, tree / part)
+        file = tree / mutant.file
+        file.write_text(file.read_text().replace(mutant.right, mutant.wrong))
+        return _status(tree, mutant.tests) == _FAILED
+
+
+def _copy(source: Path, target: Path) -> None:
+    if source.is_dir():
+        ignored = shutil.ignore_patterns("__pycache__", "baselines")
+        shutil.copytree(source, target, ignore=ignored)
+    else:
+        shutil.copy(source, target)
+
+
+def _status(tree: Path, tests: tuple[str, ...]) -> int:
+    words = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not real")
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", *words, *(f"tests/{one}" for one in tests)],
+        cwd=tree,
+        env={**os.environ, "PYTHONPATH": str(tree), "IVEG_HYPOTHESIS": "quick"},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=False,
+    ).returncode
+
+
+def main() -> int:
+    """Try them all and say which were caught; 1 where one was not."""
+    tests = tuple(sorted({one for mutant in MUTANTS for one in mutant.tests}))
+    if _status(ROOT, tests) != 0:
+        print("The tests fail without any mistake.")
+        return 1
+    missed = 0
+    for mutant in MUTANTS:
+        caught = is_caught(mutant)
+        missed += not caught
+        print("caught" if caught else "MISSED", mutant.says)
+    return min(missed, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
