@@ -51,14 +51,14 @@ class Mutant:
 MUTANTS = (
     Mutant(
         "STOP: standing is believed before it has lasted",
-        ">= STANDING_SAMPLES and long_enough and",
-        ">= STANDING_SAMPLES and",
+        "and (moment.since(self._began) or 0.0) >= STANDING_S",
+        "",
         ("unit/domain/test_stop.py",),
     ),
     Mutant(
         "STOP: odometry that still moves does not contradict a standstill",
-        "and long_enough and not contradicted",
-        "and long_enough",
+        "and not self._moved_lately(moment, at)",
+        "",
         ("unit/domain/test_stop.py",),
     ),
     Mutant(

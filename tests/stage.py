@@ -85,11 +85,11 @@ class Robot:
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
         self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
-        self._uplink.send(moved, now.wall)
+        self._uplink.send(moved, now)
         if number % _LOOK_EVERY == 1:
-            self._uplink.send(self._rig.look(into_run, world), now.wall)
+            self._uplink.send(self._rig.look(into_run, world), now)
         if number % _NAVIGATION_EVERY == 0:
-            self._uplink.send(self._rig.navigation(), now.wall)
+            self._uplink.send(self._rig.navigation(), now)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Hear iVeg's feedback to a robot of the fleet."""
@@ -102,7 +102,7 @@ class Robot:
                 case Drive(twist):
                     self._rig.drive(twist)
                 case Report(report):
-                    seq, message = self._uplink.report(report, now.wall)
+                    seq, message = self._uplink.report(report, now)
                     self._machine.reported(seq, now.mono)
                     self._say(message.topic, message.payload)
 
