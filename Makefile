@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
+BENCH := $(VENV)/.bench
 # A module of tests and what it starts stay together; most of its time is waiting.
 WORKERS ?= 3
 SIDE_BY_SIDE := -n $(WORKERS) --dist loadscope --no-loadscope-reorder
@@ -18,13 +19,13 @@ quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 IVEG_STOP_RUNS=20 $(
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
-bench: test-needs $(DEV) ; $(BIN)/python -m benchmarks
+bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
 chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) $(BIN)/python -m pytest tests/chaos/test_kills.py
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
-lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock
+lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra bench -c requirements/dev.lock pyproject.toml -o requirements/bench.lock
 clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output
 
 # The system's part: installed on Debian, named elsewhere.
@@ -32,4 +33,5 @@ test-needs check-needs: ; @PYTHON=$(PYTHON) .ci/setup venv $(@:-needs=)
 $(BIN)/python: ; PYTHON=$(PYTHON) .ci/setup venv && $(PYTHON) -m venv $(VENV)
 $(RUN): requirements/run.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 $(DEV): requirements/dev.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@ $(RUN)
+$(BENCH): requirements/bench.lock $(DEV) ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 node_modules: package.json ; npm install --silent --no-audit --no-fund --no-package-lock && touch $@

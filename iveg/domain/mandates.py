@@ -14,8 +14,9 @@ from iveg.domain.alerts import Rule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.people import RING_S, People, Sighting
+from iveg.domain.people import People
 from iveg.domain.profiles import profile_of
+from iveg.domain.tracking.person import RING_S, Sighting
 from iveg.domain.world import RobotState, World
 
 RELEASE_M, RELEASE_S = 0.3, 1.0

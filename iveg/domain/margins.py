@@ -17,8 +17,8 @@ from typing import Literal
 
 from iveg.domain.alerts import WALKING_SPEED
 from iveg.domain.observations import Instant
-from iveg.domain.people import RING_S, Person, Sighting
 from iveg.domain.profiles import profile_of
+from iveg.domain.tracking.person import RING_S, Person, Sighting
 from iveg.domain.world import RobotState
 
 Band = Literal["clear", "tight", "inside", "unknown"]
@@ -86,7 +86,7 @@ def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
     None where there is no pair: the robot was never seen, or nobody has seen the
     person for ten seconds.
     """
-    looks = [look for look in person.sightings.values() if look.age_s(now) <= RING_S]
+    looks = [look for look in person.sightings if look.age_s(now) <= RING_S]
     margins = [_to_look(robot, person, look, now) for look in looks]
     return least(one for one in margins if one is not None)
 

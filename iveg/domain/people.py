@@ -1,95 +1,26 @@
-"""Who is in the greenhouse: sightings of robots become people, and people age.
+"""Who is in the greenhouse: detections of robots become people on the map.
 
-::
-
-    seen (<= 1 s) ──> remembered (<= 10 s, ring grows) ──> last seen (<= 600 s, no ring)
-      ^________________________|____________________________|            └──> gone
-
-Several sightings are one person for the eye; for safety each robot's own sighting
-keeps its own circle, so a wrong merge never deletes protection (safety.md §3.4).
+A detection is placed in ``map``, judged by the rule, recognised as a fleet member where
+one stands there, and else handed to the tracker.
 """
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.alerts import Class, Rule
+from iveg.domain.alerts import WALKING_SPEED, Class, Rule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.profiles import profile_of
 from iveg.domain.suspicions import POSSIBLE_FROM, Suspicions
+from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.tracker import Seen, Tracker
 from iveg.domain.world import RobotState, World
 
-Stage = Literal["seen", "remembered", "last_seen", "gone"]
-
-SEEN_S, RING_S, LAST_SEEN_S = 1.0, 10.0, 600.0
-_GATE_M, _GATE_SPEED, _GATE_CAP_M = 1.0, 1.6, 2.0
+_SUSPECT_M = 1.0
 _PEER_GATE_M = 1.0
-_MAX_PEOPLE = 256
 _BEYOND_WALL_M = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """One robot's newest look at one person, in ``map``.
-
-    Attributes:
-        at: Source moment on our clocks.
-        possible: It was below the threshold, but seen again and again.
-        reach_m: Where the position is doubtful, x and y are the observer's own, and
-            this is how far its camera reaches (m); else 0.
-    """
-
-    observer: str
-    x: float
-    y: float
-    z: float
-    at: Instant
-    class_id: str
-    confidence: float
-    possible: bool = False
-    reach_m: float = 0.0
-
-    def age_s(self, now: Instant) -> float:
-        """Seconds since the look."""
-        return max(0.0, now.mono - self.at.mono)
-
-
-@dataclass(frozen=True, slots=True)
-class Person:
-    """A person (or a robot that is none of ours) with everyone who saw them.
-
-    Attributes:
-        sightings: By observer, the newest of each.
-    """
-
-    person_id: str
-    class_: Class
-    decision_id: str
-    first_seen: Instant
-    newest: Sighting
-    sightings: dict[str, Sighting] = field(default_factory=dict)
-
-    def age_s(self, now: Instant) -> float:
-        """Seconds since the last look of any robot."""
-        return self.newest.age_s(now)
-
-    def stage(self, now: Instant) -> Stage:
-        """Where in the life of a sighting this person stands."""
-        age = self.age_s(now)
-        if age <= SEEN_S:
-            return "seen"
-        if age <= RING_S:
-            return "remembered"
-        return "last_seen" if age <= LAST_SEEN_S else "gone"
-
-    def rings(self, rule: Rule, now: Instant) -> Iterable[tuple[Sighting, float]]:
-        """Every circle that protects this person, with its radius now (m)."""
-        for sighting in self.sightings.values():
-            age = sighting.age_s(now)
-            if age <= RING_S:
-                yield sighting, max(sighting.reach_m, rule.radius_at(age))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +59,13 @@ class People:
     def __init__(self, bounds: Rectangle | None = None) -> None:
         self._bounds = bounds
         self._suspicions = Suspicions()
-        self.known: dict[str, Person] = {}
-        self._count = 0
+        self._tracker = Tracker()
         self._faint: dict[str, list[Placed]] = {}
+
+    @property
+    def known(self) -> dict[str, Person]:
+        """Everyone, by id."""
+        return self._tracker.known
 
     def sight(
         self,
@@ -189,86 +124,47 @@ class People:
     def _assign(
         self, placed: Sequence[Placed], observer: str, at: Instant, new_id: str
     ) -> list[Placed]:
-        """Gated nearest neighbour, each person once a look, closest pairs first."""
+        """Hand confident detections that are no fleet member to the tracker."""
         out = list(placed)
         wanting = [
             index
             for index, one in enumerate(out)
             if one.kind == "alert" and one.peer is None
         ]
-        pairs = sorted(
-            (distance, index, person_id)
-            for index in wanting
-            for person_id, person in self.known.items()
-            if person.class_ == out[index].class_
-            and (distance := _distance(person, out[index], observer, at)) < math.inf
+        before = set(self.known)
+        tracks = self._tracker.take(
+            [
+                Seen(
+                    out[index].class_ or "person",
+                    _sighting(out[index], observer, at),
+                    f"{new_id}-{index}",
+                )
+                for index in wanting
+            ],
+            at,
         )
-        taken: set[str] = set()
-        for _, index, person_id in pairs:
-            if index in wanting and person_id not in taken:
-                wanting.remove(index)
-                taken.add(person_id)
-                out[index] = self._seen_again(person_id, out[index], observer, at)
-        for index in wanting:
-            if len(self.known) < _MAX_PEOPLE:
-                out[index] = self._appear(out[index], observer, at, f"{new_id}-{index}")
+        for index, track in zip(wanting, tracks, strict=True):
+            if track is not None:
+                out[index] = replace(
+                    out[index], person=self.known[track], appeared=track not in before
+                )
         return out
-
-    def _seen_again(
-        self, person_id: str, one: Placed, observer: str, at: Instant
-    ) -> Placed:
-        person, sighting = self.known[person_id], _sighting(one, observer, at)
-        older = person.sightings.get(observer)
-        if older is not None and older.at.mono > at.mono:
-            return replace(one, person=person)
-        newest = max(person.newest, sighting, key=lambda look: look.at.mono)
-        person = replace(
-            person,
-            newest=newest,
-            sightings={**person.sightings, observer: sighting},
-        )
-        self.known[person_id] = person
-        return replace(one, person=person)
-
-    def _appear(
-        self, one: Placed, observer: str, at: Instant, decision_id: str
-    ) -> Placed:
-        self._count += 1
-        sighting = _sighting(one, observer, at)
-        person = Person(
-            f"{'P' if one.class_ == 'person' else 'R'}{self._count}",
-            one.class_ or "person",
-            decision_id,
-            first_seen=at,
-            newest=sighting,
-            sightings={observer: sighting},
-        )
-        self.known[person.person_id] = person
-        return replace(one, person=person, appeared=True)
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
         """Somebody has looked there in vain: this look protects nobody any more."""
-        person = self.known[person_id]
-        left = {
-            name: look for name, look in person.sightings.items() if look != sighting
-        }
-        self.known[person_id] = replace(person, sightings=left)
-        return self.known[person_id]
+        return self._tracker.drop(person_id, sighting)
 
     def is_suspected(self, person: Person, x: float, y: float, observer: str) -> bool:
         """Whether a robot's newest look holds a faint one of the kind near a spot."""
         return any(
             one.class_ == person.class_
-            and math.hypot(one.position[0] - x, one.position[1] - y) <= _GATE_M
+            and math.hypot(one.position[0] - x, one.position[1] - y) <= _SUSPECT_M
             for one in self._faint.get(observer, ())
         )
 
     def forget(self, now: Instant) -> list[Person]:
         """Drop who has not been seen for ten minutes; returns them."""
-        gone = [one for one in self.known.values() if one.stage(now) == "gone"]
-        for person in gone:
-            del self.known[person.person_id]
-        return gone
+        return self._tracker.forget(now)
 
 
 def _place(
@@ -294,7 +190,7 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
         if peer is observer or peer.odometry is None or since is None:
             continue
         reach = _PEER_GATE_M + profile_of(peer.robot_id).length / 2
-        reach += _GATE_SPEED * min(1.0, max(0.0, at.mono - since))
+        reach += WALKING_SPEED * min(1.0, max(0.0, at.mono - since))
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):
             nearest = (residual, peer.robot_id)
@@ -313,34 +209,6 @@ def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
     return Sighting(
         observer, x, y, z, at, said.class_id, said.probability, one.possible, reach
     )
-
-
-def _distance(person: Person, one: Placed, observer: str, at: Instant) -> float:
-    """To the nearest look that the detection may continue (m); inf when to none.
-
-    Beside the newest look every fresh one counts: where two robots see one person with
-    noise, a detection that lies far from the one look seldom lies far from both.
-    A doubtful position continues only the same robot's doubtful one.
-    """
-    if one.doubtful is not None:
-        same = person.newest.reach_m > 0.0 and person.newest.observer == observer
-        return 0.0 if same else math.inf
-    x, y, _ = one.position
-    return min(
-        (
-            distance
-            for look in (person.newest, *person.sightings.values())
-            if look.reach_m == 0.0
-            and (look is person.newest or look.age_s(at) <= SEEN_S)
-            and (distance := math.hypot(look.x - x, look.y - y)) <= _gate(look, at)
-        ),
-        default=math.inf,
-    )
-
-
-def _gate(look: Sighting, at: Instant) -> float:
-    """How far one may have walked since a look (m, capped)."""
-    return min(_GATE_CAP_M, _GATE_M + _GATE_SPEED * abs(at.mono - look.at.mono))
 
 
 def _is_suspect(one: Placed) -> bool:

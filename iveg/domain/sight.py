@@ -9,8 +9,9 @@ import math
 from iveg.domain.geometry import wrap_angle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.people import RING_S, SEEN_S, People, Person, Sighting
+from iveg.domain.people import People
 from iveg.domain.profiles import profile_of
+from iveg.domain.tracking.person import RING_S, SEEN_S, Person, Sighting
 from iveg.domain.world import LIVE_S, RobotState, World
 
 CLEAR_S = 1.0
@@ -19,7 +20,7 @@ _EDGE_RAD = math.radians(5.0)
 _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_LOOK_S = 0.5
 
-_Look = tuple[str, str, str]
+_Look = tuple[int, str]
 
 
 class AllClear:
@@ -35,7 +36,7 @@ class AllClear:
         watched: dict[_Look, float] = {}
         cleared: list[Person] = []
         for person in list(people.known.values()):
-            for sighting in list(person.sightings.values()):
+            for sighting in list(person.sightings):
                 if not SEEN_S < sighting.age_s(now) <= RING_S:
                     continue
                 if sighting.reach_m > 0.0:  # nobody knows where to look
@@ -46,21 +47,20 @@ class AllClear:
                     if can_see(robot, sighting.x, sighting.y, greenhouse, now)
                     and not _sees_faintly(robot, people, person, sighting)
                 ]
-                if self._is_empty(person, sighting, lookers, now, watched):
+                if self._is_empty(sighting, lookers, now, watched):
                     cleared.append(people.drop_sighting(person.person_id, sighting))
         self._since = watched
         return cleared
 
     def _is_empty(
         self,
-        person: Person,
         sighting: Sighting,
         lookers: list[str],
         now: Instant,
         watched: dict[_Look, float],
     ) -> bool:
         for robot_id in lookers:
-            look = person.person_id, sighting.observer, robot_id
+            look = sighting.chain, robot_id
             watched[look] = self._since.get(look, now.mono)
             if now.mono - watched[look] >= CLEAR_S:
                 return True

@@ -179,7 +179,7 @@ class Detector:
         camera = pose.compose(self._profile.camera)
         found: list[Detection] = []
         for target in targets:
-            seen = self._part_seen(camera, target.body, scenery)
+            seen = self.part_seen(camera, target.body, scenery)
             encounter = self._encounter(now, camera, target, seen > 0.0)
             if encounter is None:
                 continue
@@ -191,8 +191,8 @@ class Detector:
 
     # --- what is in view ----------------------------------------------------------
 
-    def _part_seen(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
-        """How much of a target is in view: 0, 1/3, 2/3 or 1."""
+    def part_seen(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
+        """How much of a target ``camera`` has in view: 0, 1/3, 2/3 or 1."""
         x, y = body.pose.x, body.pose.y
         distance = camera.distance_to(x, y)
         if not _NEAREST_M < distance <= self._profile.camera_range:

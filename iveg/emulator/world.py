@@ -129,6 +129,11 @@ class Rig:
             found = (*found, ghost)
         return DetectionFrame(self.robot_id, Origin(), found)
 
+    def part_seen(self, target: Target, around: "World") -> float:
+        """How much of a target its camera has in view, whatever the detector says."""
+        camera = self.vehicle.pose.compose(self.profile.camera)
+        return self._detector.part_seen(camera, target.body, around.scenery)
+
     def navigation(self) -> Navigation:
         """The intent: task, goal and path."""
         path = self._follower.path()

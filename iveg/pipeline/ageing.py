@@ -3,8 +3,9 @@
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.people import People, Person
+from iveg.domain.people import People
 from iveg.domain.sight import AllClear
+from iveg.domain.tracking.person import Person
 from iveg.domain.world import Link, RobotState, World
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub

@@ -11,7 +11,8 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FeedbackAlert
 from iveg.domain.observations import DetectionFrame, Instant, Received
 from iveg.domain.order import Verdict
-from iveg.domain.people import RING_S, People, Placed
+from iveg.domain.people import People, Placed
+from iveg.domain.tracking.person import RING_S
 from iveg.domain.world import World
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Ids

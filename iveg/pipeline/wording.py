@@ -11,7 +11,8 @@ from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.mandates import Crossing
 from iveg.domain.observations import SafetyReport
-from iveg.domain.people import People, Person
+from iveg.domain.people import People
+from iveg.domain.tracking.person import Person
 from iveg.domain.world import RobotState, World
 
 

@@ -9,9 +9,9 @@ from iveg.domain.echoes import echoes_of
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import least, margins_of
 from iveg.domain.observations import Instant, LaserScan
-from iveg.domain.people import Person
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import STALE_S, Command, StopMachine
+from iveg.domain.tracking.person import Person
 from iveg.domain.world import RobotState, World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
@@ -162,11 +162,7 @@ class Views:
             "first_seen": format_stamp(person.first_seen.wall),
             "last_seen": format_stamp(newest.at.wall),
             "age_s": round(age, 3),
-            "observers": [
-                name
-                for name, look in person.sightings.items()
-                if look.age_s(now) <= 1.0
-            ],
+            "observers": person.observers(now),
             "possible": newest.possible,
             "doubtful": newest.reach_m > 0.0,
             "decision_id": max((one.decision_id for one in crossings), default=None),

@@ -5,7 +5,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.people import RING_S
+from iveg.domain.tracking.person import RING_S
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -77,6 +77,8 @@ def test_a_look_is_counted_for_one_person_alone(
         scene.now += pause
         (placed,) = scene.look(observer, person(*place))
         assert placed.person is not None
-        look = placed.person.sightings[observer]
-        holders = [one for one in scene.everyone if look in one.sightings.values()]
+        look = next(
+            one for one in reversed(placed.person.sightings) if one.observer == observer
+        )
+        holders = [one for one in scene.everyone if look in one.sightings]
         assert [one.person_id for one in holders] == [placed.person.person_id]

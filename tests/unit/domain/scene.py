@@ -14,8 +14,9 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
-from iveg.domain.people import People, Person, Placed
+from iveg.domain.people import People, Placed
 from iveg.domain.sight import AllClear
+from iveg.domain.tracking.person import Person
 from iveg.domain.world import World
 from tests.builders import (
     at,

@@ -9,7 +9,7 @@ from iveg.domain.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.mandates import Crossing, Hazard
 from iveg.domain.observations import SafetyReport
-from iveg.domain.people import Sighting
+from iveg.domain.tracking.person import Sighting
 from iveg.domain.world import RobotState, World
 from tests.builders import (
     START,

@@ -8,7 +8,7 @@ from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision
 from iveg.domain.echoes import ECHO_S, WINDOW_S, echoes_of
 from iveg.domain.mandates import Crossing, Hazard
-from iveg.domain.people import Sighting
+from iveg.domain.tracking.person import Sighting
 from tests.builders import START, at
 
 

@@ -33,7 +33,7 @@ def test_a_spot_looked_at_in_vain_for_a_second_is_clear() -> None:
 
     assert watched(scene, 0.95) == []
     assert watched(scene, 0.2) == ["P1"]
-    assert scene.everyone[0].sightings == {}
+    assert scene.everyone[0].sightings == ()
 
 
 def test_a_look_that_was_interrupted_begins_anew() -> None:
@@ -99,7 +99,7 @@ def test_only_the_circles_that_were_looked_at_go() -> None:
 
     watched(scene, 1.1)
 
-    assert set(scene.everyone[0].sightings) == {"AG3"}
+    assert [one.observer for one in scene.everyone[0].sightings] == ["AG3"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,93 @@
+"""A person on the map, and the sightings that make and protect one.
+
+::
+
+    seen (<= 1 s) ──> remembered (<= 10 s, ring grows) ──> last seen (<= 600 s, no ring)
+      ^________________________|                                 └──> gone
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.domain.alerts import Class, Rule
+from iveg.domain.observations import Instant
+
+Stage = Literal["seen", "remembered", "last_seen", "gone"]
+
+SEEN_S, RING_S, LAST_SEEN_S = 1.0, 10.0, 600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One robot's newest look at one person, in ``map``.
+
+    Attributes:
+        at: Source moment on our clocks.
+        possible: It was below the threshold, but seen again and again.
+        reach_m: Where the position is doubtful, x and y are the observer's own, and
+            this is how far its camera reaches (m); else 0.
+        chain: Number of the chain of looks whose newest this is.
+    """
+
+    observer: str
+    x: float
+    y: float
+    z: float
+    at: Instant
+    class_id: str
+    confidence: float
+    possible: bool = False
+    reach_m: float = 0.0
+    chain: int = 0
+
+    def age_s(self, now: Instant) -> float:
+        """Seconds since the look."""
+        return max(0.0, now.mono - self.at.mono)
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A person (or a robot that is none of ours) with everyone who saw them.
+
+    Attributes:
+        person_id: Of the track: the same person as long as iVeg can tell.
+        sightings: The newest of each chain of looks; each has a ring of its own.
+        number: Counts tracks in the order of their appearance.
+    """
+
+    person_id: str
+    class_: Class
+    decision_id: str
+    first_seen: Instant
+    newest: Sighting
+    sightings: tuple[Sighting, ...]
+    number: int = 0
+
+    def age_s(self, now: Instant) -> float:
+        """Seconds since the last look of any robot."""
+        return self.newest.age_s(now)
+
+    def stage(self, now: Instant) -> Stage:
+        """Where in the life of a sighting this person stands."""
+        age = self.age_s(now)
+        if age <= SEEN_S:
+            return "seen"
+        if age <= RING_S:
+            return "remembered"
+        return "last_seen" if age <= LAST_SEEN_S else "gone"
+
+    def observers(self, now: Instant) -> list[str]:
+        """Robots that see this person now, in the order in which they began to."""
+        return list(
+            dict.fromkeys(
+                look.observer for look in self.sightings if look.age_s(now) <= SEEN_S
+            )
+        )
+
+    def rings(self, rule: Rule, now: Instant) -> Iterable[tuple[Sighting, float]]:
+        """Every circle that protects this person, with its radius now (m)."""
+        for sighting in self.sightings:
+            age = sighting.age_s(now)
+            if age <= RING_S:
+                yield sighting, max(sighting.reach_m, rule.radius_at(age))

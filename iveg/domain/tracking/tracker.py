@@ -1,0 +1,334 @@
+"""Sightings become chains of looks, chains become people.
+
+Each look of one robot is taken in two layers.
+
+*Chains* (protection).  A sighting continues the chain of its own observer whose last
+look is near enough, and replaces that look alone; else it begins a chain.  Nothing else
+but time or an all-clear ends a chain's ring.  Names play no part in it.
+
+*Tracks* (names).  A chain that goes on keeps its track.  One that begins, or comes back
+after a second, joins the nearest live track first (global assignment over the whole
+picture), else one that was lost no longer than somebody could have walked there, else
+it begins a track.  Live tracks closer than half a metre become one unless one picture
+ever showed both.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from iveg.domain.alerts import WALKING_SPEED, Class
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.assignment import assign
+from iveg.domain.tracking.person import RING_S, SEEN_S, Person, Sighting
+
+MAX_PEOPLE = 256
+GATE_M, GATE_CAP_M = 1.0, 2.0
+MERGE_M = 0.5
+LOST_SPEED, LOST_CAP_M = 1.0, 6.0
+"""How far from where somebody was lost the same one may appear: more is as often
+another person (``benchmarks/tracking.py``; m/s, m)."""
+MARK_M = 6.0
+"""So near to a new track a last-seen mark is taken for the same person's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """One confident detection of a picture.
+
+    Attributes:
+        decision_id: Of the alert, should this begin a track.
+    """
+
+    class_: Class
+    sighting: Sighting
+    decision_id: str
+
+
+@dataclass
+class Tracker:
+    """Everyone who is known, by id, in the order of their appearance.
+
+    Attributes:
+        merge_m: Live tracks this near become one (m); below zero none do.
+    """
+
+    merge_m: float = MERGE_M
+    known: dict[str, Person] = field(default_factory=dict)
+    _chains: int = 0
+    _tracks: int = 0
+    _together: dict[str, set[str]] = field(default_factory=dict)
+
+    def take(self, picture: Sequence[Seen], at: Instant) -> list[str | None]:
+        """Take one look of one robot in.
+
+        Returns:
+            The track of each detection; None where no more can be kept.
+        """
+        chains = self._continue_chains(picture, at)
+        picture = [
+            replace(one, sighting=self._chained(one.sighting, old))
+            for one, old in zip(picture, chains, strict=True)
+        ]
+        tracks = self._choose_tracks(picture, chains, at)
+        for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
+            tracks[index] = self._put(one, old, tracks[index], at)
+        named = [track for track in tracks if track is not None]
+        self._remember_together(named)
+        merged = dict(self._merge(dict.fromkeys(named), at))
+        return [
+            track if track is None else merged.get(track, track) for track in tracks
+        ]
+
+    def drop(self, person_id: str, sighting: Sighting) -> Person:
+        """Somebody has looked there in vain: this look protects nobody any more."""
+        person = self.known[person_id]
+        left = tuple(look for look in person.sightings if look != sighting)
+        self.known[person_id] = replace(person, sightings=left)
+        return self.known[person_id]
+
+    def forget(self, now: Instant) -> list[Person]:
+        """Drop who has not been seen for ten minutes; returns them."""
+        gone = [one for one in self.known.values() if one.stage(now) == "gone"]
+        for person in gone:
+            self._remove(person.person_id)
+        return gone
+
+    # --- chains -------------------------------------------------------------------
+
+    def _continue_chains(
+        self, picture: Sequence[Seen], at: Instant
+    ) -> list[tuple[str, Sighting] | None]:
+        """For each detection the own earlier look that it replaces, and whose it is."""
+        out: list[tuple[str, Sighting] | None] = [None] * len(picture)
+        if not picture:
+            return out
+        observer = picture[0].sighting.observer
+        own = [
+            (person, look)
+            for person in self.known.values()
+            for look in person.sightings
+            if look.observer == observer and look.age_s(at) <= RING_S
+        ]
+        for is_live in (True, False):
+            wanting = [index for index, old in enumerate(out) if old is None]
+            offered = [
+                (person, look)
+                for person, look in own
+                if (look.age_s(at) <= SEEN_S) is is_live
+            ]
+            costs = [
+                [_chain_cost(picture[i], person, look, at) for person, look in offered]
+                for i in wanting
+            ]
+            for row, column in assign(costs):
+                person, look = offered[column]
+                out[wanting[row]] = person.person_id, look
+        return out
+
+    def _chained(
+        self, sighting: Sighting, old: tuple[str, Sighting] | None
+    ) -> Sighting:
+        if old is not None:
+            return replace(sighting, chain=old[1].chain)
+        self._chains += 1
+        return replace(sighting, chain=self._chains)
+
+    # --- tracks -------------------------------------------------------------------
+
+    def _choose_tracks(
+        self,
+        picture: Sequence[Seen],
+        chains: Sequence[tuple[str, Sighting] | None],
+        at: Instant,
+    ) -> list[str | None]:
+        tracks: list[str | None] = [None] * len(picture)
+        for index, old in enumerate(chains):
+            if old is not None and old[1].age_s(at) <= SEEN_S:
+                tracks[index] = old[0]
+        self._assign_tracks(picture, tracks, at, is_live=True)
+        taken = set(tracks)
+        for index, old in enumerate(chains):
+            if tracks[index] is None and old is not None and old[0] not in taken:
+                tracks[index] = old[0]
+                taken.add(old[0])
+        self._assign_tracks(picture, tracks, at, is_live=False)
+        return tracks
+
+    def _assign_tracks(
+        self,
+        picture: Sequence[Seen],
+        tracks: list[str | None],
+        at: Instant,
+        *,
+        is_live: bool,
+    ) -> None:
+        """Give detections without a track one of those that nobody has taken."""
+        wanting = [index for index, track in enumerate(tracks) if track is None]
+        taken = set(tracks)
+        offered = [
+            person
+            for person in self.known.values()
+            if person.person_id not in taken
+            and (person.age_s(at) <= SEEN_S) is is_live
+            and person.age_s(at) <= RING_S
+        ]
+        cost = _live_cost if is_live else _lost_cost
+        costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
+        for row, column in assign(costs):
+            tracks[wanting[row]] = offered[column].person_id
+
+    def _put(
+        self,
+        one: Seen,
+        old: tuple[str, Sighting] | None,
+        track: str | None,
+        at: Instant,
+    ) -> str | None:
+        """Keep a sighting in its track; its chain's earlier look goes, wherever."""
+        if old is not None:
+            if old[1].at.mono > one.sighting.at.mono:
+                return old[0]
+            self.drop(*old)
+        if track is None:
+            return self._begin(one, at)
+        person, sighting = self.known[track], one.sighting
+        kept = tuple(look for look in person.sightings if look.age_s(at) <= RING_S)
+        newest = max(person.newest, sighting, key=lambda look: look.at.mono)
+        self.known[track] = replace(
+            person,
+            newest=newest,
+            sightings=(*kept, sighting),
+        )
+        return track
+
+    def _begin(self, one: Seen, at: Instant) -> str | None:
+        if len(self.known) >= MAX_PEOPLE:
+            return None
+        self._drop_mark(one, at)
+        self._tracks += 1
+        track = f"{'P' if one.class_ == 'person' else 'R'}{self._tracks}"
+        look = one.sighting
+        self.known[track] = Person(
+            track, one.class_, one.decision_id, at, look, (look,), self._tracks
+        )
+        return track
+
+    def _drop_mark(self, one: Seen, at: Instant) -> None:
+        """Somebody appears: the nearest last-seen mark within reach was theirs."""
+        marks = [
+            (_distance(person.newest, one.sighting), person.person_id)
+            for person in self.known.values()
+            if person.class_ == one.class_ and person.stage(at) == "last_seen"
+        ]
+        distance, track = min(marks, default=(math.inf, ""))
+        if distance <= MARK_M:
+            self._remove(track)
+
+    def _remove(self, track: str) -> None:
+        del self.known[track]
+        for other in self._together.pop(track, ()):
+            self._together[other].discard(track)
+
+    # --- one person under two names -----------------------------------------------
+
+    def _remember_together(self, tracks: Iterable[str]) -> None:
+        """One picture showed all of these: they can never be one."""
+        shown = set(tracks)
+        for track in shown:
+            self._together.setdefault(track, set()).update(shown - {track})
+
+    def _merge(self, touched: Iterable[str], at: Instant) -> Iterator[tuple[str, str]]:
+        """Join live tracks that stand at one spot; yields who is called what now."""
+        for track in touched:
+            while track in self.known and (twin := self._twin_of(track, at)):
+                first, second = sorted(
+                    (track, twin), key=lambda name: self.known[name].number
+                )
+                self._join(first, second)
+                yield second, first
+
+    def _twin_of(self, track: str, at: Instant) -> str | None:
+        person = self.known[track]
+        apart = self._together.get(track, set())
+        for other in self.known.values():
+            if (
+                other is not person
+                and other.class_ == person.class_
+                and other.person_id not in apart
+                and other.age_s(at) <= SEEN_S
+                and not other.newest.reach_m
+                and not person.newest.reach_m
+                and _distance(other.newest, person.newest) <= self.merge_m
+            ):
+                return other.person_id
+        return None
+
+    def _join(self, first: str, second: str) -> None:
+        """Every sighting of both is kept: names change, rings do not."""
+        older, younger = self.known[first], self.known[second]
+        self.known[first] = replace(
+            older,
+            newest=max(older.newest, younger.newest, key=lambda look: look.at.mono),
+            sightings=(*older.sightings, *younger.sightings),
+        )
+        apart = self._together.get(second, set()) - {first}
+        self._remove(second)
+        self._together.setdefault(first, set()).update(apart)
+        for other in apart:
+            self._together[other].add(first)
+
+
+def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:
+    while track is not None and track in merged:
+        track = merged[track]
+    return track
+
+
+def _chain_cost(one: Seen, person: Person, look: Sighting, at: Instant) -> float:
+    """Distance to the same observer's earlier look (m); inf where it is another's."""
+    if person.class_ != one.class_ or bool(look.reach_m) != bool(one.sighting.reach_m):
+        return math.inf
+    if look.reach_m:
+        return 0.0
+    distance = _distance(look, one.sighting)
+    return distance if distance <= _gate(look, at) else math.inf
+
+
+def _live_cost(one: Seen, person: Person, at: Instant) -> float:
+    """Distance to the nearest fresh look of anybody (m); inf beyond its gate.
+
+    Where two robots see one person with noise, a detection that lies far from the one
+    look seldom lies far from both.
+    """
+    if person.class_ != one.class_ or one.sighting.reach_m:
+        return math.inf
+    return min(
+        (
+            distance
+            for look in person.sightings
+            if not look.reach_m
+            and look.age_s(at) <= SEEN_S
+            and (distance := _distance(look, one.sighting)) <= _gate(look, at)
+        ),
+        default=math.inf,
+    )
+
+
+def _lost_cost(one: Seen, person: Person, at: Instant) -> float:
+    """Distance to the last look (m); inf beyond what is likely."""
+    last = person.newest
+    if person.class_ != one.class_ or one.sighting.reach_m or last.reach_m:
+        return math.inf
+    distance = _distance(last, one.sighting)
+    reach = min(LOST_CAP_M, GATE_M + LOST_SPEED * last.age_s(at))
+    return distance if distance <= reach else math.inf
+
+
+def _distance(one: Sighting, other: Sighting) -> float:
+    return math.hypot(one.x - other.x, one.y - other.y)
+
+
+def _gate(look: Sighting, at: Instant) -> float:
+    """How far one may have walked since a look (m, capped)."""
+    return min(GATE_CAP_M, GATE_M + WALKING_SPEED * abs(at.mono - look.at.mono))

@@ -1,0 +1,207 @@
+"""One person is one track: who is joined, revived, merged, and who never is (13.1)."""
+
+from itertools import permutations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iveg.domain.alerts import Rule
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.assignment import assign
+from iveg.domain.tracking.person import Sighting
+from iveg.domain.tracking.tracker import Seen, Tracker
+from tests.builders import at
+from tests.unit.domain.scene import Scene, person
+
+# --- global assignment ------------------------------------------------------------
+
+costs = st.integers(1, 4).flatmap(
+    lambda columns: st.lists(
+        st.lists(
+            st.one_of(st.floats(0.0, 10.0), st.just(float("inf"))),
+            min_size=columns,
+            max_size=columns,
+        ),
+        min_size=1,
+        max_size=4,
+    )
+)
+
+
+def best(table: list[list[float]]) -> tuple[int, float]:
+    """Most pairs, and the least sum with so many, by trying all."""
+    rows, columns = len(table), len(table[0])
+    if rows > columns:
+        return best([list(column) for column in zip(*table, strict=True)])
+    found = []
+    for order in permutations(range(columns), rows):
+        chosen = [table[row][column] for row, column in enumerate(order)]
+        known = [cost for cost in chosen if cost < float("inf")]
+        found.append((-len(known), sum(known)))
+    pairs, total = min(found)
+    return -pairs, total
+
+
+@given(costs)
+def test_as_many_pairs_as_can_be_are_made_and_the_cheapest_of_those(
+    table: list[list[float]],
+) -> None:
+    pairs = assign(table)
+
+    assert len({row for row, _ in pairs}) == len({c for _, c in pairs}) == len(pairs)
+    total = sum(table[row][column] for row, column in pairs)
+    count, least = best(table)
+    assert len(pairs) == count
+    assert abs(total - least) < 1e-6
+
+
+# --- who is who -------------------------------------------------------------------
+
+
+def walk_in_pairs(scene: Scene) -> None:
+    """Two people cross a picture side by side, half a metre apart, for two seconds."""
+    for tenth in range(20):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0 + 0.1 * tenth), person(3.0 + 0.1 * tenth, 0.5))
+
+
+def test_two_who_walk_side_by_side_keep_their_names() -> None:
+    scene = Scene()
+    walk_in_pairs(scene)
+
+    assert {one.person_id: one.newest.y for one in scene.everyone} == {
+        "P1": 0.0,
+        "P2": 0.5,
+    }
+
+
+def test_a_nearer_pair_does_not_take_what_another_needs() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0), person(4.0))
+    scene.now = 0.3
+
+    # Nearest first would give 4.0 to the one at 3.9 and leave 4.9 to nobody near it.
+    scene.look("AGI", person(3.9), person(4.9))
+
+    found = {one.person_id: round(one.newest.x, 6) for one in scene.everyone}
+    assert found == {"P1": 3.9, "P2": 4.9}
+
+
+def test_two_tracks_that_come_to_one_spot_become_one_and_keep_both_rings() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.look("AGII", person(5.2))
+    scene.now = 0.5
+    scene.look("AGI", person(4.0))
+    scene.now = 1.0
+    scene.look("AGII", person(4.4))
+
+    (known,) = scene.everyone
+    assert known.person_id == "P1"
+    circles = sorted(look.x for look, _ in known.rings(scene.rule, at(scene.now)))
+    assert circles == [4.0, 4.4]
+
+
+def test_two_who_were_in_one_picture_never_become_one() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0), person(6.0))
+    for tenth in range(1, 31):
+        scene.now = tenth / 10
+        scene.look("AGI", person(3.0 + 0.045 * tenth), person(6.0 - 0.045 * tenth))
+
+    assert [one.person_id for one in scene.everyone] == ["P1", "P2"]
+    assert scene.everyone[1].newest.x - scene.everyone[0].newest.x < 0.5
+
+
+def test_who_walked_behind_crop_comes_out_as_the_same_person() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 4.0
+
+    scene.look("AGI", person(7.0))
+
+    assert [one.person_id for one in scene.everyone] == ["P1"]
+
+
+def test_the_circle_at_the_spot_where_somebody_was_lost_stays() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 4.0
+    scene.look("AGI", person(7.0))
+
+    rings = scene.everyone[0].rings(scene.rule, at(scene.now))
+    assert sorted(look.x for look, _ in rings) == [3.0, 7.0]
+
+
+def test_a_live_track_is_joined_before_a_lost_one_is_revived() -> None:
+    scene = Scene(robots=("AGI", "AGII"))
+    scene.look("AGI", person(3.0))
+    scene.now = 3.0
+    scene.look("AGII", person(4.5))
+    assert [one.person_id for one in scene.everyone] == ["P1"]
+    scene.now = 3.1
+    scene.look("AGII", person(4.5), person(9.0))
+    scene.now = 6.0
+    scene.look("AGII", person(9.0))
+    scene.now = 6.1
+
+    (placed,) = scene.look("AGI", person(8.6))
+
+    assert placed.person is not None
+    assert placed.person.person_id == "P2"
+
+
+def test_a_new_person_takes_the_mark_of_who_was_last_seen_there() -> None:
+    scene = Scene()
+    scene.look("AGI", person(3.0))
+    scene.now = 60.0
+
+    scene.look("AGI", person(4.0))
+
+    assert [one.person_id for one in scene.everyone] == ["P2"]
+
+
+# --- a name protects nobody -------------------------------------------------------
+
+
+pictures = st.lists(
+    st.tuples(
+        st.sampled_from(["AGI", "AGII", "AG3"]),
+        st.floats(0.0, 3.0),
+        st.lists(st.tuples(st.floats(0, 6), st.floats(0, 3)), max_size=4),
+    ),
+    min_size=1,
+    max_size=30,
+)
+
+
+def rings_of(tracker: Tracker, now: Instant) -> set[tuple[str, float, float, float]]:
+    return {
+        (look.observer, look.x, look.y, radius)
+        for one in tracker.known.values()
+        for look, radius in one.rings(Rule(), now)
+    }
+
+
+@given(pictures)
+def test_the_union_of_rings_is_the_same_with_and_without_merging(
+    seen: list[tuple[str, float, list[tuple[float, float]]]],
+) -> None:
+    merging, never = Tracker(), Tracker(merge_m=-1.0)
+    after = 0.0
+    for number, (observer, pause, places) in enumerate(seen):
+        after += pause
+        now = at(after)
+        for tracker in (merging, never):
+            tracker.take(
+                [
+                    Seen(
+                        "person",
+                        Sighting(observer, x, y, 0.9, now, "farmer", 0.9),
+                        f"d{number}",
+                    )
+                    for x, y in places
+                ],
+                now,
+            )
+        assert rings_of(merging, now) == rings_of(never, now)
