@@ -22,6 +22,7 @@ from iveg.app import Dss, broker_of, create_app
 from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.settings import Settings
+from iveg.web.bounded import BoundedSocket
 
 _log = logging.getLogger(__name__)
 _LIVE_ROBOT_S = 10.0
@@ -74,6 +75,7 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
             port=settings.port,
             log_config=None,
             access_log=False,
+            ws=BoundedSocket,
             ws_max_size=_WS_MAX_BYTES,
             ws_ping_interval=10.0,
             ws_ping_timeout=10.0,

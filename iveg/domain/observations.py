@@ -93,14 +93,18 @@ class LaserScan:
     mount: Pose2D
     ranges: NDArray[np.float32]
 
-    def points(self, pose: Pose2D) -> NDArray[np.float32]:
-        """Returns that count, in the frame that ``pose`` is in; shape (m, 2), (m)."""
+    def returns(self) -> NDArray[np.bool_]:
+        """Which ranges count: what came back from farther than the robot itself."""
         ranges = self.ranges
-        counts = (
+        return (
             np.isfinite(ranges)
             & (ranges >= self.range_min)
             & (ranges <= self.range_max)
         )
+
+    def points(self, pose: Pose2D) -> NDArray[np.float32]:
+        """Returns that count, in the frame that ``pose`` is in; shape (m, 2), (m)."""
+        ranges, counts = self.ranges, self.returns()
         sensor = pose.compose(self.mount)
         angles = (
             sensor.yaw + self.angle_min + self.angle_increment * np.flatnonzero(counts)

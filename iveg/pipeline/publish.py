@@ -6,33 +6,70 @@ sent; a browser that lets them pile up is told to come back for a snapshot.
 """
 
 import asyncio
+import contextlib
 from collections import Counter, deque
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Final
 
 MAX_PENDING = 1000
 
+_TELEMETRY: Final = ("robots/", "detections/", "people")
+
+
+def is_telemetry(topic: str) -> bool:
+    """Whether a topic changes with each measure, so that its sending is paced."""
+    return topic.startswith(_TELEMETRY)
+
 
 class Subscriber:
-    """One browser's view of what it has not seen yet."""
+    """One browser's view of what it has not seen yet.
+
+    Attributes:
+        wants_telemetry: False while no telemetry could be sent: a change is noted and
+            wakes nobody.
+    """
 
     def __init__(self) -> None:
         self.dirty: dict[str, None] = {}
         self.pending: deque[tuple[str, Any]] = deque()
         self.overflowed = False
+        self.wants_telemetry = True
         self._wake = asyncio.Event()
 
     def wake(self) -> None:
         """There is something to take."""
         self._wake.set()
 
+    def changed(self, topic: str) -> None:
+        """A state topic is new."""
+        self.dirty[topic] = None
+        if self.wants_telemetry or not is_telemetry(topic):
+            self.wake()
+
+    async def news(self, within_s: float | None = None) -> None:
+        """Wait until there may be something to take, or that long (s)."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(within_s):
+                await self._wake.wait()
+        self._wake.clear()
+
+    def take_events(self) -> list[tuple[str, Any]]:
+        """Every event since the last time, in order."""
+        events = list(self.pending)
+        self.pending.clear()
+        return events
+
+    def take_topics(self, wanted: Callable[[str], bool]) -> list[str]:
+        """The topics of a kind that changed, longest waiting first."""
+        topics = [topic for topic in self.dirty if wanted(topic)]
+        for topic in topics:
+            del self.dirty[topic]
+        return topics
+
     async def take(self) -> tuple[list[tuple[str, Any]], list[str]]:
         """Wait for news; returns events in order and the topics that changed."""
-        await self._wake.wait()
-        self._wake.clear()
-        events, topics = list(self.pending), list(self.dirty)
-        self.pending.clear()
-        self.dirty.clear()
-        return events, topics
+        await self.news()
+        return self.take_events(), self.take_topics(lambda _: True)
 
 
 class Hub:
@@ -61,8 +98,7 @@ class Hub:
         """The value behind a state topic is new."""
         self.versions[topic] += 1
         for subscriber in self._subscribers:
-            subscriber.dirty[topic] = None
-            subscriber.wake()
+            subscriber.changed(topic)
 
     def append(self, topic: str, item: Any) -> None:
         """An event that nobody may miss."""

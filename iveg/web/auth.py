@@ -184,7 +184,10 @@ class Door:
         if (origin is not None or by_cookie) and not is_own(origin, websocket):
             raise WebSocketException(FOREIGN_ORIGIN)
         if principal is None or not principal.may("read"):
-            await websocket.accept()
+            # A browser that asked for a subprotocol takes no handshake without one.
+            await websocket.accept(
+                next(iter(websocket.scope.get("subprotocols", ())), None)
+            )
             raise WebSocketException(NO_SESSION)
         return principal
 

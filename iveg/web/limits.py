@@ -1,6 +1,7 @@
 """How often somebody may try the door, and how much a page may say (safety.md §5.2).
 
-STOP is never limited: not over HTTP, and not on a socket that says too much.
+STOP is never limited: not over HTTP, and not on a socket that says too much.  What a
+page has painted is counted apart: it says so with every frame that its screen shows.
 """
 
 import asyncio
@@ -18,6 +19,8 @@ from iveg.web.roles import Principal
 
 SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
 MESSAGES_PER_S = 20
+PAINTED_PER_S = 300
+"""More than frames are ever sent in a second: no honest page is not heard."""
 SOCKETS = 5
 TOO_MANY_SOCKETS: Final = 4429
 """Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
@@ -87,6 +90,7 @@ class Allowance:
 class _Socket:
     heard_at: float
     allowance: Allowance
+    painting: Allowance
     serving: asyncio.Task[None] | None = None
     ended: bool = False
 
@@ -98,7 +102,7 @@ class _Socket:
 
 
 class SocketLimits:
-    """Five sockets a session, twenty messages a second each; pure ASGI.
+    """Five sockets a session, twenty messages a second each (what was painted: 300).
 
     Of more sockets the one that has been silent gives way: it is a page that lost its
     line and came back.  When all of them are alive the new one is refused, so that the
@@ -132,9 +136,11 @@ class SocketLimits:
         now = self._clock().mono
         sockets = self._sockets.setdefault(who.session, [])
         if not _make_room(sockets, now):
-            await _refuse(receive, send)
+            await _refuse(scope, receive, send)
             return
-        socket = _Socket(now, Allowance(MESSAGES_PER_S, now))
+        socket = _Socket(
+            now, Allowance(MESSAGES_PER_S, now), Allowance(PAINTED_PER_S, now)
+        )
         sockets.append(socket)
         try:
             await self._serve(socket, scope, receive, send)
@@ -170,7 +176,8 @@ class SocketLimits:
                 socket.heard_at = now
                 if message["type"] != "websocket.receive" or _is_stop(message):
                     return message
-                if socket.allowance.take(now):
+                of = socket.painting if _is_painted(message) else socket.allowance
+                if of.take(now):
                     return message
 
         return receive_limited
@@ -188,13 +195,19 @@ def _make_room(sockets: list[_Socket], now: float) -> bool:
     return True
 
 
+def _is_painted(message: Message) -> bool:
+    """Whether this says that a frame was painted, as pages write it."""
+    return (message.get("text") or "").startswith('{"type":"painted"')
+
+
 def _is_stop(message: Message) -> bool:
     """Whether this may be a STOP; the reader tells for sure."""
     return '"stop"' in (message.get("text") or "")
 
 
-async def _refuse(receive: Receive, send: Send) -> None:
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
     # A browser sees close codes only after the handshake.
     await receive()
-    await send({"type": "websocket.accept"})
+    subprotocol = next(iter(scope.get("subprotocols", ())), None)
+    await send({"type": "websocket.accept", "subprotocol": subprotocol})
     await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})

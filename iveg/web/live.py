@@ -1,13 +1,15 @@
 """The WebSocket to browsers: a snapshot, then what changes.
 
-A message is encoded once, whoever looks: state topics by their version, scans as
-binary.  Each browser has one task that sends what is newest; a browser that reads
-nothing keeps no queue and is closed after a while (fault F23).
+A message is encoded once, whoever looks.  Each browser has one task that sends what is
+newest; a browser that reads nothing keeps no queue and is closed after a while (fault
+F23).  One that speaks ``iveg.2`` is sent telemetry in frames, as fast as it paints
+them; everything else passes beside them at once.  One that does not gets a message a
+topic, for one version more.
 """
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from typing import Annotated, Any
 
 import orjson
@@ -18,10 +20,13 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import Command, Press
 from iveg.ngsi.codec import load_json
-from iveg.pipeline.publish import Hub, Subscriber
+from iveg.pipeline.publish import Hub, Subscriber, is_telemetry
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
+from iveg.web.feed import TelemetryFeed
+from iveg.web.pacing import SUBPROTOCOL
 from iveg.web.presses import read_press
 from iveg.web.shapes import log_line
+from iveg.web.telemetry import TelemetryEncoder
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -49,6 +54,7 @@ class Encoder:
         self._hub = hub
         self._clock = clock
         self._health = health
+        self.telemetry = TelemetryEncoder(views, hub)
         self._frames: dict[str, tuple[int, bytes]] = {}
 
     def frame(self, topic: str) -> bytes | None:
@@ -86,7 +92,7 @@ class Encoder:
             data = self._health(now)
         elif kind == "climate":
             data = self._views.climate(now)
-        return None if data is None else text(topic, data)
+        return None if data is None else text(topic, data, now)
 
     def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
         swept = self._views.scan(robot_id)
@@ -107,16 +113,17 @@ class Encoder:
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event that nobody may miss."""
         data: Any = item
+        now = self._clock()
         if isinstance(item, LogRecord):
             data = log_line(item)
         elif isinstance(item, Command):
-            data = self._views.command(item, self._clock())
-        return text(topic, data)
+            data = self._views.command(item, now)
+        return text(topic, data, now)
 
 
-def text(topic: str, data: Any) -> bytes:
-    """A JSON frame."""
-    return orjson.dumps({"topic": topic, "data": data})
+def text(topic: str, data: Any, now: Instant) -> bytes:
+    """A JSON frame; ``at`` is when it was true, on the server's monotonic clock."""
+    return orjson.dumps({"topic": topic, "data": data, "at": now.mono})
 
 
 def router(
@@ -139,22 +146,24 @@ def router(
         principal: Annotated[Principal, Depends(require("read"))],
     ) -> None:
         """A browser looks."""
-        await websocket.accept()
+        is_paced = SUBPROTOCOL in websocket.scope.get("subprotocols", ())
+        await websocket.accept(SUBPROTOCOL if is_paced else None)
         subscriber = hub.join()
+        line = Line(websocket, subscriber, encoder, clock)
+        feed = TelemetryFeed(encoder.telemetry, subscriber) if is_paced else None
         try:
-            first = text("snapshot", snapshot(principal, clock()))
-            await websocket.send_text(first.decode())
+            now = clock()
+            await line.say(text("snapshot", snapshot(principal, now), now))
             async with asyncio.TaskGroup() as tasks:
                 sender = tasks.create_task(
-                    _send(websocket, subscriber, encoder), name="live-send"
+                    line.send_all() if feed is None else line.send_paced(feed),
+                    name="live-send",
                 )
                 watcher = tasks.create_task(
                     _watch_session(websocket, principal), name="live-session"
                 )
-                tasks.create_task(
-                    _listen(websocket, clock, stop, principal, (sender, watcher)),
-                    name="live-listen",
-                )
+                ear = Ear(websocket, clock, stop, principal, feed)
+                tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
         except* (WebSocketDisconnect, ConnectionError, RuntimeError) as gone:
             _log.debug("browser gone: %s", gone)
         finally:
@@ -163,22 +172,69 @@ def router(
     return routes
 
 
-async def _send(websocket: WebSocket, subscriber: Subscriber, encoder: Encoder) -> None:
-    while True:
-        events, topics = await subscriber.take()
-        if subscriber.overflowed:
-            await websocket.close(TOO_SLOW)
-            return
+class Line:
+    """What goes to one browser, one message after the other."""
+
+    def __init__(
+        self,
+        websocket: WebSocket,
+        subscriber: Subscriber,
+        encoder: Encoder,
+        clock: Callable[[], Instant],
+    ) -> None:
+        self._websocket = websocket
+        self._subscriber = subscriber
+        self._encoder = encoder
+        self._clock = clock
+
+    async def say(self, frame: bytes) -> None:
+        """Send JSON."""
+        await self._websocket.send_text(frame.decode())
+
+    async def send_all(self) -> None:
+        """The newest of every topic, as fast as the browser reads."""
+        while True:
+            await self._subscriber.news()
+            if not await self._in_time(self._send_news(lambda _: True)):
+                return
+
+    async def send_paced(self, feed: TelemetryFeed) -> None:
+        """Telemetry as fast as the browser paints, everything else at once."""
+        while True:
+            await self._subscriber.news(feed.wait_s(self._clock().mono))
+            if not await self._in_time(self._send_with(feed)):
+                return
+
+    async def _in_time(self, sending: Coroutine[Any, Any, None]) -> bool:
+        """Whether the browser still reads; one that does not is closed."""
         try:
-            async with asyncio.timeout(_SEND_LIMIT_S):
-                for topic, item in events:
-                    frame = encoder.event(topic, item)
-                    await websocket.send_text(frame.decode())
-                for topic in topics:
-                    await _send_state(websocket, topic, encoder)
+            if not self._subscriber.overflowed:
+                async with asyncio.timeout(_SEND_LIMIT_S):
+                    await sending
+                return True
         except TimeoutError:
-            await websocket.close(TOO_SLOW)
-            return
+            pass
+        sending.close()
+        await self._websocket.close(TOO_SLOW)
+        return False
+
+    async def _send_with(self, feed: TelemetryFeed) -> None:
+        await self._send_news(lambda topic: not is_telemetry(topic))
+        frame = feed.next_frame(self._clock())
+        if frame is not None:
+            await self._websocket.send_bytes(frame)
+
+    async def _send_news(self, wanted: Callable[[str], bool]) -> None:
+        for topic, item in self._subscriber.take_events():
+            await self.say(self._encoder.event(topic, item))
+        for topic in self._subscriber.take_topics(wanted):
+            frame = self._encoder.frame(topic)
+            if frame is None:
+                continue
+            if topic.endswith("/scan"):
+                await self._websocket.send_bytes(frame)
+            else:
+                await self.say(frame)
 
 
 async def _watch_session(websocket: WebSocket, principal: Principal) -> None:
@@ -196,58 +252,61 @@ def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bo
     return current is not None and current.may(action)
 
 
-async def _send_state(websocket: WebSocket, topic: str, encoder: Encoder) -> None:
-    frame = encoder.frame(topic)
-    if frame is None:
-        return
-    if topic.endswith("/scan"):
-        await websocket.send_bytes(frame)
-    else:
-        await websocket.send_text(frame.decode())
+class Ear:
+    """What one browser says: pings, presses, and what it has painted."""
 
+    def __init__(
+        self,
+        websocket: WebSocket,
+        clock: Callable[[], Instant],
+        stop: Stop,
+        principal: Principal,
+        feed: TelemetryFeed | None,
+    ) -> None:
+        self._websocket = websocket
+        self._clock = clock
+        self._stop = stop
+        self._principal = principal
+        self._feed = feed
 
-async def _listen(
-    websocket: WebSocket,
-    clock: Callable[[], Instant],
-    stop: Stop,
-    principal: Principal,
-    others: Iterable[asyncio.Task[None]],
-) -> None:
-    try:
-        while True:
-            raw = await websocket.receive_text()
-            try:
-                message = load_json(raw[:_MAX_MESSAGE])
-            except UnreadableError as error:
-                await websocket.send_text(
-                    text("problem", {"reason": error.reason}).decode()
-                )
-                continue
-            if isinstance(message, dict):
-                await _answer(websocket, message, clock(), stop, principal)
-    except WebSocketDisconnect:
-        return
-    finally:
-        for task in others:
-            task.cancel()
+    async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
+        """Until the browser goes; then ``others`` end, too."""
+        try:
+            while True:
+                await self._hear(await self._websocket.receive_text())
+        except WebSocketDisconnect:
+            return
+        finally:
+            for task in others:
+                task.cancel()
 
+    async def _hear(self, raw: str) -> None:
+        try:
+            message = load_json(raw[:_MAX_MESSAGE])
+        except UnreadableError as error:
+            await self._say("problem", {"reason": error.reason})
+            return
+        if not isinstance(message, dict):
+            return
+        match message.get("type"):
+            case "painted":
+                if self._feed is not None:
+                    self._feed.painted(message.get("frame"), self._clock().mono)
+            case "ping":
+                t, server = message.get("t"), self._clock().wall
+                await self._say("pong", {"t": t, "server": server})
+            case "stop":
+                await self._press(message)
 
-async def _answer(
-    websocket: WebSocket,
-    message: dict[str, Any],
-    now: Instant,
-    stop: Stop,
-    principal: Principal,
-) -> None:
-    if message.get("type") == "ping":
-        pong = {"t": message.get("t"), "server": now.wall}
-        await websocket.send_text(text("pong", pong).decode())
-    elif message.get("type") == "stop":
+    async def _press(self, message: dict[str, Any]) -> None:
         robot_id = message.get("robot_id")
-        allowed = _may_still(websocket, principal, "stop")
+        allowed = _may_still(self._websocket, self._principal, "stop")
         if allowed and (robot_id is None or isinstance(robot_id, str)):
             try:
-                await stop(robot_id, principal.name, read_press(message))
+                await self._stop(robot_id, self._principal.name, read_press(message))
             except UnknownRobotError as error:
-                problem = text("problem", {"reason": str(error)})
-                await websocket.send_text(problem.decode())
+                await self._say("problem", {"reason": str(error)})
+
+    async def _say(self, topic: str, data: Any) -> None:
+        frame = text(topic, data, self._clock())
+        await self._websocket.send_text(frame.decode())

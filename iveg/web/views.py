@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.echoes import echoes_of
+from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import least, margins_of
-from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import STALE_S, Command, StopMachine
 from iveg.domain.tracking.person import Person
@@ -123,12 +124,26 @@ class Views:
             "feedback_age_s": robot.safety.feedback_age_s,
         }
 
+    def motion(
+        self, robot_id: str, now: Instant
+    ) -> tuple[Odometry | None, float | None]:
+        """A robot's newest odometry and its age (s)."""
+        robot = self._world.robot(robot_id)
+        return robot.odometry, robot.age_s(now)
+
     def scan(self, robot_id: str) -> tuple[LaserScan, NDArray[np.float32]] | None:
         """A robot's newest sweep and its points in ``map``, shape (n, 2), (m)."""
         robot = self._world.robot(robot_id)
         if robot.scan is None or robot.scan_pose is None:
             return None
         return robot.scan, robot.scan.points(robot.scan_pose)
+
+    def sweep(self, robot_id: str) -> tuple[LaserScan, Pose2D] | None:
+        """A robot's newest sweep and the pose of its sensor in ``map``."""
+        robot = self._world.robot(robot_id)
+        if robot.scan is None or robot.scan_pose is None:
+            return None
+        return robot.scan, robot.scan_pose.compose(robot.scan.mount)
 
     def scan_age_s(self, robot_id: str, now: Instant) -> float | None:
         """Seconds since the newest sweep arrived."""

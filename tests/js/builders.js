@@ -158,3 +158,21 @@ export function scanFrame(head, points) {
   new Float32Array(bytes, 4 + length).set(points);
   return bytes;
 }
+
+/**
+ * A frame of telemetry as the server writes it.
+ *
+ * @param {{frame: number, parts?: unknown[], moves?: unknown[], scans?: unknown[]}} head
+ * @param {number[]} [units] ranges of all scans, each scan's padded to an even count
+ * @returns {ArrayBuffer}
+ */
+export function telemetryFrame(head, units = []) {
+  const words = new TextEncoder().encode(JSON.stringify(head));
+  const length = Math.ceil(words.length / 4) * 4;
+  const bytes = new ArrayBuffer(4 + length + 2 * units.length);
+  new DataView(bytes).setUint32(0, length, true);
+  new Uint8Array(bytes, 4, length).fill(32);
+  new Uint8Array(bytes, 4, length).set(words);
+  new Uint16Array(bytes, 4 + length).set(units);
+  return bytes;
+}

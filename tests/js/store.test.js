@@ -38,6 +38,46 @@ test("a robot's older state never replaces a newer one", () => {
   equal(store.robots().get("AGI")?.mode, "SLOW");
 });
 
+test("a robot's move and its state are told as the robot, whole", () => {
+  const { store, frame } = storeByHand();
+  store.apply("snapshot", snapshot(), 0);
+  /** @type {any[]} */
+  const told = [];
+  store.subscribe("robots/AGI", (data) => told.push(data));
+  const pose = { x: 9, y: 8, yaw: 1 };
+  store.apply("robots/AGI/move", { robot_id: "AGI", age_s: 0, pose, stamp: "new" }, 10);
+  store.apply("robots/AGI/state", { mode: "SLOW" }, 20);
+  frame();
+  const { pose: at, stamp, mode, link } = told[told.length - 1];
+  equal([at, stamp, mode, link], [pose, "new", "SLOW", "LIVE"]);
+  equal(store.get("robots/AGI"), store.robots().get("AGI"));
+});
+
+test("the ages of a pose and of a state count from when each was true", () => {
+  const { store } = storeByHand();
+  const applied = { reason: "clear", cause: null, age_s: 2, feedback_age_s: 0 };
+  store.apply("snapshot", snapshot({ robots: [robot({ age_s: 0.5, applied })] }), 1000);
+  const known = () => store.robots().get("AGI");
+  const stateAge = () =>
+    ageOf({ ...known()?.applied, receivedAtMs: known()?.receivedAtMs }, 9000);
+  near(ageOf(known(), 9000), 8.5);
+  near(stateAge(), 10);
+  store.apply("robots/AGI/move", { robot_id: "AGI", age_s: 0.1 }, 5000);
+  near(ageOf(known(), 9000), 4.1);
+  near(stateAge(), 10);
+  store.apply("robots/AGI/state", { applied: { ...applied, age_s: 0.2 } }, 6000);
+  near(ageOf(known(), 9000), 4.1);
+  near(stateAge(), 3.2);
+});
+
+test("a move of a robot that nobody knows is left alone", () => {
+  const { store, frame, heard, hear } = storeByHand();
+  hear("robots/");
+  store.apply("robots/AGX/move", { robot_id: "AGX", age_s: 0 });
+  frame();
+  equal([heard, store.robots().size], [[], 0]);
+});
+
 test("ages count from the arrival, in lists too", () => {
   const { store } = storeByHand();
   store.apply("people", [person({ age_s: 0.5 })], 1000);

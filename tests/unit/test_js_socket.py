@@ -13,7 +13,7 @@ from http.server import ThreadingHTTPServer
 from pathlib import Path
 from socket import SHUT_RDWR
 from threading import Event, Thread
-from time import time
+from time import monotonic, time
 from typing import Any
 
 import pytest
@@ -21,8 +21,11 @@ from playwright.sync_api import Browser, Page
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import Server, ServerConnection, serve
+from websockets.typing import Subprotocol
 
+from iveg.web.pacing import SUBPROTOCOL
 from tests.browsers import running_browser
+from tests.processes import until
 from tests.unit.test_js_modules import Files
 
 _ROOT = Path(__file__).parents[2]
@@ -69,7 +72,11 @@ class LiveServer:
     def start(self) -> None:
         """Listens, at the same address as before."""
         self._server: Server = serve(
-            self._talk, "127.0.0.1", self._port, process_request=_answer_health
+            self._talk,
+            "127.0.0.1",
+            self._port,
+            process_request=_answer_health,
+            subprotocols=[Subprotocol(SUBPROTOCOL)],
         )
         self._port = self._server.socket.getsockname()[1]
         self._thread = Thread(target=self._server.serve_forever, name="live")
@@ -83,6 +90,14 @@ class LiveServer:
             with suppress(OSError):
                 connection.socket.shutdown(SHUT_RDWR)
         self._connections.clear()
+
+    def tell(self, at: float, frame: int = 1) -> None:
+        """A frame of telemetry: AGI moves; true at ``at`` (s), by the server's word."""
+        move = ["AGI", at, 0.0, 1.0, 2.0, 0.0, 0.5, 0.0, "2026-11-20T09:00:00.000Z"]
+        head = json.dumps({"frame": frame, "moves": [move]}).encode()
+        head += b" " * (-len(head) % 4)
+        for connection in self._connections:
+            connection.send(len(head).to_bytes(4, "little") + head)
 
     def _talk(self, connection: ServerConnection) -> None:
         self.attempts += 1
@@ -100,13 +115,15 @@ class LiveServer:
             self.heard.append(said)
         elif self.answers:
             now = time() + self.clock_ahead_s
-            _send(connection, "pong", {"t": said["t"], "server": now})
+            pong = {"t": said["t"], "server": now}
+            frame = {"topic": "pong", "data": pong, "at": monotonic()}
+            connection.send(json.dumps(frame))
 
 
 _SNAPSHOT: dict[str, Any] = {
     "t": "2026-11-20T09:00:00.000Z",
     "map": None,
-    "robots": [],
+    "robots": [{"robot_id": "AGI", "age_s": 0.0}],
     "people": [],
     "detections": {},
     "commands": [],
@@ -300,3 +317,44 @@ def test_the_servers_clock_is_known_to_a_few_milliseconds(
     after = time()
 
     assert before - 0.1 <= told - 3600 <= after + 0.1
+
+
+# --- telemetry ----------------------------------------------------------------------
+
+
+def test_a_frame_that_was_painted_is_said_to_be(page: Page, live: LiveServer) -> None:
+    live.tell(monotonic())
+    page.wait_for_function("() => window.store.robots().get('AGI').pose?.x === 1")
+
+    until(lambda: live.heard, 5.0, "the page says what it has painted")
+    assert live.heard == [{"type": "painted", "frame": 1}]
+
+
+def test_a_page_out_of_sight_says_seldom_what_it_has_heard(
+    page: Page, live: LiveServer
+) -> None:
+    page.evaluate("() => { window.requestAnimationFrame = () => 0; }")
+    for frame in range(1, 30):
+        live.tell(monotonic(), frame)
+        page.wait_for_timeout(50)
+
+    assert 1 <= len(live.heard) <= 3
+
+
+def test_what_was_long_on_its_way_is_late_although_the_server_says_it_is_fresh(
+    page: Page, live: LiveServer
+) -> None:
+    page.evaluate(
+        """async () => {
+            const {linkOfRobot} = await import('/iveg/static/js/clock.js');
+            window.links = [];
+            window.store.watch((robot) => window.links.push(linkOfRobot(robot)));
+        }"""
+    )
+    page.wait_for_function("() => window.line.roundTripMs() !== null")
+
+    for age_s in (0.0, 1.5, 4.0):
+        live.tell(monotonic() - age_s)
+    page.wait_for_function("() => window.links.length === 3")
+
+    assert page.evaluate("() => window.links") == ["LIVE", "LATE", "LOST"]

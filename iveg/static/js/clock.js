@@ -72,9 +72,13 @@ export function aboutAge(robot, said, words) {
  * Of the last eight round trips the shortest counts: its answer spent the least time
  * waiting somewhere, so half of it is the best guess of the way back (Cristian 1989).
  *
+ * `at` is the server's monotonic clock (s), which no correction of the date moves:
+ * `localOf(at)` is that moment by `performance.now()` (ms), null before an answer told.
+ *
  * @typedef {{
- *   note: (sentMs: number, receivedMs: number, serverS: number) => void,
+ *   note: (sentMs: number, receivedMs: number, serverS: number, at?: number) => void,
  *   serverNow: (nowMs: number) => number,
+ *   localOf: (at: number) => number | null,
  *   roundTripMs: () => number | null,
  *   reset: () => void,
  * }} ServerClock
@@ -83,21 +87,26 @@ export function aboutAge(robot, said, words) {
  * @returns {ServerClock}
  */
 export function createServerClock(fallbackOriginS = performance.timeOrigin / 1000) {
-  /** @type {{roundTrip: number, origin: number}[]} */
+  /** @type {{roundTrip: number, origin: number, zeroMs: number | null}[]} */
   let samples = [];
   const best = () =>
     samples.reduce((a, b) => (b.roundTrip < a.roundTrip ? b : a), samples[0]);
   return {
-    note(sentMs, receivedMs, serverS) {
+    note(sentMs, receivedMs, serverS, at) {
       const middle = (sentMs + receivedMs) / 2;
       const sample = {
         roundTrip: receivedMs - sentMs,
         origin: serverS - middle / 1000,
+        zeroMs: at === undefined ? null : middle - 1000 * at,
       };
       samples = [...samples.slice(-7), sample];
     },
     serverNow: (nowMs) =>
       (samples.length ? best().origin : fallbackOriginS) + nowMs / 1000,
+    localOf(at) {
+      const zeroMs = samples.length ? best().zeroMs : null;
+      return zeroMs === null ? null : zeroMs + 1000 * at;
+    },
     roundTripMs: () => (samples.length ? samples[samples.length - 1].roundTrip : null),
     reset() {
       samples = [];

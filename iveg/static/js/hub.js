@@ -88,8 +88,11 @@ export function matches(pattern, topic) {
   );
 }
 
-/** @param {() => void} flush */
-export function onNextFrame(flush) {
+/**
+ * @param {() => void} flush
+ * @param {number} [hiddenMs] when at the latest, also where nothing is painted
+ */
+export function onNextFrame(flush, hiddenMs = HIDDEN_FLUSH_MS) {
   let done = false;
   const once = () => {
     if (done) return;
@@ -99,5 +102,5 @@ export function onNextFrame(flush) {
     flush();
   };
   const frame = requestAnimationFrame(once);
-  const timer = setTimeout(once, HIDDEN_FLUSH_MS);
+  const timer = setTimeout(once, hiddenMs);
 }

@@ -140,17 +140,14 @@
  *   log: Entry[], health: Health | null, climate: Climate | null,
  * }} Snapshot
  *
- * @typedef {{topic: string, data: unknown}} Message
+ * @typedef {{topic: string, data: unknown, at?: number}} Message `at`: when it was true,
+ *   on the server's monotonic clock (s)
  */
 
-/** A frame that does not follow the contract; the connection goes on without it. */
-export class ProtocolError extends Error {
-  /** @param {string} fact */
-  constructor(fact) {
-    super(`unreadable frame: ${fact}`);
-    this.name = "ProtocolError";
-  }
-}
+import { readTelemetry } from "./telemetry.js";
+import { ProtocolError, parse, readHead } from "./wire.js";
+
+export { ProtocolError };
 
 /**
  * Reads one frame as the socket hands it over (`binaryType` "arraybuffer").
@@ -161,7 +158,7 @@ export class ProtocolError extends Error {
  */
 export function readFrame(frame) {
   if (typeof frame === "string") return readText(frame);
-  if (frame instanceof ArrayBuffer) return readScan(frame);
+  if (frame instanceof ArrayBuffer) return readBytes(frame);
   throw new ProtocolError("neither text nor bytes");
 }
 
@@ -175,7 +172,17 @@ export function readText(text) {
   if (typeof message?.topic !== "string" || !("data" in message)) {
     throw new ProtocolError("no topic or no data");
   }
-  return { topic: message.topic, data: message.data };
+  return { topic: message.topic, data: message.data, at: message.at };
+}
+
+/**
+ * @param {ArrayBuffer} bytes one scan, or a frame of telemetry
+ * @returns {Message}
+ */
+function readBytes(bytes) {
+  const { head, start } = readHead(bytes);
+  if (typeof head?.frame !== "number") return readScan(bytes);
+  return { topic: "telemetry", data: readTelemetry(head, bytes, start) };
 }
 
 /**
@@ -189,13 +196,8 @@ export function readText(text) {
  * @throws {ProtocolError}
  */
 export function readScan(bytes) {
-  if (bytes.byteLength < 4) throw new ProtocolError("shorter than its length field");
-  const headLength = new DataView(bytes).getUint32(0, true);
-  const start = 4 + headLength;
-  if (start > bytes.byteLength) throw new ProtocolError("head longer than the frame");
-  if (headLength % 4) throw new ProtocolError("head not padded to four bytes");
+  const { head, start } = readHead(bytes);
   if ((bytes.byteLength - start) % 8) throw new ProtocolError("half a point");
-  const head = parse(new TextDecoder().decode(new Uint8Array(bytes, 4, headLength)));
   if (typeof head?.topic !== "string" || typeof head.robot_id !== "string") {
     throw new ProtocolError("scan without topic or robot_id");
   }
@@ -213,6 +215,14 @@ export function writePing(t) {
 }
 
 /**
+ * @param {number} frame the newest that was painted
+ * @returns {string} as the server's counters know it: nothing before `type`, no spaces
+ */
+export function writePainted(frame) {
+  return JSON.stringify({ type: "painted", frame });
+}
+
+/**
  * @param {string | null} robotId null = the whole fleet
  * @param {string} pressId the same for every repetition of one press
  * @param {number} pressedAt Unix time (s), corrected by the server clock's offset
@@ -221,13 +231,4 @@ export function writePing(t) {
 export function writeStop(robotId, pressId, pressedAt) {
   const stop = { type: "stop", robot_id: robotId };
   return JSON.stringify({ ...stop, press_id: pressId, pressed_at: pressedAt });
-}
-
-/** @param {string} text */
-function parse(text) {
-  try {
-    return JSON.parse(text);
-  } catch {
-    throw new ProtocolError("not JSON");
-  }
 }

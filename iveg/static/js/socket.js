@@ -13,13 +13,22 @@
  */
 
 import { createServerClock } from "./clock.js";
-import { ProtocolError, readFrame, writePing, writeStop } from "./protocol.js";
+import { createPace } from "./pace.js";
+import {
+  ProtocolError,
+  readFrame,
+  writePainted,
+  writePing,
+  writeStop,
+} from "./protocol.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./store.js").ConnectionState} ConnectionState */
 /** @typedef {EventTarget & {readonly hidden: boolean}} PageSight what `document` tells */
 /** @typedef {{robotId: string | null, pressId: string, pressedAt: number}} Press */
 
+/** Asks for telemetry as fast as this page paints, and no faster. */
+const SUBPROTOCOL = "iveg.2";
 const PING_EVERY_MS = 1000;
 const SILENCE_IS_LOSS_MS = 2000;
 const WATCH_EVERY_MS = 250;
@@ -71,6 +80,7 @@ export function connect(options) {
   let hiddenAtMs = 0;
   let tries = 0;
   let isFirstPong = true;
+  let pace = createPace(() => {});
   let malformed = 0;
   let ended = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -88,8 +98,11 @@ export function connect(options) {
     drop();
     heardAtMs = performance.now();
     isFirstPong = true;
-    const opened = new WebSocket(url);
+    const opened = new WebSocket(url, [SUBPROTOCOL]);
     opened.binaryType = "arraybuffer";
+    pace = createPace((frame) => {
+      if (opened.readyState === WebSocket.OPEN) opened.send(writePainted(frame));
+    });
     opened.addEventListener("open", ping);
     opened.addEventListener("message", (event) => hear(opened, event.data));
     opened.addEventListener("close", (event) => onClose(opened, event.code));
@@ -112,21 +125,39 @@ export function connect(options) {
   }
 
   /** @param {import("./protocol.js").Message} message */
-  function take({ topic, data }) {
-    if (topic === "pong") return takePong(/** @type {any} */ (data));
+  function take({ topic, data, at }) {
+    if (topic === "pong") return takePong(/** @type {any} */ (data), at);
+    if (topic === "telemetry") return takeTelemetry(/** @type {any} */ (data));
     if (topic === "snapshot") {
       tries = 0;
       become("open");
       presses.each(sendPress);
     }
-    store.apply(topic, data, heardAtMs);
+    store.apply(topic, data, momentOf(at));
   }
 
-  /** @param {{t: number, server: number}} pong */
-  function takePong({ t, server }) {
+  /** @param {import("./telemetry.js").Telemetry} telemetry */
+  function takeTelemetry({ frame, told }) {
+    for (const { topic, at, data } of told) store.apply(topic, data, momentOf(at));
+    pace.took(frame);
+  }
+
+  /**
+   * When what was heard just now was true (ms): the way here makes it older, and a line
+   * that is full shows itself by that.
+   *
+   * @param {number} [at] the server's monotonic clock (s)
+   */
+  function momentOf(at) {
+    const said = at === undefined || isFirstPong ? null : clock.localOf(at);
+    return said === null ? heardAtMs : Math.min(heardAtMs, said);
+  }
+
+  /** @param {{t: number, server: number}} pong @param {number} [at] */
+  function takePong({ t, server }, at) {
     if (isFirstPong) clock.reset();
     isFirstPong = false;
-    clock.note(t, heardAtMs, server);
+    clock.note(t, heardAtMs, server, at);
     presses.confirm(t);
   }
 

@@ -63,8 +63,24 @@ export function createStore(options = {}) {
     const known = robots.get(robot.robot_id);
     if (known && isOlder(robot, known)) return false;
     robots.set(robot.robot_id, robot);
+    values.set(`robots/${robot.robot_id}`, robot);
     slotOf(robot.robot_id);
     return true;
+  }
+
+  /**
+   * Keeps what has changed of a robot, and tells of all of it.
+   *
+   * @param {string} id
+   * @param {(known: Robot) => Robot} change
+   */
+  function changeRobot(id, change) {
+    const known = robots.get(id);
+    if (!known) return;
+    const robot = change(known);
+    robots.set(id, robot);
+    values.set(`robots/${id}`, robot);
+    hub.tell(`robots/${id}`, robot);
   }
 
   /** @param {Entry} entry */
@@ -95,8 +111,8 @@ export function createStore(options = {}) {
     const [head, id, leaf] = topic.split("/");
     if (topic === "log") return keepEntry(data);
     if (head === "commands") keepCommand(topic);
-    if (head === "robots" && leaf === "scan") scans.set(id, data);
-    else if (head === "robots" && !keepRobot(data)) return false;
+    if (head === "robots" && !leaf) return keepRobot(data);
+    if (head === "robots") scans.set(id, data);
     else if (head === "detections") looks.set(id, data);
     values.set(topic, data);
     return true;
@@ -130,14 +146,18 @@ export function createStore(options = {}) {
 
   return {
     /**
-     * Takes one message in.
+     * Takes one message in.  `robots/{id}/move` and `robots/{id}/state` tell a part of a
+     * robot; they are kept and told as `robots/{id}`, whole.
      *
      * @param {string} topic
      * @param {any} data
      * @param {number} [receivedAtMs] `performance.now()` when it arrived
      */
     apply(topic, data, receivedAtMs = now()) {
+      const [, id, leaf] = topic.split("/");
       if (topic === "snapshot") applySnapshot(data, receivedAtMs);
+      else if (leaf === "move") changeRobot(id, moved(data, receivedAtMs));
+      else if (leaf === "state") changeRobot(id, changed(data, receivedAtMs));
       else if (keep(topic, received(data, receivedAtMs))) hub.tell(topic, data);
     },
     /** The newest value of a topic. @param {string} topic @returns {any} */
@@ -217,6 +237,37 @@ function received(data, atMs) {
 function isOlder(robot, known) {
   if (!robot.received_at || !known.received_at) return false;
   return robot.received_at < known.received_at;
+}
+
+/**
+ * A robot that has moved.  Ages within its state count from when that was told, so the
+ * age of the pose, which is younger, is written as of then, too.
+ *
+ * @param {Robot} move `age_s`, `pose`, `twist`, `stamp`
+ * @param {number} atMs
+ * @returns {(known: Robot) => Robot}
+ */
+function moved(move, atMs) {
+  return (known) => {
+    const sinceS = (atMs - (known.receivedAtMs ?? atMs)) / 1000;
+    const age_s = typeof move.age_s === "number" ? move.age_s - sinceS : null;
+    return { ...known, ...move, age_s };
+  };
+}
+
+/**
+ * A robot of which something else has changed; its pose grows older meanwhile.
+ *
+ * @param {Partial<Robot>} changes
+ * @param {number} atMs
+ * @returns {(known: Robot) => Robot}
+ */
+function changed(changes, atMs) {
+  return (known) => {
+    const sinceS = (atMs - (known.receivedAtMs ?? atMs)) / 1000;
+    const age_s = typeof known.age_s === "number" ? known.age_s + sinceS : null;
+    return { ...known, ...changes, age_s, receivedAtMs: atMs };
+  };
 }
 
 /**

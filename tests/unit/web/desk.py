@@ -28,6 +28,7 @@ from iveg.web import (
     security,
 )
 from iveg.web.auth import Door, NotifySecret, Principal, Role
+from iveg.web.bounded import BoundedSocket
 from iveg.web.views import Views
 from tests.fakes.rule_store import FakeRuleStore
 from tests.unit.pipeline.desk import Desk
@@ -137,7 +138,7 @@ class WebDesk(Desk):
             port=0,
             log_config=None,
             lifespan="off",
-            ws="websockets-sansio",
+            ws=BoundedSocket,
             timeout_graceful_shutdown=1,
         )
         server = uvicorn.Server(config)

@@ -23,6 +23,7 @@ from iveg.web import history, problems
 from iveg.web.auth import Principal
 from iveg.web.contexts import Site
 from iveg.web.openapi import describe_api
+from iveg.web.pacing import SUBPROTOCOL
 from iveg.web.pages import Pages, router
 from iveg.web.security import SecurityHeaders
 from tests.browsers import running_browser
@@ -102,7 +103,7 @@ class Server:
 
 
 async def _say_nothing(websocket: WebSocket) -> None:
-    await websocket.accept()
+    await websocket.accept(SUBPROTOCOL)
     try:
         while True:
             await websocket.receive_text()

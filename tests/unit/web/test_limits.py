@@ -9,6 +9,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from iveg.web.limits import (
     MESSAGES_PER_S,
+    PAINTED_PER_S,
     SOCKETS,
     TOO_MANY_SOCKETS,
     Attempts,
@@ -144,6 +145,22 @@ async def test_what_a_page_says_beyond_twenty_a_second_is_not_heard() -> None:
 
     assert at_once == MESSAGES_PER_S
     assert len(bench.server.heard) == MESSAGES_PER_S * 3 // 2
+
+
+async def test_what_was_painted_is_counted_apart_and_bounded_too() -> None:
+    bench = Bench()
+    page = await bench.open()
+    for number in range(PAINTED_PER_S + 50):
+        page.say(f'{{"type":"painted","frame":{number}}}')
+    for number in range(MESSAGES_PER_S + 5):
+        page.say(f'{{"type":"ping","t":{number}}}')
+    while not page.queue.empty():
+        await settle()
+    await bench.close()
+
+    painted = [text for text in bench.server.heard if "painted" in text]
+    assert len(painted) == PAINTED_PER_S
+    assert len(bench.server.heard) - len(painted) == MESSAGES_PER_S
 
 
 async def test_i11_a_stop_is_heard_from_a_page_that_says_too_much() -> None:

@@ -1,0 +1,36 @@
+/**
+ * Tells the server which frame of telemetry has been painted; only then does it send more
+ * than a small window of them.  So a page that paints slowly skips, and never lags.
+ */
+
+import { onNextFrame } from "./hub.js";
+
+/** A page that is not painted says seldom that it has heard (ms). */
+const HIDDEN_MS = 1000;
+
+/**
+ * @param {(frame: number) => void} say
+ * @param {(fn: () => void) => void} [whenPainted] after the map has drawn what has come
+ */
+export function createPace(
+  say,
+  whenPainted = (/** @type {() => void} */ fn) => onNextFrame(fn, HIDDEN_MS),
+) {
+  let newest = 0;
+  let told = 0;
+
+  function tell() {
+    told = newest;
+    say(newest);
+  }
+
+  return {
+    /** Call it when everything that a frame brought was handed on. @param {number} frame */
+    took(frame) {
+      const isAsked = newest > told;
+      newest = frame;
+      // Asked for after the map has asked for its own frame: painting comes first.
+      if (!isAsked) whenPainted(tell);
+    },
+  };
+}

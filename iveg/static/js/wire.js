@@ -1,0 +1,39 @@
+/** How a frame lies in its bytes, before anybody asks what it says. */
+
+/** A frame that does not follow the contract; the connection goes on without it. */
+export class ProtocolError extends Error {
+  /** @param {string} fact */
+  constructor(fact) {
+    super(`unreadable frame: ${fact}`);
+    this.name = "ProtocolError";
+  }
+}
+
+/**
+ * The JSON that a binary frame begins with, and where its body starts.
+ *
+ * Little-endian, as every browser's hardware is: `uint32` length of the head, then the
+ * head, padded to a multiple of four.
+ *
+ * @param {ArrayBuffer} bytes
+ * @returns {{head: any, start: number}}
+ * @throws {ProtocolError}
+ */
+export function readHead(bytes) {
+  if (bytes.byteLength < 4) throw new ProtocolError("shorter than its length field");
+  const length = new DataView(bytes).getUint32(0, true);
+  const start = 4 + length;
+  if (start > bytes.byteLength) throw new ProtocolError("head longer than the frame");
+  if (length % 4) throw new ProtocolError("head not padded to four bytes");
+  const head = parse(new TextDecoder().decode(new Uint8Array(bytes, 4, length)));
+  return { head, start };
+}
+
+/** @param {string} text */
+export function parse(text) {
+  try {
+    return JSON.parse(text);
+  } catch {
+    throw new ProtocolError("not JSON");
+  }
+}

@@ -1,0 +1,159 @@
+"""What one browser is told of telemetry, and when: the newest, at a pace of its own.
+
+Positions go as often as the page paints.  The rest goes as often as eyes need: a scan
+or a detection frame is looked at, not measured, and digits that change more than ten
+times a second cannot be read.
+"""
+
+from typing import Final
+
+from iveg.domain.observations import Instant
+from iveg.pipeline.publish import Subscriber, is_telemetry
+from iveg.web.pacing import BYTES, CreditWindow
+from iveg.web.telemetry import Part, TelemetryEncoder
+
+PICTURE_S: Final = 1 / 15
+"""Between two scans, or detection frames, of one robot."""
+READ_OUT_S: Final = 0.1
+"""Between two states of one robot, or lists of people."""
+
+_NEVER: Final = -1, float("-inf")
+_INF: Final = float("inf")
+
+
+class TelemetryFeed:
+    """Makes the frames of one browser from what has changed for it."""
+
+    def __init__(self, encoder: TelemetryEncoder, subscriber: Subscriber) -> None:
+        self.window = CreditWindow()
+        self._encoder = encoder
+        self._subscriber = subscriber
+        self._waiting: dict[str, None] = {}
+        self._told: dict[str, tuple[int, float]] = {}
+        self._is_full = False
+
+    def painted(self, number: object, now: float) -> None:
+        """The page has painted a frame: there may be credit for another."""
+        if self.window.painted(number, now):
+            self._is_full = False
+            self._subscriber.wake()
+
+    def wait_s(self, now: float) -> float | None:
+        """How long until there may be a frame (s); None: until something changes.
+
+        Meanwhile a change of telemetry wakes nobody unless it could be sent at once.
+        """
+        self._absorb()
+        opens_at = self.window.opens_at
+        self._subscriber.wants_telemetry = opens_at <= now
+        wake_at = opens_at if opens_at > now else self._due_at()
+        return None if wake_at == _INF else max(0.0, wake_at - now)
+
+    def next_frame(self, now: Instant) -> bytes | None:
+        """A frame of the newest of everything that is due; None: not now."""
+        self._absorb()
+        if self.window.opens_at > now.mono:
+            return None
+        frame = _Frame(self.window.room)
+        for topic in sorted(self._waiting, key=_rank):
+            self._add(frame, topic, now)
+        self._is_full = frame.is_full
+        if frame.is_empty:
+            return None
+        told = frame.write(self.window.next_number)
+        self.window.sent(frame.heavy, now.mono)
+        return told
+
+    def _absorb(self) -> None:
+        for topic in self._subscriber.take_topics(is_telemetry):
+            self._waiting[topic] = None
+            if _is_robot(topic):
+                self._waiting[f"{topic}/state"] = None
+
+    def _due_at(self) -> float:
+        """When the first of what waits may go; what has no room waits for credit."""
+        times = (
+            self._told.get(topic, _NEVER)[1] + _period_s(topic)
+            for topic in self._waiting
+            if _is_robot(topic) or not self._is_full
+        )
+        return min(times, default=_INF)
+
+    def _add(self, frame: "_Frame", topic: str, now: Instant) -> None:
+        version, told_at = self._told.get(topic, _NEVER)
+        if told_at + _period_s(topic) > now.mono:
+            return
+        part = self._part(topic, version, now)
+        if part is None or part.version == version:
+            del self._waiting[topic]
+        elif frame.take(topic, part):
+            del self._waiting[topic]
+            self._told[topic] = part.version, now.mono
+
+    def _part(self, topic: str, since: int, now: Instant) -> Part | None:
+        if _is_robot(topic):
+            return self._encoder.move(topic.split("/")[1], now)
+        if topic.endswith("/state"):
+            return self._encoder.state(topic.split("/")[1], since, now)
+        return self._encoder.part(topic, now)
+
+
+class _Frame:
+    """One frame in the making."""
+
+    def __init__(self, room: int) -> None:
+        self._room = room
+        self._moves: list[bytes] = []
+        self._parts: list[bytes] = []
+        self._scans: list[Part] = []
+        self.heavy = 0
+        self.is_full = False
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was worth saying."""
+        return not (self._moves or self._parts or self._scans)
+
+    def take(self, topic: str, part: Part) -> bool:
+        """Take a part in; False where it would be too much on its way at once."""
+        if _is_robot(topic):
+            self._moves.append(part.head)
+            return True
+        # One that is larger than all room goes when nothing heavy is on its way.
+        is_first = self._room == BYTES and self.heavy == 0
+        if self.heavy + part.size > self._room and not is_first:
+            self.is_full = True
+            return False
+        self.heavy += part.size
+        if part.body:
+            self._scans.append(part)
+        else:
+            self._parts.append(part.head)
+        return True
+
+    def write(self, number: int) -> bytes:
+        """``uint32`` length of the JSON, the JSON padded with spaces, the bodies."""
+        head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
+            number,
+            b",".join(self._parts),
+            b",".join(self._moves),
+            b",".join(scan.head for scan in self._scans),
+        )
+        head += b" " * (-len(head) % 4)
+        bodies = (scan.body for scan in self._scans)
+        return b"".join((len(head).to_bytes(4, "little"), head, *bodies))
+
+
+def _is_robot(topic: str) -> bool:
+    return topic.startswith("robots/") and topic.count("/") == 1
+
+
+def _period_s(topic: str) -> float:
+    if _is_robot(topic):
+        return 0.0
+    return PICTURE_S if topic.endswith("/scan") or topic[0] == "d" else READ_OUT_S
+
+
+def _rank(topic: str) -> int:
+    """People and states before pictures, where there is no room for all."""
+    return 1 if topic.endswith("/scan") or topic.startswith("detections/") else 0

@@ -1,0 +1,80 @@
+"""How much telemetry may be on its way to one browser: credit given by painting.
+
+Buffers of the kernel, of the server and of the browser are queues without a size, and
+telemetry that waits in them shows the past.  So the page says which frame it has
+painted, and no more than a window of frames that it has not painted is ever sent: what
+waits beyond it waits in slots, where the newest wins.
+"""
+
+from collections import deque
+from typing import Final, NamedTuple
+
+SUBPROTOCOL: Final = "iveg.2"
+"""A browser asks for paced telemetry by this WebSocket subprotocol."""
+
+FRAMES: Final = 8
+"""Spread over the round trip: 300 ms away a page still gets 26 frames a second, and a
+page next door several between two of its own, so that none of them is old."""
+BYTES: Final = 24_576
+"""Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
+GAP_S: Final = 0.004
+"""Frames nearer to each other would cost more than the freshness that they bring."""
+
+_LEARNS: Final = 0.5
+
+
+class _Sent(NamedTuple):
+    number: int
+    heavy: int
+    at: float
+
+
+class CreditWindow:
+    """The frames that one page has not painted yet; times are monotonic (s)."""
+
+    def __init__(self) -> None:
+        self._sent: deque[_Sent] = deque()
+        self._number = 0
+        self._sent_at = float("-inf")
+        self._round_trip_s = 0.0
+
+    @property
+    def unpainted(self) -> int:
+        """How many frames are on their way."""
+        return len(self._sent)
+
+    @property
+    def next_number(self) -> int:
+        """Of the frame that goes next, from 1."""
+        return self._number + 1
+
+    @property
+    def opens_at(self) -> float:
+        """From when on the next frame may go; ``inf``: not before one is painted."""
+        if len(self._sent) >= FRAMES:
+            return float("inf")
+        return self._sent_at + max(GAP_S, self._round_trip_s / FRAMES)
+
+    @property
+    def room(self) -> int:
+        """How many heavy bytes may go with it."""
+        return BYTES - sum(one.heavy for one in self._sent)
+
+    def sent(self, heavy: int, now: float) -> None:
+        """One more frame is on its way, ``heavy`` bytes of it heavy."""
+        self._number += 1
+        self._sent_at = now
+        self._sent.append(_Sent(self._number, heavy, now))
+
+    def painted(self, number: object, now: float) -> bool:
+        """The page has painted this frame and all before; whether that was news."""
+        if type(number) is not int or number > self._number:
+            return False
+        if not self._sent or number < self._sent[0].number:
+            return False
+        # The oldest of them tells how long credit is away.
+        away_s = now - self._sent[0].at
+        self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
+        while self._sent and self._sent[0].number <= number:
+            self._sent.popleft()
+        return True

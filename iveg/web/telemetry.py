@@ -1,0 +1,167 @@
+"""Telemetry in the parts that frames are made of, each version encoded once for all.
+
+A part is JSON, and for a scan the integers that it counts; docs/interfaces.md, section
+8, has their shapes.  Browsers differ in when they take a part, never in its bytes: it
+says itself when it was true (``at``, the server's monotonic clock).
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import orjson
+
+from iveg.domain.observations import Instant, LaserScan
+from iveg.pipeline.publish import Hub
+from iveg.web.views import Views
+
+UNIT_M: Final = 0.005
+"""A range is told in these: finer than a map shows, and 327 m fit in 16 bits."""
+NO_RETURN: Final = 0xFFFF
+
+_MOVES: Final = frozenset({"pose", "twist", "stamp", "age_s"})
+"""What of a robot goes by itself, with each measure."""
+
+
+class Part(NamedTuple):
+    """One topic's share of a frame.
+
+    Attributes:
+        version: Of the topic when it was encoded; who has it needs no other.
+        head: JSON.
+        body: What follows the JSON of the frame; a multiple of four bytes.
+    """
+
+    version: int
+    head: bytes
+    body: bytes = b""
+
+    @property
+    def size(self) -> int:
+        """In bytes."""
+        return len(self.head) + len(self.body)
+
+
+class TelemetryEncoder:
+    """Encodes what browsers ask for, when the first of them does."""
+
+    def __init__(self, views: Views, hub: Hub) -> None:
+        self._views = views
+        self._hub = hub
+        self._parts: dict[str, Part] = {}
+        self._states: dict[str, _RobotState] = {}
+        self._moved: dict[str, object] = {}
+
+    def move(self, robot_id: str, now: Instant) -> Part | None:
+        """Where a robot is and how it moves; None before its first odometry."""
+        odometry, age_s = self._views.motion(robot_id, now)
+        if odometry is None:
+            return None
+        topic = f"robots/{robot_id}"
+        if self._moved.get(robot_id) is not odometry:
+            self._moved[robot_id] = odometry
+            pose, twist = odometry.pose, odometry.twist
+            place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
+            speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
+            age = None if age_s is None else round(age_s, 3)
+            told = [robot_id, now.mono, age, *place, *speed, odometry.origin.stamp]
+            head = orjson.dumps(told)
+            self._parts[topic] = Part(self._hub.versions[topic], head)
+        return self._parts[topic]
+
+    def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
+        """What else of a robot has changed since a version; None: nothing."""
+        topic = f"robots/{robot_id}"
+        state = self._states.setdefault(robot_id, _RobotState())
+        if state.version != self._hub.versions[topic]:
+            told = self._views.robot(robot_id, now)
+            state.update(told, self._hub.versions[topic], now.mono)
+        return state.changes(topic, since)
+
+    def part(self, topic: str, now: Instant) -> Part | None:
+        """A scan, one detection frame or all people; None: nothing is known."""
+        version = self._hub.versions[topic]
+        kept = self._parts.get(topic)
+        if kept is not None and kept.version == version:
+            return kept
+        part = self._encode(topic, version, now)
+        if part is not None:
+            self._parts[topic] = part
+        return part
+
+    def _encode(self, topic: str, version: int, now: Instant) -> Part | None:
+        if topic.endswith("/scan"):
+            return self._scan(topic, version, now)
+        kind, _, robot_id = topic.partition("/")
+        data: Any = None
+        if kind == "people":
+            data = self._views.people(now)
+        elif kind == "detections":
+            data = self._views.frame(robot_id, now)
+        if data is None:
+            return None
+        told = {"topic": topic, "at": now.mono, "data": data}
+        return Part(version, orjson.dumps(told))
+
+    def _scan(self, topic: str, version: int, now: Instant) -> Part | None:
+        robot_id = topic.split("/")[1]
+        swept = self._views.sweep(robot_id)
+        if swept is None:
+            return None
+        scan, sensor = swept
+        told = {
+            "topic": topic,
+            "at": now.mono,
+            "robot_id": robot_id,
+            "stamp": scan.origin.stamp,
+            "age_s": self._views.scan_age_s(robot_id, now),
+            "x": round(sensor.x, 3),
+            "y": round(sensor.y, 3),
+            "yaw": round(sensor.yaw, 5),
+            "angle_min": scan.angle_min,
+            "angle_increment": scan.angle_increment,
+            "unit_m": UNIT_M,
+            "count": scan.ranges.size,
+        }
+        return Part(version, orjson.dumps(told), write_ranges(scan))
+
+
+class _RobotState:
+    """A robot's members, each encoded when it differs from what it was."""
+
+    def __init__(self) -> None:
+        self.version = -1
+        self._at = 0.0
+        self._values: dict[str, Any] = {}
+        self._members: dict[str, tuple[int, bytes]] = {}
+
+    def update(self, told: Mapping[str, Any], version: int, at: float) -> None:
+        """Compare with what was told before."""
+        self.version, self._at = version, at
+        for name, value in told.items():
+            if name in _MOVES or self._values.get(name, self) == value:
+                continue
+            self._values[name] = value
+            member = b'"%b":%b' % (name.encode(), orjson.dumps(value))
+            self._members[name] = version, member
+
+    def changes(self, topic: str, since: int) -> Part | None:
+        """The members that are newer than a version."""
+        newer = [text for version, text in self._members.values() if version > since]
+        if not newer:
+            return None
+        head = b'{"topic":%b,"at":%b,"data":{%b}}' % (
+            orjson.dumps(topic),
+            orjson.dumps(self._at),
+            b",".join(newer),
+        )
+        return Part(self.version, head)
+
+
+def write_ranges(scan: LaserScan) -> bytes:
+    """Ranges as ``uint16`` in ``UNIT_M``, little-endian, padded to four bytes."""
+    ranges = scan.ranges
+    units = np.full(ranges.size + ranges.size % 2, NO_RETURN, "<u2")
+    counts = scan.returns() & (ranges < UNIT_M * NO_RETURN)
+    units[: ranges.size][counts] = np.rint(ranges[counts] / UNIT_M)
+    return units.tobytes()
