@@ -46,6 +46,14 @@ class Subscriber:
         if self.wants_telemetry or not is_telemetry(topic):
             self.wake()
 
+    def append(self, topic: str, item: Any) -> None:
+        """An event that this browser may not miss."""
+        if len(self.pending) >= MAX_PENDING:
+            self.overflowed = True
+        else:
+            self.pending.append((topic, item))
+        self.wake()
+
     async def news(self, within_s: float | None = None) -> None:
         """Wait until there may be something to take, or that long (s)."""
         with contextlib.suppress(TimeoutError):
@@ -103,8 +111,4 @@ class Hub:
     def append(self, topic: str, item: Any) -> None:
         """An event that nobody may miss."""
         for subscriber in self._subscribers:
-            if len(subscriber.pending) >= MAX_PENDING:
-                subscriber.overflowed = True
-            else:
-                subscriber.pending.append((topic, item))
-            subscriber.wake()
+            subscriber.append(topic, item)

@@ -162,7 +162,7 @@ def router(
                 watcher = tasks.create_task(
                     _watch_session(websocket, principal), name="live-session"
                 )
-                ear = Ear(websocket, clock, stop, principal, feed)
+                ear = Ear(websocket, subscriber, clock, stop, principal, feed)
                 tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
         except* (WebSocketDisconnect, ConnectionError, RuntimeError) as gone:
             _log.debug("browser gone: %s", gone)
@@ -253,17 +253,23 @@ def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bo
 
 
 class Ear:
-    """What one browser says: pings, presses, and what it has painted."""
+    """What one browser says: pings, presses, and what it has painted.
+
+    Answers go out with all else, so that a press is read at once also where the way
+    back is full.
+    """
 
     def __init__(
         self,
         websocket: WebSocket,
+        subscriber: Subscriber,
         clock: Callable[[], Instant],
         stop: Stop,
         principal: Principal,
         feed: TelemetryFeed | None,
     ) -> None:
         self._websocket = websocket
+        self._subscriber = subscriber
         self._clock = clock
         self._stop = stop
         self._principal = principal
@@ -284,7 +290,7 @@ class Ear:
         try:
             message = load_json(raw[:_MAX_MESSAGE])
         except UnreadableError as error:
-            await self._say("problem", {"reason": error.reason})
+            self._subscriber.append("problem", {"reason": error.reason})
             return
         if not isinstance(message, dict):
             return
@@ -294,7 +300,7 @@ class Ear:
                     self._feed.painted(message.get("frame"), self._clock().mono)
             case "ping":
                 t, server = message.get("t"), self._clock().wall
-                await self._say("pong", {"t": t, "server": server})
+                self._subscriber.append("pong", {"t": t, "server": server})
             case "stop":
                 await self._press(message)
 
@@ -305,8 +311,4 @@ class Ear:
             try:
                 await self._stop(robot_id, self._principal.name, read_press(message))
             except UnknownRobotError as error:
-                await self._say("problem", {"reason": str(error)})
-
-    async def _say(self, topic: str, data: Any) -> None:
-        frame = text(topic, data, self._clock())
-        await self._websocket.send_text(frame.decode())
+                self._subscriber.append("problem", {"reason": str(error)})

@@ -28,12 +28,14 @@ class Weather:
         lost: Share of the pieces that have to be sent again; nothing is read behind
             one meanwhile.
         reset: Chance of a connection, every two seconds, to be reset.
+        bytes_per_s: What the line carries each way; what is more waits, without end.
     """
 
     late_s: float = 0.0
     jitter_s: float = 0.0
     lost: float = 0.0
     reset: float = 0.0
+    bytes_per_s: float = float("inf")
 
     def delay(self, rnd: Random) -> float:
         """How long this piece takes when it is not lost (s)."""
@@ -134,12 +136,13 @@ class Radio:
         """Every piece at its time, none before the one that came before it."""
         pieces: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue(1000)
         passing = asyncio.create_task(self._pass_on(pieces, sink))
-        last = 0.0
+        last, free = 0.0, 0.0
         try:
             while piece := await source.read(_CHUNK):
                 await asyncio.sleep(self.weather.repeat(self._rnd))
-                due = self._loop.time() + self.weather.delay(self._rnd)
-                last = max(last, due)
+                free = max(free, self._loop.time())
+                free += len(piece) / self.weather.bytes_per_s
+                last = max(last, free + self.weather.delay(self._rnd))
                 await pieces.put((last, piece))
         except OSError:
             return

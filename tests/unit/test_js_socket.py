@@ -326,7 +326,7 @@ def test_a_frame_that_was_painted_is_said_to_be(page: Page, live: LiveServer) ->
     live.tell(monotonic())
     page.wait_for_function("() => window.store.robots().get('AGI').pose?.x === 1")
 
-    until(lambda: live.heard, 5.0, "the page says what it has painted")
+    until(lambda: live.heard != [], 5.0, "the page says what it has painted")
     assert live.heard == [{"type": "painted", "frame": 1}]
 
 

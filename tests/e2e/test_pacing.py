@@ -1,0 +1,114 @@
+"""Twenty robots before two pages that cannot keep up: facts of order, not times.
+
+One page has a processor six times slower; the other sits behind a line of 1 Mbit/s and
+300 ms, whose queue has no end.  Either skips; neither looks into the past.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page
+
+from iveg.web.pacing import FRAMES
+from tests.chaos.radio import Radio, Weather
+from tests.e2e.reading import evaluate
+from tests.fleet import names
+from tests.processes import ROOT, Site, site
+
+pytestmark = pytest.mark.e2e
+
+ROBOTS = names(20)
+SECONDS = 8.0
+FAR = Weather(late_s=0.15, bytes_per_s=125_000)
+
+WATCH = """() => {
+  const seen = {most: 0, painted: 0, frames: 0, older: [], last: {}, count: {}};
+  const Native = WebSocket;
+  window.seen = seen;
+  window.WebSocket = class extends Native {
+    constructor(...words) {
+      super(...words);
+      seen.painted = 0;
+      this.addEventListener('message', ({data}) => {
+        if (!(data instanceof ArrayBuffer)) return;
+        const size = new DataView(data).getUint32(0, true);
+        const head = new TextDecoder().decode(new Uint8Array(data, 4, size));
+        seen.frames = JSON.parse(head).frame;
+        seen.most = Math.max(seen.most, seen.frames - seen.painted);
+      });
+    }
+    send(words) {
+      const said = JSON.parse(words);
+      if (said.type === 'painted') seen.painted = said.frame;
+      super.send(words);
+    }
+  };
+  window.__onPaint = ({robot, kind, stamp}) => {
+    const key = `${robot} ${kind}`;
+    if (seen.last[key] > stamp) seen.older.push([key, seen.last[key], stamp]);
+    seen.last[key] = stamp;
+    seen.count[key] = (seen.count[key] ?? 0) + 1;
+  };
+}"""
+
+ALL_PAINTED = """robots => {
+  const painted = Object.entries(window.seen.count);
+  return painted.filter(([key, n]) => key.endsWith('odom') && n > 2).length === robots;
+}"""
+
+
+@pytest.fixture(scope="module")
+def crowd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A server for twenty robots in an open field, all of them talking."""
+    settings = {"IVEG_ROBOTS": ",".join(ROBOTS), "IVEG_GREENHOUSE": "none"}
+    with site(tmp_path_factory.mktemp("crowd"), **settings) as place:
+        place.start("fiware").wait_until_ready()
+        place.start("serve")
+        place.wait_until_served()
+        port = urlsplit(place.settings["IVEG_MQTT_URL"]).port
+        words = ["--port", str(port), "--robots", "20", "--hz", "5", "--beams", "360"]
+        fleet = subprocess.Popen(
+            [sys.executable, "-m", "tests.fleet", *words], cwd=ROOT
+        )
+        yield place
+        fleet.terminate()
+        fleet.wait(10)
+
+
+def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
+    browser: Browser, crowd: Site
+) -> None:
+    with Radio(int(crowd.settings["IVEG_PORT"])) as line:
+        line.weather = FAR
+        pages = [
+            _open(browser, crowd.sign_in_link, slower=6),
+            _open(browser, crowd.sign_in_link.replace(crowd.url, _at(line.port))),
+        ]
+        pages[0].wait_for_timeout(1000 * SECONDS)
+        for page in pages:
+            page.wait_for_function(ALL_PAINTED, arg=len(ROBOTS), timeout=60_000)
+        seen = [evaluate(page, "() => window.seen") for page in pages]
+        for page in pages:
+            page.context.close()
+
+    for told in seen:
+        assert told["older"] == []
+        assert 0 < told["most"] <= FRAMES
+        assert told["frames"] > FRAMES
+
+
+def _open(browser: Browser, link: str, slower: float = 1) -> Page:
+    context: BrowserContext = browser.new_context()
+    context.add_init_script(f"({WATCH})()")
+    page = context.new_page()
+    page.goto(link)
+    tools = context.new_cdp_session(page)
+    tools.send("Emulation.setCPUThrottlingRate", {"rate": slower})
+    return page
+
+
+def _at(port: int) -> str:
+    return f"http://127.0.0.1:{port}"
