@@ -6,13 +6,13 @@ import { detection, person, robot, STAMP, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
 /** A map of 600 × 400 px on the page, its store, and what it said it painted. */
-function mapOnPage() {
+function mapOnPage(options = {}) {
   const canvas = document.createElement("canvas");
   canvas.style.width = "600px";
   canvas.style.height = "400px";
   document.body.replaceChildren(canvas);
   const store = createStore();
-  const map = createMap(canvas, store, { storage: null });
+  const map = createMap(canvas, store, { storage: null, ...options });
   /** @type {{robot: string, kind: string, stamp: string}[]} */
   const painted = [];
   /** @type {any} */ (globalThis).__onPaint = (/** @type {any} */ it) =>
@@ -65,6 +65,56 @@ test("a message is painted in the next frame and told with its own stamp", async
     { robot: "AGI", kind: "lidar", stamp: "s2" },
     { robot: "AGI", kind: "detection", stamp: "s3" },
   ]);
+  map.destroy();
+});
+
+/** @param {string} robot_id @param {string} stamp @param {number} count of points */
+function sweepOf(robot_id, stamp, count) {
+  const points = Float32Array.from({ length: 2 * count }, (_, i) => i % 10);
+  return { robot_id, stamp, age_s: 0, points };
+}
+
+test("scans of a fleet are drawn together, and told when they are", async () => {
+  let nowMs = 1000;
+  const { store, map, painted } = mapOnPage({ now: () => nowMs });
+  store.apply("snapshot", snapshot());
+  store.apply("robots/AGI/scan", sweepOf("AGI", "s1", 5000));
+  await settled();
+  painted.length = 0;
+  store.apply("robots/AGI/scan", sweepOf("AGI", "s2", 5000));
+  store.apply("robots/AGI", robot({ stamp: "o2" }));
+  await frame();
+  store.apply("robots/AGI/scan", sweepOf("AGI", "s3", 5000));
+  await frame();
+  equal(painted, [{ robot: "AGI", kind: "odom", stamp: "o2" }]);
+  nowMs += 66;
+  await new Promise((done) => setTimeout(done, 150));
+  equal(painted[1], { robot: "AGI", kind: "lidar", stamp: "s3" });
+  equal(painted.length, 2);
+  map.destroy();
+});
+
+test("what lies under a robot is not drawn again because it moves", async () => {
+  const { store, map } = mapOnPage();
+  store.apply("snapshot", snapshot());
+  store.apply("robots/AGI/scan", sweepOf("AGI", "s1", 100));
+  await settled();
+  const real = CanvasRenderingContext2D.prototype.fillRect;
+  let rectangles = 0;
+  CanvasRenderingContext2D.prototype.fillRect = function (...place) {
+    rectangles += 1;
+    return real.apply(this, place);
+  };
+  try {
+    for (const step of [1, 2, 3, 4, 5]) {
+      const pose = { x: 1 + 0.01 * step, y: 2, yaw: 0 };
+      store.apply("robots/AGI", robot({ stamp: `o${step}`, pose }));
+      await frame();
+    }
+  } finally {
+    CanvasRenderingContext2D.prototype.fillRect = real;
+  }
+  equal(rectangles < 300, true);
   map.destroy();
 });
 

@@ -103,6 +103,24 @@ test("a state is told once a frame, with its newest value", () => {
   equal(told, [3]);
 });
 
+test("telemetry is told as often as it can be read, other state in the next frame", async () => {
+  const store = createStore();
+  /** @type {string[]} */
+  const told = [];
+  for (const topic of ["robots/AGI", "alerts"]) {
+    store.subscribe(topic, (_, name) => void told.push(name));
+  }
+  const until = performance.now() + 350;
+  while (performance.now() < until) {
+    store.apply("robots/AGI", robot());
+    store.apply("alerts", []);
+    await new Promise((done) => requestAnimationFrame(done));
+  }
+  const readings = told.filter((topic) => topic === "robots/AGI").length;
+  equal([readings >= 1, readings <= 4], [true, true]);
+  equal(told.length - readings > readings, true);
+});
+
 test("log entries and command events are told one by one, at once", () => {
   const { store, heard, hear } = storeByHand();
   hear("log");

@@ -1,22 +1,28 @@
 /**
- * Who listens to what: state is told once per frame and topic, facts at once.
+ * Who listens to what: facts are told at once, state once per frame and topic, telemetry
+ * as often as it can be read.
  *
  * @typedef {(data: any, topic: string) => void} Listener
  */
 
+/** Digits that change more often than this cannot be read (ms). */
+const READING_MS = 100;
 /** A hidden page gets no animation frames; alarms must be heard there all the same. */
 const HIDDEN_FLUSH_MS = 250;
 
 /**
  * @param {(flush: () => void) => void} schedule
+ * @param {(flush: () => void) => void} [scheduleReadings]
  */
-export function createHub(schedule) {
+export function createHub(schedule, scheduleReadings = schedule) {
   /** @type {Set<{pattern: string, fn: Listener}>} */
   const listeners = new Set();
   /** @type {Set<Listener>} */
   const watchers = new Set();
   /** @type {Map<string, any>} */
   let waiting = new Map();
+  /** @type {Map<string, any>} */
+  let readings = new Map();
 
   /** @param {string} topic @param {any} data */
   function deliver(topic, data) {
@@ -28,6 +34,12 @@ export function createHub(schedule) {
   function flush() {
     const told = waiting;
     waiting = new Map();
+    for (const [topic, data] of told) deliver(topic, data);
+  }
+
+  function flushReadings() {
+    const told = readings;
+    readings = new Map();
     for (const [topic, data] of told) deliver(topic, data);
   }
 
@@ -48,6 +60,11 @@ export function createHub(schedule) {
       for (const fn of watchers) guarded(fn, data, topic);
       if (topic === "log" || topic.startsWith("commands/")) {
         deliver(topic, data);
+        return;
+      }
+      if (isReading(topic)) {
+        if (!readings.size) scheduleReadings(flushReadings);
+        readings.set(topic, data);
         return;
       }
       if (!waiting.size) schedule(flush);
@@ -86,6 +103,25 @@ export function matches(pattern, topic) {
     wanted.length === found.length &&
     wanted.every((word, i) => word === "+" || word === found[i])
   );
+}
+
+/** @param {string} topic */
+function isReading(topic) {
+  return /^(robots|detections)\/|^people$/.test(topic);
+}
+
+/** The next frame that is not too soon after the last of these. */
+export function readingFrames() {
+  let lastMs = Number.NEGATIVE_INFINITY;
+  return (/** @type {() => void} */ flush) => {
+    const told = () => {
+      lastMs = performance.now();
+      flush();
+    };
+    const waitMs = lastMs + READING_MS - performance.now();
+    if (waitMs > 0) setTimeout(onNextFrame, waitMs, told);
+    else onNextFrame(told);
+  };
 }
 
 /**

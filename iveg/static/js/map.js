@@ -60,6 +60,8 @@ export function createMap(canvas, store, options = {}) {
   let tape = { points: [] };
   let isMeasuring = false;
   let frame = 0;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let later;
   const camera = redrawing(
     createCamera(() => scene, options.onFollow, covers),
     invalidate,
@@ -75,8 +77,11 @@ export function createMap(canvas, store, options = {}) {
     camera.settle();
     const view = camera.view();
     if (!view.width || !view.height) return;
-    picture.draw({ view, theme, scene, words, followed: camera.followed(), tape });
-    hook.painted();
+    const followed = camera.followed();
+    const missingMs = picture.draw({ view, theme, scene, words, followed, tape });
+    hook.painted(missingMs === 0);
+    clearTimeout(later);
+    if (missingMs) later = setTimeout(invalidate, missingMs);
   }
 
   /** @param {import("./scene.js").Scene} whole */
@@ -142,6 +147,7 @@ export function createMap(canvas, store, options = {}) {
     onResize([canvas], resize),
     covers.end,
     () => cancelAnimationFrame(frame),
+    () => clearTimeout(later),
   ];
   invalidate();
 

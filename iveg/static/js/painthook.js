@@ -23,13 +23,15 @@ export function createPaintHook() {
       if (told.get(name) === data.stamp) return;
       arrived.set(name, { robot: data.robot_id, kind, stamp: data.stamp });
     },
-    painted() {
+    /** @param {boolean} hasScans whether the newest scans are in the picture, too */
+    painted(hasScans) {
       const listener = /** @type {any} */ (globalThis).__onPaint;
       for (const [name, painted] of arrived) {
+        if (!hasScans && painted.kind === "lidar") continue;
+        arrived.delete(name);
         told.set(name, painted.stamp);
         listener?.(painted);
       }
-      arrived.clear();
     },
   };
 }

@@ -1,7 +1,8 @@
 /**
  * The layers put on one canvas, from the ground up.
  *
- * What does not move is drawn once per viewport and theme and copied after that.
+ * What does not move is drawn once per viewport and theme, what lies under the machines
+ * when it changes; both are copied in between.
  *
  * @typedef {import("./layers/paint.js").Paint} Paint
  * @typedef {import("./layers/trail.js").Trails} Trails
@@ -11,6 +12,7 @@ import { createCostmapLayer } from "./layers/costmap.js";
 import * as detections from "./layers/detections.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
+import { createGround } from "./layers/ground.js";
 import * as intent from "./layers/intent.js";
 import * as links from "./layers/links.js";
 import * as measure from "./layers/measure.js";
@@ -22,7 +24,7 @@ import { createStaticImage } from "./layers/static.js";
 import * as trail from "./layers/trail.js";
 import { drawVeil } from "./layers/veil.js";
 
-/** From the ground up: the first two do not move, and nothing ever hides a person. */
+/** From the ground up: nothing ever hides a person. */
 export const LAYERS = [
   "grid",
   "greenhouse",
@@ -36,6 +38,10 @@ export const LAYERS = [
   "people",
   "scalebar",
 ];
+
+/** Under the machines; the two below them never move. */
+const GROUND = ["costmap", "trail", "scan"];
+const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
 
 /** More than any layer nests its drawing states. */
 const DEEPEST_SAVE = 8;
@@ -55,7 +61,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
     ["greenhouse", greenhouse.draw],
   ]);
   /** @type {Record<string, (paint: Paint) => void>} */
-  const moving = {
+  const layers = {
     measure: (paint) => measure.draw(paint, paint.tape),
     costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, trailSeconds()),
@@ -67,6 +73,11 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
     people: people.draw,
     scalebar: scalebar.draw,
   };
+  const ground = createGround(
+    still,
+    GROUND.map((name) => [name, (paint) => drawLayer(name, paint)]),
+    () => [trails.changes(), trailSeconds(), ...LAYERS.map(isOn)],
+  );
   /** @type {Set<string>} */
   const broken = new Set();
 
@@ -78,26 +89,32 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
    */
   function drawLayer(layer, paint) {
     try {
-      moving[layer]?.(paint);
+      layers[layer]?.(paint);
       broken.delete(layer);
     } catch (error) {
       if (!broken.has(layer)) reportError(error);
       broken.add(layer);
-      recover(ctx);
+      recover(paint.ctx);
     }
   }
 
   return {
-    /** @param {Omit<Paint, "ctx">} what */
+    /**
+     * @param {Omit<Paint, "ctx">} what
+     * @returns {number} when the scans that are not in it may be drawn (ms from now); 0:
+     *   all are
+     */
     draw(what) {
       const paint = { ...what, ctx };
       matchPixels(canvas, paint.view);
+      const missingMs = ground.update(paint, devicePixelRatio, isOn);
       ctx.setTransform(1, 0, 0, 1, 0, 0);
-      ctx.drawImage(still.image(paint, devicePixelRatio, isOn), 0, 0);
+      ctx.drawImage(ground.canvas, 0, 0);
       ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
-      for (const layer of LAYERS) if (isOn(layer)) drawLayer(layer, paint);
+      for (const layer of OVER_GROUND) if (isOn(layer)) drawLayer(layer, paint);
       if (paint.tape.points.length) drawLayer("measure", paint);
       if (paint.scene.isVeiled) drawVeil(paint);
+      return missingMs;
     },
   };
 }

@@ -30,6 +30,7 @@ const CRUMBS_MAX = 2000;
 export function createTrails() {
   /** @type {Map<string, Crumb[]>} */
   const trails = new Map();
+  let changes = 0;
   return {
     /**
      * @param {string} robotId
@@ -42,6 +43,7 @@ export function createTrails() {
       const last = trail[trail.length - 1];
       if (last && distance(last, pose) < STEP_M) return;
       trail.push({ x: pose.x, y: pose.y, atMs });
+      changes += 1;
       if (trail.length % 64 === 0) trails.set(robotId, thinned(trail, atMs));
     },
     /** @param {string} robotId @returns {readonly Crumb[]} oldest first */
@@ -50,7 +52,12 @@ export function createTrails() {
     keepOnly(robots) {
       for (const id of trails.keys()) if (!robots.has(id)) trails.delete(id);
     },
-    clear: () => trails.clear(),
+    clear() {
+      trails.clear();
+      changes += 1;
+    },
+    /** How often a trail has become another. */
+    changes: () => changes,
   };
 }
 

@@ -15,6 +15,8 @@ import { createRelease } from "./release.js";
 /** @typedef {import("../protocol.js").Robot} Robot */
 
 const TICK_MS = 200;
+/** Cards that nobody sees are drawn at every so many ticks: a second. */
+const UNSEEN_TICKS = 5;
 const DEFAULT_MAX = 1;
 /** What SLOW means, also of a robot that has not said yet how fast it may be. */
 const HALF_SPEED = 0.5;
@@ -26,12 +28,16 @@ export function createRobotsPanel(app) {
   const place = need("#robots");
   /** @type {Map<string, ReturnType<typeof createCard>>} */
   const cards = new Map();
+  const sight = createSight();
+  let ticks = 0;
 
   /** @param {string} robotId */
   function cardOf(robotId) {
     const known = cards.get(robotId);
     if (known) return known;
-    const card = createCard(app, findElement(robotId) ?? cloneElement(robotId));
+    const element = findElement(robotId) ?? cloneElement(robotId);
+    const card = createCard(app, element);
+    sight.watch(robotId, element);
     cards.set(robotId, card);
     app.stops.place();
     return card;
@@ -63,12 +69,46 @@ export function createRobotsPanel(app) {
     for (const [robotId, card] of cards) card.draw(store.robots().get(robotId));
   }
 
+  function tick() {
+    ticks += 1;
+    if (ticks % UNSEEN_TICKS === 0) return drawAll();
+    for (const robot of store.robots().values()) drawSeen(robot);
+  }
+
+  /** @param {Robot} robot */
+  function drawSeen(robot) {
+    const card = cardOf(robot.robot_id);
+    if (sight.isSeen(robot.robot_id)) card.draw(robot);
+  }
+
   for (const card of all(".card", place)) cardOf(String(card.dataset.robot));
-  store.subscribe("robots/", (robot) => cardOf(robot.robot_id).draw(robot));
+  store.subscribe("robots/", drawSeen);
   store.subscribe("snapshot", drawAll);
   words.onChange(drawAll);
-  setInterval(drawAll, TICK_MS);
+  setInterval(tick, TICK_MS);
   drawAll();
+}
+
+/** Which cards are within the screen, or may be: a fleet has more than fit. */
+function createSight() {
+  /** @type {Set<string>} */
+  const unseen = new Set();
+  const observer = new IntersectionObserver((changes) => {
+    for (const { target, isIntersecting } of changes) {
+      const robotId = String(/** @type {HTMLElement} */ (target).dataset.robot);
+      if (isIntersecting) unseen.delete(robotId);
+      else unseen.add(robotId);
+    }
+  });
+  return {
+    /** @param {string} robotId @param {HTMLElement} card its `data-robot` is the id */
+    watch(robotId, card) {
+      unseen.delete(robotId);
+      observer.observe(card);
+    },
+    /** @param {string} robotId */
+    isSeen: (robotId) => !unseen.has(robotId),
+  };
 }
 
 /**
@@ -77,6 +117,8 @@ export function createRobotsPanel(app) {
  */
 function createCard(app, card) {
   const { store, words, dialogs } = app;
+  /** @type {Map<string, HTMLElement>} */
+  const parts = new Map();
   const robotId = String(card.dataset.robot);
   const gauge = createGauge();
   needPart("gauge", card).append(gauge.svg);
@@ -98,6 +140,13 @@ function createCard(app, card) {
   );
   const ages = all("[data-age]", card);
 
+  /** @param {string} name */
+  function partOf(name) {
+    const part = parts.get(name) ?? needPart(name, card);
+    parts.set(name, part);
+    return part;
+  }
+
   /** @param {Robot | undefined} robot */
   function draw(robot) {
     const ageS = ageOf(robot);
@@ -106,14 +155,14 @@ function createCard(app, card) {
     setAttribute(card, "data-mode", robot?.mode ?? "UNKNOWN");
     setAttribute(menu, "aria-label", words.t("release.open", { robot: robotId }));
     setText(fields.link, words.t(`robot.link.${link}`));
-    const shape = needPart("shape", card);
+    const shape = partOf("shape");
     setAttribute(shape, "data-slot", String(store.slotOf(robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
-    setHidden(needPart("replay", card), !robot?.replay);
+    setHidden(partOf("replay"), !robot?.replay);
     drawMode(robot);
     drawReadouts(robot, ageS);
     drawGauge(robot);
-    setText(needPart("certainty", card), certaintyOf(robotId));
+    setText(partOf("certainty"), certaintyOf(robotId));
     drawMargin(robot?.margin ?? null);
     drawTask(robot);
     release.draw(robot);
@@ -123,7 +172,7 @@ function createCard(app, card) {
   /** @param {Robot | undefined} robot */
   function drawMode(robot) {
     setText(fields.mode, modeSaid(robot, words));
-    setText(needPart("why", card), robot ? whyOf(robot) : "");
+    setText(partOf("why"), robot ? whyOf(robot) : "");
   }
 
   /** @param {Robot} robot */
@@ -206,8 +255,8 @@ function createCard(app, card) {
 
   /** The least margin to a person, and what it is made of. @param {Margin | null} margin */
   function drawMargin(margin) {
-    const line = needPart("margin-line", card);
-    const parts = needPart("margin-parts", card);
+    const line = partOf("margin-line");
+    const parts = partOf("margin-parts");
     setHidden(line, margin === null);
     setHidden(parts, margin === null);
     if (!margin) return;
@@ -215,16 +264,16 @@ function createCard(app, card) {
     const key = margin.band === "unknown" ? "margin_unknown" : "margin_value";
     const slots = { ...margin, ...margin.parts };
     const band = words.t(`robot.margin_band.${margin.band}`);
-    setText(needPart("margin", card), words.t(`robot.${key}`, { ...slots, band }));
+    setText(partOf("margin"), words.t(`robot.${key}`, { ...slots, band }));
     setText(parts, words.t("robot.margin_parts", slots));
   }
 
   /** @param {Robot | undefined} robot */
   function drawTask(robot) {
     const task = robot?.navigation?.task;
-    setHidden(needPart("task-line", card), !task);
+    setHidden(partOf("task-line"), !task);
     const key = `task.${task}`;
-    setText(needPart("task", card), words.has(key) ? words.t(key) : (task ?? ""));
+    setText(partOf("task"), words.has(key) ? words.t(key) : (task ?? ""));
   }
 
   return { draw };
