@@ -13,6 +13,7 @@ BENCHMARKS = (
     "notify_cost",
     "paint",
     "tracking",
+    "glass",
 )
 
 

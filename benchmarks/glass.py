@@ -1,0 +1,300 @@
+"""From a robot's stamp to pixels, with 2, 10 and 20 robots: iVeg beside a plain relay.
+
+The same fleet (``tests.fleet``: odometry, a scan of 720 ranges and four boxes a robot
+at 30 Hz) talks to either, in turns, in the same Chromium.  *Calm*: each robot sees one
+person; *storm*: no two looks are alike.  Ages are taken from the robot's stamp in the
+animation frame that drew it; both clocks are this machine's.
+
+    python -m benchmarks.glass --robots 2,10,20 --scenes calm,storm --seconds 10
+
+prints a table and leaves ``test-output/glass.json`` and ``glass.html``.
+"""
+
+import argparse
+import itertools
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from urllib.parse import urlsplit
+
+from playwright.sync_api import Browser, CDPSession
+
+from benchmarks.process import Usage, machine, percentile, print_table
+from tests.brokers import MOSQUITTO, PLAIN
+from tests.browsers import running_browser
+from tests.fleet import names
+from tests.ports import free_ports
+from tests.processes import ROOT, Site, children_of, site, until
+
+SIDES = ("relay", "iveg")
+HZ, SENSORS, WARM_UP_S, LATE_MS = 30.0, 3, 4.0, 100.0
+APIKEY = "glass"
+
+WATCH = """() => {
+  window.painted = [];
+  window.__onPaint = ({robot, kind, stamp}) => {
+    if (kind !== 'odom') return;
+    const now = performance.timeOrigin + performance.now();
+    const micros = Number(stamp.slice(20, -1).padEnd(6, '0'));
+    const sent = Date.parse(stamp.slice(0, 19) + 'Z') + micros / 1000;
+    window.painted.push([robot, sent, now]);
+  };
+}"""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What one side did with one fleet.
+
+    Attributes:
+        ages_ms: Of every odometry that was painted, when it was.
+        late_share: Of the time, that a robot's newest painted odometry was older than
+            it would be had the next one been painted 100 ms after it was sent.
+        cpu_per_1k: Processor seconds of the servers for 1,000 messages sent.
+        main_ms_per_s: What the page's main thread was busy.
+    """
+
+    side: str
+    robots: int
+    scene: str
+    ages_ms: list[float]
+    late_share: float
+    cpu_per_1k: float
+    main_ms_per_s: float
+    load: float
+
+    def age(self, share: float) -> float:
+        """That share of the painted odometry was younger (ms)."""
+        return percentile(sorted(self.ages_ms), share) if self.ages_ms else float("nan")
+
+
+def main() -> None:
+    """Measure what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", default="2,10,20")
+    parser.add_argument("--scenes", default="calm,storm")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--rounds", type=int, default=1)
+    parser.add_argument("--sides", default=",".join(SIDES))
+    parser.add_argument("--out", type=Path, default=ROOT / "test-output")
+    asked, _ = parser.parse_known_args()
+    turns = itertools.product(
+        asked.scenes.split(","),
+        map(int, asked.robots.split(",")),
+        asked.sides.split(",") * asked.rounds,
+    )
+    with running_browser() as browser:
+        runs = [
+            measure(browser, side, robots, scene, asked.seconds)
+            for scene, robots, side in turns
+        ]
+    report(runs)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    told = json.dumps([asdict(run) for run in runs])
+    (asked.out / "glass.json").write_text(told)
+    draw(runs, asked.out / "glass.html")
+
+
+# --- one run --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a side listens, and what it costs."""
+
+    link: str
+    mqtt: int
+    servers: list[int]
+
+
+def measure(
+    browser: Browser, side: str, robots: int, scene: str, seconds: float
+) -> Run:
+    """One side, one fleet."""
+    serving = _iveg if side == "iveg" else _relay
+    with (
+        tempfile.TemporaryDirectory() as directory,
+        serving(Path(directory), robots) as place,
+        _fleet(place, robots, scene),
+    ):
+        context = browser.new_context(viewport={"width": 1280, "height": 900})
+        page = context.new_page()
+        page.goto(place.link)
+        page.wait_for_timeout(1000 * WARM_UP_S)
+        tools = context.new_cdp_session(page)
+        tools.send("Performance.enable")
+        before = _spent(place), _busy_s(tools)
+        page.evaluate(WATCH)
+        page.wait_for_timeout(1000 * seconds)
+        painted = page.evaluate("() => window.painted")
+        after = _spent(place), _busy_s(tools)
+        context.close()
+    sent = HZ * SENSORS * robots * seconds
+    return Run(
+        side,
+        robots,
+        scene,
+        [now - stamp for _, stamp, now in painted],
+        late_share(painted, robots, seconds),
+        1000.0 * (after[0] - before[0]) / sent,
+        1000.0 * (after[1] - before[1]) / seconds,
+        os.getloadavg()[0],
+    )
+
+
+def late_share(
+    painted: Sequence[tuple[str, float, float]], robots: int, seconds: float
+) -> float:
+    """The share of time in which a robot's next odometry was more than 100 ms away."""
+    late_ms = 0.0
+    for robot in {one[0] for one in painted}:
+        mine = [(stamp, now) for name, stamp, now in painted if name == robot]
+        for (stamp, _), (_, now) in itertools.pairwise(mine):
+            due = stamp + 1000.0 / HZ + LATE_MS
+            late_ms += max(0.0, now - due)
+    unseen = robots - len({one[0] for one in painted})
+    return (late_ms / (1000.0 * seconds) + unseen) / robots
+
+
+@contextmanager
+def _iveg(directory: Path, robots: int) -> Iterator[Place]:
+    settings = {
+        "IVEG_ROBOTS": ",".join(names(robots)),
+        "IVEG_GREENHOUSE": "none",
+        "IVEG_APIKEY": APIKEY,
+    }
+    with site(directory, **settings) as there:
+        demo = there.start("demo", "--no-emulator")
+        there.wait_until_served(60.0)
+        yield Place(there.sign_in_link, _mqtt_port(there), _family(demo.pid))
+
+
+def _mqtt_port(there: Site) -> int:
+    return urlsplit(there.settings["IVEG_MQTT_URL"]).port or 1883
+
+
+@contextmanager
+def _relay(directory: Path, _: int) -> Iterator[Place]:
+    mqtt, http = free_ports(2)
+    conf = directory / "mosquitto.conf"
+    conf.write_text(PLAIN.format(port=mqtt) + "max_queued_messages 0\n")
+    words = "--port", str(http), "--log-level", "warning"
+    environment = {"RELAY_MQTT_PORT": str(mqtt), "RELAY_APIKEY": APIKEY}
+    relay = [sys.executable, "-m", "uvicorn", "benchmarks.relay:app", *words]
+    with (
+        _program([MOSQUITTO or "mosquitto", "-c", str(conf)]) as broker,
+        _program(relay, environment) as server,
+    ):
+        link = f"http://127.0.0.1:{http}/"
+        until(lambda: _answers(link), 20.0, "the relay")
+        yield Place(link, mqtt, [broker, server])
+
+
+@contextmanager
+def _fleet(place: Place, robots: int, scene: str) -> Iterator[None]:
+    words = ["--port", str(place.mqtt), "--robots", str(robots), "--hz", str(HZ)]
+    words += ["--apikey", APIKEY, "--scene", scene]
+    with _program([sys.executable, "-m", "tests.fleet", *words]):
+        yield
+
+
+@contextmanager
+def _program(
+    words: Sequence[str], environment: Mapping[str, str] | None = None
+) -> Iterator[int]:
+    process = subprocess.Popen(
+        words, cwd=ROOT, env={**os.environ, **(environment or {})}
+    )
+    try:
+        yield process.pid
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def _answers(link: str) -> bool:
+    address = urlsplit(link)
+    with socket.socket() as probe:
+        return probe.connect_ex((address.hostname or "", address.port or 0)) == 0
+
+
+def _family(pid: int) -> list[int]:
+    return [pid, *children_of(pid)]
+
+
+def _spent(place: Place) -> float:
+    return sum(Usage.of(one).cpu_s for one in place.servers)
+
+
+def _busy_s(tools: CDPSession) -> float:
+    told = tools.send("Performance.getMetrics")["metrics"]
+    return float({one["name"]: one["value"] for one in told}["TaskDuration"])
+
+
+# --- the report -----------------------------------------------------------------------
+
+FIGURES = {
+    "P50 ms": lambda run: run.age(0.50),
+    "P95 ms": lambda run: run.age(0.95),
+    "late %": lambda run: 100.0 * run.late_share,
+    "CPU s/1k": lambda run: run.cpu_per_1k,
+    "main ms/s": lambda run: run.main_ms_per_s,
+}
+
+
+def report(runs: Sequence[Run]) -> None:
+    """Medians of the rounds, and iVeg divided by the relay."""
+    rows = []
+    for scene, robots in dict.fromkeys((run.scene, run.robots) for run in runs):
+        told = {}
+        for side in SIDES:
+            mine = [
+                run
+                for run in runs
+                if (run.scene, run.robots, run.side) == (scene, robots, side)
+            ]
+            if not mine:
+                continue
+            told[side] = [median(map(of, mine)) for of in FIGURES.values()]
+            rows.append(
+                [scene, str(robots), side, *(f"{one:.2f}" for one in told[side])]
+            )
+        if len(told) == len(SIDES):
+            ratios = zip(told["iveg"], told["relay"], strict=True)
+            cells = (f"{ours / its:.2f}" if its else "-" for ours, its in ratios)
+            rows.append([scene, str(robots), "ratio", *cells])
+    head = ["scene", "robots", "page", *FIGURES]
+    print_table(f"Odometry: stamp → painted ({machine()})", head, rows)
+
+
+def draw(runs: Sequence[Run], file: Path) -> None:
+    """One box a run, on a scale of powers."""
+    from plotly.graph_objects import Box, Figure
+
+    figure = Figure()
+    for side in SIDES:
+        mine = [run for run in runs if run.side == side]
+        figure.add_trace(
+            Box(
+                name=side,
+                x=[f"{run.robots} {run.scene}" for run in mine for _ in run.ages_ms],
+                y=[age for run in mine for age in run.ages_ms],
+                boxpoints=False,
+            )
+        )
+    figure.update_layout(
+        title="Odometry: stamp → painted (ms)", boxmode="group", yaxis_type="log"
+    )
+    figure.write_html(file)
+
+
+if __name__ == "__main__":
+    main()
