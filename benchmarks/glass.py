@@ -173,7 +173,7 @@ def _iveg(directory: Path, robots: int) -> Iterator[Place]:
     }
     with site(directory, **settings) as there:
         demo = there.start("demo", "--no-emulator")
-        there.wait_until_served(60.0)
+        there.wait_until_whole()
         yield Place(there.sign_in_link, _mqtt_port(there), _family(demo.pid))
 
 

@@ -175,6 +175,15 @@ class Site:
         with self.api() as api:
             until(lambda: _live(api) >= robots, deadline_s, f"{robots} robots LIVE")
 
+    def wait_until_whole(self, deadline_s: float = 60.0) -> None:
+        """Until a measure of iVeg's own has passed every hop of FIWARE.
+
+        The agent makes up an entity for a device that it has not been told of yet.
+        """
+        self.wait_until_served(deadline_s)
+        with self.api() as api:
+            until(lambda: _is_whole(api), deadline_s, "FIWARE passes measures on")
+
     def stop_all(self) -> None:
         """Ctrl-C for what still runs, last started first; a kill where that hangs."""
         for program in reversed(self.programs):
@@ -234,6 +243,16 @@ def _answers(url: str) -> bool:
         return httpx.get(url, timeout=2.0, trust_env=False).status_code == 200
     except httpx.TransportError:
         return False
+
+
+def _is_whole(api: httpx.Client) -> bool:
+    try:
+        answer = api.get("health")
+    except httpx.TransportError:
+        return False
+    hops = answer.json()["hops"] if answer.status_code == 200 else []
+    wanted = {"mqtt", "orion", "iot_agent", "notifications"}
+    return wanted <= {hop["hop"] for hop in hops if hop["state"] == "ok"}
 
 
 def _live(api: httpx.Client) -> int:

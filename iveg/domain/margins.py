@@ -107,6 +107,34 @@ def least(margins: Iterable[Margin]) -> Margin | None:
     return min(margins, key=lambda one: (one.known, one.margin_m), default=None)
 
 
+class LeastMargins:
+    """The least margin of each robot and of each person, worked out pair by pair once.
+
+    Args:
+        robots: Whose margins are asked for.
+        people: To whom.
+    """
+
+    def __init__(
+        self, robots: Iterable[RobotState], people: Collection[Person], now: Instant
+    ) -> None:
+        by_robot: dict[str, list[Margin]] = {}
+        by_person: dict[str, list[Margin]] = {}
+        for one in margins_of(robots, people, now):
+            by_robot.setdefault(one.robot_id, []).append(one)
+            by_person.setdefault(one.person_id, []).append(one)
+        self._of_robot = {name: least(found) for name, found in by_robot.items()}
+        self._of_person = {name: least(found) for name, found in by_person.items()}
+
+    def of_robot(self, robot_id: str) -> Margin | None:
+        """To whomever it has the least margin."""
+        return self._of_robot.get(robot_id)
+
+    def of_person(self, person_id: str) -> Margin | None:
+        """Of whichever robot has the least margin."""
+        return self._of_person.get(person_id)
+
+
 def _to_look(
     robot: RobotState, person: Person, look: Sighting, now: Instant
 ) -> Margin | None:

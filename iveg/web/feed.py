@@ -5,6 +5,7 @@ or a detection frame is looked at, not measured, and digits that change more tha
 times a second cannot be read.
 """
 
+import math
 from typing import Final
 
 from iveg.domain.observations import Instant
@@ -54,6 +55,7 @@ class TelemetryFeed:
         self._absorb()
         if self.window.opens_at > now.mono:
             return None
+        self._encoder.begin()
         frame = _Frame(self.window.room)
         for topic in sorted(self._waiting, key=_rank):
             self._add(frame, topic, now)
@@ -73,7 +75,7 @@ class TelemetryFeed:
     def _due_at(self) -> float:
         """When the first of what waits may go; what has no room waits for credit."""
         times = (
-            self._told.get(topic, _NEVER)[1] + _period_s(topic)
+            _next_after(topic, self._told.get(topic, _NEVER)[1])
             for topic in self._waiting
             if _is_robot(topic) or not self._is_full
         )
@@ -81,7 +83,7 @@ class TelemetryFeed:
 
     def _add(self, frame: "_Frame", topic: str, now: Instant) -> None:
         version, told_at = self._told.get(topic, _NEVER)
-        if told_at + _period_s(topic) > now.mono:
+        if _next_after(topic, told_at) > now.mono:
             return
         part = self._part(topic, version, now)
         if part is None or part.version == version:
@@ -95,6 +97,8 @@ class TelemetryFeed:
             return self._encoder.move(topic.split("/")[1], now)
         if topic.endswith("/state"):
             return self._encoder.state(topic.split("/")[1], since, now)
+        if topic == "people":
+            return self._encoder.people(since, now)
         return self._encoder.part(topic, now)
 
 
@@ -148,10 +152,17 @@ def _is_robot(topic: str) -> bool:
     return topic.startswith("robots/") and topic.count("/") == 1
 
 
-def _period_s(topic: str) -> float:
-    if _is_robot(topic):
-        return 0.0
-    return PICTURE_S if topic.endswith("/scan") or topic[0] == "d" else READ_OUT_S
+def _next_after(topic: str, told_at: float) -> float:
+    """When a topic may be told again (monotonic, s).
+
+    Read-outs go together, at the same moments to all browsers: what takes all robots
+    and people is worked out once for all of them.
+    """
+    if _is_robot(topic) or told_at == _NEVER[1]:
+        return told_at
+    if _rank(topic):
+        return told_at + PICTURE_S
+    return (math.floor(told_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
 
 
 def _rank(topic: str) -> int:

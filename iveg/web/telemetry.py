@@ -5,14 +5,16 @@ A part is JSON, and for a scan the integers that it counts; docs/interfaces.md, 
 says itself when it was true (``at``, the server's monotonic clock).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import orjson
 
+from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant, LaserScan
 from iveg.pipeline.publish import Hub
+from iveg.web import schemas
 from iveg.web.views import Views
 
 UNIT_M: Final = 0.005
@@ -50,7 +52,13 @@ class TelemetryEncoder:
         self._hub = hub
         self._parts: dict[str, Part] = {}
         self._states: dict[str, _RobotState] = {}
+        self._people = _People()
         self._moved: dict[str, object] = {}
+        self._margins: LeastMargins | None = None
+
+    def begin(self) -> None:
+        """A frame begins: what was worked out for the one before is of the past."""
+        self._margins = None
 
     def move(self, robot_id: str, now: Instant) -> Part | None:
         """Where a robot is and how it moves; None before its first odometry."""
@@ -74,12 +82,20 @@ class TelemetryEncoder:
         topic = f"robots/{robot_id}"
         state = self._states.setdefault(robot_id, _RobotState())
         if state.version != self._hub.versions[topic]:
-            told = self._views.robot(robot_id, now)
+            told = self._views.robot(robot_id, now, self._margins_at(now))
             state.update(told, self._hub.versions[topic], now.mono)
         return state.changes(topic, since)
 
+    def people(self, since: int, now: Instant) -> Part | None:
+        """Who there is, and whoever has changed since a version; None: nothing has."""
+        version = self._hub.versions["people"]
+        if self._people.version != version:
+            told = self._views.people(now, self._margins_at(now))
+            self._people.update(told, version, now.mono)
+        return self._people.changes(since)
+
     def part(self, topic: str, now: Instant) -> Part | None:
-        """A scan, one detection frame or all people; None: nothing is known."""
+        """A scan or one detection frame; None: nothing is known."""
         version = self._hub.versions[topic]
         kept = self._parts.get(topic)
         if kept is not None and kept.version == version:
@@ -89,15 +105,15 @@ class TelemetryEncoder:
             self._parts[topic] = part
         return part
 
+    def _margins_at(self, now: Instant) -> LeastMargins:
+        if self._margins is None:
+            self._margins = self._views.margins(now)
+        return self._margins
+
     def _encode(self, topic: str, version: int, now: Instant) -> Part | None:
         if topic.endswith("/scan"):
             return self._scan(topic, version, now)
-        kind, _, robot_id = topic.partition("/")
-        data: Any = None
-        if kind == "people":
-            data = self._views.people(now)
-        elif kind == "detections":
-            data = self._views.frame(robot_id, now)
+        data = self._views.frame(topic.partition("/")[2], now)
         if data is None:
             return None
         told = {"topic": topic, "at": now.mono, "data": data}
@@ -156,6 +172,58 @@ class _RobotState:
             b",".join(newer),
         )
         return Part(self.version, head)
+
+
+class _People:
+    """Everyone who is known, each encoded when there is more to say than an age."""
+
+    def __init__(self) -> None:
+        self.version = -1
+        self._at = 0.0
+        self._changed = -1
+        self._ids: list[str] = []
+        self._values: dict[str, Any] = {}
+        self._texts: dict[str, tuple[int, bytes]] = {}
+
+    def update(
+        self, told: Sequence[schemas.PersonJson], version: int, at: float
+    ) -> None:
+        """Compare with who was told of before."""
+        self.version, self._at = version, at
+        ids = [person["person_id"] for person in told]
+        if ids != self._ids:
+            self._ids, self._changed = ids, version
+        self._values = {name: self._values.get(name) for name in ids}
+        self._texts = {name: self._texts[name] for name in ids if name in self._texts}
+        for person in told:
+            value = _without_ages(person)
+            if self._values[person["person_id"]] == value:
+                continue
+            self._values[person["person_id"]] = value
+            # Its age counts from here, whoever takes it later.
+            text = orjson.dumps({**person, "at": at})
+            self._texts[person["person_id"]] = version, text
+            self._changed = version
+
+    def changes(self, since: int) -> Part | None:
+        """Who is there, and what has changed of whom since a version."""
+        if self._changed <= since:
+            return None
+        newer = [text for version, text in self._texts.values() if version > since]
+        head = b'{"topic":"people","at":%b,"data":{"ids":%b,"changed":[%b]}}' % (
+            orjson.dumps(self._at),
+            orjson.dumps(self._ids),
+            b",".join(newer),
+        )
+        return Part(self.version, head)
+
+
+def _without_ages(person: schemas.PersonJson) -> dict[str, Any]:
+    margin = person["margin"]
+    told = {name: value for name, value in person.items() if name != "age_s"}
+    if margin is not None:
+        told["margin"] = {**margin, "age_s": None}
+    return told
 
 
 def write_ranges(scan: LaserScan) -> bytes:

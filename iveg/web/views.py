@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from iveg.domain.echoes import echoes_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.margins import least, margins_of
+from iveg.domain.margins import LeastMargins, least, margins_of
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import STALE_S, Command, StopMachine
@@ -42,7 +42,13 @@ class Views:
         """The whole fleet."""
         return [self.robot(robot_id, now) for robot_id in self._world.robots]
 
-    def robot(self, robot_id: str, now: Instant) -> schemas.RobotJson:
+    def margins(self, now: Instant) -> LeastMargins:
+        """Of all live robots and all people, for who asks for many at once."""
+        return LeastMargins(self._fleet(), self._people(), now)
+
+    def robot(
+        self, robot_id: str, now: Instant, margins: LeastMargins | None = None
+    ) -> schemas.RobotJson:
         """One robot. Raises UnknownRobotError."""
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
@@ -93,7 +99,11 @@ class Views:
             "clock_offset_s": shapes.rounded(robot.clock.offset_s(now)),
             "road": robot.frame_road,
             "profile": shapes.profile(robot_id),
-            "margin": shapes.margin(least(margins_of([robot], self._people(), now))),
+            "margin": shapes.margin(
+                margins.of_robot(robot_id)
+                if margins is not None and not robot.is_replay
+                else least(margins_of([robot], self._people(), now))
+            ),
             "cmd_status": robot.command_status,
         }
 
@@ -152,11 +162,19 @@ class Views:
 
     # --- people and looks ---------------------------------------------------------
 
-    def people(self, now: Instant) -> list[schemas.PersonJson]:
+    def people(
+        self, now: Instant, margins: LeastMargins | None = None
+    ) -> list[schemas.PersonJson]:
         """Everyone who is known."""
-        return [self._person(one, now) for one in self._assessor.people.known.values()]
+        margins = margins or self.margins(now)
+        return [
+            self._person(one, margins, now)
+            for one in self._assessor.people.known.values()
+        ]
 
-    def _person(self, person: Person, now: Instant) -> schemas.PersonJson:
+    def _person(
+        self, person: Person, margins: LeastMargins, now: Instant
+    ) -> schemas.PersonJson:
         newest, age = person.newest, person.age_s(now)
         crossings = [
             one
@@ -190,7 +208,7 @@ class Views:
                 }
                 for one in crossings
             ],
-            "margin": shapes.margin(least(margins_of(self._fleet(), [person], now))),
+            "margin": shapes.margin(margins.of_person(person.person_id)),
         }
 
     def _people(self) -> list[Person]:

@@ -67,7 +67,7 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     with site(tmp_path_factory.mktemp("crowd"), **settings) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
-        place.wait_until_served()
+        place.wait_until_whole()
         port = urlsplit(place.settings["IVEG_MQTT_URL"]).port
         words = ["--port", str(port), "--robots", "20", "--hz", "5", "--beams", "360"]
         fleet = subprocess.Popen(

@@ -70,6 +70,29 @@ test("the ages of a pose and of a state count from when each was true", () => {
   near(stateAge(), 3.2);
 });
 
+test("of people is told who has changed; the others grow older", () => {
+  const { store, frame } = storeByHand();
+  const [one, two, three] = ["P1", "P2", "P3"].map((person_id) =>
+    person({ person_id }),
+  );
+  store.apply("snapshot", snapshot({ people: [one, two] }), 1000);
+  /** @type {string[][]} */
+  const told = [];
+  store.subscribe("people", (all) =>
+    told.push(all.map((/** @type {any} */ it) => it.person_id)),
+  );
+  frame();
+  store.apply("people/P3", three, 2000);
+  store.apply("people/ids", ["P1", "P3"], 2000);
+  frame();
+  equal(told, [
+    ["P1", "P2"],
+    ["P1", "P3"],
+  ]);
+  near(ageOf(store.people()[0], 3000), 2.1);
+  near(ageOf(store.people()[1], 3000), 1.1);
+});
+
 test("a move of a robot that nobody knows is left alone", () => {
   const { store, frame, heard, hear } = storeByHand();
   hear("robots/");

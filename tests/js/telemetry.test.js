@@ -27,7 +27,8 @@ const read = (bytes) => /** @type {any} */ (readFrame(bytes).data);
 
 test("a frame tells states before moves, so that no state makes a move older", () => {
   const state = { topic: "robots/AGI", at: 1, data: { mode: "SLOW" } };
-  const people = { topic: "people", at: 2, data: [] };
+  const changed = [{ person_id: "P1", at: 0.5 }];
+  const people = { topic: "people", at: 2, data: { ids: ["P1"], changed } };
   const move = ["AGI", 3, 0.01, 1, 2, 0.5, 0.4, 0.1, "stamp"];
   const { frame, told } = read(
     telemetryFrame({ frame: 9, parts: [state, people], moves: [move] }),
@@ -37,11 +38,12 @@ test("a frame tells states before moves, so that no state makes a move older", (
     told.map(({ topic, at }) => [topic, at]),
     [
       ["robots/AGI/state", 1],
-      ["people", 2],
+      ["people/P1", 0.5],
+      ["people/ids", 2],
       ["robots/AGI/move", 3],
     ],
   );
-  equal(told[2].data, {
+  equal(told[3].data, {
     robot_id: "AGI",
     age_s: 0.01,
     pose: { x: 1, y: 2, yaw: 0.5 },

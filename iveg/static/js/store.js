@@ -45,6 +45,8 @@ export function createStore(options = {}) {
   let values = new Map();
   /** @type {Map<string, Robot>} */
   let robots = new Map();
+  /** @type {Map<string, Person>} */
+  let people = new Map();
   /** @type {Map<string, Scan>} */
   let scans = new Map();
   /** @type {Map<string, Look>} */
@@ -83,6 +85,11 @@ export function createStore(options = {}) {
     hub.tell(`robots/${id}`, robot);
   }
 
+  /** @param {Person[]} all */
+  function keepPeople(all) {
+    people = new Map(all.map((person) => [person.person_id, person]));
+  }
+
   /** @param {Entry} entry */
   function keepEntry(entry) {
     if (log.length && entry.id <= log[log.length - 1].id) return false;
@@ -102,6 +109,24 @@ export function createStore(options = {}) {
   }
 
   /**
+   * Keeps who has changed until it is told who there is; who has not grows older.
+   *
+   * @param {string} id
+   * @param {any} data
+   */
+  function changePeople(id, data) {
+    if (id !== "ids") return void people.set(id, data);
+    const known = people;
+    people = new Map();
+    for (const one of data) {
+      const person = known.get(one);
+      if (person) people.set(one, person);
+    }
+    values.set("people", [...people.values()]);
+    hub.tell("people", values.get("people"));
+  }
+
+  /**
    * Keeps one value; false when it is older than what is known.
    *
    * @param {string} topic
@@ -114,6 +139,7 @@ export function createStore(options = {}) {
     if (head === "robots" && !leaf) return keepRobot(data);
     if (head === "robots") scans.set(id, data);
     else if (head === "detections") looks.set(id, data);
+    else if (topic === "people") keepPeople(data);
     values.set(topic, data);
     return true;
   }
@@ -125,6 +151,7 @@ export function createStore(options = {}) {
   function applySnapshot(snapshot, atMs) {
     values = new Map();
     robots = new Map();
+    people = new Map();
     scans = new Map();
     looks = new Map();
     commands = new Set();
@@ -147,7 +174,8 @@ export function createStore(options = {}) {
   return {
     /**
      * Takes one message in.  `robots/{id}/move` and `robots/{id}/state` tell a part of a
-     * robot; they are kept and told as `robots/{id}`, whole.
+     * robot, `people/{id}` and then `people/ids` who has changed and who there is; they
+     * are kept and told whole.
      *
      * @param {string} topic
      * @param {any} data
@@ -156,6 +184,8 @@ export function createStore(options = {}) {
     apply(topic, data, receivedAtMs = now()) {
       const [, id, leaf] = topic.split("/");
       if (topic === "snapshot") applySnapshot(data, receivedAtMs);
+      else if (topic.startsWith("people/"))
+        changePeople(id, received(data, receivedAtMs));
       else if (leaf === "move") changeRobot(id, moved(data, receivedAtMs));
       else if (leaf === "state") changeRobot(id, changed(data, receivedAtMs));
       else if (keep(topic, received(data, receivedAtMs))) hub.tell(topic, data);

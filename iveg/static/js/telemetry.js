@@ -33,7 +33,7 @@ const directions = new Map();
  */
 export function readTelemetry(head, bytes, start) {
   const { frame, parts = [], moves = [], scans = [] } = head;
-  const told = [...parts.map(readPart), ...moves.map(readMove)];
+  const told = [...parts.flatMap(readPart), ...moves.map(readMove)];
   let offset = start;
   for (const sweep of scans) {
     const size = 2 * (sweep.count + (sweep.count % 2));
@@ -45,13 +45,21 @@ export function readTelemetry(head, bytes, start) {
 }
 
 /**
- * A robot's part tells what has changed of it; all others are whole.
+ * A robot's part tells what has changed of it; that of people who there is, and each who
+ * has changed; all others are whole.
  *
  * @param {Told} part
- * @returns {Told}
+ * @returns {Told[]}
  */
 function readPart({ topic, at, data }) {
-  return { topic: topic.startsWith("robots/") ? `${topic}/state` : topic, at, data };
+  if (topic.startsWith("robots/")) return [{ topic: `${topic}/state`, at, data }];
+  if (topic !== "people") return [{ topic, at, data }];
+  const changed = data.changed.map((/** @type {any} */ person) => ({
+    topic: `people/${person.person_id}`,
+    at: person.at,
+    data: person,
+  }));
+  return [...changed, { topic: "people/ids", at, data: data.ids }];
 }
 
 /**

@@ -251,9 +251,47 @@ def test_a_version_is_encoded_once_for_all_browsers(desk: WebDesk) -> None:
     desk.hear(scan(origin=desk.next_origin()))
     now = desk.clock()
 
-    for topic in ("robots/AGI/scan", "people"):
-        assert encoder.part(topic, now) is encoder.part(topic, now.later(1.0))
+    sweep = "robots/AGI/scan"
+    assert encoder.part(sweep, now) is encoder.part(sweep, now.later(1.0))
     assert encoder.move("AGI", now) is encoder.move("AGI", now.later(1.0))
+
+
+def test_of_people_those_are_told_of_whom_there_is_more_to_say_than_an_age(
+    desk: WebDesk, page: Page
+) -> None:
+    desk.drive("AGI")
+    desk.drive("AGII", 50.0)
+    desk.look("AGI", detection("farmer", 5.0))
+    desk.look("AGII", detection("farmer", 55.0))
+    page.read()
+    page.paint()
+    desk.clock.now += 0.3
+    desk.look("AGII", detection("farmer", 55.1))
+    page.read()
+
+    told = [one for one in page.told("parts") if one["topic"] == "people"]
+    ids = [[one["person_id"] for one in each["data"]["changed"]] for each in told]
+    assert ids == [["P1", "P2"], ["P2"]]
+    assert [one["data"]["ids"] for one in told] == [["P1", "P2"]] * 2
+    ages = [one["age_s"] for one in told[0]["data"]["changed"]]
+    assert ages == [0.0, 0.0]
+
+
+def test_who_comes_later_is_told_ages_as_of_when_they_were_true(desk: WebDesk) -> None:
+    early = Page(desk)
+    desk.drive("AGI")
+    desk.look("AGI", detection("farmer", 5.0))
+    early.read()
+    seen_at = desk.clock().mono
+    desk.clock.now += 0.3
+    late = Page(desk)
+    desk.hub.changed("people")
+    late.read()
+
+    (told,) = [one for one in late.told("parts") if one["topic"] == "people"]
+    (person,) = told["data"]["changed"]
+    assert told["at"] == pytest.approx(seen_at + 0.3)
+    assert (person["at"], person["age_s"]) == (seen_at, 0.0)
 
 
 def test_a_scan_is_ranges_in_integers_finer_than_a_centimetre(
