@@ -56,8 +56,8 @@ class Run:
 
     Attributes:
         ages_ms: Of every odometry that was painted, when it was.
-        late_share: Of the time, that a robot's newest painted odometry was older than
-            it would be had the next one been painted 100 ms after it was sent.
+        late_share: Of the time, that a robot's next odometry had been sent more than
+            100 ms ago and was not painted yet.
         cpu_per_1k: Processor seconds of the servers for 1,000 messages sent.
         main_ms_per_s: What the page's main thread was busy.
     """
@@ -153,13 +153,13 @@ def measure(
 def late_share(
     painted: Sequence[tuple[str, float, float]], robots: int, seconds: float
 ) -> float:
-    """The share of time in which a robot's next odometry was more than 100 ms away."""
+    """The share of time in which a robot's next odometry was late by 100 ms."""
     late_ms = 0.0
     for robot in {one[0] for one in painted}:
         mine = [(stamp, now) for name, stamp, now in painted if name == robot]
-        for (stamp, _), (_, now) in itertools.pairwise(mine):
+        for (stamp, shown), (_, now) in itertools.pairwise(mine):
             due = stamp + 1000.0 / HZ + LATE_MS
-            late_ms += max(0.0, now - due)
+            late_ms += max(0.0, now - max(shown, due))
     unseen = robots - len({one[0] for one in painted})
     return (late_ms / (1000.0 * seconds) + unseen) / robots
 

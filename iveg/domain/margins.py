@@ -11,12 +11,15 @@ data: a distance is as old as the older of both positions.  Left out: the intrus
 distance C, since nobody reaches through a light curtain here.
 """
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from iveg.domain.alerts import WALKING_SPEED
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Odometry
 from iveg.domain.profiles import profile_of
 from iveg.domain.tracking.person import RING_S, Person, Sighting
 from iveg.domain.world import RobotState
@@ -32,6 +35,7 @@ UNCERTAINTY_M = 0.40
 PERSON_RADIUS_M = 0.30
 POSE_LOST_S = 1.5
 """An older pose says nothing of where a robot is (safety.md §3.3)."""
+_UNKNOWN_M = 1e6
 CLEAR_M = 1.0
 
 
@@ -108,7 +112,7 @@ def least(margins: Iterable[Margin]) -> Margin | None:
 
 
 class LeastMargins:
-    """The least margin of each robot and of each person, worked out pair by pair once.
+    """The least margin of each robot and of each person, all pairs worked out at once.
 
     Args:
         robots: Whose margins are asked for.
@@ -116,23 +120,73 @@ class LeastMargins:
     """
 
     def __init__(
-        self, robots: Iterable[RobotState], people: Collection[Person], now: Instant
+        self, robots: Iterable[RobotState], people: Iterable[Person], now: Instant
     ) -> None:
-        by_robot: dict[str, list[Margin]] = {}
-        by_person: dict[str, list[Margin]] = {}
-        for one in margins_of(robots, people, now):
-            by_robot.setdefault(one.robot_id, []).append(one)
-            by_person.setdefault(one.person_id, []).append(one)
-        self._of_robot = {name: least(found) for name, found in by_robot.items()}
-        self._of_person = {name: least(found) for name, found in by_person.items()}
+        self._now = now
+        self._robots: list[RobotState] = []
+        facts: list[tuple[float, ...]] = []
+        for one in robots:
+            age = one.age_s(now)
+            if one.odometry is not None and age is not None:
+                self._robots.append(one)
+                facts.append(_facts(one.robot_id, one.odometry, age))
+        self._looks = [
+            (person, look)
+            for person in people
+            for look in person.sightings
+            if look.age_s(now) <= RING_S
+        ]
+        self._row = {one.robot_id: row for row, one in enumerate(self._robots)}
+        self._columns: dict[str, list[int]] = {}
+        for column, (person, _) in enumerate(self._looks):
+            self._columns.setdefault(person.person_id, []).append(column)
+        self._margins = _all_pairs(facts, [look for _, look in self._looks], now)
 
     def of_robot(self, robot_id: str) -> Margin | None:
         """To whomever it has the least margin."""
-        return self._of_robot.get(robot_id)
+        row = self._row.get(robot_id)
+        if row is None or not self._looks:
+            return None
+        return self._pair(row, int(np.argmin(self._margins[row])))
 
     def of_person(self, person_id: str) -> Margin | None:
         """Of whichever robot has the least margin."""
-        return self._of_person.get(person_id)
+        columns = self._columns.get(person_id)
+        if columns is None or not self._robots:
+            return None
+        found = self._margins[:, columns]
+        row, column = np.unravel_index(int(np.argmin(found)), found.shape)
+        return self._pair(int(row), columns[int(column)])
+
+    def _pair(self, row: int, column: int) -> Margin | None:
+        return _to_look(self._robots[row], *self._looks[column], self._now)
+
+
+def _all_pairs(
+    facts: Sequence[tuple[float, ...]], looks: Sequence[Sighting], now: Instant
+) -> NDArray[np.float64]:
+    """``margin_m`` of each robot with each look, as ``_to_look`` has it.
+
+    Shape (robots, looks), (m).  What is not known lies below everything else: it comes
+    before what is small.
+    """
+    told = np.array(facts, float)
+    x, y, speed, braking, half, age = told.reshape(-1, 6).T[:, :, np.newaxis]
+    seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
+    to_x, to_y, look_age = seen.reshape(-1, 3).T
+    reaction = np.maximum(REACTION_S, np.maximum(age, look_age) + ONWARD_S)
+    gap = np.hypot(x - to_x, y - to_y) - half - PERSON_RADIUS_M
+    walks = WALKING_SPEED * (reaction + speed / braking)
+    needs = walks + speed * reaction + speed * speed / (2 * braking) + UNCERTAINTY_M
+    margins: NDArray[np.float64] = gap - needs - _UNKNOWN_M * (age > POSE_LOST_S)
+    return margins
+
+
+def _facts(robot_id: str, odometry: Odometry, age_s: float) -> tuple[float, ...]:
+    """x, y (m), speed (m/s), braking (m/s²), half the length (m), age (s)."""
+    place, speed = odometry.pose, abs(odometry.twist.linear_x)
+    profile = profile_of(robot_id)
+    return place.x, place.y, speed, profile.assumed_braking, profile.length / 2, age_s
 
 
 def _to_look(

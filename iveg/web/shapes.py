@@ -16,7 +16,7 @@ from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.margins import UNCERTAINTY_M, Margin
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Detection, Instant
 from iveg.domain.people import Placed
 from iveg.domain.profiles import profile_of
 from iveg.domain.records import LogRecord
@@ -162,11 +162,24 @@ def detection(
         "class_id": detection.class_id,
         "probability": detection.probability,
         "position": {"x": x, "y": y, "z": z},
-        "box": {**asdict(detection.box), "frame_id": detection.frame_id},
+        "box": _box(detection),
         "confident": one.kind != "faint",
         "person_id": None if one.person is None else one.person.person_id,
         "peer": one.peer,
         "road": road,
+    }
+
+
+def _box(detection: Detection) -> dict[str, Any]:
+    box = detection.box
+    return {
+        "xmin": box.xmin,
+        "xmax": box.xmax,
+        "ymin": box.ymin,
+        "ymax": box.ymax,
+        "zmin": box.zmin,
+        "zmax": box.zmax,
+        "frame_id": detection.frame_id,
     }
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.margins import Margin, least, margin_of
+from iveg.domain.margins import LeastMargins, Margin, least, margin_of, margins_of
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -140,3 +140,33 @@ def test_the_least_margin_is_shown_and_the_unknown_before_it() -> None:
     assert least([far, near]) is near
     assert least([far, near, unknown]) is unknown
     assert least([]) is None
+
+
+def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:
+    scene = Scene()
+    for number, robot_id in enumerate(("AGI", "AGII")):
+        scene.drive(robot_id, 9.0 * number, linear=0.3 + number)
+        scene.look(robot_id, *(person(2.5 + 3.0 * each + number) for each in range(3)))
+    scene.now = 1.2
+    scene.drive("AGII", 8.0, linear=0.4)
+    for now in (at(1.2), at(2.9)):
+        robots, people = list(scene.world.robots.values()), scene.everyone
+        pairs = list(margins_of(robots, people, now))
+        at_once = LeastMargins(robots, people, now)
+
+        assert len(people) > 1
+        for robot in robots:
+            mine = (one for one in pairs if one.robot_id == robot.robot_id)
+            assert at_once.of_robot(robot.robot_id) == least(mine)
+        for one in people:
+            its = (pair for pair in pairs if pair.person_id == one.person_id)
+            assert at_once.of_person(one.person_id) == least(its)
+
+
+def test_without_robots_or_people_there_is_no_margin() -> None:
+    scene = met()
+    nobody = LeastMargins([], scene.everyone, at(0.0))
+    alone = LeastMargins(scene.world.robots.values(), [], at(0.0))
+
+    assert nobody.of_person(scene.everyone[0].person_id) is None
+    assert alone.of_robot("AGI") is None
