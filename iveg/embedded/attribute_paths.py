@@ -76,5 +76,6 @@ async def put_value(broker: ContextBroker, call: Call) -> Response:
 async def delete_attribute(broker: ContextBroker, call: Call) -> Response:
     """``DELETE /v2/entities/{id}/attrs/{name}``."""
     entity = broker.find(call.scope, call.parts[1], call.kind)
-    broker.delete_attributes(call.scope, entity, [call.parts[3]])
+    if broker.delete_attributes(call.scope, entity, [call.parts[3]]):
+        raise not_found(ATTRIBUTE_NOT_FOUND)
     return Response(204)

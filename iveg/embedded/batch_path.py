@@ -1,66 +1,129 @@
 """``/v2/op/update``: many entities in one request."""
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 from iveg.embedded.context_broker import ContextBroker
-from iveg.embedded.entities import Change, Entity
+from iveg.embedded.entities import Change
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, read_id
 from iveg.embedded.orion_errors import bad_request
+from iveg.embedded.outcomes import EXISTING, MISSING, Outcome, raise_for_batch
 
-_ACTIONS = {"UPDATE": "update", "APPEND": "append", "DELETE": "delete",
-            "APPEND_STRICT": "appendStrict", "REPLACE": "replace"}  # fmt: skip
+_OLD_WORDS = {"UPDATE": "update", "APPEND": "append", "DELETE": "delete",
+              "APPEND_STRICT": "appendStrict", "REPLACE": "replace"}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """One entity of a batch; ``kind`` is empty where the request names no type."""
+
+    id: str
+    kind: str
+    changes: Mapping[str, Change]
 
 
 async def batch_update(broker: ContextBroker, call: Call) -> Response:
-    """``POST /v2/op/update``."""
-    raw = call.object()
-    action = _ACTIONS.get(str(raw.get("actionType")), raw.get("actionType"))
-    entities = raw.get("entities")
-    if not isinstance(entities, list) or not entities:
-        raise bad_request("empty update action payload")
-    read = [(*read_id(one), call.changes(one)) for one in entities]
-    if action == "update":
-        await broker.update_many(call.scope, read)
-    elif action in ("append", "appendStrict"):
-        for entity_id, kind, changes in read:
-            _append_one(broker, call, entity_id, kind, changes, action)
-    elif action in ("replace", "delete"):
-        for entity_id, kind, changes in read:
-            entity = broker.find(call.scope, entity_id, kind)
-            _change_one(broker, call, entity, changes, action)
-    else:
-        raise bad_request("invalid update action type")
+    """``POST /v2/op/update``: does what can be done and says what could not."""
+    raw = _checked(call.object())
+    items = [_read_item(call, one) for one in raw["entities"]]
+    action = _OLD_WORDS.get(raw["actionType"], raw["actionType"])
+    outcomes = [await _ACTIONS[action](broker, call, item) for item in items]
+    raise_for_batch(outcomes, EXISTING if action == "appendStrict" else MISSING)
     return Response(204)
 
 
-def _append_one(
-    broker: ContextBroker,
-    call: Call,
-    entity_id: str,
-    kind: str,
-    changes: Mapping[str, Change],
-    action: str,
-) -> None:
-    known = broker.tenant(call.scope.service).entities.get(
-        call.scope.path, entity_id, kind
+def _checked(raw: dict[str, Any]) -> dict[str, Any]:
+    """The request, if Orion would read on.
+
+    Raises:
+        NgsiError: 400, with Orion's sentence, its slip of the pen included.
+    """
+    if not raw:
+        raise bad_request("empty payload")
+    for name in ("entities", "actionType"):
+        if name not in raw:
+            raise bad_request(
+                f"Invalid JSON payload, mandatory field /{name}/ not found"
+            )
+    for name in raw:
+        if name not in ("entities", "actionType"):
+            raise bad_request(f"Unrecognized field in JSON payload: /{name}/")
+    action = raw["actionType"]
+    if not isinstance(action, str) or _OLD_WORDS.get(action, action) not in _ACTIONS:
+        raise bad_request(
+            "invalid update action type: right ones are: "
+            "append, appendStric, delete, replace, update"
+        )
+    if not isinstance(raw["entities"], list):
+        raise bad_request("not a JSON array")
+    if not raw["entities"]:
+        raise bad_request("empty entities vector")
+    return raw
+
+
+def _read_item(call: Call, raw: Any) -> _Item:
+    if not isinstance(raw, dict):
+        raise bad_request("entity is not a JSON object")
+    if "id" not in raw:
+        raise bad_request("nor /id/ nor /idPattern/ present")
+    entity_id, kind = read_id(raw)
+    return _Item(entity_id, kind if "type" in raw else "", call.changes(raw))
+
+
+async def _update(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
+    return await broker.try_update(call.scope, item.id, item.kind, item.changes)
+
+
+async def _append(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
+    kind = item.kind or "Thing"
+    broker.upsert(call.scope, item.id, kind, item.changes)
+    return Outcome(item.id, item.kind, kind, exists=True)
+
+
+async def _append_strict(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
+    known = broker.tenant(call.scope.service).entities.find(
+        call.scope.path, item.id, item.kind
     )
-    if known is None or action == "append":
-        broker.upsert(call.scope, entity_id, kind, changes)
-    else:
-        broker.append(call.scope, known, changes, strict=True)
+    if known is None:
+        return await _append(broker, call, item)
+    return broker.append_new(call.scope, known, item.changes, item.kind)
 
 
-def _change_one(
-    broker: ContextBroker,
-    call: Call,
-    entity: Entity,
-    changes: Mapping[str, Change],
-    action: str,
-) -> None:
-    if action == "replace":
-        broker.replace(call.scope, entity, changes)
-    elif changes:
-        broker.delete_attributes(call.scope, entity, changes)
-    else:
-        broker.delete(call.scope, entity)
+async def _replace(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
+    known = broker.tenant(call.scope.service).entities.find(
+        call.scope.path, item.id, item.kind
+    )
+    if known is not None:
+        broker.replace(call.scope, known, item.changes)
+    return Outcome(item.id, item.kind, item.kind, exists=known is not None)
+
+
+async def _delete(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
+    known = broker.tenant(call.scope.service).entities.find(
+        call.scope.path, item.id, item.kind
+    )
+    missing: tuple[str, ...] = ()
+    if known is not None and item.changes:
+        missing = broker.delete_attributes(call.scope, known, item.changes)
+    elif known is not None:
+        broker.delete(call.scope, known)
+    return Outcome(
+        item.id,
+        item.kind,
+        item.kind,
+        exists=known is not None,
+        updated=tuple(name for name in item.changes if name not in missing),
+        refused=missing,
+    )
+
+
+_Action = Callable[[ContextBroker, Call, _Item], Awaitable[Outcome]]
+_ACTIONS: Mapping[str, _Action] = {
+    "append": _append,
+    "appendStrict": _append_strict,
+    "update": _update,
+    "replace": _replace,
+    "delete": _delete,
+}

@@ -22,6 +22,7 @@ from iveg.embedded.entities import (
 )
 from iveg.embedded.orion_errors import NgsiError, not_found
 from iveg.embedded.outbox import Outbox
+from iveg.embedded.outcomes import Outcome
 from iveg.embedded.registrations import (
     Asking,
     Registration,
@@ -151,40 +152,41 @@ class ContextBroker:
         changes: Mapping[str, Change],
         *,
         forced: bool = False,
-        strict: bool = False,
     ) -> None:
-        """Change attributes; make those that are not there.
+        """Change attributes; make those that are not there."""
+        if changes:
+            touched = apply(entity, changes, scope.now, forced=forced)
+            self._tell(scope, entity, touched, "entityChange")
 
-        Raises:
-            NgsiError: 422, strict and some are there already; the others are made.
+    def append_new(
+        self, scope: Scope, entity: Entity, changes: Mapping[str, Change], kind: str
+    ) -> Outcome:
+        """Make attributes; those that are there stay as they are.
+
+        Args:
+            scope: Whose data.
+            entity: The entity.
+            changes: The attributes.
+            kind: The entity's type, as the request named it.
         """
-        there = [name for name in changes if name in entity.attributes]
-        if strict:
-            changes = {n: c for n, c in changes.items() if n not in entity.attributes}
-        self._change(scope, entity, changes, forced=forced)
-        if strict and there:
-            raise _not_all(
-                bool(changes), f"already exist: {entity.id} - [ {_listed(there)} ]"
-            )
+        there = tuple(name for name in changes if name in entity.attributes)
+        made = {name: one for name, one in changes.items() if name not in there}
+        self.append(scope, entity, made)
+        return Outcome(
+            entity.id,
+            kind,
+            entity.type,
+            exists=True,
+            updated=tuple(made),
+            refused=there,
+        )
 
     def replace(
         self, scope: Scope, entity: Entity, changes: Mapping[str, Change]
     ) -> None:
         """Put attributes in place of all there were."""
         fresh(entity, scope.now)
-        self._change(scope, entity, changes)
-
-    def _change(
-        self,
-        scope: Scope,
-        entity: Entity,
-        changes: Mapping[str, Change],
-        *,
-        forced: bool = False,
-    ) -> None:
-        if changes:
-            touched = apply(entity, changes, scope.now, forced=forced)
-            self._tell(scope, entity, touched, "entityChange")
+        self.append(scope, entity, changes)
 
     def delete(self, scope: Scope, entity: Entity) -> None:
         """Forget an entity and tell those who asked to know."""
@@ -195,18 +197,14 @@ class ContextBroker:
 
     def delete_attributes(
         self, scope: Scope, entity: Entity, names: Iterable[str]
-    ) -> None:
-        """Forget attributes.
-
-        Raises:
-            NgsiError: 404, one is not there; nothing is forgotten.
-        """
+    ) -> tuple[str, ...]:
+        """Forget attributes; those that were not there."""
         names = list(names)
-        if not set(names) <= entity.attributes.keys():
-            raise not_found("The entity does not have such an attribute")
+        missing = tuple(name for name in names if name not in entity.attributes)
         for name in names:
-            del entity.attributes[name]
+            entity.attributes.pop(name, None)
         entity.modified = scope.now
+        return missing
 
     # --- updates that may have to be passed on ----------------------------------
 
@@ -224,12 +222,12 @@ class ContextBroker:
         Raises:
             NgsiError: 404 or 422, as Orion says it; what could be done is done.
         """
-        outcome = await self._update(
+        outcome = await self.try_update(
             scope, entity_id, entity_type, changes, forced=forced
         )
         outcome.raise_for_one()
 
-    async def _update(
+    async def try_update(
         self,
         scope: Scope,
         entity_id: str,
@@ -237,14 +235,15 @@ class ContextBroker:
         changes: Mapping[str, Change],
         *,
         forced: bool = False,
-    ) -> "Outcome":
+    ) -> Outcome:
+        """Do of ``update`` what can be done, and say what could not."""
         tenant = self.tenant(scope.service)
         entity = tenant.entities.find(scope.path, entity_id, entity_type)
         kind = entity.type if entity else entity_type
         own = entity.attributes if entity else {}
         local = {name: change for name, change in changes.items() if name in own}
         if entity is not None and local:
-            self._change(scope, entity, local, forced=forced)
+            self.append(scope, entity, local, forced=forced)
         rest = {name: one for name, one in changes.items() if name not in own}
         forwards = self._providers(scope, entity_id, kind, rest)
         taken = await asyncio.gather(
@@ -262,6 +261,7 @@ class ContextBroker:
         passed = {name for _, names in forwards for name in names}
         return Outcome(
             entity_id,
+            entity_type,
             kind,
             exists=entity is not None,
             updated=tuple(local),
@@ -277,33 +277,7 @@ class ContextBroker:
                 if not ok
                 for name in names
             ),
-            missing=tuple(name for name in rest if name not in passed),
-        )
-
-    async def update_many(
-        self,
-        scope: Scope,
-        entities: Iterable[tuple[str, str, Mapping[str, Change]]],
-    ) -> None:
-        """``op/update`` with action ``update``.
-
-        Raises:
-            NgsiError: 404 or 422, as Orion says it; what could be done is done.
-        """
-        outcomes = [
-            await self._update(scope, entity_id, kind, changes)
-            for entity_id, kind, changes in entities
-        ]
-        if len(outcomes) == 1:
-            outcomes[0].raise_for_one()
-        bad = [one for one in outcomes if not one.complete]
-        if not bad:
-            return
-        if any(one.passed or one.failed for one in outcomes):
-            raise NgsiError(404, "PartialUpdate", _not_passed_on(bad))
-        raise _not_all(
-            len(bad) < len(outcomes) or any(one.updated for one in bad),
-            "do not exist: " + ", ".join(one.missing_text() for one in bad),
+            refused=tuple(name for name in rest if name not in passed),
         )
 
     def _providers(
@@ -363,6 +337,24 @@ class ContextBroker:
                 told[key] = {**attributes, **told.get(key, {})}
         return told
 
+    def bare(self, scope: Scope, names: tuple[str, ...]) -> list[tuple[str, str]]:
+        """Registered entities that nobody need be asked of, by id and type.
+
+        Asked for attributes of which no provider has one, Orion names the entities of
+        its registrations all the same.
+        """
+        if not names or "*" in names:
+            return []
+        return [
+            (one["id"], one.get("type", ""))
+            for registration in self.tenant(scope.service).registrations.values()
+            if registration.attributes
+            and not set(names) & set(registration.attributes)
+            and under(scope.path, registration.path)
+            for one in registration.entities
+            if "id" in one
+        ]
+
     # --- subscriptions and registrations ----------------------------------------
 
     def subscribe(self, subscription: Subscription) -> None:
@@ -412,66 +404,3 @@ class ContextBroker:
                     scope.correlator,
                     scope.now,
                 )
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of an update of one entity.
-
-    Attributes:
-        exists: Whether the entity is one of ours.
-        updated: Attributes of ours that were changed.
-        passed: Attributes that a provider took.
-        failed: Attributes that a provider did not take.
-        missing: Attributes that nobody has.
-    """
-
-    entity_id: str
-    kind: str
-    exists: bool
-    updated: tuple[str, ...]
-    passed: tuple[str, ...]
-    failed: tuple[str, ...]
-    missing: tuple[str, ...]
-
-    @property
-    def complete(self) -> bool:
-        """Whether everything asked for was done."""
-        return not self.missing and not self.failed
-
-    def missing_text(self) -> str:
-        """The entity and what it lacks, as Orion lists it."""
-        names = _listed(self.missing) if self.exists else "entity itself"
-        return f"{self.entity_id} - [ {names} ]"
-
-    def raise_for_one(self) -> None:
-        """Raise what Orion answers to an update of one entity, if it complains.
-
-        An attribute of ours that was changed hides a command that was not passed on.
-
-        Raises:
-            NgsiError: 404 or 422.
-        """
-        if self.complete or (self.updated and not self.missing):
-            return
-        if not self.updated and not self.passed and (self.failed or not self.exists):
-            raise not_found()
-        if self.passed or self.failed:
-            raise NgsiError(404, "PartialUpdate", _not_passed_on([self]))
-        raise _not_all(bool(self.updated), f"do not exist: {self.missing_text()}")
-
-
-def _not_all(some: bool, description: str) -> NgsiError:
-    return NgsiError(422, "PartialUpdate" if some else "Unprocessable", description)
-
-
-def _not_passed_on(outcomes: Iterable[Outcome]) -> str:
-    named = ", ".join(
-        f"{one.entity_id}-{one.kind} : [{', '.join((*one.missing, *one.failed))}]"
-        for one in outcomes
-    )
-    return f"Some of the following attributes were not updated: {{ {named} }}"
-
-
-def _listed(names: Iterable[str]) -> str:
-    return " ".join(names)

@@ -5,7 +5,7 @@ An attribute holds JSON text, not objects: what arrives once is shown many times
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -51,6 +51,10 @@ class Attribute:
             self.json,
             inner,
         )
+
+    def noted(self, notes: Mapping[str, bytes]) -> "Attribute":
+        """The same with metadata that were never stored."""
+        return replace(self, metadata={**self.metadata, **notes})
 
     def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
         chosen: dict[str, bytes] = {}
@@ -105,11 +109,13 @@ class Touched:
         named: Attributes that the request named, in its order.
         changed: Those whose value or metadata is different now.
         values: Those whose value is different now.
+        before: What was there before, of those that were named.
     """
 
     named: tuple[str, ...] = ()
     changed: frozenset[str] = frozenset()
     values: frozenset[str] = frozenset()
+    before: Mapping[str, Attribute] = field(default_factory=dict)
 
 
 class EntityStore:
@@ -176,8 +182,11 @@ def apply(
         forced: Count every named attribute as changed (``forcedUpdate``).
     """
     changed, values = [], []
+    before = {}
     for name, change in changes.items():
         old = entity.attributes.get(name)
+        if old is not None:
+            before[name] = old
         new = _changed(old, change, now)
         entity.attributes[name] = new
         if old is None or forced or old.json != new.json:
@@ -186,7 +195,7 @@ def apply(
         elif old.type != new.type or old.metadata != new.metadata:
             changed.append(name)
     entity.modified = now
-    return Touched(tuple(changes), frozenset(changed), frozenset(values))
+    return Touched(tuple(changes), frozenset(changed), frozenset(values), before)
 
 
 def _changed(old: Attribute | None, change: Change, now: float) -> Attribute:

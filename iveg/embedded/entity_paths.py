@@ -1,60 +1,89 @@
 """``/v2/entities`` and what lies below it."""
 
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from iveg.embedded.context_broker import ContextBroker, Scope
 from iveg.embedded.entities import Attribute, Change, Entity
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, names, paging, pattern, read_id
 from iveg.embedded.orion_errors import bad_request, not_found
+from iveg.embedded.outcomes import EXISTING
 from iveg.embedded.query import matches_query, ordered
 from iveg.embedded.views import write_attributes, write_entity
 
 
 async def list_entities(broker: ContextBroker, call: Call) -> Response:
-    """``GET /v2/entities``."""
+    """``GET /v2/entities``.
+
+    Asked for by name, an attribute need not be there: the entity is listed without it.
+    """
     query = call.request.query
     limit, offset = paging(query)
-    chosen = _chosen(broker, call)
+    wanted = _Wanted.read(call)
+    found = broker.tenant(call.scope.service).entities.all(call.scope.path)
+    chosen = [
+        one
+        for one in found
+        if wanted.fits(one.id, one.type) and matches_query(one, query.get("q", ""))
+    ]
+    chosen = ordered(chosen, query.get("orderBy", ""))
     view = call.view()
     told = await ask_providers(broker, call, "", view.names)
-    known = {(one.id, one.type) for one in chosen}
-    wanted_id = set(names(query.get("id")))
-    for entity_id, kind in told:
-        strange = (entity_id, kind) not in known
-        if strange and (not wanted_id or entity_id in wanted_id):
-            chosen.append(_ghost(call.scope, entity_id, kind))
-    # Asked for by name, attributes must be there: an entity with none is left out.
+    known = {(one.id, one.type) for one in found}
+    strange = [key for key in told if key not in known and wanted.fits(*key)]
+    bare = [
+        key
+        for key in broker.bare(call.scope, view.names)
+        if key not in known and key not in told and wanted.fits(*key)
+    ]
     shown = [
         write_entity(one, view, told.get((one.id, one.type)))
-        for one in chosen
-        if not view.names or _has_any(one, view.names) or told.get((one.id, one.type))
+        for one in (*chosen, *(_ghost(call.scope, *key) for key in (*strange, *bare)))
     ]
     response = Response(200, b"[%b]" % b",".join(shown[offset : offset + limit]))
     if "count" in call.options:
-        response.headers["Fiware-Total-Count"] = str(len(shown))
+        response.headers["Fiware-Total-Count"] = str(len(chosen) + len(strange))
     return response
 
 
-def _chosen(broker: ContextBroker, call: Call) -> list[Entity]:
-    query = call.request.query
-    for one in ("id", "type"):
-        if one in query and f"{one}Pattern" in query:
-            name = "IdPattern" if one == "id" else "typePattern"
-            raise bad_request(f"Incompatible parameters: {one}, {name}")
-    ids, kinds = names(query.get("id")), names(query.get("type"))
-    id_pattern = pattern(query.get("idPattern"), "idPattern")
-    kind_pattern = pattern(query.get("typePattern"), "typePattern")
-    found = [
-        one
-        for one in broker.tenant(call.scope.service).entities.all(call.scope.path)
-        if (not ids or one.id in ids)
-        and (not kinds or one.type in kinds)
-        and (id_pattern is None or id_pattern.search(one.id))
-        and (kind_pattern is None or kind_pattern.search(one.type))
-        and matches_query(one, query.get("q", ""))
-    ]
-    return ordered(found, query.get("orderBy", ""))
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """Which entities a list is to hold; what is empty or None fits all."""
+
+    ids: tuple[str, ...]
+    kinds: tuple[str, ...]
+    id_pattern: re.Pattern[str] | None
+    kind_pattern: re.Pattern[str] | None
+
+    @classmethod
+    def read(cls, call: Call) -> "_Wanted":
+        """From the query.
+
+        Raises:
+            NgsiError: 400.
+        """
+        query = call.request.query
+        for one in ("id", "type"):
+            if one in query and f"{one}Pattern" in query:
+                name = "IdPattern" if one == "id" else "typePattern"
+                raise bad_request(f"Incompatible parameters: {one}, {name}")
+        return cls(
+            names(query.get("id")),
+            names(query.get("type")),
+            pattern(query.get("idPattern"), "idPattern"),
+            pattern(query.get("typePattern"), "typePattern"),
+        )
+
+    def fits(self, entity_id: str, kind: str) -> bool:
+        """Whether an entity is one of them."""
+        return (
+            (not self.ids or entity_id in self.ids)
+            and (not self.kinds or kind in self.kinds)
+            and (self.id_pattern is None or bool(self.id_pattern.search(entity_id)))
+            and (self.kind_pattern is None or bool(self.kind_pattern.search(kind)))
+        )
 
 
 async def create_entity(broker: ContextBroker, call: Call) -> Response:
@@ -96,10 +125,13 @@ async def _whole(
     told = await ask_providers(broker, call, entity_id, view.names)
     if entity is not None:
         return entity, told.get((entity.id, entity.type), {})
-    if not told:
-        raise not_found()
-    key, attributes = next(iter(told.items()))
-    return _ghost(call.scope, *key), attributes
+    for key, attributes in told.items():
+        return _ghost(call.scope, *key), attributes
+    # Asked with its type, Orion finds that it does not know the entity.
+    for key in broker.bare(call.scope, view.names) if not call.kind else ():
+        if key[0] == entity_id:
+            return _ghost(call.scope, *key), {}
+    raise not_found()
 
 
 async def ask_providers(
@@ -122,13 +154,12 @@ async def append_attributes(broker: ContextBroker, call: Call) -> Response:
     """``POST /v2/entities/{id}/attrs``."""
     changes = call.changes(call.object())
     entity = broker.find(call.scope, call.parts[1], call.kind)
-    broker.append(
-        call.scope,
-        entity,
-        changes,
-        forced="forcedUpdate" in call.options,
-        strict="append" in call.options,
-    )
+    if "append" in call.options:
+        outcome = broker.append_new(call.scope, entity, changes, call.kind)
+        outcome.raise_for_one(EXISTING)
+    else:
+        forced = "forcedUpdate" in call.options
+        broker.append(call.scope, entity, changes, forced=forced)
     return Response(204)
 
 
@@ -165,9 +196,3 @@ async def update(
 def _ghost(scope: Scope, entity_id: str, kind: str) -> Entity:
     """An entity that only a provider knows."""
     return Entity(entity_id, kind, scope.path, scope.now, scope.now)
-
-
-def _has_any(entity: Entity, names: tuple[str, ...]) -> bool:
-    return "*" in names or any(
-        name in entity.attributes or name.startswith("date") for name in names
-    )

@@ -102,12 +102,14 @@ async def _close(broker: "MqttBroker") -> None:
 
 
 class MqttBroker(Broker):  # type: ignore[misc]
-    """amqtt's broker with four things mended.
+    """amqtt's broker with five things mended.
 
     It looks up a topic's audience once and not for every message; it lets a neighbour
     in the process listen; it takes and gives telemetry (QoS 0) without a task for each
-    message; and it closes connections whose client went away rudely,
-    which amqtt leaves to the garbage collector.
+    message; it delivers with the lesser quality of service of publication and
+    subscription, where amqtt takes the subscription's (MQTT 3.1.1 §3.8.4); and it
+    closes connections whose client went away rudely, which amqtt leaves to the garbage
+    collector.
     """
 
     def __init__(self, config: dict[str, object]) -> None:
@@ -115,6 +117,8 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self._open: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._listeners: list[Listener] = []
         self._known_audience: dict[str, tuple[tuple[Any, int], ...]] = {}
+        self._arriving: dict[str, int] = {}
+        """Client → quality of service of the publication that is being taken."""
 
     @property
     def port(self) -> int:
@@ -138,6 +142,22 @@ class MqttBroker(Broker):  # type: ignore[misc]
 
     # --- amqtt's own, mended ----------------------------------------------------
 
+    async def _handle_message_delivery(
+        self, client_session: Any, handler: Any, wait_deliver: asyncio.Future[Any]
+    ) -> bool:
+        """A client published; amqtt would forget with which quality."""
+        message = wait_deliver.result()
+        client = str(client_session.client_id)
+        self._arriving[client] = (message and message.qos) or 0
+        try:
+            return bool(
+                await super()._handle_message_delivery(
+                    client_session, handler, wait_deliver
+                )
+            )
+        finally:
+            self._arriving.pop(client, None)
+
     async def _broadcast_message(
         self,
         session: Any,
@@ -146,6 +166,8 @@ class MqttBroker(Broker):  # type: ignore[misc]
         force_qos: int | None = None,
     ) -> None:
         payload = bytes(data or b"")
+        if force_qos is None and session is not None:
+            force_qos = self._arriving.get(str(session.client_id))
         for listener in self._listeners:
             try:
                 listener(topic, payload)
@@ -188,6 +210,20 @@ class MqttBroker(Broker):  # type: ignore[misc]
                 topic, broadcast["data"], min(wanted, most), retain=False
             )
             running_tasks.append(asyncio.ensure_future(sending))
+
+    async def _publish_retained_messages_for_subscription(
+        self, subscription: tuple[str, int], session: Any
+    ) -> None:
+        topic_filter, wanted = subscription
+        handler = self._get_handler(session)
+        kept = [
+            handler.mqtt_publish(
+                topic, one.data, min(wanted, one.qos or 0), retain=True
+            )
+            for topic, one in self._retained_messages.items()
+            if handler is not None and self._matches(topic, topic_filter)
+        ]
+        await asyncio.gather(*kept, return_exceptions=True)
 
     def _audience(self, topic: str) -> tuple[tuple[Any, int], ...]:
         """Who is subscribed to a topic, and with which quality."""

@@ -12,7 +12,7 @@ from iveg.embedded.entities import Entity, Touched
 from iveg.embedded.notifier import Delivery, Lane, Target
 from iveg.embedded.orion_text import quoted
 from iveg.embedded.subscriptions import Subscription
-from iveg.embedded.views import View, write_entity
+from iveg.embedded.views import View, annotated, write_entity
 
 AGENT = "orion/4.7.0-next libcurl/7.88.1"
 _MACRO = re.compile(r"\$\{([^}]*)\}")
@@ -48,6 +48,7 @@ class Outbox:
     ) -> None:
         """Send one entity to one subscriber."""
         view = subscription.shown(touched)
+        entity = annotated(entity, touched, view.metadata, alteration)
         body = self._body(subscription, entity, view, alteration)
         request = self._request(subscription, entity, body, correlator)
         subscription.sent(now)

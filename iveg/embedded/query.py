@@ -81,19 +81,33 @@ def _read(text: str) -> Any:
 
 
 def ordered(entities: Iterable[Entity], order: str) -> list[Entity]:
-    """Entities in the order of ``?orderBy=``; ``!`` before a name turns it round."""
+    """Entities in the order of ``?orderBy=``; ``!`` before a name turns it round.
+
+    Raises:
+        NgsiError: 400, a name comes twice.
+    """
     entities = list(entities)
-    for name in reversed([one for one in order.split(",") if one]):
-        entities.sort(
-            key=lambda one: _rank(one, name.lstrip("!")), reverse=name[0] == "!"
-        )
+    tokens = [one for one in order.split(",") if one]
+    if len({one.removeprefix("!") for one in tokens}) < len(tokens):
+        raise bad_request("duplicate orderBy token detected")
+    for token in reversed(tokens):
+        name = token.removeprefix("!")
+        entities.sort(key=lambda one: _rank(one, name), reverse=name != token)
     return entities
 
 
 def _rank(entity: Entity, name: str) -> tuple[int, float, str]:
+    """MongoDB's order: what is absent or null comes before everything else."""
     if name in ("id", "type"):
-        return 1, 0.0, str(getattr(entity, name))
+        return 2, 0.0, str(getattr(entity, name))
+    if name in ("dateCreated", "dateModified"):
+        return 1, entity.created if name == "dateCreated" else entity.modified, ""
     _, value = _value(entity, name)
+    if value is None:
+        return 0, 0.0, ""
+    if isinstance(value, bool):
+        return 5, float(value), ""
     if isinstance(value, int | float):
-        return 0, float(value), ""
-    return 1, 0.0, str(value)
+        return 1, float(value), ""
+    kind = (str, dict, list).index(type(value)) + 2
+    return kind, 0.0, value if isinstance(value, str) else orjson.dumps(value).decode()

@@ -1,14 +1,22 @@
 """Entities as text, in each of the representations that NGSI-v2 has."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import orjson
 
-from iveg.embedded.entities import Attribute, Entity, date_json
+from iveg.embedded.entities import (
+    Attribute,
+    Entity,
+    Touched,
+    date_json,
+    metadata_json,
+)
 from iveg.embedded.orion_text import quoted
 
 _BUILTIN = ("dateCreated", "dateModified", "alterationType")
+_NOTIFIED = frozenset(("actionType", "previousValue"))
+"""Metadata that exist in notifications alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +59,33 @@ def write_entity(
     parts = [b'"id":%b,"type":%b' % (quoted(entity.id), quoted(entity.type))]
     parts += _named(chosen, view)
     return b"{%b}" % b",".join(parts)
+
+
+def annotated(
+    entity: Entity, touched: Touched, wanted: Sequence[str], alteration: str
+) -> Entity:
+    """The entity with the metadata that only notifications have, where wanted.
+
+    ``actionType`` says ``append`` or ``update`` of what the request named;
+    ``previousValue`` is what was there before it, also of what it did not name, and of
+    nothing where the entity itself is new.
+    """
+    if _NOTIFIED.isdisjoint(wanted):
+        return entity
+    previous = "previousValue" in wanted and alteration != "entityCreate"
+    attributes = {}
+    for name, one in entity.attributes.items():
+        old = touched.before.get(name, None if name in touched.named else one)
+        notes = {}
+        if "actionType" in wanted and name in touched.named:
+            notes["actionType"] = metadata_json("Text", "update" if old else "append")
+        if previous and old is not None:
+            notes["previousValue"] = b'{"type":%b,"value":%b}' % (
+                quoted(old.type),
+                old.json,
+            )
+        attributes[name] = one.noted(notes)
+    return replace(entity, attributes=attributes)
 
 
 def write_attributes(

@@ -7,8 +7,9 @@ A case is JSON: ``about`` says what it proves, ``steps`` are played in order:
   (text) and ``shows`` (headers) what must come back.  ``"soon": true`` asks again until
   it does.  ``"save": {"sub": "/v2/subscriptions/(.+)"}`` keeps a part of ``Location``.
 - ``{"publish": topic, "json" | "text" | "hex": …, "qos": n}`` sends over MQTT.
-- ``{"command": topic, "json": …}`` waits for what a device would hear.
-- ``{"heard": path, "json": …, "shows": {…}}`` waits for a notification.
+- ``{"command": topic, "json": …, "qos": n}`` waits for what a device would hear.
+- ``{"heard": path, "json": …, "shows": {…}}`` waits for a notification;
+  ``{"heard": path, "any_order": [body, …]}`` for several.
 - ``{"quiet": true}``: no notification was left over.
 - ``{"listener": {"status": 500}}``: how the receiver answers from now on.
 
@@ -149,11 +150,13 @@ class Player:
         assert str(message.topic) == step["command"]
         assert isinstance(message.payload, bytes)
         assert orjson.loads(message.payload) == step["json"]
+        assert message.qos == step.get("qos", message.qos)
 
     async def _heard(self, step: Mapping[str, Any]) -> None:
-        async with asyncio.timeout(PATIENCE_S):
-            request = await self.listener.heard.get()
-        assert request.path == step["heard"]
+        if "any_order" in step:
+            await self._heard_in_any_order(step["heard"], step["any_order"])
+            return
+        request = await self._notification(step["heard"])
         for name, wanted in step.get("shows", {}).items():
             assert not _differs(wanted, request.headers.get(name.lower()), name)
         if "text" in step:
@@ -162,6 +165,20 @@ class Player:
             assert not (wrong := _differs(step["json"], orjson.loads(request.body))), (
                 wrong
             )
+
+    async def _heard_in_any_order(self, path: str, wanted: list[Any]) -> None:
+        # Orion sends each notification on a thread of its own.
+        bodies = [orjson.loads((await self._notification(path)).body) for _ in wanted]
+        for one in wanted:
+            fitting = [body for body in bodies if not _differs(one, body)]
+            assert fitting, f"{one} is not among {bodies}"
+            bodies.remove(fitting[0])
+
+    async def _notification(self, path: str) -> Request:
+        async with asyncio.timeout(PATIENCE_S):
+            request = await self.listener.heard.get()
+        assert request.path == path
+        return request
 
     async def _quiet(self, _: Mapping[str, Any]) -> None:
         # A silence can only be waited for; the pause is generous against 1 ms.

@@ -59,7 +59,7 @@ async def test_poison_is_survived_in_silence(
 
 
 async def test_what_is_discarded_is_counted(up: Running, orion: OrionClient) -> None:
-    assert await orion.read_robots() == []
+    assert await orion.read_robots() == [{"id": "AGI", "type": "Robot"}]
     for payload in (b"x", b'{"a":"<"}', b"[1]"):
         up.agent.hear("/iveg/AGI/attrs", payload)
     up.agent.hear("/AGI/mqtt_feedback", b"none of its business")
