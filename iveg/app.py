@@ -26,10 +26,10 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
-from iveg.adapters.upkeep import Upkeep
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -39,8 +39,8 @@ from iveg.domain.stop.drills import Drills
 from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
-from iveg.pipeline.chain import Chain
 from iveg.pipeline.command import Commander
+from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.mapping import Mapper
@@ -115,7 +115,7 @@ class Dss:
         self.recorder = Recorder(url, journal_file(url, directory))
         self.queries = Queries(url)
         self.minutes = Minutes(self.hub, self.recorder, start)
-        self.chain = Chain(start)
+        self.chain = HealthMonitor(start)
         world = World(settings.robots, self.chain.probe)
         self.ingest = Ingest(world.robots.__contains__, self._rejected, world.is_past)
         self.journal = FileJournal(directory / "commands.jsonl")
@@ -185,7 +185,7 @@ class Dss:
             clock.now,
             lambda: self.recorder.health(clock.now()).state,
         )
-        self.upkeep = Upkeep(
+        self.provisioner = Provisioner(
             self.orion,
             self.agent,
             self.link,
@@ -236,7 +236,7 @@ class Dss:
             tasks.create_task(self.link.run(), name="mqtt")
             tasks.create_task(self.loop.run(), name="rule-loop")
             tasks.create_task(self.mapper.run(clock.now), name="costmap")
-            tasks.create_task(self.upkeep.run(), name="upkeep")
+            tasks.create_task(self.provisioner.run(), name="provisioner")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())
             tasks.create_task(self._remember(), name="remember")
@@ -324,7 +324,7 @@ class Dss:
 
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a subscription is one that this DSS keeps."""
-        return subscription_id in self.upkeep.subscription_ids
+        return subscription_id in self.provisioner.subscription_ids
 
     def notified(self, at: Instant) -> None:
         """A notification of Orion's came in."""

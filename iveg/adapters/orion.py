@@ -236,8 +236,8 @@ class OrionClient:
         query = {"type": entity_type, "attrs": ",".join(attributes), "orderBy": "id"}
         return await self._all("/v2/entities", {**query, "options": asked})
 
-    async def read_canary(self) -> Document | None:
-        """The canary as Orion has it; None where none ever came through the agent.
+    async def read_probe(self) -> Document | None:
+        """The heartbeat probe as Orion has it; None where none ever came so far.
 
         Raises:
             HopError: Orion does not answer at once.

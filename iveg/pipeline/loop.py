@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Canary, CommandAnswer, Instant, Received
 from iveg.pipeline.assess import Assessor
-from iveg.pipeline.chain import Chain, Hop, HopState
 from iveg.pipeline.command import Commander
+from iveg.pipeline.health_monitor import HealthMonitor, Hop, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock
@@ -27,7 +27,7 @@ class RuleLoop:
         ingest: Ingest,
         assessor: Assessor,
         commander: Commander,
-        chain: Chain,
+        chain: HealthMonitor,
         minutes: Minutes,
         hub: Hub,
         clock: Clock,
@@ -57,7 +57,7 @@ class RuleLoop:
         for received in arrived:
             fresh = self._assessor.take(received)
             if isinstance(received.observation, Canary):
-                self._chain.hear(received.observation.origin, received.at)
+                self._chain.received(received.observation.origin, received.at)
             if received.asked:
                 continue
             # The second road's answer is no news, but its time is kept.
@@ -70,7 +70,7 @@ class RuleLoop:
             self._watch_chain(now)
 
     def _watch_chain(self, now: Instant) -> None:
-        self._chain.canary_at = self._assessor.world.canary_at
+        self._chain.received_at = self._assessor.world.canary_at
         self._chain.database = self._database_state()
         changed = False
         for hop in self._chain.hops(now):

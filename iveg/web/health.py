@@ -7,14 +7,14 @@ from fastapi import APIRouter, Depends
 from starlette.responses import PlainTextResponse, Response
 
 from iveg.domain.observations import Instant
-from iveg.pipeline.chain import Chain
+from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.web import schemas
 from iveg.web.auth import require
 from iveg.web.robots import Json
 
 
 def health_of(
-    chain: Chain,
+    chain: HealthMonitor,
     counters: Callable[[], Counter[str]],
     safety: Callable[[Instant], schemas.SafetyJson],
     now: Instant,

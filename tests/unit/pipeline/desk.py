@@ -20,8 +20,8 @@ from iveg.domain.observations import (
 from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
-from iveg.pipeline.chain import Chain
 from iveg.pipeline.command import Commander
+from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.minutes import Minutes
@@ -70,7 +70,7 @@ class Desk:
             self.world.robots.__contains__,
             lambda source, reason: self.rejected.append((source, reason)),
         )
-        self.chain = Chain(START)
+        self.chain = HealthMonitor(START)
         self.assessor = Assessor(
             self.world,
             house,

@@ -52,7 +52,7 @@ def test_the_canary_that_came_back_is_evidence_for_the_chain() -> None:
 
     desk.hear(Canary(origin()))
 
-    assert desk.chain.canary_at == desk.clock().mono
+    assert desk.chain.received_at == desk.clock().mono
 
 
 async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:

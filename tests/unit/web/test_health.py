@@ -9,7 +9,7 @@ from tests.unit.web.desk import WebDesk
 def whole(desk: WebDesk) -> WebDesk:
     now = desk.clock().mono
     desk.chain.mqtt_connected = True
-    desk.chain.orion_ok_at = desk.chain.canary_at = desk.chain.notified_at = now
+    desk.chain.orion_ok_at = desk.chain.received_at = desk.chain.notified_at = now
     desk.chain.database = "ok"
     return desk
 

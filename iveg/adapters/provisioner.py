@@ -1,11 +1,11 @@
 """Keeps the FIWARE chain whole with no hand on it.
 
 Devices and subscriptions are made at the start and looked after for ever; after a gap
-one read of all robots brings the world up to date; a canary measure goes out every two
+one read of all robots brings the world up to date; a probe measure goes out every two
 seconds, because only what comes back proves that the chain is alive.
 
 Three things go on beside each other, so that none of them waits for a slow neighbour:
-the canary, a short question to Orion and to the agent, and the repairs.
+the probe, a short question to Orion and to the agent, and the repairs.
 """
 
 import asyncio
@@ -21,11 +21,11 @@ from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
 from iveg.domain.errors import HopError
 from iveg.domain.observations import Canary, Instant, Origin, Received
 from iveg.ngsi import codec, names
-from iveg.pipeline.chain import CANARY_PERIOD_S, SLOW_S, Chain
+from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
 from iveg.pipeline.ingest import Ingest
 
 _log = logging.getLogger(__name__)
-_PROBE_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
+_ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
 _DEVICES_EVERY = 3
 """While all is well, devices are looked at every third time."""
@@ -33,8 +33,8 @@ _DEVICES_EVERY = 3
 T = TypeVar("T")
 
 
-class Upkeep:
-    """Provisioning, subscriptions, reconciling reads and the canary.
+class Provisioner:
+    """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
 
     Attributes:
         subscription_ids: The subscriptions that are ours.
@@ -45,7 +45,7 @@ class Upkeep:
         orion: OrionClient,
         agent: IotAgentClient,
         link: MqttLink,
-        chain: Chain,
+        chain: HealthMonitor,
         ingest: Ingest,
         *,
         robots: Sequence[str],
@@ -68,7 +68,7 @@ class Upkeep:
         self._notify_token = notify_token
         self._boot = boot
         self._clock = read_clock
-        self._canary_seq = 0
+        self._probe_seq = 0
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
@@ -77,14 +77,14 @@ class Upkeep:
     async def run(self) -> None:
         """Until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._sing(), name="canary")
+            tasks.create_task(self._send_probes(), name="probe")
             tasks.create_task(self._watch(self._ask_orion), name="watch-orion")
             tasks.create_task(self._watch(self._ask_agent), name="watch-agent")
             tasks.create_task(self._look_after(), name="look-after")
 
-    # --- the canary ---------------------------------------------------------------
+    # --- the heartbeat probe --------------------------------------------------------
 
-    async def _sing(self) -> None:
+    async def _send_probes(self) -> None:
         """At QoS 1: a broker that is there and does nothing says nothing either."""
         topic = names.measure_topic(self._apikey, names.CANARY_ID)
         while True:
@@ -92,17 +92,17 @@ class Upkeep:
                 self._chain.mqtt_error = ""
                 await asyncio.sleep(0.1)
                 continue
-            self._canary_seq += 1
+            self._probe_seq += 1
             now = self._clock()
             stamp = codec.format_stamp(now.wall)
-            origin = Origin(self._boot, self._canary_seq, stamp)
-            self._chain.sing(origin, now)
+            origin = Origin(self._boot, self._probe_seq, stamp)
+            self._chain.sent(origin, now)
             self._chain.mqtt_error = await self._publish(topic, origin)
             spent = self._clock().mono - now.mono
-            await asyncio.sleep(max(0.1, CANARY_PERIOD_S - spent))
+            await asyncio.sleep(max(0.1, PROBE_PERIOD_S - spent))
 
     async def _publish(self, topic: str, origin: Origin) -> str:
-        """What the broker says to a canary; empty when it takes it."""
+        """What the broker says to a probe; empty when it takes it."""
         try:
             await self._link.publish(topic, codec.write_canary(origin))
         except HopError:
@@ -116,16 +116,16 @@ class Upkeep:
         while True:
             if await ask():
                 pause = _FIRST_PAUSE_S
-                await asyncio.sleep(_PROBE_PERIOD_S)
+                await asyncio.sleep(_ASK_PERIOD_S)
             else:
                 await asyncio.sleep(_jittered(pause))
                 pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _ask_orion(self) -> bool:
-        """Proves Orion, and how far the canary came."""
+        """Proves Orion, and how far the probe came."""
         before = self._clock()
         try:
-            entity = await self._orion.read_canary()
+            entity = await self._orion.read_probe()
         except HopError as error:
             self._chain.orion_error = error.detail
             return self._tell("orion", error)
@@ -134,7 +134,7 @@ class Upkeep:
         self._chain.orion_slow = self._slow("orion", at.mono - before.mono)
         for observation in codec.read_entity(entity).observations if entity else ():
             if isinstance(observation, Canary):
-                self._chain.find(observation.origin)
+                self._chain.stored(observation.origin)
         if self._chain.orion_error:
             self._chain.orion_error = ""
             self._gap.set()

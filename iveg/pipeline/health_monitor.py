@@ -1,6 +1,6 @@
 """The chain from robot to screen, hop by hop, and which hop is broken.
 
-Each hop is judged by what went through it, never by what it says of itself: a canary
+Each hop is judged by what went through it, never by what it says of itself: a probe
 measure goes out over MQTT every two seconds and must come back as a notification
 (safety.md §0.3, fault F4).  Where it was seen last tells which hop lost it::
 
@@ -20,12 +20,12 @@ from iveg.domain.probe import ProbeLag
 HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
 
-CANARY_PERIOD_S = 2.0
+PROBE_PERIOD_S = 2.0
 LATE_S, DOWN_S = 4.0, 5.5
 GRACE_S = 6.0
 """After the start nobody is accused for this long."""
 SLOW_S = 1.0
-"""A canary or an answer that takes longer is late."""
+"""A probe or an answer that takes longer is late."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,20 +38,20 @@ class Hop:
     detail: str = ""
 
 
-class Chain:
+class HealthMonitor:
     """Collects the evidence.
 
     Attributes:
         mqtt_connected: Whether our own connection to the broker stands.
-        mqtt_error: Why the broker did not confirm the last canary.
+        mqtt_error: Why the broker did not confirm the last probe.
         orion_error: What the last question to Orion came to; empty when well.
         orion_slow: That it answers, and how late.
         agent_error: The same of the IoT Agent; ``agent_slow`` too.
         agent_warning: What a person should look at though all seems well.
         notify_error: What was wrong with the subscriptions when last looked at.
         notify_detail: Why Orion could not deliver, as it remembers; may be long past.
-        canary_at: When the newest canary came back (s, monotonic).
-        stored_at: When the newest canary that Orion has was sent (s, monotonic).
+        received_at: When the newest probe came back (s, monotonic).
+        stored_at: When the newest probe that Orion has was sent (s, monotonic).
         notified_at: When the newest notification of any kind came (s, monotonic).
         probe: How far the whole chain is behind.
         database: The recorder's state.
@@ -66,24 +66,24 @@ class Chain:
         self.orion_ok_at: float | None = None
         self.agent_error = self.agent_slow = self.agent_warning = ""
         self.notify_error = self.notify_detail = ""
-        self.canary_at: float | None = None
+        self.received_at: float | None = None
         self.stored_at: float | None = None
         self.notified_at: float | None = None
         self.probe = ProbeLag()
         self.database: HopState = "unknown"
 
-    # --- the canary ---------------------------------------------------------------
+    # --- the heartbeat probe --------------------------------------------------------
 
-    def sing(self, origin: Origin, now: Instant) -> None:
-        """A canary leaves."""
+    def sent(self, origin: Origin, now: Instant) -> None:
+        """A probe leaves."""
         self.probe.sent(origin, now)
 
-    def hear(self, origin: Origin, now: Instant) -> None:
-        """A canary has come back as a notification."""
+    def received(self, origin: Origin, now: Instant) -> None:
+        """A probe has come back as a notification."""
         self.probe.returned(origin, now)
 
-    def find(self, origin: Origin) -> None:
-        """Orion has this canary; one of an earlier life of iVeg proves nothing."""
+    def stored(self, origin: Origin) -> None:
+        """Orion has this probe; one of an earlier life of iVeg proves nothing."""
         left = self.probe.sent_at(origin)
         if left is not None:
             self.stored_at = left
@@ -132,8 +132,8 @@ class Chain:
         return Hop("orion", "unknown" if age is None else "ok", age)
 
     def _agent(self, now: Instant, *, broken: bool) -> Hop:
-        """Deaf or healthy: the canary knows, if the hops round it are well."""
-        age = _age(_newest(self.canary_at, self.stored_at), now)
+        """Deaf or healthy: the probe knows, if the hops round it are well."""
+        age = _age(_newest(self.received_at, self.stored_at), now)
         if self.agent_error:
             return Hop("iot_agent", "down", age, self.agent_error)
         state = self._by_age(age, now)

@@ -12,13 +12,13 @@ from iveg.adapters import clock
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.subscriptions import WANTED
-from iveg.adapters.upkeep import Upkeep
 from iveg.domain.observations import Odometry, Received
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
-from iveg.pipeline.chain import Chain
+from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from tests.builders import odometry
 
@@ -32,16 +32,16 @@ async def until(true: Callable[[], object], within_s: float = 10.0) -> None:
 
 
 async def first_ids(site: "Site") -> frozenset[str]:
-    await until(lambda: site.upkeep.subscription_ids)
-    return site.upkeep.subscription_ids
+    await until(lambda: site.provisioner.subscription_ids)
+    return site.provisioner.subscription_ids
 
 
 class Site:
-    """Upkeep over a FIWARE that can be reached, or cannot."""
+    """Provisioner over a FIWARE that can be reached, or cannot."""
 
     def __init__(self, fiware: Running, *, orion_url: str = "") -> None:
         self.heard: list[tuple[str, bytes]] = []
-        self.chain = Chain(clock.now())
+        self.chain = HealthMonitor(clock.now())
         self.ingest = Ingest({"AGI"}.__contains__)
         self.orion = OrionClient(orion_url or fiware.orion_url, *SERVICE)
         self.agent = IotAgentClient(fiware.iota_url, *SERVICE)
@@ -51,7 +51,7 @@ class Site:
             {names.measure_topic("iveg", names.CANARY_ID): 0},
             lambda topic, payload: self.heard.append((topic, payload)),
         )
-        self.upkeep = Upkeep(
+        self.provisioner = Provisioner(
             self.orion,
             self.agent,
             self.link,
@@ -70,7 +70,7 @@ class Site:
     async def running(self) -> AsyncIterator["Site"]:
         tasks = [
             asyncio.create_task(self.link.run()),
-            asyncio.create_task(self.upkeep.run()),
+            asyncio.create_task(self.provisioner.run()),
         ]
         try:
             yield self
@@ -90,15 +90,15 @@ async def fiware() -> AsyncIterator[Running]:
 
 async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -> None:
     async with Site(fiware).running() as site:
-        await until(lambda: site.upkeep.subscription_ids)
+        await until(lambda: site.provisioner.subscription_ids)
         kept = await site.orion.read_subscriptions()
 
-    assert {one["id"] for one in kept} == site.upkeep.subscription_ids
+    assert {one["id"] for one in kept} == site.provisioner.subscription_ids
     assert site.chain.agent_error == ""
     assert site.chain.orion_ok_at is not None
 
 
-async def test_the_canary_sings_on_the_road_of_every_measure(fiware: Running) -> None:
+async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:
     async with Site(fiware).running() as site:
         await until(lambda: site.heard)
 
@@ -111,7 +111,7 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
     fiware: Running,
 ) -> None:
     async with Site(fiware).running() as site:
-        await until(lambda: site.upkeep.subscription_ids)
+        await until(lambda: site.provisioner.subscription_ids)
         measure = codec.write_odometry(odometry())
         await site.link.publish("/iveg/AGI_odom/attrs", measure)
         read: list[Received] = []
@@ -148,14 +148,14 @@ async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
     fiware: Running,
 ) -> None:
     async with Site(fiware).running() as site:
-        await until(lambda: site.upkeep.subscription_ids)
-        lost = next(iter(site.upkeep.subscription_ids))
+        await until(lambda: site.provisioner.subscription_ids)
+        lost = next(iter(site.provisioner.subscription_ids))
         await site.orion.delete_subscription(lost)
         await until(lambda: site.chain.notify_error)
         await until(lambda: not site.chain.notify_error)
         kept = await site.orion.read_subscriptions()
 
-    assert {one["id"] for one in kept} == site.upkeep.subscription_ids
+    assert {one["id"] for one in kept} == site.provisioner.subscription_ids
     assert len(kept) == len(WANTED)
 
 
@@ -173,7 +173,7 @@ async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
     assert seen == {frozenset(one["id"] for one in kept)}
 
 
-async def test_a_canary_that_reached_orion_is_found_there(fiware: Running) -> None:
+async def test_a_probe_that_reached_orion_is_found_there(fiware: Running) -> None:
     async with Site(fiware).running() as site:
         await until(lambda: site.chain.stored_at is not None)
 
@@ -188,7 +188,7 @@ async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
         "entity_type": "Robot",
     }
     async with Site(fiware).running() as site:
-        await until(lambda: site.upkeep.subscription_ids)
+        await until(lambda: site.provisioner.subscription_ids)
         await site.agent.create_device(device)
         await until(lambda: site.chain.agent_warning, within_s=20.0)
         await site.agent.delete_device("AAA_gps")
@@ -228,5 +228,5 @@ def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [
         one.getMessage()
         for one in caplog.records
-        if one.levelno >= logging.WARNING and one.name == "iveg.adapters.upkeep"
+        if one.levelno >= logging.WARNING and one.name == "iveg.adapters.provisioner"
     ]

@@ -3,28 +3,28 @@
 import pytest
 
 from iveg.domain.observations import Origin
-from iveg.pipeline.chain import Chain, Hop
+from iveg.pipeline.health_monitor import HealthMonitor, Hop
 from tests.builders import START, at
 
 
-def states(chain: Chain, now: float) -> dict[str, str]:
+def states(chain: HealthMonitor, now: float) -> dict[str, str]:
     return {hop.name: hop.state for hop in chain.hops(at(now))}
 
 
-def hop(chain: Chain, name: str, now: float) -> Hop:
+def hop(chain: HealthMonitor, name: str, now: float) -> Hop:
     return next(one for one in chain.hops(at(now)) if one.name == name)
 
 
-def healthy(now: float) -> Chain:
-    chain = Chain(START)
+def healthy(now: float) -> HealthMonitor:
+    chain = HealthMonitor(START)
     chain.mqtt_connected = True
-    chain.orion_ok_at = chain.canary_at = chain.notified_at = at(now).mono
+    chain.orion_ok_at = chain.received_at = chain.notified_at = at(now).mono
     chain.database = "ok"
     return chain
 
 
 def test_nobody_is_accused_in_the_first_seconds() -> None:
-    found = states(Chain(START), 5.9)
+    found = states(HealthMonitor(START), 5.9)
 
     assert found == {
         "mqtt": "unknown",
@@ -42,9 +42,7 @@ def test_a_whole_chain_is_ok() -> None:
 @pytest.mark.parametrize(
     ("age", "state"), [(4.0, "ok"), (4.1, "late"), (5.5, "late"), (5.6, "down")]
 )
-def test_f4_an_agent_that_is_deaf_is_found_by_the_canary(
-    age: float, state: str
-) -> None:
+def test_f4_an_agent_that_is_deaf_is_found_by_the_probe(age: float, state: str) -> None:
     chain = healthy(10.0)
     chain.notified_at = at(10.0 + age).mono
 
@@ -115,21 +113,21 @@ def test_f2_a_broker_that_confirms_nothing_is_down_though_connected() -> None:
     assert (found["iot_agent"], found["notifications"]) == ("unknown", "unknown")
 
 
-def test_a_canary_that_takes_long_makes_the_agent_late() -> None:
+def test_a_probe_that_takes_long_makes_the_agent_late() -> None:
     chain = healthy(10.0)
-    chain.sing(Origin("b", 1, "now"), at(7.0))
-    chain.hear(Origin("b", 1), at(10.0))
+    chain.sent(Origin("b", 1, "now"), at(7.0))
+    chain.received(Origin("b", 1), at(10.0))
 
     late = hop(chain, "iot_agent", 10.0)
 
     assert (late.state, late.detail) == ("late", "a measure takes 3.0 s to come back")
 
 
-def test_a_canary_of_an_earlier_life_proves_nothing() -> None:
-    chain = Chain(START)
-    chain.sing(Origin("new", 1), START)
-    chain.find(Origin("old", 1))
-    chain.hear(Origin("old", 1), START)
+def test_a_probe_of_an_earlier_life_proves_nothing() -> None:
+    chain = HealthMonitor(START)
+    chain.sent(Origin("new", 1), START)
+    chain.stored(Origin("old", 1))
+    chain.received(Origin("old", 1), START)
 
     assert (chain.stored_at, chain.probe.is_known) == (None, False)
 
@@ -153,7 +151,7 @@ def test_a_device_that_may_swallow_commands_is_shown_though_measures_pass() -> N
 
 
 def test_what_never_came_is_down_after_the_first_seconds() -> None:
-    chain = Chain(START)
+    chain = HealthMonitor(START)
     chain.mqtt_connected = True
     chain.orion_ok_at = at(6.0).mono
 
