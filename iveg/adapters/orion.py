@@ -13,7 +13,7 @@ from typing import Any, Self
 import httpx
 import orjson
 
-from iveg.domain.errors import HopError
+from iveg.domain.errors import HopError, NoAnswerError
 from iveg.ngsi import names
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
@@ -84,7 +84,8 @@ class FiwareHttp:
             also: Statuses beside 2xx that the caller understands.
 
         Raises:
-            HopError: no connection, no answer in time, or another status.
+            NoAnswerError: no answer in time.
+            HopError: no connection, or another status.
         """
         try:
             async with asyncio.timeout(timeout_s):
@@ -97,7 +98,7 @@ class FiwareHttp:
                     timeout=timeout_s,
                 )
         except (TimeoutError, httpx.TimeoutException) as error:
-            raise HopError(
+            raise NoAnswerError(
                 self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
             ) from error
         except httpx.HTTPError as error:

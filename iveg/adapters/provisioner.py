@@ -18,7 +18,7 @@ from iveg.adapters.iot_agent import IotAgentClient, Provisioned, provision
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
-from iveg.domain.errors import HopError
+from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.observations import Canary, Instant, Origin, Received
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
@@ -27,6 +27,7 @@ from iveg.pipeline.ingest import Ingest
 _log = logging.getLogger(__name__)
 _ASK_PERIOD_S, _REPAIR_PERIOD_S = 1.0, 4.0
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 3.0
+_LONGEST_DEVICES_WAIT_S = 32.0
 _DEVICES_EVERY = 3
 """While all is well, devices are looked at every third time."""
 
@@ -69,6 +70,7 @@ class Provisioner:
         self._boot = boot
         self._clock = read_clock
         self._probe_seq = 0
+        self._devices_at = self._devices_wait_s = 0.0
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
@@ -144,15 +146,23 @@ class Provisioner:
         before = self._clock()
         try:
             await self._agent.version()
+        except NoAnswerError as error:
+            self._chain.agent_silent, self._chain.agent_error = error.detail, ""
+            return self._tell("iot_agent", error)
         except HopError as error:
-            self._chain.agent_error = error.detail
+            self._chain.agent_error, self._chain.agent_silent = error.detail, ""
             return self._tell("iot_agent", error)
         spent = self._clock().mono - before.mono
         self._chain.agent_slow = self._slow("iot_agent", spent)
-        if self._chain.agent_error:
-            self._chain.agent_error = ""
+        if self._agent_trouble:
+            self._chain.agent_error = self._chain.agent_silent = ""
+            self._devices_wait_s = self._devices_at = 0.0
             self._gap.set()
         return self._tell("iot_agent", None)
+
+    @property
+    def _agent_trouble(self) -> str:
+        return self._chain.agent_error or self._chain.agent_silent
 
     def _slow(self, hop: str, spent_s: float) -> str:
         if spent_s <= SLOW_S:
@@ -169,9 +179,7 @@ class Provisioner:
         rounds, pause = 0, _FIRST_PAUSE_S
         while True:
             self._gap.clear()
-            devices = rounds % _DEVICES_EVERY == 0 or not self._chain.whole(
-                self._clock()
-            )
+            devices = self._devices_are_due(rounds, self._clock())
             rounds += 1
             if await self._repair(devices=devices):
                 pause = _FIRST_PAUSE_S
@@ -179,6 +187,12 @@ class Provisioner:
             else:
                 await self._rest(_jittered(pause))
                 pause = min(_LONGEST_PAUSE_S, 2 * pause)
+
+    def _devices_are_due(self, rounds: int, now: Instant) -> bool:
+        """Never while the agent falls behind: the questions would queue there too."""
+        if self._chain.is_overloaded(now) or now.mono < self._devices_at:
+            return False
+        return rounds % _DEVICES_EVERY == 0 or not self._chain.whole(now)
 
     async def _rest(self, seconds: float) -> None:
         """Sleep, unless a neighbour comes back meanwhile."""
@@ -196,10 +210,10 @@ class Provisioner:
         if self._chain.orion_error:
             return False
         whole = True
-        if devices and not self._chain.agent_error:
+        if devices and not self._agent_trouble:
             whole = await self._check_devices()
         whole = await self._check_subscriptions() and whole
-        return await self._reconcile() and whole and not self._chain.agent_error
+        return await self._reconcile() and whole and not self._agent_trouble
 
     async def _check_devices(self) -> bool:
         work = provision(
@@ -213,10 +227,19 @@ class Provisioner:
             done: Provisioned = await _made_sense("iot_agent", work)
         except HopError as error:
             self._chain.agent_warning = error.detail
+            if isinstance(error, NoAnswerError):
+                self._wait_longer()
             return await self._blame("devices", error)
+        self._devices_wait_s = self._devices_at = 0.0
         self._explain(done.mended)
         self._warn(done.problems)
         return self._tell("devices", None)
+
+    def _wait_longer(self) -> None:
+        """What was not answered is asked again ever later: it may still be queued."""
+        longer = max(_REPAIR_PERIOD_S, 2 * self._devices_wait_s)
+        self._devices_wait_s = min(_LONGEST_DEVICES_WAIT_S, longer)
+        self._devices_at = self._clock().mono + self._devices_wait_s
 
     async def _check_subscriptions(self) -> bool:
         work = ensure_subscriptions(self._orion, self._notify_url, self._notify_token)

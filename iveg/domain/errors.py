@@ -9,6 +9,7 @@ IvegError
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
 ├── NotAllowedError         somebody without the role (HTTP 403)
 └── HopError                a neighbour that cannot be reached or answered wrongly
+    └── NoAnswerError       one that took the question and did not answer in time
 """
 
 
@@ -86,3 +87,7 @@ class HopError(IvegError):
         super().__init__(f"{hop}: {detail}")
         self.hop = hop
         self.detail = detail
+
+
+class NoAnswerError(HopError):
+    """A neighbour took the question and did not answer in time: late, or hung."""

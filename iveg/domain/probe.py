@@ -62,6 +62,11 @@ class ProbeLag:
         """Whether a probe has come back; until then ``lag`` only says "at least"."""
         return bool(self._back)
 
+    @property
+    def transit_s(self) -> float:
+        """How long the newest probe that came back took (s); 0 before the first."""
+        return self._back[-1][1] if self._back else 0.0
+
     def lag(self, now: Instant) -> float | None:
         """How far the chain is behind (s); None before the first probe left."""
         known = [self._back[-1][1]] if self._back else []

@@ -26,16 +26,26 @@ GRACE_S = 6.0
 """After the start nobody is accused for this long."""
 SLOW_S = 1.0
 """A probe or an answer that takes longer is late."""
+_LONGEST_GAP_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
 class Hop:
-    """One hop's state, how old the evidence is (s), and a short detail."""
+    """One hop's state and why.
+
+    Attributes:
+        age_s: How old the evidence is (s).
+        detail: One short sentence.
+        lag_s: How late measures pass it (s); None where no probe tells.
+        growing: Whether they pass it ever later.
+    """
 
     name: HopName
     state: HopState
     age_s: float | None = None
     detail: str = ""
+    lag_s: float | None = None
+    growing: bool = False
 
 
 class HealthMonitor:
@@ -47,6 +57,7 @@ class HealthMonitor:
         orion_error: What the last question to Orion came to; empty when well.
         orion_slow: That it answers, and how late.
         agent_error: The same of the IoT Agent; ``agent_slow`` too.
+        agent_silent: That the agent takes questions and does not answer them.
         agent_warning: What a person should look at though all seems well.
         notify_error: What was wrong with the subscriptions when last looked at.
         notify_detail: Why Orion could not deliver, as it remembers; may be long past.
@@ -64,12 +75,15 @@ class HealthMonitor:
         self.mqtt_error = ""
         self.orion_error = self.orion_slow = ""
         self.orion_ok_at: float | None = None
-        self.agent_error = self.agent_slow = self.agent_warning = ""
+        self.agent_error = self.agent_silent = ""
+        self.agent_slow = self.agent_warning = ""
         self.notify_error = self.notify_detail = ""
         self.received_at: float | None = None
         self.stored_at: float | None = None
         self.notified_at: float | None = None
         self.probe = ProbeLag()
+        self._last_return: float | None = None
+        self._gap_s = 0.0
         self.database: HopState = "unknown"
 
     # --- the heartbeat probe --------------------------------------------------------
@@ -80,6 +94,9 @@ class HealthMonitor:
 
     def received(self, origin: Origin, now: Instant) -> None:
         """A probe has come back as a notification."""
+        if self._last_return is not None:
+            self._gap_s = now.mono - self._last_return
+        self._last_return = now.mono
         self.probe.returned(origin, now)
 
     def stored(self, origin: Origin) -> None:
@@ -132,22 +149,54 @@ class HealthMonitor:
         return Hop("orion", "unknown" if age is None else "ok", age)
 
     def _agent(self, now: Instant, *, broken: bool) -> Hop:
-        """Deaf or healthy: the probe knows, if the hops round it are well."""
+        """Deaf, overloaded or healthy: the probe knows, if the hops round it are well.
+
+        An agent that measures still pass is not down because it leaves questions
+        unanswered: under load it answers them last.
+        """
         age = _age(_newest(self.received_at, self.stored_at), now)
         if self.agent_error:
             return Hop("iot_agent", "down", age, self.agent_error)
-        state = self._by_age(age, now)
-        if state != "ok":
-            known: HopState = "unknown" if broken else state
-            lost = "" if known == "unknown" else "measures do not reach Orion"
-            return Hop("iot_agent", known, age, lost)
-        if self.agent_slow or self.agent_warning:
-            return Hop("iot_agent", "late", age, self.agent_slow or self.agent_warning)
-        lag = self.probe.lag(now)
-        if lag is not None and lag > SLOW_S:
-            detail = f"a measure takes {lag:.1f} s to come back"
-            return Hop("iot_agent", "late", age, detail)
-        return Hop("iot_agent", "ok", age)
+        state = self._by_age(age, now, self._agent_down_s)
+        if broken and state != "ok":
+            return Hop("iot_agent", "unknown", age)
+        lag, growing = self.probe.lag(now), self.probe.grows(now)
+        if state == "ok" or (state == "late" and self._was_behind):
+            state, detail = self._agent_says(lag, growing=growing)
+        else:
+            detail = "" if state == "unknown" else "measures do not reach Orion"
+        return Hop("iot_agent", state, age, detail, lag, growing)
+
+    def _agent_says(
+        self, lag_s: float | None, *, growing: bool
+    ) -> tuple[HopState, str]:
+        """What is said of an agent that measures pass, the lag before all else."""
+        if lag_s is not None and lag_s > SLOW_S:
+            return "late", _lag_in_words(lag_s, growing=growing)
+        if self.agent_silent:
+            return "down", self.agent_silent
+        detail = self.agent_slow or self.agent_warning
+        return ("late", detail) if detail else ("ok", "")
+
+    @property
+    def _was_behind(self) -> bool:
+        return self.probe.transit_s > SLOW_S
+
+    @property
+    def _agent_down_s(self) -> float:
+        """After which silence the agent is deaf and not merely behind (s).
+
+        Behind a backlog that grows, probes come back ever farther apart.
+        """
+        if not self._was_behind:
+            return DOWN_S
+        return min(_LONGEST_GAP_S, max(DOWN_S, 2 * self._gap_s))
+
+    def is_overloaded(self, now: Instant) -> bool:
+        """Whether measures pass the agent ever later: nothing may be added to it."""
+        age = _age(_newest(self.received_at, self.stored_at), now)
+        passing = self._by_age(age, now, self._agent_down_s) in ("ok", "late")
+        return passing and self._was_behind and self.probe.grows(now)
 
     def _notifications(self, now: Instant, *, blind: bool) -> Hop:
         age = _age(self.notified_at, now)
@@ -159,15 +208,22 @@ class HealthMonitor:
             return Hop("notifications", "unknown", age)
         return Hop("notifications", state, age, self.notify_error or self.notify_detail)
 
-    def _by_age(self, age: float | None, now: Instant) -> HopState:
+    def _by_age(
+        self, age: float | None, now: Instant, down_s: float = DOWN_S
+    ) -> HopState:
         if age is None:
             return "unknown" if self._starting(now) else "down"
         if age <= LATE_S:
             return "ok"
-        return "late" if age <= DOWN_S else "down"
+        return "late" if age <= down_s else "down"
 
     def _starting(self, now: Instant) -> bool:
         return now.mono - self._start.mono < GRACE_S
+
+
+def _lag_in_words(lag_s: float, *, growing: bool) -> str:
+    late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
+    return f"measures reach Orion {late} s late" + (", growing" if growing else "")
 
 
 def _newest(one: float | None, other: float | None) -> float | None:

@@ -27,6 +27,8 @@ def health_of(
             "age_s": None if hop.age_s is None else round(hop.age_s, 1),
             "key": f"health.hop.{hop.name}.{hop.state}",
             "detail": hop.detail,
+            "lag_s": None if hop.lag_s is None else round(hop.lag_s, 1),
+            "growing": hop.growing,
         }
         for hop in chain.hops(now)
     ]
@@ -70,6 +72,21 @@ def router(
             f'iveg_hop_up{{hop="{hop["hop"]}"}} {int(hop["state"] == "ok")}'
             for hop in state["hops"]
         ]
+        lines += _lag_lines(state["hops"])
         return PlainTextResponse("\n".join(lines) + "\n")
 
     return routes
+
+
+def _lag_lines(hops: list[schemas.HopJson]) -> list[str]:
+    """How late measures pass each hop that a probe tells of."""
+    known = [hop for hop in hops if hop["lag_s"] is not None]
+    return [
+        "# TYPE iveg_lag_seconds gauge",
+        *(f'iveg_lag_seconds{{hop="{hop["hop"]}"}} {hop["lag_s"]}' for hop in known),
+        "# TYPE iveg_lag_growing gauge",
+        *(
+            f'iveg_lag_growing{{hop="{hop["hop"]}"}} {int(hop["growing"])}'
+            for hop in known
+        ),
+    ]

@@ -300,6 +300,8 @@ class HopJson(TypedDict):
     age_s: float | None
     key: str
     detail: str
+    lag_s: float | None
+    growing: bool
 
 
 class AlertLatencyJson(TypedDict):

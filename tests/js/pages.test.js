@@ -1,4 +1,4 @@
-import { judgeChain, ORDER } from "../../iveg/static/js/pages/chain.js";
+import { judgeChain, ORDER, sentenceOf } from "../../iveg/static/js/pages/chain.js";
 import { statOf, summaryOf, tookOf } from "../../iveg/static/js/pages/latency.js";
 import { equal, test } from "./harness.js";
 
@@ -43,6 +43,25 @@ test("of several broken hops the one nearest to the robots is named", () => {
 test("a hop that is down is worse news than a late one before it", () => {
   const found = judgeChain(hops({ mqtt: "late", orion: "down" }), [], true);
   equal(found.hop, "orion");
+});
+
+test("an agent that falls behind is said to be late by its seconds", () => {
+  const found = judgeChain(
+    [{ hop: "iot_agent", state: "late", lag_s: 23.4, growing: true }],
+    [],
+    true,
+  );
+  equal([found.key, found.slots.lag], ["health.lag.growing", 23.4]);
+});
+
+test("a lag that does not grow is said without it", () => {
+  const hop = /** @type {const} */ ({ hop: "iot_agent", state: "late", lag_s: 23.4 });
+  equal(sentenceOf(hop).key, "health.lag.steady");
+});
+
+test("what is late for another reason than its lag keeps its sentence", () => {
+  const hop = /** @type {const} */ ({ hop: "iot_agent", state: "late", lag_s: 0.1 });
+  equal(sentenceOf(hop).key, "health.hop.iot_agent.late");
 });
 
 test("a silent robot before a merely late chain is named with its id", () => {

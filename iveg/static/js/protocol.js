@@ -101,7 +101,7 @@
  * @typedef {Aged & {
  *   ok: boolean,
  *   hops: {hop: string, state: "ok" | "late" | "down" | "unknown", age_s: number | null,
- *     key: string, detail: string | null}[],
+ *     key: string, detail: string | null, lag_s?: number | null, growing?: boolean}[],
  *   counters: Record<string, number>, safety?: Safety,
  * }} Health
  *

@@ -14,7 +14,7 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.subscriptions import WANTED
-from iveg.domain.observations import Odometry, Received
+from iveg.domain.observations import Odometry, Origin, Received
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
@@ -39,12 +39,14 @@ async def first_ids(site: "Site") -> frozenset[str]:
 class Site:
     """Provisioner over a FIWARE that can be reached, or cannot."""
 
-    def __init__(self, fiware: Running, *, orion_url: str = "") -> None:
+    def __init__(
+        self, fiware: Running, *, orion_url: str = "", agent_url: str = ""
+    ) -> None:
         self.heard: list[tuple[str, bytes]] = []
         self.chain = HealthMonitor(clock.now())
         self.ingest = Ingest({"AGI"}.__contains__)
         self.orion = OrionClient(orion_url or fiware.orion_url, *SERVICE)
-        self.agent = IotAgentClient(fiware.iota_url, *SERVICE)
+        self.agent = IotAgentClient(agent_url or fiware.iota_url, *SERVICE)
         self.link = MqttLink(
             BrokerAddress("127.0.0.1", fiware.mqtt_port),
             "test",
@@ -196,6 +198,28 @@ async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
 
     told = [line for line in _warnings(caplog) if line.startswith("Device AAA_gps")]
     assert len(told) == 1
+
+
+async def test_an_agent_that_falls_behind_is_asked_nothing_more(
+    fiware: Running,
+) -> None:
+    asked: list[str] = []
+
+    async def answer(request: Request) -> Response:
+        asked.append(request.path)
+        return Response(200, b"{}")
+
+    async with http_server(answer, "127.0.0.1", 0) as port:
+        behind = Site(fiware, agent_url=f"http://127.0.0.1:{port}")
+        now = clock.now()
+        for seq, (left, back) in enumerate(((-14.0, -12.0), (-8.0, 0.0))):
+            behind.chain.sent(Origin("b", seq), now.later(left))
+            behind.chain.received(Origin("b", seq), now.later(back))
+        behind.chain.received_at = now.mono
+        async with behind.running() as site:
+            await first_ids(site)
+
+    assert set(asked) == {"/iot/about"}
 
 
 @pytest.mark.parametrize(

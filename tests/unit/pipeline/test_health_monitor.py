@@ -120,7 +120,57 @@ def test_a_probe_that_takes_long_makes_the_agent_late() -> None:
 
     late = hop(chain, "iot_agent", 10.0)
 
-    assert (late.state, late.detail) == ("late", "a measure takes 3.0 s to come back")
+    assert (late.state, late.detail) == ("late", "measures reach Orion 3.0 s late")
+    assert (late.lag_s, late.growing) == (3.0, False)
+
+
+def behind(lags: list[float], every_s: float = 2.0) -> tuple[HealthMonitor, float]:
+    """A monitor whose probes came back this late each, and when the last one did."""
+    chain, now = healthy(10.0), 10.0
+    for seq, lag in enumerate(lags):
+        now = 10.0 + every_s * seq
+        chain.sent(Origin("b", seq), at(now - lag))
+        chain.received(Origin("b", seq), at(now))
+        chain.orion_ok_at = chain.received_at = chain.notified_at = at(now).mono
+    return chain, now
+
+
+def test_the_lag_is_said_though_the_agent_answers_no_question() -> None:
+    chain, now = behind([15.0, 17.0, 19.0, 21.0, 23.0, 25.0, 27.0])
+    chain.agent_silent = "no answer to GET /iot/about in 3 s"
+    chain.agent_warning = "no answer to POST /iot/services in 6 s"
+
+    late = hop(chain, "iot_agent", now)
+
+    assert (late.state, late.detail) == (
+        "late",
+        "measures reach Orion 27 s late, growing",
+    )
+    assert chain.is_overloaded(at(now))
+
+
+def test_a_lag_that_stays_is_said_without_growing_and_repairs_go_on() -> None:
+    chain, now = behind([4.0] * 7)
+
+    assert hop(chain, "iot_agent", now).detail == "measures reach Orion 4.0 s late"
+    assert not chain.is_overloaded(at(now))
+
+
+def test_behind_a_backlog_that_grows_probes_may_come_ever_farther_apart() -> None:
+    chain, now = behind([5.0, 8.0, 11.0, 14.0], every_s=6.0)
+
+    assert hop(chain, "iot_agent", now + 8.0).state == "late"
+    assert hop(chain, "iot_agent", now + 12.1).state == "down"
+    assert not chain.is_overloaded(at(now + 12.1))
+
+
+def test_an_agent_that_keeps_up_and_answers_no_question_is_down() -> None:
+    chain, now = behind([0.1] * 3)
+    chain.agent_silent = "no answer to GET /iot/about in 3 s"
+
+    silent = hop(chain, "iot_agent", now)
+
+    assert (silent.state, silent.detail) == ("down", chain.agent_silent)
 
 
 def test_a_probe_of_an_earlier_life_proves_nothing() -> None:

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.builders import detection
+from iveg.domain.observations import Origin
+from tests.builders import at, detection
 from tests.unit.web.desk import WebDesk
 
 
@@ -57,6 +58,21 @@ async def test_prometheus_reads_counters_and_hops() -> None:
 
     assert 'iveg_events_total{name="some"} 1' in text.splitlines()
     assert 'iveg_hop_up{hop="orion"} 1' in text.splitlines()
+
+
+async def test_how_late_measures_are_is_told_to_programs_and_to_prometheus() -> None:
+    desk = whole(WebDesk())
+    for seq, (left, back) in enumerate(((-20.0, 0.0), (-19.0, 4.0))):
+        desk.chain.sent(Origin("b", seq), at(left))
+        desk.chain.received(Origin("b", seq), at(back))
+    async with desk.program() as program:
+        agent = (await program.get("/api/v1/health")).json()["hops"][1]
+        figures = (await program.get("/metrics")).text.splitlines()
+
+    assert (agent["state"], agent["lag_s"], agent["growing"]) == ("late", 23.0, True)
+    assert agent["detail"] == "measures reach Orion 23 s late, growing"
+    assert 'iveg_lag_seconds{hop="iot_agent"} 23.0' in figures
+    assert 'iveg_lag_growing{hop="iot_agent"} 1' in figures
 
 
 async def test_strangers_get_no_figures() -> None:

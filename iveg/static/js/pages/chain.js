@@ -5,9 +5,9 @@
  * bad the one nearest to the robots is named.
  *
  * @typedef {"ok" | "late" | "down" | "unknown"} State
- * @typedef {{hop: string, state: State}} Hop
- * @typedef {{key: string, slots: Record<string, string>, state: State, hop: string | null}
- * } Verdict
+ * @typedef {{hop: string, state: State, lag_s?: number | null, growing?: boolean}} Hop
+ * @typedef {{key: string, slots: Record<string, string | number>}} Sentence
+ * @typedef {Sentence & {state: State, hop: string | null}} Verdict
  */
 
 /** In the order in which a datum travels; then what stands beside. */
@@ -19,6 +19,8 @@ export const ORDER = [
   "database",
   "emulator",
 ];
+/** From this lag on (s), the lag itself is what is wrong. */
+const LATE_S = 1;
 /** @type {State[]} */
 const WORST_FIRST = ["down", "late", "unknown"];
 
@@ -31,16 +33,29 @@ const WORST_FIRST = ["down", "late", "unknown"];
 export function judgeChain(hops, lost, isOpen) {
   if (!isOpen) return verdict("fleet.silent_server", "down", "server");
   for (const state of WORST_FIRST) {
-    const broken = ORDER.find((name) =>
-      hops.some((hop) => hop.hop === name && hop.state === state),
-    );
+    const broken = hops
+      .filter((hop) => hop.state === state)
+      .sort((a, b) => ORDER.indexOf(a.hop) - ORDER.indexOf(b.hop))[0];
     // Robots that are silent while the chain is only late are the worse news.
     if (state === "late" && lost.length) break;
-    if (broken) return verdict(`health.hop.${broken}.${state}`, state, broken);
+    if (broken) return { ...sentenceOf(broken), state, hop: broken.hop };
   }
   if (!lost.length) return verdict("fleet.whole", "ok", null);
   const robots = lost.join(", ");
   return { ...verdict("fleet.silent_robots", "down", "robots"), slots: { robots } };
+}
+
+/**
+ * What is said of one hop: how late it is where that is known, else its state.
+ *
+ * @param {Hop} hop
+ * @returns {Sentence}
+ */
+export function sentenceOf(hop) {
+  const lag = hop.lag_s ?? null;
+  if (hop.state !== "late" || lag === null || lag <= LATE_S)
+    return { key: `health.hop.${hop.hop}.${hop.state}`, slots: {} };
+  return { key: `health.lag.${hop.growing ? "growing" : "steady"}`, slots: { lag } };
 }
 
 /**

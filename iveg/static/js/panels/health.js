@@ -3,6 +3,7 @@
  */
 
 import { ageOf } from "../clock.js";
+import { sentenceOf } from "../pages/chain.js";
 import { make, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
@@ -36,12 +37,13 @@ export function createHealthPanel({ store, words, line }) {
     const hop = isOpen ? (worst?.hop ?? "") : "server";
     setAttribute(chip, "data-state", state);
     setText(need("#health-sentence"), words.t(`health.chip.${state}`, { hop }));
-    chip.title = isOpen && worst ? sentenceOf(worst) : "";
+    chip.title = isOpen && worst ? said(worst) : "";
   }
 
   /** @param {Hop} hop */
-  function sentenceOf(hop) {
-    return words.t(`health.hop.${hop.hop}.${hop.state}`);
+  function said(hop) {
+    const sentence = sentenceOf(hop);
+    return words.t(sentence.key, sentence.slots);
   }
 
   /** @param {Hop[]} hops @param {number} waitedS since the server wrote the ages */
@@ -56,8 +58,11 @@ export function createHealthPanel({ store, words, line }) {
       const age =
         hop.age_s === null ? "" : words.t("health.age", { age: hop.age_s + waitedS });
       setText(need("small", item), `${words.t(`health.state.${hop.state}`)} ${age}`);
-      const detail = hop.detail && hop.state !== "ok" ? ` (${hop.detail})` : "";
-      setText(need("p", item), `${sentenceOf(hop)}${detail}`);
+      // The lag says it all, and in the reader's language.
+      const isTold = sentenceOf(hop).key.startsWith("health.lag.");
+      const detail =
+        hop.detail && hop.state !== "ok" && !isTold ? ` (${hop.detail})` : "";
+      setText(need("p", item), `${said(hop)}${detail}`);
     });
   }
 
