@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from iveg.adapters.orion import PROBE_TIMEOUT_S, Document, FiwareHttp
+from iveg.adapters.strays import Entities, remove_strays
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -118,7 +119,7 @@ class IotAgentClient:
         return found
 
 
-class CommandRoads(Protocol):
+class CommandRoads(Entities, Protocol):
     """What provisioning looks at in Orion."""
 
     async def read_registrations(self) -> list[Document]:
@@ -173,8 +174,10 @@ async def provision(
     for robot_id in robots:
         mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
         problems += _thieves(known.values(), robot_id)
-    # Last, so that the canary's return says that all the others are there again.
+    # Last, so that the probe's return says that all the others are there again.
     mended += await _ensure_device(agent, known, _canary_device(apikey))
+    mended += await _remove_doctor(agent, known)
+    mended += await remove_strays(orion, known, robots)
     return Provisioned(tuple(mended), tuple(problems))
 
 
@@ -206,6 +209,8 @@ async def _ensure_group(
         "lazy": [],
         "commands": [],
         "static_attributes": [],
+        # A measure of a device that is not there makes nothing.
+        "autoprovision": False,
     }
     if await agent.create_group(wanted):
         return [f"Made the group of API key {apikey}."]
@@ -213,12 +218,23 @@ async def _ensure_group(
         (one for one in await agent.read_groups() if one.get("apikey") == apikey), {}
     )
     # The agent never shows the address of its broker, so it is always told again.
-    await agent.change_group(
-        apikey, {"entity_type": names.ROBOT_TYPE, "cbroker": cbroker_url}
-    )
+    told = ("entity_type", "cbroker", "autoprovision")
+    await agent.change_group(apikey, {name: wanted[name] for name in told})
     if known.get("entity_type") == names.ROBOT_TYPE:
         return []
     return [f"Corrected the entity type of the group of API key {apikey}."]
+
+
+async def _remove_doctor(
+    agent: IotAgentClient, known: dict[str, Document]
+) -> list[str]:
+    """The doctor's device, if it is not the doctor's own but made up by the agent."""
+    there = known.get(names.DOCTOR_ID)
+    if there is None or there.get("entity_name") == names.DOCTOR_ID:
+        return []
+    await agent.delete_device(names.DOCTOR_ID)
+    del known[names.DOCTOR_ID]
+    return [f"Removed device {names.DOCTOR_ID}, which the agent had made up."]
 
 
 async def _ensure_robot(

@@ -255,6 +255,31 @@ class OrionClient:
             raise HopError("orion", "answered JSON that means nothing here")
         return None if response.status_code == 404 else told
 
+    async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
+        """Id and type of those of these entities that Orion itself keeps.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        query = {
+            "id": ",".join(ids),
+            "attrs": "dateCreated",
+            "options": "keyValues,skipForwarding",
+            "limit": str(_PAGE),
+        }
+        response = await self.http.ask("GET", "/v2/entities", query=query)
+        found = self.http.read_list(response)
+        return [(str(one["id"]), str(one["type"])) for one in found if one.get("id")]
+
+    async def delete_entity(self, entity_id: str, entity_type: str) -> None:
+        """Delete an entity; one that is gone already is no error.
+
+        Raises:
+            HopError: Orion does not answer.
+        """
+        path, query = f"/v2/entities/{entity_id}", {"type": entity_type}
+        await self.http.ask("DELETE", path, query=query, also=(404,))
+
     async def modified_at(self, robot_id: str) -> float | None:
         """When Orion last changed a robot's odometry.
 

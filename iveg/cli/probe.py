@@ -12,7 +12,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
-PROBE_ID, PROBE_TYPE = "iveg-doctor", names.CANARY_TYPE
+PROBE_ID, PROBE_TYPE = names.DOCTOR_ID, names.CANARY_TYPE
 DESCRIPTION = "iveg doctor"
 """Of the subscription.  Not ``iVeg: …``: a running iVeg removes such strangers."""
 _ENTITY = f"/v2/entities/{PROBE_ID}"
@@ -166,6 +166,7 @@ def _group(apikey: str, orion_url: str) -> dict[str, Any]:
         "lazy": [],
         "commands": [],
         "static_attributes": [],
+        "autoprovision": False,
     }
 
 

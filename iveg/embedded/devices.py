@@ -77,7 +77,7 @@ class Group:
             "static_attributes": document.get("static_attributes") or [],
             "entity_type": self.entity_type,
         }
-        for name in ("entityNameExp", "timestamp", "explicitAttrs"):
+        for name in ("entityNameExp", "timestamp", "explicitAttrs", "autoprovision"):
             if name in document:
                 shown[name] = document[name]
         return shown

@@ -151,7 +151,7 @@ class IotAgent:
 
     def _autoprovision(self, apikey: str, device_id: str, now: float) -> Device | None:
         group = None if apikey == DEFAULT_APIKEY else self.registry.group_of(apikey)
-        if group is None:
+        if group is None or group.document.get("autoprovision") is False:
             return None
         raw: dict[str, Any] = {"device_id": device_id}
         if group.commands:

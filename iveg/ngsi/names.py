@@ -21,7 +21,9 @@ FEEDBACK_FILTER = "/+/mqtt_feedback"
 DESIRED_TOPIC = "/{robot_id}/iveg/desired"
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
-_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID, "iveg-doctor"})
+DOCTOR_ID = "iveg-doctor"
+"""Device and entity of ``iveg doctor``, while it looks."""
+_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID, DOCTOR_ID})
 
 
 @dataclass(frozen=True, slots=True)

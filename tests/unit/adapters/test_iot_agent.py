@@ -100,6 +100,48 @@ async def test_a_device_that_drifted_is_made_anew(site: Site) -> None:
     assert (await site.provision("AGI")).mended == ()
 
 
+async def test_an_agent_that_forgot_our_devices_leaves_no_entities_of_its_own(
+    site: Site,
+) -> None:
+    await site.provision("AGI")
+    for device in names.ROBOT_DEVICES:
+        await site.agent.delete_device("AGI" + device.suffix)
+    site.up.agent.hear("/iveg/AGI_odom/attrs", b'{"base_pose_ground_truth":{}}')
+
+    assert await site.orion.find_entities(["Robot:AGI_odom"]) == []
+    assert "AGI_odom" not in str(await site.agent.read_devices())
+
+
+async def test_entities_that_an_agent_once_made_up_are_removed(site: Site) -> None:
+    group = {"apikey": "iveg", "resource": "/iot/json", "entity_type": "Robot"}
+    await site.agent.create_group({**group, "cbroker": site.up.orion_url})
+    for device in ("AGI_odom", "iveg-doctor", "somebody"):
+        site.up.agent.hear(f"/iveg/{device}/attrs", b'{"v":1}')
+    made_up = ["Robot:AGI_odom", "Robot:iveg-doctor", "Robot:somebody"]
+    assert len(await site.orion.find_entities(made_up)) == 3
+
+    mended = (await site.provision("AGI")).mended
+
+    assert await site.orion.find_entities(made_up) == [("Robot:somebody", "Robot")]
+    assert "Removed entity Robot:AGI_odom, which no device of ours feeds." in mended
+    assert "iveg-doctor" not in str(await site.agent.read_devices())
+    assert (await site.provision("AGI")).mended == ()
+
+
+async def test_a_doctor_at_work_keeps_its_device_and_its_entity(site: Site) -> None:
+    device = {"device_id": "iveg-doctor", "entity_name": "iveg-doctor"}
+    await site.agent.create_device({**device, "entity_type": "Probe", "apikey": "iveg"})
+    site.up.agent.hear("/iveg/iveg-doctor/attrs", b'{"probe":1}')
+
+    await site.provision("AGI")
+    kept = await site.orion.find_entities(["iveg-doctor"])
+    await site.agent.delete_device("iveg-doctor")
+    await site.provision("AGI")
+
+    assert kept == [("iveg-doctor", "Probe")]
+    assert await site.orion.find_entities(["iveg-doctor"]) == []
+
+
 async def test_a_command_that_was_never_registered_gets_its_road(site: Site) -> None:
     await site.provision("AGI")
     (registration,) = await site.orion.read_registrations()
