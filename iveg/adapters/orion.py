@@ -48,13 +48,19 @@ class FiwareHttp:
         url: Address without a path.
         service: Tenant.
         path: Service path.
+        bearer: Token that is sent along; empty for none.
     """
 
-    def __init__(self, hop: str, url: str, service: str, path: str) -> None:
+    def __init__(
+        self, hop: str, url: str, service: str, path: str, bearer: str = ""
+    ) -> None:
         self._hop = hop
+        headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
+        if bearer:
+            headers["Authorization"] = f"Bearer {bearer}"
         self._client = httpx.AsyncClient(
             base_url=url,
-            headers={"Fiware-Service": service, "Fiware-ServicePath": path},
+            headers=headers,
             timeout=_TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
         )
@@ -255,6 +261,35 @@ class OrionClient:
             raise HopError("orion", "answered JSON that means nothing here")
         return None if response.status_code == 404 else told
 
+    async def read_probe_times(self) -> tuple[float, float]:
+        """When the newest heartbeat probe at Orion left iVeg, and when it came there.
+
+        Returns:
+            Seconds, Unix time, by iVeg's clock and by Orion's.
+
+        Raises:
+            HopError: Orion does not answer, or has none that tells.
+        """
+        response = await self.http.ask(
+            "GET",
+            f"/v2/entities/{names.CANARY_ID}",
+            query={
+                "type": names.CANARY_TYPE,
+                "attrs": "probe",
+                "metadata": "dateModified",
+            },
+            timeout_s=PROBE_TIMEOUT_S,
+        )
+        told = self.http.read(response)
+        try:
+            left = datetime.fromisoformat(told["probe"]["value"]["stamp"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise HopError("orion", "has no probe of iVeg's") from error
+        came = _date_modified(told, "probe")
+        if came is None:
+            raise HopError("orion", "does not tell when the probe came")
+        return left.timestamp(), came
+
     async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
         """Id and type of those of these entities that Orion itself keeps.
 
@@ -302,7 +337,7 @@ class OrionClient:
         )
         if response.status_code == 404:
             return None
-        return _date_modified(self.http.read(response))
+        return _date_modified(self.http.read(response), names.ODOMETRY)
 
     async def delete_attribute(self, robot_id: str, name: str) -> bool:
         """Delete an attribute of a robot; whether there was one.
@@ -413,9 +448,9 @@ class OrionClient:
         return found
 
 
-def _date_modified(entity: Any) -> float | None:
+def _date_modified(entity: Any, attribute: str) -> float | None:
     try:
-        text = entity[names.ODOMETRY]["metadata"]["dateModified"]["value"]
+        text = entity[attribute]["metadata"]["dateModified"]["value"]
         return datetime.fromisoformat(text).timestamp()
     except (KeyError, TypeError, ValueError):
         return None

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
 
+from iveg.domain.probe import lag_in_words
+
 State = Literal["ok", "failed", "not tried"]
 
 
@@ -36,12 +38,40 @@ NEEDS: Mapping[Hop, tuple[Hop, ...]] = {
     Hop.MEASURE: (Hop.BROKER, Hop.DEVICE),
     Hop.NOTIFICATION: (Hop.ORION,),
     Hop.COMMAND: (Hop.BROKER, Hop.DEVICE),
-    Hop.ANSWER: (Hop.COMMAND,),
+    Hop.ANSWER: (Hop.COMMAND, Hop.MEASURE),
     Hop.DIRECT: (Hop.BROKER,),
     Hop.DATABASE: (),
     Hop.PAGE: (),
 }
 """What each hop stands on."""
+_BY_THE_AGENT = frozenset((Hop.AGENT, Hop.DEVICE, Hop.MEASURE, Hop.COMMAND, Hop.ANSWER))
+_ORION_WAITS_S = 4.0
+"""Nearly the five seconds for which Orion waits for an agent."""
+LATE_S = 1.0
+"""A measure that takes longer is late, as it is for a running iVeg."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lag:
+    """How late measures reach Orion.
+
+    Attributes:
+        lag_s: Seconds.
+        growing: Whether it is known to become more.
+        at_least: Whether it may be any longer.
+        told_by: Who says so, as a clause; empty for the doctor's own measure.
+    """
+
+    lag_s: float
+    growing: bool = False
+    at_least: bool = False
+    told_by: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """Such as "Measures reach Orion 23 s late, growing"."""
+        said = lag_in_words(self.lag_s, growing=self.growing, at_least=self.at_least)
+        return said[0].upper() + said[1:] + self.told_by
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +83,8 @@ class Stack:
         user: Who we are there; empty for nobody.
         listener: Where Orion was asked to post to.
         topics: The probe device's topics, up to the last slash.
+        lag: How late measures are, where that is known to be the trouble.
+        waited_s: How long the doctor's measure was waited for (s).
     """
 
     broker: str
@@ -63,6 +95,8 @@ class Stack:
     database: str
     page: str
     topics: str
+    lag: Lag | None = None
+    waited_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,13 +163,35 @@ def table(rows: Sequence[Row]) -> str:
 
 def _row(hop: Hop, findings: Findings, stack: Stack) -> Row:
     finding = findings.get(hop)
+    if finding is None and stack.lag is not None and hop in _BY_THE_AGENT:
+        return Row(hop, "not tried", None, "The agent is behind: nothing is added.")
     if finding is None:
         because = " and ".join(f"“{need}”" for need in missing(hop, findings))
         return Row(hop, "not tried", None, f"Stands on {because}." if because else "")
     if finding.trouble is None:
-        return Row(hop, "ok", finding.took_s)
+        late = hop == Hop.MEASURE and finding.took_s > LATE_S
+        return Row(hop, "ok", finding.took_s, _late(finding.took_s) if late else "")
     said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
+    away = hop == Hop.AGENT and not _is_silence(said)
+    if stack.lag is not None and hop in _BY_THE_AGENT and not away:
+        sentence = _overloaded(hop, said, stack, stack.lag)
+        return Row(hop, "failed", finding.took_s, sentence)
     return Row(hop, "failed", finding.took_s, _SENTENCES[hop](said, stack, findings))
+
+
+def _late(took_s: float) -> str:
+    return f"{Lag(took_s).sentence}."
+
+
+def _overloaded(hop: Hop, said: str, stack: Stack, lag: Lag) -> str:
+    """Before anything is said of addresses, tenants or databases."""
+    if hop not in (Hop.AGENT, Hop.MEASURE):
+        return f"The agent is behind ({said}); {lag_in_words(lag.lag_s)}."
+    return (
+        f"{lag.sentence} ({said}): the agent at {stack.agent} is overloaded. Let the "
+        "robots send less, or let several agents share the load; STOP still goes "
+        "straight over MQTT."
+    )
 
 
 def _broker(said: str, stack: Stack, _: Findings) -> str:
@@ -165,6 +221,12 @@ def _orion(said: str, stack: Stack, _: Findings) -> str:
 
 
 def _agent(said: str, stack: Stack, _: Findings) -> str:
+    if _is_silence(said):
+        return (
+            f"The IoT Agent at {stack.agent} takes questions and does not answer "
+            f"({said}): it is overloaded or hung; look at its processor time first, "
+            "then at its log."
+        )
     return (
         f"No IoT Agent at {stack.agent} ({said}): look whether it runs, at its log, "
         "and at IVEG_IOTA_URL."
@@ -172,6 +234,11 @@ def _agent(said: str, stack: Stack, _: Findings) -> str:
 
 
 def _device(said: str, stack: Stack, _: Findings) -> str:
+    if _is_silence(said):
+        return (
+            f"The agent at {stack.agent} did not answer to a new device ({said}): it "
+            "is overloaded or hung; look at its processor time first, then at its log."
+        )
     return (
         f"The agent at {stack.agent} does not take a device with a command ({said}): "
         "it registers the command at Orion, so look at the agent's own address of "
@@ -180,18 +247,22 @@ def _device(said: str, stack: Stack, _: Findings) -> str:
 
 
 def _measure(said: str, stack: Stack, findings: Findings) -> str:
+    least = Lag(stack.waited_s, at_least=True).sentence
+    first = (
+        f"{least}, or never ({said}). First look whether the agent is overloaded: the "
+        "processor time it takes, and whether this changes within a minute. If not, "
+    )
     command = findings.get(Hop.COMMAND)
     if command is not None and command.well:
-        return (
-            "The agent sends commands and does not hear: a measure on "
-            f"{stack.topics}attrs is not in Orion ({said}); its connection is deaf or "
-            "the broker's access list keeps the topic from it: restart the agent and "
-            "look at its log."
+        return first + (
+            f"it sends commands and is deaf to {stack.topics}attrs: its connection is, "
+            "or the broker's access list keeps the topic from it; restart the agent "
+            "and look at its log."
         )
-    return (
-        f"A measure on {stack.topics}attrs is not in Orion ({said}): look whether the "
-        "agent is connected to the same broker, may read the topic, and reaches Orion "
-        "at the address that iVeg gave it (IVEG_IOTA_CB_URL)."
+    return first + (
+        "look whether the agent is connected to the same broker, may read "
+        f"{stack.topics}attrs, and reaches Orion at the address that iVeg gave it "
+        "(IVEG_IOTA_CB_URL)."
     )
 
 
@@ -203,7 +274,12 @@ def _notification(said: str, stack: Stack, _: Findings) -> str:
     )
 
 
-def _command(said: str, stack: Stack, _: Findings) -> str:
+def _command(said: str, stack: Stack, findings: Findings) -> str:
+    if said.startswith("404") and _took_long(findings):
+        return (
+            f"Orion cannot pass a command on ({said}): the agent did not answer Orion "
+            "in five seconds, so it is overloaded or hung; look at its processor time."
+        )
     if said.startswith("404"):
         return (
             f"Orion cannot pass a command on ({said}): with this answer it says that "
@@ -217,13 +293,17 @@ def _command(said: str, stack: Stack, _: Findings) -> str:
     )
 
 
-def _answer(said: str, stack: Stack, findings: Findings) -> str:
-    measure = findings.get(Hop.MEASURE)
-    if measure is not None and not measure.well:
-        return (
-            f"The device's answer on {stack.topics}cmdexe is not in Orion ({said}), "
-            "nor was its measure: it is the same deafness of the agent."
-        )
+def _took_long(findings: Findings) -> bool:
+    """Orion says 404 at once of an agent that is away, after 5 s of a silent one."""
+    finding = findings.get(Hop.COMMAND)
+    return finding is not None and finding.took_s > _ORION_WAITS_S
+
+
+def _is_silence(said: str) -> bool:
+    return said.startswith(("no answer", "nothing came"))
+
+
+def _answer(said: str, stack: Stack, _: Findings) -> str:
     return (
         f"The device's answer on {stack.topics}cmdexe is not in Orion ({said}), though "
         "its measure was: look whether the broker lets the agent read the topic."

@@ -1,7 +1,14 @@
 """``iveg doctor``: examines every hop of the chain by using it once.
 
 A probe of its own is made, measured, commanded and removed again; no robot's device,
-entity or topic is touched, so it may run while robots drive.
+entity or topic is touched, so it may run while robots drive.  It ends within twenty
+seconds, with what it has found by then::
+
+    broker, Orion, agent, database, page      all at once
+    what the running iVeg says of the lag     overload is known before anything is added
+    device → measure → notification → command → answer → straight command
+    the measure that has not come             waited for, while there is time
+    removal
 """
 
 import asyncio
@@ -22,7 +29,17 @@ from iveg.adapters.history.engine import describe, sqlite_url
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import FiwareHttp, OrionClient
 from iveg.app import broker_of, notify_url_of
-from iveg.cli.diagnosis import Finding, Hop, Stack, exit_code, judge, missing, table
+from iveg.cli.diagnosis import (
+    LATE_S,
+    Finding,
+    Hop,
+    Lag,
+    Stack,
+    exit_code,
+    judge,
+    missing,
+    table,
+)
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_told
 from iveg.domain.errors import HopError, IvegError
@@ -30,8 +47,14 @@ from iveg.embedded.http_server import Request, Response, http_server
 from iveg.ngsi import names
 from iveg.settings import Settings
 
-PATIENCE_S = 5.0
+PATIENCE_S, LIMIT_S = 5.0, 20.0
+_REMOVAL_S = 4.0
+"""Of the limit, what is kept for removing what was made."""
+_WAITS = 3
+"""A measure that has not come is waited for this many patiences in all."""
 _LOOK_EVERY_S = 0.05
+_FRESH_S = 10.0
+"""An older probe of the running iVeg's tells nothing of now."""
 _ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - read, not bound
 
 
@@ -53,13 +76,19 @@ class Examination:
         settings: The addresses of the parts.
         data: Where the history is unless the settings say otherwise.
         patience_s: How long each hop may take (s).
+        limit_s: How long the visit may take, removal included (s).
 
     Attributes:
         findings: What was found so far.
+        lag: How late measures are, where that is the trouble.
     """
 
     def __init__(
-        self, settings: Settings, data: Path, patience_s: float = PATIENCE_S
+        self,
+        settings: Settings,
+        data: Path,
+        patience_s: float = PATIENCE_S,
+        limit_s: float = LIMIT_S,
     ) -> None:
         service = settings.fiware_service, settings.fiware_servicepath
         self._settings = settings
@@ -68,13 +97,20 @@ class Examination:
         self._database = settings.database_url or sqlite_url(data / "iveg.sqlite")
         self._orion = OrionClient(settings.orion_url, *service)
         self._agent = IotAgentClient(settings.iota_url, *service)
-        self._page = FiwareHttp("page", _page_url(settings), *service)
+        self._page = FiwareHttp(
+            "page", _page_url(settings), *service, bearer=settings.api_token
+        )
         self._probe = Probe(self._orion, self._agent, settings.apikey)
         self._device: ProbeDevice | None = None
         self._listening_at = ""
         self._mark = ""
-        self._began = 0.0
+        self._began: dict[Hop, float] = {}
+        self._ends = clock.now().mono + limit_s - _REMOVAL_S
+        self._measure_mark = ""
+        self._measured_at = 0.0
+        self._waited_s = 0.0
         self.findings: dict[Hop, Finding] = {}
+        self.lag: Lag | None = None
 
     @property
     def stack(self) -> Stack:
@@ -89,6 +125,8 @@ class Examination:
             database=describe(self._database),
             page=_page_url(settings),
             topics=self._probe.topic(""),
+            lag=self.lag,
+            waited_s=self._waited_s,
         )
 
     @property
@@ -101,34 +139,103 @@ class Examination:
         async with AsyncExitStack() as stack:
             for client in (self._orion, self._agent, self._page):
                 stack.push_async_callback(client.close)
-            stack.push_async_callback(self._probe.remove)
-            await self._try(Hop.BROKER, lambda: self._connect(stack))
-            await self._try(Hop.ORION, self._orion.version)
-            await self._try(Hop.AGENT, self._agent.version)
-            await self._try(Hop.DEVICE, self._make_device)
-            await self._try(Hop.MEASURE, self._measure)
+            stack.push_async_callback(self._probe.remove, _REMOVAL_S)
+            async with asyncio.TaskGroup() as tasks:
+                for hop, step in (
+                    (Hop.BROKER, lambda: self._connect(stack)),
+                    (Hop.ORION, self._orion.version),
+                    (Hop.AGENT, self._agent.version),
+                    (Hop.DATABASE, self._look_at_database),
+                    (Hop.PAGE, self._look_at_page),
+                ):
+                    tasks.create_task(self._try(hop, step), name=hop.name)
+            told = await self._ask_iveg()
+            if told is None or told.lag_s < self._patience_s:
+                await self._use_the_agent()
+            else:
+                self.lag = told
+                self.findings[Hop.MEASURE] = Finding(
+                    Hop.MEASURE, told.lag_s, "nothing was added to it"
+                )
             await self._try(Hop.NOTIFICATION, self._be_notified)
-            await self._try(Hop.COMMAND, self._command)
-            await self._try(Hop.ANSWER, self._answer)
             await self._try(Hop.DIRECT, self._command_straight)
-            await self._try(Hop.DATABASE, self._look_at_database)
-            await self._try(Hop.PAGE, self._look_at_page)
+            await self._wait_for_the_measure()
+
+    async def _use_the_agent(self) -> None:
+        await self._try(Hop.DEVICE, self._make_device)
+        await self._try(Hop.MEASURE, self._measure)
+        await self._try(Hop.COMMAND, self._command)
+        await self._try(Hop.ANSWER, self._answer)
 
     async def _try(self, hop: Hop, step: Callable[[], Awaitable[object]]) -> None:
-        if missing(hop, self.findings):
+        if missing(hop, self.findings) or clock.now().mono >= self._ends:
             return
         trouble = None
-        self._began = clock.now().mono
+        began = clock.now().mono
         try:
-            await step()
+            # Whoever waits twice, or for Orion that waits for the agent, is within.
+            async with asyncio.timeout(min(2 * self._patience_s, self._left_s)):
+                await step()
         except TimeoutError:
             trouble = ""
         except HopError as error:
             trouble = error.detail
         except (IvegError, OSError) as error:
             trouble = str(error)
-        took_s = clock.now().mono - self._began
+        took_s = clock.now().mono - self._began.get(hop, began)
         self.findings[hop] = Finding(hop, took_s, trouble)
+
+    @property
+    def _left_s(self) -> float:
+        return max(0.0, self._ends - clock.now().mono)
+
+    # --- lag ----------------------------------------------------------------------
+
+    async def _ask_iveg(self) -> Lag | None:
+        """What a running iVeg says of the lag, to those who have its token."""
+        if not self._settings.api_token or missing(Hop.PAGE, self.findings):
+            return None
+        with contextlib.suppress(HopError):
+            path, within_s = "/api/v1/health", self._patience_s
+            answer = await self._page.ask("GET", path, timeout_s=within_s)
+            return _lag_told(self._page.read(answer))
+        return None
+
+    async def _wait_for_the_measure(self) -> None:
+        """A measure that comes late tells how late; one that does not, at least how."""
+        finding = self.findings.get(Hop.MEASURE)
+        if finding is None or finding.trouble is None or not self._measured_at:
+            return
+        until = self._measured_at + _WAITS * self._patience_s
+        left_s = min(until, self._ends) - clock.now().mono
+        with contextlib.suppress(TimeoutError, HopError):
+            await self._seen("probe", self._measure_mark, left_s)
+            took_s = clock.now().mono - self._measured_at
+            self.lag = Lag(took_s)
+        self._waited_s = took_s = clock.now().mono - self._measured_at
+        self.findings[Hop.MEASURE] = Finding(
+            Hop.MEASURE, took_s, f"nothing came in {self._patience_s:.1f} s"
+        )
+        if self.lag is None:
+            self.lag = await self._lag_of_the_heartbeat()
+        if self.lag is None and self._agent_is_slow:
+            self.lag = Lag(took_s, at_least=True)
+
+    async def _lag_of_the_heartbeat(self) -> Lag | None:
+        """By a running iVeg's own probe at Orion: when it left, when it came there."""
+        with contextlib.suppress(HopError):
+            left, came = await self._orion.read_probe_times()
+            fresh = clock.now().wall - came < _FRESH_S
+            if fresh and came - left > LATE_S:
+                return Lag(came - left, told_by=", as the running iVeg's probe shows")
+        return None
+
+    @property
+    def _agent_is_slow(self) -> bool:
+        """Whether it answered other questions late too."""
+        asked = (Hop.AGENT, Hop.DEVICE, Hop.COMMAND)
+        found = [self.findings[hop] for hop in asked if hop in self.findings]
+        return any(one.took_s > LATE_S for one in found)
 
     # --- hops ---------------------------------------------------------------------
 
@@ -148,9 +255,10 @@ class Examination:
         await self._probe.make_device(settings.iota_cb_url or settings.orion_url)
 
     async def _measure(self) -> None:
-        mark = secrets.token_hex(8)
+        self._measure_mark = mark = secrets.token_hex(8)
+        self._measured_at = clock.now().mono
         await self._publish("attrs", {"probe": {"mark": mark}})
-        await self._seen("probe", mark)
+        await self._seen("probe", mark, self._patience_s)
 
     async def _be_notified(self) -> None:
         """Past the agent, so that only Orion and the way from it are on trial."""
@@ -166,7 +274,7 @@ class Examination:
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()
             # What was done so far is preparation; the hop begins here.
-            self._began = clock.now().mono
+            self._began[Hop.NOTIFICATION] = clock.now().mono
             await self._probe.change(mark)
             try:
                 await ear.heard(mark, self._patience_s)
@@ -182,7 +290,7 @@ class Examination:
 
     async def _answer(self) -> None:
         await self._publish("cmdexe", {names.COMMAND: {"probe": self._mark}})
-        await self._seen(names.COMMAND_INFO, self._mark)
+        await self._seen(names.COMMAND_INFO, self._mark, self._patience_s)
 
     async def _command_straight(self) -> None:
         mark = self._connected.ear.mark()
@@ -208,12 +316,23 @@ class Examination:
         topic = self._probe.topic(last)
         await self._connected.publish(topic, body, self._patience_s)
 
-    async def _seen(self, attribute: str, mark: str) -> None:
+    async def _seen(self, attribute: str, mark: str, within_s: float) -> None:
         """Until Orion has the mark in an attribute of the probe."""
-        async with asyncio.timeout(self._patience_s):
+        async with asyncio.timeout(max(0.0, within_s)):
             # Orion is asked: whether it calls is another hop's question.
             while not await self._probe.holds(attribute, mark):  # noqa: ASYNC110
                 await asyncio.sleep(_LOOK_EVERY_S)
+
+
+def _lag_told(health: Any) -> Lag | None:
+    """The lag in ``GET /api/v1/health``; None where all is well or nothing is told."""
+    try:
+        agent = next(one for one in health["hops"] if one["hop"] == "iot_agent")
+        lag_s, growing = float(agent["lag_s"]), bool(agent["growing"])
+    except (KeyError, TypeError, ValueError, StopIteration):
+        return None
+    told_by = ", as the running iVeg says"
+    return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > LATE_S else None
 
 
 def _notify_host(settings: Settings) -> str:

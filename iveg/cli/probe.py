@@ -4,6 +4,7 @@ What is to be removed is noted before it is made: a request that was cancelled o
 out may have been carried out all the same.
 """
 
+import asyncio
 from collections.abc import Awaitable
 from typing import Any
 
@@ -71,11 +72,13 @@ class Probe:
     async def change(self, mark: str) -> None:
         """Change the entity at Orion itself, past the agent.
 
+        Another attribute than the measure's, which may still come.
+
         Raises:
             HopError: Orion does not take it.
         """
         attribute = {"type": "object", "value": {"mark": mark}}
-        body = {"id": PROBE_ID, "type": PROBE_TYPE, "probe": attribute}
+        body = {"id": PROBE_ID, "type": PROBE_TYPE, "notified": attribute}
         query = {"options": "upsert"}
         await self._orion.http.ask("POST", "/v2/entities", query=query, body=body)
 
@@ -116,24 +119,38 @@ class Probe:
 
     # --- removing -----------------------------------------------------------------
 
-    async def remove(self) -> None:
-        """Remove all that was made, the device first: it may still write."""
-        if self._made_device:
-            await self._try("device", self._agent.delete_device(PROBE_ID))
-        if self._made_group:
-            await self._try("group", self._delete_group())
-        if self._touched_orion:
-            await self._try("subscription", self._delete_subscriptions())
-            await self._try("registration", self._delete_registrations())
-            await self._try("entity", self._delete_entity())
+    async def remove(self, within_s: float) -> None:
+        """Remove all that was made, the device first: it may still write.
 
-    async def _try(self, what: str, removing: Awaitable[object]) -> None:
+        Args:
+            within_s: For all of it (s); a neighbour that does not answer has half.
+        """
+        half = within_s / 2
+        ends = asyncio.get_running_loop().time() + within_s
+        if self._made_device:
+            await self._try("device", self._agent.delete_device(PROBE_ID), half)
+        if self._made_group:
+            await self._try("group", self._delete_group(), half / 2)
+        for what, removing in (
+            ("subscription", self._delete_subscriptions),
+            ("registration", self._delete_registrations),
+            ("entity", self._delete_entities),
+        ):
+            if self._touched_orion:
+                left = ends - asyncio.get_running_loop().time()
+                await self._try(what, removing(), max(0.0, left))
+
+    async def _try(
+        self, what: str, removing: Awaitable[object], within_s: float
+    ) -> None:
         try:
-            await removing
-        except HopError as error:
+            async with asyncio.timeout(within_s):
+                await removing
+        except (HopError, TimeoutError) as error:
+            why = str(error) or f"no answer in {within_s:.1f} s"
             self.left_behind.append(
-                f"The {what} of {PROBE_ID} may be left behind ({error}); the next "
-                "`iveg doctor` removes it."
+                f"The {what} of {PROBE_ID} may be left behind ({why}); a running iVeg "
+                "or the next `iveg doctor` removes it."
             )
 
     async def _delete_group(self) -> None:
@@ -152,8 +169,11 @@ class Probe:
             if any(entity.get("id") == PROBE_ID for entity in entities):
                 await self._orion.delete_registration(one["id"])
 
-    async def _delete_entity(self) -> None:
-        await self._orion.http.ask("DELETE", _ENTITY, query=_TYPE, also=(404,))
+    async def _delete_entities(self) -> None:
+        """Ours, and what an agent made up of a measure that came after our device."""
+        ids = [PROBE_ID, f"{names.ROBOT_TYPE}:{PROBE_ID}"]
+        for entity_id, kind in await self._orion.find_entities(ids):
+            await self._orion.delete_entity(entity_id, kind)
 
 
 def _group(apikey: str, orion_url: str) -> dict[str, Any]:
@@ -188,7 +208,7 @@ def _subscription(url: str) -> dict[str, Any]:
         "description": DESCRIPTION,
         "subject": {
             "entities": [{"id": PROBE_ID, "type": PROBE_TYPE}],
-            "condition": {"attrs": ["probe"]},
+            "condition": {"attrs": ["notified"]},
         },
-        "notification": {"http": {"url": url}, "attrs": ["probe"]},
+        "notification": {"http": {"url": url}, "attrs": ["notified"]},
     }

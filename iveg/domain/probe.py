@@ -90,6 +90,13 @@ class ProbeLag:
         return self._back[0][1] if self._back else 0.0
 
 
+def lag_in_words(lag_s: float, *, growing: bool = False, at_least: bool = False) -> str:
+    """A lag as the log, programs and ``iveg doctor`` say it."""
+    late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
+    least, more = "at least " if at_least else "", ", growing" if growing else ""
+    return f"measures reach Orion {least}{late} s late{more}"
+
+
 def _count(origin: Origin) -> Origin:
     """What names a probe; stamps may be reprinted on the way."""
     return Origin(origin.boot, origin.seq)

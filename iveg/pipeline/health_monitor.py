@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.observations import Instant, Origin
-from iveg.domain.probe import ProbeLag
+from iveg.domain.probe import ProbeLag, lag_in_words
 
 HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
@@ -172,7 +172,7 @@ class HealthMonitor:
     ) -> tuple[HopState, str]:
         """What is said of an agent that measures pass, the lag before all else."""
         if lag_s is not None and lag_s > SLOW_S:
-            return "late", _lag_in_words(lag_s, growing=growing)
+            return "late", lag_in_words(lag_s, growing=growing)
         if self.agent_silent:
             return "down", self.agent_silent
         detail = self.agent_slow or self.agent_warning
@@ -219,11 +219,6 @@ class HealthMonitor:
 
     def _starting(self, now: Instant) -> bool:
         return now.mono - self._start.mono < GRACE_S
-
-
-def _lag_in_words(lag_s: float, *, growing: bool) -> str:
-    late = f"{lag_s:.0f}" if lag_s >= 10.0 else f"{lag_s:.1f}"
-    return f"measures reach Orion {late} s late" + (", growing" if growing else "")
 
 
 def _newest(one: float | None, other: float | None) -> float | None:

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import orjson
 import pytest
 
 from iveg.adapters.history.migrate import upgrade
-from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.cli.diagnosis import Hop, State, exit_code, judge
 from iveg.cli.doctor import Examination
@@ -144,6 +145,85 @@ async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
     assert "deaf" in next(row for row in rows if row.hop == Hop.MEASURE).sentence
     assert exit_code(rows) == 1
     assert await leftovers(up) == []
+
+
+async def test_an_agent_that_is_behind_is_called_late_and_not_misconfigured(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    up.agent.fail(Faults(slow_s=1.4))
+
+    states, examination = await examine(settings, tmp_path, 1.0)
+
+    assert states[Hop.DEVICE] == states[Hop.COMMAND] == "ok"
+    assert states[Hop.MEASURE] == "failed"
+    rows = judge(examination.findings, examination.stack)
+    sentence = next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    assert sentence.startswith("Measures reach Orion ")
+    assert "at least" not in sentence
+    assert "is overloaded" in sentence
+
+
+async def test_the_running_ivegs_figure_is_believed_and_nothing_is_added(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    hop = {"hop": "iot_agent", "lag_s": 23.4, "growing": True}
+
+    async def told(request: Request) -> Response:
+        assert request.headers["authorization"] == "Bearer secret"
+        return Response(200, orjson.dumps({"hops": [hop]}))
+
+    async with http_server(told, "127.0.0.1", 0) as port:
+        busy = replace(settings, port=port, api_token="secret")
+        states, examination = await examine(busy, tmp_path)
+
+    rows = judge(examination.findings, examination.stack)
+    sentence = next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    assert sentence.startswith(
+        "Measures reach Orion 23 s late, growing, as the running"
+    )
+    assert {states[hop] for hop in (Hop.DEVICE, Hop.COMMAND, Hop.ANSWER)} == {
+        "not tried"
+    }
+    assert states[Hop.NOTIFICATION] == states[Hop.DIRECT] == "ok"
+    assert await leftovers(up) == []
+
+
+async def test_a_measure_that_comes_after_the_doctor_went_leaves_nothing(
+    up: Running, settings: Settings, tmp_path: Path
+) -> None:
+    async with (
+        IotAgentClient(up.iota_url, *TENANT) as agent,
+        OrionClient(up.orion_url, *TENANT) as orion,
+    ):
+        await provision(agent, orion, [], "iveg", up.orion_url)
+        up.agent.fail(Faults(slow_s=3.0))
+        before = up.agent.discarded
+
+        await examine(settings, tmp_path, SHORT_S)
+        await until(lambda: up.agent.discarded > before, LONG_S)
+
+        made_up = [PROBE_ID, f"Robot:{PROBE_ID}"]
+        assert await orion.find_entities(made_up) == []
+        assert PROBE_ID not in str(await agent.read_devices())
+
+
+async def test_a_visit_ends_in_time_though_nobody_answers(
+    settings: Settings, tmp_path: Path
+) -> None:
+    async def hang(_: Request) -> Response:
+        await asyncio.sleep(60)
+        return Response(204)
+
+    async with http_server(hang, "127.0.0.1", 0) as port:
+        url = f"http://127.0.0.1:{port}"
+        hung = replace(settings, orion_url=url, iota_url=url, port=port)
+        examination = Examination(hung, tmp_path, limit_s=6.0)
+        async with asyncio.timeout(6.0):
+            await examination.run()
+
+    rows = judge(examination.findings, examination.stack)
+    agent = next(row for row in rows if row.hop == Hop.AGENT)
+    assert "overloaded or hung" in agent.sentence
 
 
 async def test_a_dead_broker_leaves_orion_and_the_page_well(

@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import pytest
 
 from iveg.cli.diagnosis import (
     NEEDS,
     Finding,
     Hop,
+    Lag,
     Row,
     Stack,
     exit_code,
@@ -108,11 +111,64 @@ def test_an_agent_that_sends_and_does_not_hear_is_called_deaf() -> None:
     assert "IVEG_IOTA_CB_URL" in cut_off.sentence
 
 
-def test_a_lost_answer_is_the_agents_deafness_only_where_measures_are_lost_too() -> (
-    None
-):
-    assert "same deafness" in row(Hop.ANSWER, found(ANSWER="", MEASURE="")).sentence
-    assert "though its measure was" in row(Hop.ANSWER, found(ANSWER="")).sentence
+def test_overload_is_named_before_address_tenant_or_database() -> None:
+    behind = replace(STACK, lag=Lag(23.4, growing=True))
+    findings = found(
+        AGENT="no answer to GET /iot/about in 3 s", MEASURE="", COMMAND="404"
+    )
+    rows = {one.hop: one.sentence for one in judge(findings, behind)}
+
+    assert rows[Hop.MEASURE].startswith("Measures reach Orion 23 s late, growing (")
+    assert "overloaded" in rows[Hop.AGENT]
+    assert "IOTA_PROVIDER_URL" not in rows[Hop.COMMAND]
+
+
+def test_a_measure_that_never_came_is_at_least_so_late_or_never() -> None:
+    waited = replace(STACK, waited_s=15.0)
+    (lost,) = [
+        one.sentence
+        for one in judge(found(MEASURE=""), waited)
+        if one.hop == Hop.MEASURE
+    ]
+
+    assert lost.startswith("Measures reach Orion at least 15 s late, or never (")
+
+
+def test_a_measure_that_comes_late_is_well_and_says_how_late() -> None:
+    findings = {**found(), Hop.MEASURE: Finding(Hop.MEASURE, 2.34)}
+
+    late = row(Hop.MEASURE, findings)
+
+    assert (late.state, late.sentence) == ("ok", "Measures reach Orion 2.3 s late.")
+
+
+def test_behind_an_agent_that_is_late_hops_are_not_tried_and_say_why() -> None:
+    findings = found(MEASURE="told")
+    del findings[Hop.COMMAND]
+    (command,) = [
+        one
+        for one in judge(findings, replace(STACK, lag=Lag(23.0)))
+        if one.hop == Hop.COMMAND
+    ]
+
+    assert (command.state, command.sentence) == (
+        "not tried",
+        "The agent is behind: nothing is added.",
+    )
+
+
+@pytest.mark.parametrize("hop", [Hop.AGENT, Hop.DEVICE])
+def test_an_agent_that_is_silent_is_not_called_misconfigured(hop: Hop) -> None:
+    silent = row(hop, found(**{hop.name: "no answer to POST /iot/services in 6 s"}))
+
+    assert "overloaded or hung" in silent.sentence
+    assert "MongoDB" not in silent.sentence
+
+
+def test_a_404_that_took_orions_patience_is_an_agent_that_is_silent() -> None:
+    slow = {**found(), Hop.COMMAND: Finding(Hop.COMMAND, 5.0, "404 to PATCH")}
+
+    assert "overloaded or hung" in row(Hop.COMMAND, slow).sentence
 
 
 def test_orions_404_to_a_command_is_read_as_an_agent_out_of_reach() -> None:
