@@ -58,6 +58,9 @@ class Decision:
         speed_after: Speed at ``observed`` (m/s).
         waited_out: Whether every link has come or is missing.
         interrupted: iVeg went away while it was open; ``ended`` is when that was.
+        noticed: Arrival of the look that it rests on (monotonic, s); None for a ring
+            that was known before.
+        answered: When a robot that was ahead said that it slows (monotonic, s).
     """
 
     crossing: Crossing
@@ -69,6 +72,18 @@ class Decision:
     speed_after: float | None = None
     waited_out: bool = False
     interrupted: bool = False
+    noticed: float | None = None
+    answered: float | None = None
+
+    @property
+    def took_s(self) -> float | None:
+        """From the look to the robot's own report (s); None where one is missing."""
+        answered = self.answered
+        if answered is None and self.applied is not None and not self.crossing.ahead:
+            answered = self.applied.mono
+        if answered is None or self.noticed is None:
+            return None
+        return answered - self.noticed
 
     @property
     def decision_id(self) -> str:

@@ -1,14 +1,15 @@
 """How soon the fleet does as it is told (safety.md §6.3).
 
-Timed is the whole road of an alert: from the notification of a detection that put a
-robot into a ring to that robot's own report that it applies the factor.  Both are read
-on our clock, so no clock has to be believed; left out is the way from camera to iVeg,
-which only the robot's clock could tell.
+Timed is the whole way of an alert: from the notification of the look that a slow-down
+rests on to the robot's own report that it applies the factor.  Both are read on our
+clock, so no clock has to be believed; left out is the way from camera to iVeg, which
+only the robot's clock could tell.
 
-Whoever drives into a ring that is known already judges it by its own pose, and one that
-has judged the same alert was ahead of us: both count as asked and echoed, but what they
-took says nothing of the road.  A robot that was slow for something else has nothing to
-echo.
+A robot judges by its own pose what the feedback told it, and may say so before iVeg
+finds it inside: it is timed from the newest look that the fleet had been told of by
+then.  Whoever drives into a ring that nobody has looked at for a while counts as asked
+and answered, but what it took says nothing of the way.  A robot that was slow for
+something else has nothing to answer.
 """
 
 import math
@@ -22,8 +23,6 @@ from iveg.domain.stop.latency import nearest_rank
 WINDOW_S = 300.0
 ECHO_S = 1.0
 """A robot that has not answered by then has not echoed."""
-_SAME_MOMENT_S = 1e-3
-"""A detection is judged at the moment that it arrives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,32 +52,31 @@ def echoes_of(decisions: Iterable[Decision], now: Instant) -> Echoes:
     """What the decisions of the last five minutes tell; of those in memory."""
     recent = [one for one in decisions if _counts(one, now)]
     due = [one for one in recent if _is_due(one, now)]
-    heard = [one for one in recent if _tells_the_road(one)]
-    took = sorted(_took_s(one) for one in heard)
+    timed = [one for one in recent if one.took_s is not None]
+    took = sorted(one.took_s for one in timed if one.took_s is not None)
     return Echoes(
         timed=len(took),
         p50_s=nearest_rank(took, 0.50) if took else None,
         p95_s=nearest_rank(took, 0.95) if took else None,
         p99_s=nearest_rank(took, 0.99) if took else None,
-        echo_age_s=_age((one.applied for one in heard), now),
+        echo_age_s=_age((_answered(one) for one in timed), now),
         asked=len(due),
         missed=sum(not _is_echoed(one) for one in due),
-        asked_age_s=_age((one.crossing.entered for one in due), now),
+        asked_age_s=_age((one.crossing.entered.mono for one in due), now),
     )
 
 
 def _counts(decision: Decision, now: Instant) -> bool:
     crossing = decision.crossing
-    return not crossing.already_slow and now.mono - crossing.entered.mono <= WINDOW_S
+    # Who was ahead and has braked by now was not slow for something else.
+    asked = decision.answered is not None or not crossing.already_slow
+    return asked and now.mono - crossing.entered.mono <= WINDOW_S
 
 
-def _tells_the_road(decision: Decision) -> bool:
-    """Whether a detection fired the rule, and a robot answered that knew of nothing."""
-    crossing = decision.crossing
-    look = crossing.hazard.sighting
-    if decision.applied is None or crossing.ahead or look is None:
-        return False
-    return crossing.entered.mono - look.at.mono <= _SAME_MOMENT_S
+def _answered(decision: Decision) -> float | None:
+    if decision.answered is not None:
+        return decision.answered
+    return None if decision.applied is None else decision.applied.mono
 
 
 def _is_due(decision: Decision, now: Instant) -> bool:
@@ -88,14 +86,14 @@ def _is_due(decision: Decision, now: Instant) -> bool:
 
 
 def _is_echoed(decision: Decision) -> bool:
-    return decision.crossing.ahead or _took_s(decision) <= ECHO_S
+    return decision.crossing.ahead or _waited_s(decision) <= ECHO_S
 
 
-def _took_s(decision: Decision) -> float:
+def _waited_s(decision: Decision) -> float:
     applied, entered = decision.applied, decision.crossing.entered
     return math.inf if applied is None else applied.mono - entered.mono
 
 
-def _age(moments: Iterable[Instant | None], now: Instant) -> float | None:
-    newest = max((at.mono for at in moments if at is not None), default=None)
+def _age(moments: Iterable[float | None], now: Instant) -> float | None:
+    newest = max((at for at in moments if at is not None), default=None)
     return None if newest is None else now.mono - newest

@@ -34,6 +34,7 @@ from iveg.pipeline.alarming import Alarming
 from iveg.pipeline.evidence import record_of
 from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.notices import Notices
 from iveg.pipeline.ports import Fleet, Ids
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.telling import Teller
@@ -84,6 +85,7 @@ class Assessor:
         self._hub = hub
         self._new_id = new_id
         self._applied: dict[str, tuple[float, str]] = {}
+        self._notices = Notices()
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -122,6 +124,7 @@ class Assessor:
         observation = received.observation
         if isinstance(observation, DetectionFrame):
             self.looks.take(observation, received, verdict, self.rule)
+            self._notice(observation.robot_id, received.at)
         if verdict != "new":
             return False
         match observation:
@@ -137,6 +140,11 @@ class Assessor:
                 self._judge(received.at)
         return True
 
+    def _notice(self, robot_id: str, at: Instant) -> None:
+        for one in self.placed.get(robot_id, ()):
+            if one.person is not None:
+                self._notices.seen(one.person.person_id, at)
+
     def _moved(self, odometry: Odometry, at: Instant) -> None:
         for decision in self.decisions.open_of(odometry.robot_id):
             self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
@@ -149,6 +157,7 @@ class Assessor:
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):
             self._advance(decision, decision.reported(report, at), at)
+        self._notices.reported(report, self._teller.told_at, at)
         applied = report.speed_factor, report.reason
         before = self._applied.get(report.robot_id)
         if applied != before:
@@ -189,7 +198,13 @@ class Assessor:
         if change.began:
             if not crossing.in_sight:
                 self.protected_unseen += 1
-            decision = Decision(crossing, self.rule)
+            notice = self._notices.of(crossing)
+            decision = Decision(
+                crossing,
+                self.rule,
+                noticed=None if notice is None else notice.at,
+                answered=None if notice is None else notice.answered,
+            )
             self.decisions.put(decision)
             self._minutes.decision(decision, now)
             return
@@ -209,6 +224,7 @@ class Assessor:
         """Let time pass: silence, ages, overdue links, alarms, heartbeat."""
         self._ageing.tick(now)
         self.looks.forget(now)
+        self._notices.forget(self.people.known)
         self._judge(now)
         if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)

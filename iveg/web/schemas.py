@@ -305,7 +305,7 @@ class HopJson(TypedDict):
 
 
 class AlertLatencyJson(TypedDict):
-    """From the datum that fired the rule to the robot's own report (ms)."""
+    """From the look that a slow-down rests on to the robot's own report (ms)."""
 
     p50_ms: float | None
     p95_ms: float | None

@@ -8,7 +8,6 @@ from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision
 from iveg.domain.echoes import ECHO_S, WINDOW_S, echoes_of
 from iveg.domain.mandates import Crossing, Hazard
-from iveg.domain.tracking.person import Sighting
 from tests.builders import START, at
 
 
@@ -17,29 +16,32 @@ def asked(
     *,
     after: float | None = None,
     already_slow: bool = False,
-    ahead: bool = False,
+    ahead: float | None = None,
     looked: float | None = 0.0,
 ) -> Decision:
     """AGII was told at ``entered`` and answered ``after`` that long; None: never.
 
-    It was seen ``looked`` before it was told; None where a peer's own ring was entered.
+    The look that it rests on came ``looked`` before; None: the ring was known.  A robot
+    that was ``ahead`` had said so that long before.
     """
-    look = None
-    if looked is not None:
-        look = Sighting("AGI", 1.0, 0.0, 0.9, at(entered - looked), "farmer", 0.94)
     crossing = Crossing(
         f"d-{entered}",
         "AGII",
-        Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0, look),
+        Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0),
         entered=at(entered),
         entered_m=1.43,
         speed_before=0.8,
         in_sight=False,
         distance_m=1.43,
         already_slow=already_slow,
-        ahead=ahead,
+        ahead=ahead is not None,
     )
-    one = Decision(crossing, Rule())
+    one = Decision(
+        crossing,
+        Rule(),
+        noticed=None if looked is None else at(entered - looked).mono,
+        answered=None if ahead is None else at(entered - ahead).mono,
+    )
     return one if after is None else replace(one, applied=at(entered + after))
 
 
@@ -90,16 +92,33 @@ def test_a_robot_that_was_slow_for_something_else_has_nothing_to_echo() -> None:
     assert (told.timed, told.asked) == (0, 0)
 
 
-@pytest.mark.parametrize("looked", [0.05, None])
-def test_whoever_drives_into_a_known_ring_has_echoed_but_is_not_timed(
-    looked: float | None,
-) -> None:
-    told = echoes_of([asked(after=0.01, looked=looked)], at(5))
+def test_an_answer_is_timed_from_the_look_and_not_from_the_crossing() -> None:
+    told = echoes_of([asked(after=0.04, looked=0.06)], at(5))
+
+    assert told.p50_s == pytest.approx(0.10)
+
+
+def test_whoever_drives_into_a_known_ring_has_answered_but_is_not_timed() -> None:
+    told = echoes_of([asked(after=0.01, looked=None)], at(5))
 
     assert (told.timed, told.asked, told.missed) == (0, 1, 0)
 
 
-def test_a_robot_that_was_ahead_has_echoed_but_is_not_timed() -> None:
-    told = echoes_of([asked(after=0.4, ahead=True)], at(5))
+def test_a_robot_that_was_ahead_is_timed_by_when_it_said_so() -> None:
+    told = echoes_of([asked(after=0.4, ahead=0.02, looked=0.15)], at(5))
 
-    assert (told.timed, told.asked, told.missed) == (0, 1, 0)
+    assert (told.timed, told.asked, told.missed) == (1, 1, 0)
+    assert told.p50_s == pytest.approx(0.13)
+    assert told.echo_age_s == pytest.approx(5.02)
+
+
+def test_a_robot_that_was_ahead_and_has_braked_by_now_is_timed() -> None:
+    told = echoes_of([asked(ahead=0.02, looked=0.15, already_slow=True)], at(5))
+
+    assert (told.timed, told.asked, told.missed) == (1, 1, 0)
+
+
+def test_a_robot_that_was_ahead_of_a_known_ring_is_not_timed() -> None:
+    one = replace(asked(after=0.4, ahead=0.02, looked=None), answered=None)
+
+    assert echoes_of([one], at(5)).timed == 0
