@@ -115,7 +115,12 @@ def _parser() -> argparse.ArgumentParser:
     replay = commands.add_parser("replay", help="recorded logs as robots")
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")
     replay.add_argument(
-        "--robot", nargs="+", required=True, metavar="NAME", help="one for each file"
+        "--robot",
+        nargs="+",
+        action="extend",
+        required=True,
+        metavar="NAME",
+        help="one for each file, in their order; may be repeated",
     )
     replay.add_argument("--speed", type=_speed, default=1.0, metavar="FACTOR")
     replay.add_argument("--loop", action="store_true", help="start over at the end")

@@ -82,6 +82,15 @@ def test_a_recording_of_a_robot_outside_the_fleet_is_refused(
     assert "AGX" in capsys.readouterr().err
 
 
+def test_robots_of_recordings_may_be_named_one_by_one(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    one_by_one = ["--robot", "AGX", "--robot", "AGI"]
+
+    assert run(["replay", "one.jsonl", "two.jsonl", *one_by_one]) == UNUSABLE
+    assert "AGX" in capsys.readouterr().err
+
+
 def test_a_recording_is_not_played_on_a_broker_elsewhere(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
