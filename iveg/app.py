@@ -16,7 +16,7 @@ from starlette.staticfiles import StaticFiles
 from ulid import ULID
 
 from iveg import __version__
-from iveg.adapters import clock
+from iveg.adapters import clock, floods
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.engine import sqlite_file, sqlite_url
@@ -283,6 +283,7 @@ class Dss:
         total = Counter(self.ingest.counters)
         total.update(self.assessor.world.counters)
         total.update(self.recorder.counters)
+        total.update(floods.counted)
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.assessor.protected_unseen
         return total

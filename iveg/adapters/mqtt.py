@@ -17,9 +17,12 @@ from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
+from iveg.adapters.floods import quiet
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
+# aiomqtt's own: it complains of every message that finds no room or no confirmation.
+quiet("mqtt")
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5

@@ -16,6 +16,7 @@ from typing import Any
 
 from amqtt.broker import Broker
 
+from iveg.adapters.floods import quiet
 from iveg.embedded.loopback import require_loopback
 from iveg.embedded.mqtt_telemetry import BoundedWriter, TelemetryReader, publish_packet
 
@@ -26,29 +27,8 @@ for _name in ("amqtt", "transitions"):
 _log = logging.getLogger(__name__)
 
 
-class _Once(logging.Filter):
-    """Lets each complaint about a slow client through once, without its traceback.
-
-    A client that does not confirm for five seconds is one fact; amqtt tells it for
-    every message that waits.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._told: set[str] = set()
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """Whether this is news."""
-        complaint = str(record.msg).partition(":")[0].partition(" for ")[0]
-        news = complaint not in self._told
-        self._told.add(complaint)
-        if news and record.levelno > logging.WARNING:
-            record.exc_info = None
-        return news
-
-
-for _name in ("amqtt.broker", "amqtt.mqtt.protocol.handler"):
-    logging.getLogger(_name).addFilter(_Once())
+# A client that does not confirm is one fact; amqtt tells it for each waiting message.
+quiet("amqtt.broker", "amqtt.mqtt.protocol.handler")
 _PATIENCE_S = 1.0
 _MOST_TOPICS = 10_000
 Listener = Callable[[str, bytes], None]
