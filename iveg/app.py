@@ -125,11 +125,12 @@ class Dss:
             clock.now,
             self.ingest.offer,
             self.ingest.reject,
+            settings.direct_read,
         )
         self.link = MqttLink(
             broker_of(settings),
             "iveg",
-            self._direct.subscriptions() if settings.direct_read else None,
+            self._direct.subscriptions(),
             self._direct.read,
             self._broker_back,
             self._broker_lost,
@@ -191,6 +192,7 @@ class Dss:
             self.link,
             self.chain,
             self.ingest,
+            world.feeds,
             robots=settings.robots,
             apikey=settings.apikey,
             context_broker_url=settings.iota_cb_url or settings.orion_url,
@@ -327,6 +329,10 @@ class Dss:
         """Whether a subscription is one that this DSS keeps."""
         return subscription_id in self.provisioner.subscription_ids
 
+    def is_thinned(self, subscription_id: str) -> bool:
+        """Whether Orion was told to leave out most of what a subscription is about."""
+        return self.upkeep.throttle.is_throttled(subscription_id)
+
     def notified(self, at: Instant) -> None:
         """A notification of Orion's came in."""
         self.chain.notified_at = at.mono
@@ -358,7 +364,13 @@ def create_app(dss: Dss) -> FastAPI:
     settings = dss.settings
     tenant = settings.fiware_service, settings.fiware_servicepath
     orion = notifications.NotificationEndpoint(
-        dss.ingest, dss.notify_secret, clock.now, dss.is_ours, tenant, dss.notified
+        dss.ingest,
+        dss.notify_secret,
+        clock.now,
+        dss.is_ours,
+        tenant,
+        dss.notified,
+        dss.is_thinned,
     )
     app.router.routes.append(orion.route())
     app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))

@@ -66,6 +66,13 @@ def _switch(value: str) -> bool:
     return value.lower() == "on"
 
 
+def _direct_read(value: str) -> str:
+    choice = {"on": "all"}.get(value.lower(), value.lower())
+    if choice not in ("all", "safety", "off"):
+        raise _NotAllowedError("one of all, safety, off, or on, which means all")
+    return choice
+
+
 def _choice(*choices: str) -> Callable[[str], str]:
     def read(value: str) -> str:
         if value not in choices:
@@ -213,11 +220,13 @@ class Settings:
     stop_direct: bool = setting(
         "IVEG_STOP_DIRECT", _switch, True, "STOP also straight over MQTT."
     )
-    direct_read: bool = setting(
+    direct_read: Literal["all", "safety", "off"] = setting(
         "IVEG_DIRECT_READ",
-        _switch,
-        True,
-        "Detections and safety reports also straight from MQTT.",
+        _direct_read,
+        "all",
+        "What iVeg reads straight from MQTT as well as through FIWARE: `all` that "
+        "robots send, `safety` (detections, safety reports and answers), or nothing "
+        "(`off`); `on` means `all`.",
     )
     feedback_slow_s: float = setting(
         "IVEG_FEEDBACK_SLOW_S",

@@ -1,22 +1,47 @@
-"""The direct road in: what people's safety needs, read from MQTT without FIWARE.
+"""The direct transport in: what robots publish, read from MQTT without FIWARE.
 
-Detections, safety reports and answers also come through Orion; whichever is first
-counts.  The agent drops a whole message for one apostrophe and falls seconds behind
-under load (fiware.md), and a person must not vanish for that.
+All of it also comes through Orion, or used to; whichever copy is first counts.  The
+agent drops a whole message for one apostrophe and falls seconds behind under load
+(fiware.md), and neither people nor poses must vanish for that.
 """
 
 from collections.abc import Callable, Iterable
+from typing import Literal
 
 from iveg.domain.observations import (
+    CommandAnswer,
     DetectionFrame,
     Instant,
+    LaserScan,
+    Navigation,
     Observation,
+    Odometry,
     Received,
     SafetyReport,
 )
 from iveg.ngsi import codec, names
 
-_READ = (DetectionFrame, SafetyReport)
+Scope = Literal["all", "safety", "off"]
+
+_KINDS: dict[Scope, tuple[type[Observation], ...]] = {
+    "all": (DetectionFrame, SafetyReport, Odometry, LaserScan, Navigation),
+    "safety": (DetectionFrame, SafetyReport),
+    "off": (),
+}
+_QOS: dict[Scope, dict[str, int]] = {
+    "all": {
+        "": 1,
+        "_safety": 1,
+        "_yolox_bounding_boxes": 1,
+        "_odom": 0,
+        "_lidar2D": 0,
+        "_nav": 0,
+    },
+    "safety": {"": 1, "_safety": 1, "_yolox_bounding_boxes": 1},
+    "off": {},
+}
+"""Of each device's topics.  Poses, scans and intent are worth nothing when a newer one
+is there: at QoS 0 the inbox keeps the newest of a topic alone."""
 
 
 class DirectReader:
@@ -24,6 +49,7 @@ class DirectReader:
 
     Args:
         offer: Where observations go; ``reject`` where the unreadable is counted.
+        scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
     """
 
     def __init__(
@@ -33,21 +59,35 @@ class DirectReader:
         clock: Callable[[], Instant],
         offer: Callable[[Received], None],
         reject: Callable[[str, str, str], None],
+        scope: Scope = "all",
     ) -> None:
         self._clock = clock
         self._offer = offer
         self._reject = reject
+        self._kinds = (*_KINDS[scope], CommandAnswer)
         self._devices: dict[str, str] = {}
         self._answers: dict[str, str] = {}
+        self._subscriptions: dict[str, int] = {}
         for robot_id in robots:
-            for suffix in ("", "_safety", "_yolox_bounding_boxes"):
-                device = robot_id + suffix
-                self._devices[names.measure_topic(apikey, device)] = device
-            self._answers[names.answer_topic(apikey, robot_id)] = robot_id
+            for suffix, qos in _QOS[scope].items():
+                self._listen(apikey, robot_id, suffix, qos)
+            if scope != "off":
+                answers = names.answer_topic(apikey, robot_id)
+                self._answers[answers] = robot_id
+                self._subscriptions[answers] = 1
+
+    def _listen(self, apikey: str, robot_id: str, suffix: str, qos: int) -> None:
+        device = robot_id + suffix
+        topics = [names.measure_topic(apikey, device)]
+        if suffix in names.DIRECT_SUFFIXES:
+            topics.append(names.direct_topic(robot_id, suffix))
+        for topic in topics:
+            self._devices[topic] = device
+            self._subscriptions[topic] = qos
 
     def subscriptions(self) -> dict[str, int]:
         """Topics and their QoS."""
-        return dict.fromkeys([*self._devices, *self._answers], 1)
+        return self._subscriptions
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
@@ -61,9 +101,5 @@ class DirectReader:
         for problem in reading.problems:
             self._reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
-            if topic in self._answers or _counts(observation):
+            if isinstance(observation, self._kinds):
                 self._offer(Received(observation, at, "mqtt"))
-
-
-def _counts(observation: Observation) -> bool:
-    return isinstance(observation, _READ)

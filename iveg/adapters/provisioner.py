@@ -17,9 +17,11 @@ from typing import TypeVar
 from iveg.adapters.iot_agent import IotAgentClient, Provisioned, provision
 from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import Ensured, ensure_subscriptions
+from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
+from iveg.adapters.throttle import Throttle
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.observations import Canary, Instant, Origin, Received
+from iveg.domain.transports import Feeds
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
 from iveg.pipeline.ingest import Ingest
@@ -37,8 +39,11 @@ T = TypeVar("T")
 class Provisioner:
     """Provisioning, subscriptions, reconciling reads and the heartbeat probe.
 
+    Args:
+        feeds: Which transport feeds each robot.
+
     Attributes:
-        subscription_ids: The subscriptions that are ours.
+        throttle: Keeps Orion from sending what comes straight from MQTT already.
     """
 
     def __init__(
@@ -48,6 +53,7 @@ class Provisioner:
         link: MqttLink,
         chain: HealthMonitor,
         ingest: Ingest,
+        feeds: Feeds,
         *,
         robots: Sequence[str],
         apikey: str,
@@ -74,7 +80,21 @@ class Provisioner:
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
-        self.subscription_ids: frozenset[str] = frozenset()
+        self._subscription_ids: frozenset[str] = frozenset()
+        self.throttle = Throttle(
+            orion,
+            link,
+            feeds,
+            notify_url,
+            notify_token,
+            read_clock,
+            self._read_robots,
+        )
+
+    @property
+    def subscription_ids(self) -> frozenset[str]:
+        """The subscriptions that are ours."""
+        return self._subscription_ids | self.throttle.ids
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -83,6 +103,7 @@ class Provisioner:
             tasks.create_task(self._watch(self._ask_orion), name="watch-orion")
             tasks.create_task(self._watch(self._ask_agent), name="watch-agent")
             tasks.create_task(self._look_after(), name="look-after")
+            tasks.create_task(self.throttle.run(), name="throttle")
 
     # --- the heartbeat probe --------------------------------------------------------
 
@@ -242,14 +263,21 @@ class Provisioner:
         self._devices_at = self._clock().mono + self._devices_wait_s
 
     async def _check_subscriptions(self) -> bool:
-        work = ensure_subscriptions(self._orion, self._notify_url, self._notify_token)
+        switches = self.throttle.switches
+        work = ensure_subscriptions(
+            self._orion,
+            self._notify_url,
+            self._notify_token,
+            wanted_for(self._robots),
+        )
         try:
             done: Ensured = await _made_sense("orion", work)
         except HopError as error:
             self._chain.notify_error = error.detail
             return await self._blame("subscriptions", error)
-        first = not self.subscription_ids
-        self.subscription_ids = done.ids
+        first = not self._subscription_ids
+        self._subscription_ids = done.ids
+        self.throttle.found(done.copies, switches)
         self._explain(done.mended)
         self._chain.notify_detail = done.failing
         # What is made at the start was never missed.

@@ -2,16 +2,22 @@
 
 They are found again after a restart by how their description begins, so there is
 always one of each, however often iVeg starts.
+
+Odometry and scans have one a robot: Orion throttles a subscription as a whole, so in a
+common one the robot that sends first in each second would silence the others.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from iveg.domain.observations import LaserScan, Odometry
+from iveg.domain.transports import Copied
 from iveg.ngsi import names
 
 PREFIX = "iVeg: "
 TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
+THROTTLING_S = 1
 _TIMEOUT_MS = 2000
 
 
@@ -42,12 +48,15 @@ class Wanted:
         entity: What it is about, as NGSI-v2 says it.
         attributes: What is sent.
         condition: What makes Orion send; the attributes where it is empty.
+        copied: Robot and kind whose direct copy may make this one a mere fallback,
+            which Orion then throttles; None where every notification counts.
     """
 
     name: str
     entity: tuple[tuple[str, str], ...]
     attributes: tuple[str, ...]
     condition: tuple[str, ...] = ()
+    copied: tuple[str, Copied] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,18 +67,18 @@ class Ensured:
         ids: The subscriptions that are ours.
         mended: What had to be done, as sentences; empty when all was well.
         failing: Why Orion cannot deliver, in its words; empty when it can.
+        copies: Id of each subscription that may be throttled, and whether it is.
     """
 
     ids: frozenset[str]
     mended: tuple[str, ...]
     failing: str = ""
+    copies: Mapping[Wanted, tuple[str, bool]] = field(default_factory=dict)
 
 
 _ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
 
-WANTED = (
-    Wanted("odometry", _ROBOTS, (names.ODOMETRY,)),
-    Wanted("lidar", _ROBOTS, (names.LIDAR, names.LIDAR_HEADER)),
+WANTED_OF_ALL = (
     Wanted("detections", _ROBOTS, (names.BOXES, names.BOXES_HEADER)),
     Wanted("safety", _ROBOTS, (names.SAFETY,)),
     Wanted("navigation", _ROBOTS, (names.NAVIGATION,)),
@@ -93,17 +102,41 @@ WANTED = (
 )
 
 
+def wanted_for(robots: Iterable[str]) -> tuple[Wanted, ...]:
+    """Everything that iVeg wants to hear of a fleet."""
+    copies = [one for robot_id in robots for one in _copies_of(robot_id)]
+    return (*copies, *WANTED_OF_ALL)
+
+
+def _copies_of(robot_id: str) -> tuple[Wanted, Wanted]:
+    entity = (("id", robot_id), ("type", names.ROBOT_TYPE))
+    return (
+        Wanted(
+            f"odometry {robot_id}",
+            entity,
+            (names.ODOMETRY,),
+            copied=(robot_id, Odometry),
+        ),
+        Wanted(
+            f"lidar {robot_id}",
+            entity,
+            (names.LIDAR, names.LIDAR_HEADER),
+            copied=(robot_id, LaserScan),
+        ),
+    )
+
+
 async def ensure_subscriptions(
     orion: SubscriptionStore,
     notify_url: str,
     token: str,
-    wanted: Sequence[Wanted] = WANTED,
+    wanted: Sequence[Wanted],
 ) -> Ensured:
     """Make what stands at Orion what iVeg wants, and nothing more of ours.
 
     Run it at every start and whenever notifications stay away; it changes only what is
-    wrong.  No throttling (it drops the last value) and no limit of failures (Orion
-    would fall silent for good).
+    wrong.  No throttling (it drops the last value) but of copies, which may or may not
+    have it, and no limit of failures (Orion would fall silent for good).
 
     Args:
         orion: Where subscriptions are kept.
@@ -120,18 +153,26 @@ async def ensure_subscriptions(
         if description.startswith(PREFIX):
             ours.setdefault(description, []).append(one)
     failing = _failing(ours)
-    ids, mended = [], []
+    ids, mended, copies = [], [], {}
     for want in wanted:
         document = write_subscription(want, notify_url, token)
         known = ours.pop(document["description"], [])
-        subscription_id, done = await _ensure(orion, want.name, document, known)
+        subscription_id, done = await _ensure(orion, want, document, known)
         ids.append(subscription_id)
         mended += done
+        if want.copied is not None:
+            kept = any(one["id"] == subscription_id for one in known)
+            copies[want] = subscription_id, kept and is_throttled(known[0])
     for leftover in ours.values():
         for one in leftover:
             await orion.delete_subscription(one["id"])
             mended.append(f"Removed {one['description']!r}: it is not wanted any more.")
-    return Ensured(frozenset(ids), tuple(mended), failing)
+    return Ensured(frozenset(ids), tuple(mended), failing, copies)
+
+
+def is_throttled(subscription: Mapping[str, Any]) -> bool:
+    """Whether Orion leaves notifications of it out."""
+    return bool(subscription.get("throttling"))
 
 
 def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
@@ -149,10 +190,11 @@ def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
 
 async def _ensure(
     orion: SubscriptionStore,
-    name: str,
+    want: Wanted,
     document: dict[str, Any],
     known: list[dict[str, Any]],
 ) -> tuple[str, list[str]]:
+    name = want.name
     if not known:
         made = await orion.create_subscription(document)
         return made, [f"Subscribed to {name}."]
@@ -161,8 +203,8 @@ async def _ensure(
         await orion.delete_subscription(spare["id"])
         mended.append(f"Removed a second subscription to {name}.")
     kept = known[0]
-    if limited := [part for part in ("throttling", "expires") if kept.get(part)]:
-        # A change can replace these and cannot take them away.
+    if limited := _limits(want, kept):
+        # Not every Orion takes these away by a change.
         await orion.delete_subscription(kept["id"])
         made = await orion.create_subscription(document)
         return made, [*mended, f"Subscribed to {name} again: it had {limited[0]}."]
@@ -170,6 +212,14 @@ async def _ensure(
         await orion.update_subscription(kept["id"], {**document, "status": "active"})
         mended.append(f"Corrected the subscription to {name}: {wrong}.")
     return str(kept["id"]), mended
+
+
+def _limits(want: Wanted, kept: Mapping[str, Any]) -> list[str]:
+    """What a subscription must not have; a copy may be throttled our own way."""
+    limits = [part for part in ("throttling", "expires") if kept.get(part)]
+    if want.copied is not None and kept.get("throttling") == THROTTLING_S:
+        limits.remove("throttling")
+    return limits
 
 
 def _differs(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:

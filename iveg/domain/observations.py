@@ -276,9 +276,11 @@ class Received:
 
     Attributes:
         asked: It is Orion's answer to a question, so nobody knows how old it is.
+        thinned: Orion was told to leave most of its kind out.
     """
 
     observation: Observation
     at: Instant
     road: Road = "orion"
     asked: bool = False
+    thinned: bool = False

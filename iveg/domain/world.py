@@ -33,6 +33,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.order import Order, Verdict
 from iveg.domain.probe import ProbeLag
+from iveg.domain.transports import Feeds
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
@@ -41,7 +42,7 @@ STANDING_SPEED = 0.02
 """Below this (m/s and rad/s) a robot stands (safety.md §2.2)."""
 REPLAY_TASK = "replay"
 _HISTORY = 128
-_ASKED_AGE_S = LATE_S + 0.1
+_ASKED_AGE_S, _THINNED_AGE_S = LATE_S + 0.1, LIVE_S + 0.1
 GAIN_OVER_S = 1.0
 
 
@@ -203,6 +204,7 @@ class World:
         self.climate_received: Instant | None = None
         self.canary_at: float | None = None
         self.counters: Counter[str] = Counter()
+        self.feeds = Feeds()
 
     def robot(self, robot_id: str) -> RobotState:
         """One robot.
@@ -244,6 +246,8 @@ class World:
         if isinstance(observation, Overtaken) and verdict == "new":
             # Its stream was past it, and has since met sixteen other boots.
             verdict = "late"
+        if not received.asked:
+            verdict = self._fed(robot, received, origin, verdict)
         self.counters[f"{kind_of(observation).__name__}.{verdict}"] += 1
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
@@ -280,13 +284,14 @@ class World:
 
         Of a robot that echoes only a proof counts.
         """
-        at = received.at
-        if not origin.echoes:
-            return None if likely is None else at.mono - likely
-        proven = self.ledger.composed_at(origin.heard)
-        if proven is None or not received.asked:
-            return proven
-        return min(proven, at.mono - _ASKED_AGE_S)
+        now = received.at.mono
+        moment = None if likely is None else now - likely
+        if origin.echoes:
+            moment = self.ledger.composed_at(origin.heard)
+        if moment is None:
+            return None
+        least = _THINNED_AGE_S if received.thinned else 0.0
+        return min(moment, now - (_ASKED_AGE_S if received.asked else least))
 
     def age_then(self, received: Received) -> float:
         """How old the newest of its kind was at most when it came (s).
@@ -302,6 +307,20 @@ class World:
             robot = self.robot(observation.robot_id)
             moment = robot.pose_at if robot.estimated_since is None else None
         return inf if moment is None else max(0.0, received.at.mono - moment)
+
+    def _fed(
+        self, robot: RobotState, received: Received, origin: Origin, verdict: Verdict
+    ) -> Verdict:
+        """Note which transport brought it; without a count the direct copy wins."""
+        kind = kind_of(received.observation)
+        if kind not in (Odometry, LaserScan):
+            return verdict
+        feed = self.feeds.of(robot.robot_id, kind)
+        at, counted = received.at.mono, origin.seq is not None
+        if received.road == "orion" and not counted and feed.is_direct(at):
+            verdict = "duplicate"
+        feed.heard(received.road, at, news=verdict == "new")
+        return verdict
 
     def live_robots(self) -> Iterable[RobotState]:
         """Robots that are not recordings."""

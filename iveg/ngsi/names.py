@@ -70,6 +70,10 @@ ROBOT_DEVICES = (
 keeps its registry in memory, so that either registry picks it (fiware.md §4)."""
 
 
+DIRECT_SUFFIXES = ("", "_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")
+"""Devices that may also speak to iVeg alone, past the IoT Agent."""
+
+
 def is_robot_id(text: str) -> bool:
     """Whether a text may name a robot."""
     return _ROBOT_ID.fullmatch(text) is not None and text not in _RESERVED
@@ -78,6 +82,15 @@ def is_robot_id(text: str) -> bool:
 def measure_topic(apikey: str, device_id: str) -> str:
     """Where a device publishes its measures."""
     return f"/{apikey}/{device_id}/attrs"
+
+
+def direct_topic(robot_id: str, suffix: str) -> str:
+    """Where a robot tells iVeg alone what its device ``suffix`` measures.
+
+    The IoT Agent does not listen there (it does to ``/+/+/attrs`` and ``/+/+/cmdexe``),
+    so it costs the agent nothing.
+    """
+    return f"/{robot_id}/iveg/{suffix.removeprefix('_') or 'single'}"
 
 
 def command_topic(apikey: str, robot_id: str) -> str:

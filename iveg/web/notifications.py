@@ -37,6 +37,7 @@ class NotificationEndpoint:
         is_ours: Whether a subscription id is one that iVeg made.
         tenant: The Fiware service and path that count.
         heard: Told of each notification of Orion's.
+        is_thinned: Whether Orion leaves out most of what a subscription is about.
     """
 
     action: Final[Action] = "open"
@@ -50,6 +51,7 @@ class NotificationEndpoint:
         is_ours: Callable[[str], bool],
         tenant: tuple[str, str],
         heard: Callable[[Instant], None],
+        is_thinned: Callable[[str], bool],
     ) -> None:
         self._ingest = ingest
         self._secret = secret
@@ -57,6 +59,7 @@ class NotificationEndpoint:
         self._is_ours = is_ours
         self._tenant = tenant
         self._heard = heard
+        self._is_thinned = is_thinned
 
     def route(self) -> Route:
         """Its place in the application's table of routes."""
@@ -117,8 +120,9 @@ class NotificationEndpoint:
         self._heard(at)
         for problem in reading.problems:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
+        thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
-            self._ingest.offer(Received(observation, at, "orion"))
+            self._ingest.offer(Received(observation, at, "orion", thinned=thinned))
         return None
 
 

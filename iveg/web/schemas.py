@@ -172,6 +172,7 @@ class RobotJson(TypedDict):
     replay: bool
     clock_offset_s: float | None
     road: str
+    transport: Literal["direct", "fiware"]
     profile: ProfileJson
     margin: MarginJson | None
     cmd_status: str | None

@@ -98,6 +98,7 @@ class Views:
             "replay": robot.is_replay,
             "clock_offset_s": shapes.rounded(robot.clock.offset_s(now)),
             "road": robot.frame_road,
+            "transport": self._world.feeds.of(robot_id).transport(now.mono),
             "profile": shapes.profile(robot_id),
             "margin": shapes.margin(
                 margins.of_robot(robot_id)

@@ -45,6 +45,7 @@ def test_every_measure_topic_is_in_the_contract(device: names.Device) -> None:
         names.FEEDBACK_TOPIC.format(robot_id="{robot}"),
         names.FEEDBACK_FILTER,
         names.DESIRED_TOPIC.format(robot_id="{robot}"),
+        *(names.direct_topic("{robot}", suffix) for suffix in names.DIRECT_SUFFIXES),
     ],
 )
 def test_every_other_topic_is_in_the_contract(topic: str) -> None:

@@ -172,7 +172,13 @@ def of_robot(robot: str) -> set[str]:
     """What safety.md 5.2.8 lets a robot write, written out once more by hand."""
     plain = {f"/iveg/{robot}{suffix}/attrs" for suffix in DEVICES}
     plain.add(f"/iveg/{robot}/cmdexe")
-    return plain | {f"/json{topic}" for topic in plain}
+    return plain | {f"/json{topic}" for topic in plain} | straight(robot)
+
+
+def straight(robot: str) -> set[str]:
+    """What a robot tells iVeg past the agent."""
+    kinds = ("safety", "odom", "lidar2D", "yolox_bounding_boxes", "single")
+    return {f"/{robot}/iveg/{kind}" for kind in kinds}
 
 
 AIR = {"/iveg/climate/attrs", "/json/iveg/climate/attrs"}
@@ -192,6 +198,8 @@ ELSEWHERE = {
     "/iveg/AGI/attrs/pose",
     "/iveg/AGI/configuration/commands",
     "/iveg/AGIII/attrs",
+    "/AGI/iveg/other",
+    "/AGIII/iveg/safety",
     "anything",
 }
 TOPICS = sorted(
@@ -226,7 +234,11 @@ MAY_READ = {
     "iot_agent": REPORTS
     | {topic for topic in TOPICS if topic.startswith("/json/")}
     | {"/iveg/AGI/attrs/pose"},
-    "iveg_dss": REPORTS | PROBES,
+    "iveg_dss": REPORTS
+    | PROBES
+    | straight("AGI")
+    | straight("AGII")
+    | {"/AGIII/iveg/safety"},
     "iveg_emulator": COMMANDS | FEEDBACK | DESIRED,
     "iveg_health": set(),
 }
@@ -275,15 +287,26 @@ async def heard_until_end(client: aiomqtt.Client) -> dict[str, set[str]]:
     return heard
 
 
-async def test_robot_a_cannot_speak_as_robot_b(broker: Broker) -> None:
+@pytest.mark.parametrize(
+    "topic",
+    [
+        "/iveg/{}_odom/attrs",
+        "/{}/iveg/odom",
+        "/iveg/{}_safety/attrs",
+        "/{}/iveg/safety",
+        "/iveg/{}/cmdexe",
+    ],
+)
+async def test_robot_a_cannot_speak_as_robot_b(topic: str, broker: Broker) -> None:
     async with broker.client("iveg_dss") as dss, broker.client("AGI") as robot:
-        await dss.subscribe("/iveg/+/attrs", qos=1)
-        await robot.publish("/iveg/AGII_odom/attrs", b"lie", qos=1)
-        await robot.publish("/iveg/AGI_odom/attrs", b"truth", qos=1)
+        await dss.subscribe(topic.format("AGI"), qos=1)
+        await dss.subscribe(topic.format("AGII"), qos=1)
+        await robot.publish(topic.format("AGII"), b"lie", qos=1)
+        await robot.publish(topic.format("AGI"), b"truth", qos=1)
         async with asyncio.timeout(20):
             first = await anext(dss.messages)
 
-    assert (str(first.topic), first.payload) == ("/iveg/AGI_odom/attrs", b"truth")
+    assert (str(first.topic), first.payload) == (topic.format("AGI"), b"truth")
 
 
 async def test_iveg_stops_a_robot_and_no_robot_stops_another(broker: Broker) -> None:

@@ -20,7 +20,7 @@ import httpx
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress
-from iveg.adapters.subscriptions import WANTED
+from iveg.adapters.subscriptions import wanted_for
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.integration.gate import Gate, Mood, bridge, gate
 from tests.ports import free_ports
@@ -33,6 +33,7 @@ pytestmark = [
         MOSQUITTO is None and "CI" not in os.environ, reason="Mosquitto is missing"
     ),
 ]
+WANTED = wanted_for(["AGI", "AGII"])
 SAID_WITHIN_S, WHOLE_WITHIN_S = 6.0, 10.0
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 Json = dict[str, Any]
@@ -342,7 +343,7 @@ def _expire(stack: Stack, path: str) -> None:
 def test_f8_a_spoilt_subscription_is_told_and_mended(
     stack: Stack, spoil: Callable[[Stack, str], None]
 ) -> None:
-    odometry = next(o for o in ours(stack) if o["description"] == "iVeg: odometry")
+    odometry = next(o for o in ours(stack) if o["description"] == "iVeg: odometry AGI")
     spoil(stack, f"/v2/subscriptions/{odometry['id']}")
 
     told = stack.blames("notifications")

@@ -34,7 +34,7 @@ BAD = [
     ("IVEG_SAFETY_RADIUS_M", "0.4", "a number from 0.5 to 6"),
     ("IVEG_SAFETY_RADIUS_M", "inf", "a number from 0.5 to 6"),
     ("IVEG_STOP_DIRECT", "yes", "on or off"),
-    ("IVEG_DIRECT_READ", "1", "on or off"),
+    ("IVEG_DIRECT_READ", "1", "one of all, safety, off, or on, which means all"),
     ("IVEG_FEEDBACK_SLOW_S", "0", "a number from 0.1 to 10"),
     ("IVEG_FEEDBACK_STAND_S", "61", "a number from 0.2 to 60"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
@@ -93,13 +93,23 @@ def test_an_empty_environment_gives_the_defaults_of_the_contract() -> None:
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.robots == ("AGI", "AGII")
     assert (settings.confidence_threshold, settings.safety_radius_m) == (0.80, 2.0)
-    assert (settings.stop_direct, settings.direct_read) == (True, True)
+    assert (settings.stop_direct, settings.direct_read) == (True, "all")
     assert settings.fiware_service == "agroconnect"
     assert settings.greenhouse == "mvsim-20x20"
 
 
 def test_an_empty_value_means_the_default() -> None:
     assert Settings.from_environment({"IVEG_PORT": ""}) == Settings()
+
+
+@pytest.mark.parametrize(
+    ("text", "scope"),
+    [("on", "all"), ("all", "all"), ("safety", "safety"), ("Off", "off")],
+)
+def test_the_direct_read_has_three_scopes_and_an_old_name(
+    text: str, scope: str
+) -> None:
+    assert Settings.from_environment({"IVEG_DIRECT_READ": text}).direct_read == scope
 
 
 def test_variables_of_others_are_left_alone() -> None:

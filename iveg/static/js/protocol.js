@@ -33,6 +33,7 @@
  *   holds: Hold[], stop: Command | null,
  *   navigation: {task: string, goal: Point | null, path: [number, number][]} | null,
  *   replay: boolean, clock_offset_s: number | null, road: string | null,
+ *   transport?: "direct" | "fiware",
  *   profile: {drive: string, length: number, width: number, max_speed: number,
  *     turning_radius: number} | null,
  *   margin?: Margin | null, cmd_status: string | null,

@@ -3,20 +3,27 @@
 import orjson
 import pytest
 
-from iveg.adapters.direct import DirectReader
+from iveg.adapters.direct import DirectReader, Scope
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    Odometry,
     Received,
     SafetyReport,
 )
 from iveg.ngsi import codec
-from tests.builders import detection, detection_frame, odometry, safety_report
+from tests.builders import (
+    detection,
+    detection_frame,
+    odometry,
+    safety_report,
+    scan,
+)
 from tests.fakes.clock import FakeClock
 
 
 class Bench:
-    def __init__(self) -> None:
+    def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
         self.reader = DirectReader(
@@ -25,16 +32,36 @@ class Bench:
             FakeClock(),
             self.offered.append,
             lambda *problem: self.rejected.append(problem),
+            scope,
         )
 
 
-def test_it_listens_to_looks_reports_answers_and_the_single_uplink() -> None:
-    assert Bench().reader.subscriptions() == {
-        "/iveg/AGI/attrs": 1,
-        "/iveg/AGI_safety/attrs": 1,
-        "/iveg/AGI_yolox_bounding_boxes/attrs": 1,
-        "/iveg/AGI/cmdexe": 1,
-    }
+SAFETY = {
+    "/iveg/AGI/attrs": 1,
+    "/AGI/iveg/single": 1,
+    "/iveg/AGI_safety/attrs": 1,
+    "/AGI/iveg/safety": 1,
+    "/iveg/AGI_yolox_bounding_boxes/attrs": 1,
+    "/AGI/iveg/yolox_bounding_boxes": 1,
+    "/iveg/AGI/cmdexe": 1,
+}
+TELEMETRY = {
+    "/iveg/AGI_odom/attrs": 0,
+    "/AGI/iveg/odom": 0,
+    "/iveg/AGI_lidar2D/attrs": 0,
+    "/AGI/iveg/lidar2D": 0,
+    "/iveg/AGI_nav/attrs": 0,
+}
+
+
+@pytest.mark.parametrize(
+    ("scope", "topics"),
+    [("all", SAFETY | TELEMETRY), ("safety", SAFETY), ("off", {})],
+)
+def test_it_listens_to_what_its_scope_says(
+    scope: Scope, topics: dict[str, int]
+) -> None:
+    assert Bench(scope).reader.subscriptions() == topics
 
 
 def test_looks_reports_and_answers_come_in_on_the_mqtt_road() -> None:
@@ -53,10 +80,21 @@ def test_looks_reports_and_answers_come_in_on_the_mqtt_road() -> None:
     assert {one.road for one in bench.offered} == {"mqtt"}
 
 
-def test_poses_are_left_to_orion() -> None:
+@pytest.mark.parametrize("topic", ["/iveg/AGI_odom/attrs", "/AGI/iveg/odom"])
+def test_poses_come_straight_from_either_topic(topic: str) -> None:
     bench = Bench()
 
+    bench.reader.read(topic, codec.write_odometry(odometry()))
+
+    (read,) = bench.offered
+    assert (type(read.observation), read.road) == (Odometry, "mqtt")
+
+
+def test_a_scope_of_safety_leaves_poses_and_scans_to_orion() -> None:
+    bench = Bench("safety")
+
     bench.reader.read("/iveg/AGI/attrs", codec.write_odometry(odometry()))
+    bench.reader.read("/iveg/AGI/attrs", codec.write_scan(scan()))
 
     assert bench.offered == []
 

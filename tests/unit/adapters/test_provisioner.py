@@ -13,8 +13,9 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.subscriptions import WANTED
+from iveg.adapters.subscriptions import wanted_for
 from iveg.domain.observations import Odometry, Origin, Received
+from iveg.domain.transports import Feeds
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
@@ -59,6 +60,7 @@ class Site:
             self.link,
             self.chain,
             self.ingest,
+            Feeds(),
             robots=["AGI"],
             apikey="iveg",
             context_broker_url=fiware.orion_url,
@@ -158,7 +160,7 @@ async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
         kept = await site.orion.read_subscriptions()
 
     assert {one["id"] for one in kept} == site.provisioner.subscription_ids
-    assert len(kept) == len(WANTED)
+    assert len(kept) == len(wanted_for(["AGI"]))
 
 
 async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
@@ -171,7 +173,7 @@ async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
     async with OrionClient(fiware.orion_url, *SERVICE) as orion:
         kept = await orion.read_subscriptions()
 
-    assert len(kept) == len(WANTED)
+    assert len(kept) == len(wanted_for(["AGI"]))
     assert seen == {frozenset(one["id"] for one in kept)}
 
 
@@ -225,8 +227,8 @@ async def test_an_agent_that_falls_behind_is_asked_nothing_more(
 @pytest.mark.parametrize(
     "body",
     [
-        [{"id": 5, "description": "iVeg: odometry", "notification": 7}],
-        [{"description": "iVeg: odometry", "notification": {}}],
+        [{"id": 5, "description": "iVeg: odometry AGI", "notification": 7}],
+        [{"description": "iVeg: odometry AGI", "notification": {}}],
         {"subscriptions": []},
         [7],
         "text",

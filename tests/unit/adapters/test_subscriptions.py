@@ -7,13 +7,14 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import (
     PREFIX,
     TOKEN_HEADER,
-    WANTED,
     ensure_subscriptions,
+    wanted_for,
 )
 from iveg.embedded.server import embedded_fiware
 
 URL = "http://127.0.0.1:8000/ngsi/notifications"
 TOKEN = "ab" * 16
+WANTED = wanted_for(["AGI", "AGII"])
 
 
 class FakeStore:
@@ -50,7 +51,7 @@ class FakeStore:
 
 async def test_each_wanted_subscription_is_made_once() -> None:
     store = FakeStore()
-    first = await ensure_subscriptions(store, URL, TOKEN)
+    first = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     assert len(store.kept) == len(WANTED)
     assert first.ids == frozenset(store.kept)
 
@@ -60,9 +61,9 @@ async def test_twenty_restarts_make_no_second_one_and_change_nothing() -> None:
         embedded_fiware() as up,
         OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion,
     ):
-        first = await ensure_subscriptions(orion, URL, TOKEN)
+        first = await ensure_subscriptions(orion, URL, TOKEN, WANTED)
         for _ in range(20):
-            again = await ensure_subscriptions(orion, URL, TOKEN)
+            again = await ensure_subscriptions(orion, URL, TOKEN, WANTED)
             assert again.ids == first.ids
             assert again.mended == ()
         assert len(await orion.read_subscriptions()) == len(WANTED)
@@ -70,10 +71,10 @@ async def test_twenty_restarts_make_no_second_one_and_change_nothing() -> None:
 
 async def test_what_orion_is_told_is_what_it_needs() -> None:
     store = FakeStore()
-    await ensure_subscriptions(store, URL, TOKEN)
-    lidar = store.named("lidar")
+    await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    lidar = store.named("lidar AGI")
     assert lidar["subject"] == {
-        "entities": [{"idPattern": ".*", "type": "Robot"}],
+        "entities": [{"id": "AGI", "type": "Robot"}],
         "condition": {"attrs": ["lidar_points", "lidar_header"]},
     }
     assert lidar["notification"] == {
@@ -98,13 +99,13 @@ async def test_what_orion_is_told_is_what_it_needs() -> None:
 )
 async def test_a_damaged_subscription_is_made_right(damage: dict[str, Any]) -> None:
     store = FakeStore()
-    await ensure_subscriptions(store, URL, TOKEN)
-    wanted = dict(store.named("odometry"))
-    store.named("odometry").update(damage)
-    mended = await ensure_subscriptions(store, URL, TOKEN)
+    await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    wanted = dict(store.named("odometry AGI"))
+    store.named("odometry AGI").update(damage)
+    mended = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     assert len(mended.mended) == 1
-    assert store.named("odometry") == wanted
-    assert (await ensure_subscriptions(store, URL, TOKEN)).mended == ()
+    assert store.named("odometry AGI") == wanted
+    assert (await ensure_subscriptions(store, URL, TOKEN, WANTED)).mended == ()
 
 
 @pytest.mark.parametrize(("url", "token"), [(URL + "2", TOKEN), (URL, "cd" * 16)])
@@ -112,27 +113,27 @@ async def test_a_new_address_or_secret_reaches_every_subscription(
     url: str, token: str
 ) -> None:
     store = FakeStore()
-    first = await ensure_subscriptions(store, URL, TOKEN)
-    second = await ensure_subscriptions(store, url, token)
+    first = await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    second = await ensure_subscriptions(store, url, token, WANTED)
     assert second.ids == first.ids
     assert len(second.mended) == len(WANTED)
 
 
 async def test_a_deleted_subscription_is_made_again() -> None:
     store = FakeStore()
-    first = await ensure_subscriptions(store, URL, TOKEN)
+    first = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     del store.kept[next(iter(store.kept))]
-    second = await ensure_subscriptions(store, URL, TOKEN)
+    second = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     assert len(second.ids & first.ids) == len(WANTED) - 1
     assert len(second.ids) == len(WANTED)
 
 
 async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
     store = FakeStore()
-    await ensure_subscriptions(store, URL, TOKEN)
-    await store.create_subscription(store.named("odometry"))
+    await ensure_subscriptions(store, URL, TOKEN, WANTED)
+    await store.create_subscription(store.named("odometry AGI"))
     await store.create_subscription({"description": PREFIX + "of long ago"})
     theirs = await store.create_subscription({"description": "somebody else's"})
-    ensured = await ensure_subscriptions(store, URL, TOKEN)
+    ensured = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     assert len(ensured.mended) == 2
     assert frozenset(store.kept) == ensured.ids | {theirs}

@@ -68,6 +68,7 @@ class WebDesk(Desk):
             "ours".__eq__,
             ("agroconnect", "/greenhouse"),
             self.heard.append,
+            "thinned".__eq__,
         )
         self.app.router.routes.append(orion.route())
         self.app.add_middleware(notifications.NotificationsFirst, endpoint=orion)

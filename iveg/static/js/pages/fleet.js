@@ -134,7 +134,7 @@ function machineCells(robot, words) {
     link === "LOST" ? "—" : modeSaid(robot, words),
     profile ? words.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, words) : "—",
-    robot.road ? words.t(`fleet.road.${robot.road}`) : "—",
+    robot.transport ? words.t(`fleet.transport.${robot.transport}`) : "—",
     clock_offset_s === null ? "—" : words.t("fleet.clock", { offset: clock_offset_s }),
     robot.cmd_status ?? "—",
     sources.length ? [...new Set(sources)].join(", ") : "—",

@@ -80,6 +80,7 @@ export function createRelease(app, card, robotId) {
     const profile = robot?.profile;
     const facts = [
       profile && words.t("robot.profile", profile),
+      robot?.transport && words.t(`robot.transport.${robot.transport}`),
       robot?.cmd_status && words.t("robot.agent", { status: robot.cmd_status }),
       robot?.clock_offset_s &&
         words.t("robot.offset", { offset: robot.clock_offset_s }),

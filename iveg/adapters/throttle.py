@@ -1,0 +1,134 @@
+"""Throttles Orion's copies of odometry and scans while the direct ones are fresh.
+
+``domain.transports`` decides; here is what it takes at Orion.  The robots' entities are
+read once after every switch: throttling drops the last value, and nothing is notified
+when a subscription changes.
+"""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+
+from iveg.adapters.mqtt import MqttLink
+from iveg.adapters.subscriptions import (
+    THROTTLING_S,
+    SubscriptionStore,
+    Wanted,
+    is_throttled,
+    write_subscription,
+)
+from iveg.domain.errors import HopError
+from iveg.domain.observations import Instant
+from iveg.domain.transports import Feeds
+
+_LOOKS_EVERY_S = 0.2
+
+
+class Throttle:
+    """Switches each copy between full and one a second.
+
+    Args:
+        reread: Reads all entities; raises HopError.
+
+    Attributes:
+        copies: Id of each subscription that may be throttled, and whether it is.
+        switches: How often something was switched.
+    """
+
+    def __init__(
+        self,
+        orion: SubscriptionStore,
+        link: MqttLink,
+        feeds: Feeds,
+        notify_url: str,
+        notify_token: str,
+        read_clock: Callable[[], Instant],
+        reread: Callable[[], Awaitable[None]],
+    ) -> None:
+        self._orion = orion
+        self._link = link
+        self._feeds = feeds
+        self._notify_url = notify_url
+        self._notify_token = notify_token
+        self._clock = read_clock
+        self._reread = reread
+        self._must_read = False
+        self.copies: dict[Wanted, tuple[str, bool]] = {}
+        self.switches = 0
+
+    def found(
+        self, copies: Mapping[Wanted, tuple[str, bool]], switches: int = 0
+    ) -> None:
+        """Take what stood at Orion, unless something was switched since then."""
+        if switches == self.switches:
+            self.copies = dict(copies)
+
+    @property
+    def ids(self) -> frozenset[str]:
+        """The copies' subscriptions."""
+        return frozenset(known for known, _ in self.copies.values())
+
+    def is_throttled(self, subscription_id: str) -> bool:
+        """Whether what this subscription brings is only now and then."""
+        return any(
+            known == subscription_id and throttled
+            for known, throttled in self.copies.values()
+        )
+
+    async def run(self) -> None:
+        """Until cancelled; a neighbour that fails is asked again at the next look."""
+        while True:
+            await asyncio.sleep(_LOOKS_EVERY_S)
+            try:
+                await self.look()
+            except HopError:
+                continue  # told by those who watch Orion
+
+    async def look(self) -> None:
+        """Switch what must be switched.
+
+        Raises:
+            HopError: Orion did not do it.
+        """
+        if changes := self._changes():
+            self._must_read = True
+            self.switches += 1
+            for want, throttled in changes.items():
+                await self._switch(want, throttled)
+            await self._verify(changes)
+        if self._must_read:
+            await self._reread()
+            self._must_read = False
+
+    def _changes(self) -> dict[Wanted, bool]:
+        # Before the first connection nobody knows how the direct transport does.
+        connected = self._link.connected or not self._link.connects
+        now = self._clock().mono
+        changes = {}
+        for want, (_, throttled) in self.copies.items():
+            assert want.copied is not None  # noqa: S101 - all of these are copies
+            wish = self._feeds.of(*want.copied).judge(now, connected=connected)
+            if wish is not None and wish != throttled:
+                changes[want] = wish
+        return changes
+
+    async def _switch(self, want: Wanted, throttled: bool) -> None:
+        known, _ = self.copies[want]
+        seconds = THROTTLING_S if throttled else 0
+        await self._orion.update_subscription(known, {"throttling": seconds})
+        self.copies[want] = known, throttled
+
+    async def _verify(self, changes: Mapping[Wanted, bool]) -> None:
+        """An Orion that takes the change and does nothing gets a new subscription."""
+        stands = {one["id"]: one for one in await self._orion.read_subscriptions()}
+        for want, throttled in changes.items():
+            known, _ = self.copies[want]
+            if known in stands and is_throttled(stands[known]) != throttled:
+                await self._renew(want, known, throttled)
+
+    async def _renew(self, want: Wanted, known: str, throttled: bool) -> None:
+        document = write_subscription(want, self._notify_url, self._notify_token)
+        if throttled:
+            document["throttling"] = THROTTLING_S
+        made = await self._orion.create_subscription(document)
+        self.copies[want] = made, throttled
+        await self._orion.delete_subscription(known)
