@@ -160,6 +160,7 @@ class Dss:
             new_id,
             format_stamp,
             self._boot,
+            self.chain.probe.lag,
         )
         self.rules = Rules(self.assessor, rule_store, self.minutes, versions)
         self.commander = Commander(

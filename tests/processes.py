@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 _DIRTY = re.compile(r"^.*(?:\b(?:WARNING|ERROR|CRITICAL)\b|Traceback).*$", re.MULTILINE)
 _READY = re.compile(r"^ready$", re.MULTILINE)
 _STOP_WITHIN_S = 15.0
-EMULATOR = ("emulator", "--rate", "15")
+EMULATOR = ("emulator", "--hz", "15")
 """Robots for tests that are not about speed: half as often as they would speak, so that
 several stacks and browsers have room on one machine."""
 

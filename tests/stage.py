@@ -102,7 +102,7 @@ class Robot:
                 case Drive(twist):
                     self._rig.drive(twist)
                 case Report(report):
-                    seq, message = self._uplink.report(report, now)
+                    seq, (_, message) = self._uplink.report(report, now)
                     self._machine.reported(seq, now.mono)
                     self._say(message.topic, message.payload)
 

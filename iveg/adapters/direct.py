@@ -66,6 +66,7 @@ class DirectReader:
         self._reject = reject
         self._kinds = (*_KINDS[scope], CommandAnswer)
         self._devices: dict[str, str] = {}
+        self._dense: set[str] = set()
         self._answers: dict[str, str] = {}
         self._subscriptions: dict[str, int] = {}
         for robot_id in robots:
@@ -81,6 +82,7 @@ class DirectReader:
         topics = [names.measure_topic(apikey, device)]
         if suffix in names.DIRECT_SUFFIXES:
             topics.append(names.direct_topic(robot_id, suffix))
+            self._dense.add(topics[-1])
         for topic in topics:
             self._devices[topic] = device
             self._subscriptions[topic] = qos
@@ -102,4 +104,5 @@ class DirectReader:
             self._reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
             if isinstance(observation, self._kinds):
-                self._offer(Received(observation, at, "mqtt"))
+                sparse = topic not in self._dense
+                self._offer(Received(observation, at, "mqtt", sparse=sparse))

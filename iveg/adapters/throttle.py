@@ -20,7 +20,7 @@ from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
 from iveg.domain.transports import Feeds
 
-_LOOKS_EVERY_S = 0.2
+_LOOKS_EVERY_S, _AGAIN_S = 0.2, 1.0
 
 
 class Throttle:
@@ -75,13 +75,14 @@ class Throttle:
         )
 
     async def run(self) -> None:
-        """Until cancelled; a neighbour that fails is asked again at the next look."""
+        """Until cancelled; who watches Orion tells what fails."""
         while True:
             await asyncio.sleep(_LOOKS_EVERY_S)
             try:
                 await self.look()
-            except HopError:
-                continue  # told by those who watch Orion
+            except (HopError, AttributeError, KeyError, TypeError, ValueError):
+                # It is down, or answered JSON that means nothing here.
+                await asyncio.sleep(_AGAIN_S)
 
     async def look(self) -> None:
         """Switch what must be switched.

@@ -93,14 +93,14 @@ def _parser() -> argparse.ArgumentParser:
         "--profile", default="simulation", choices=("simulation", "field", "perfect")
     )
     emulator.add_argument(
-        "--rate",
-        type=_positive,
-        default=30,
-        metavar="HZ",
-        help="of odometry, laser and camera each (default: 30)",
+        "--held", action="store_true", help="robots stay held after they boot"
     )
     emulator.add_argument(
-        "--held", action="store_true", help="robots stay held after they boot"
+        "--hz",
+        type=_rate,
+        default=30.0,
+        metavar="RATE",
+        help="of odometry, laser and camera each (default: 30)",
     )
     emulator.add_argument(
         "--fault",
@@ -151,6 +151,13 @@ def _positive(text: str) -> int:
     if not 1 <= number <= 100:
         raise argparse.ArgumentTypeError("a number from 1 to 100")
     return number
+
+
+def _rate(text: str) -> float:
+    rate = float(text)
+    if not 1.0 <= rate <= 60.0:
+        raise argparse.ArgumentTypeError("a rate from 1 to 60 (Hz)")
+    return rate
 
 
 def _speed(text: str) -> float:

@@ -149,7 +149,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 stand_s=settings.feedback_stand_s,
                 state_directory=Path(directory),
                 held=options.held,
-                rate_hz=options.rate,
+                rate_hz=options.hz,
                 faults=read_words(options.fault, robots),
                 fault_port=options.fault_port,
             ),

@@ -11,6 +11,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
 
 FULL_SPEED = 1.0
+LONGEST_BACKLOG_S = 60.0
 HALF_SPEED = 0.5
 """The factor inside a ring; a constant of the paper, not a setting."""
 
@@ -65,6 +66,8 @@ class Feedback:
         alerts: All that are alive.
         pose: Where iVeg believes the observer to be; None when unknown.
         seen: Newest safety-report ``seq`` that iVeg has of each robot.
+        backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
+            where nobody knows.
     """
 
     robot_id: str
@@ -76,3 +79,4 @@ class Feedback:
     pose_stamp: str | None = None
     mandates: Mapping[str, Mandate] = field(default_factory=dict)
     seen: Mapping[str, int] = field(default_factory=dict)
+    backlog_s: float | None = None

@@ -277,6 +277,7 @@ class Received:
     Attributes:
         asked: It is Orion's answer to a question, so nobody knows how old it is.
         thinned: Orion was told to leave most of its kind out.
+        sparse: Its topic has two safety reports a second; else ten while a robot holds.
     """
 
     observation: Observation
@@ -284,3 +285,4 @@ class Received:
     road: Road = "orion"
     asked: bool = False
     thinned: bool = False
+    sparse: bool = True

@@ -200,5 +200,7 @@ def _relay(
     if seed is None:
         return None
     devices = (f"{robot_id}_odom", robot_id)
-    topics = frozenset(names.measure_topic(settings.apikey, one) for one in devices)
-    return Relay(settings.address, Radio(topics, np.random.default_rng((seed, place))))
+    topics = {names.measure_topic(settings.apikey, one) for one in devices}
+    topics.add(names.direct_topic(robot_id, "_odom"))
+    radio = Radio(frozenset(topics), np.random.default_rng((seed, place)))
+    return Relay(settings.address, radio)

@@ -70,7 +70,7 @@ ROBOT_DEVICES = (
 keeps its registry in memory, so that either registry picks it (fiware.md §4)."""
 
 
-DIRECT_SUFFIXES = ("", "_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")
+DIRECT_SUFFIXES = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")
 """Devices that may also speak to iVeg alone, past the IoT Agent."""
 
 
@@ -90,7 +90,7 @@ def direct_topic(robot_id: str, suffix: str) -> str:
     The IoT Agent does not listen there (it does to ``/+/+/attrs`` and ``/+/+/cmdexe``),
     so it costs the agent nothing.
     """
-    return f"/{robot_id}/iveg/{suffix.removeprefix('_') or 'single'}"
+    return f"/{robot_id}/iveg/{suffix.removeprefix('_')}"
 
 
 def command_topic(apikey: str, robot_id: str) -> str:

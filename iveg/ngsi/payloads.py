@@ -213,6 +213,7 @@ class FeedbackValue(OriginFields):
     robot_pose: FeedbackPose | None = None
     mandates: dict[str, MandateValue] = {}
     seen: dict[str, int] = {}
+    backlog: Any = None
 
 
 class NotificationValue(Wire):

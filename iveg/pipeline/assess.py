@@ -65,6 +65,7 @@ class Assessor:
         new_id: Ids,
         stamp: Callable[[float], str],
         boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
     ) -> None:
         self.world = world
         self.greenhouse = greenhouse
@@ -80,7 +81,7 @@ class Assessor:
         self.looks = Looks(world, self.people, minutes, hub, new_id, stamp)
         self._ageing = Ageing(world, self.people, greenhouse, minutes, hub)
         other = self.looks.other
-        self._teller = Teller(world, self.people, other, fleet, stamp, boot)
+        self._teller = Teller(world, self.people, other, fleet, stamp, boot, backlog)
         self._minutes = minutes
         self._hub = hub
         self._new_id = new_id

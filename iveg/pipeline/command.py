@@ -217,7 +217,12 @@ class Commander:
         match observation:
             case SafetyReport():
                 effects = machine.reported(
-                    observation, at, received.road, self._new_id(), age_s
+                    observation,
+                    at,
+                    received.road,
+                    self._new_id(),
+                    age_s,
+                    sparse=received.sparse,
                 )
             case CommandAnswer():
                 effects = machine.answered(

@@ -20,6 +20,7 @@ class Teller:
         other: The stamp of each robot's newest confident object of another class.
         stamp: Writes a wall-clock moment the way the wire does.
         boot: Random, new at each start: identity of our feedback.
+        backlog: How far Orion is behind (s); None where nobody knows.
     """
 
     def __init__(
@@ -30,6 +31,7 @@ class Teller:
         fleet: Fleet,
         stamp: Callable[[float], str],
         boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
     ) -> None:
         self.told_at = float("-inf")
         self._world = world
@@ -38,6 +40,7 @@ class Teller:
         self._fleet = fleet
         self._stamp = stamp
         self._boot = boot
+        self._backlog = backlog
         self._seq = 0
 
     def tell(self, mandates: Mapping[str, Mandate], rule: Rule, now: Instant) -> None:
@@ -78,6 +81,7 @@ class Teller:
             None if odometry is None else odometry.origin.stamp,
             mandates,
             seen,
+            self._backlog(now),
         )
 
     def _alerts(self, rule: Rule, now: Instant) -> Iterable[FeedbackAlert]:

@@ -36,9 +36,14 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Say what is applied; the uplink fills the origin and tells its ``seq`` back."""
+    """Say what is applied; the uplink fills the origin and tells its ``seq`` back.
+
+    Attributes:
+        is_measure: Also for the IoT Agent, which gets changes and two a second.
+    """
 
     report: SafetyReport
+    is_measure: bool = True
 
 
 Effect = Drive | Persist | Answer | Report

@@ -1,4 +1,4 @@
-"""The lane of safety: disk before answer, answers in order, the newest report.
+"""The lane of safety: disk before answer, answers in order, the newest reports.
 
 Telemetry has its own slots in the MQTT link, so however much of it waits, it never
 delays or drops what goes through here.
@@ -47,7 +47,7 @@ class SafetyLane:
         self._to_keep: HoldSet | None = None
         self._answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
         self._kept_answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
-        self._newest_report: Message | None = None
+        self._reports: dict[str, Message] = {}
         self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
         self._room = asyncio.Semaphore(_UNDER_WAY)
         self._disk_fails = False
@@ -65,8 +65,8 @@ class SafetyLane:
         self._keep_wake.set()
 
     def report(self, message: Message) -> None:
-        """Send when there is time; a newer report takes its place."""
-        self._newest_report = message
+        """Send when there is time; a newer one of its topic takes its place."""
+        self._reports[message.topic] = message
         self._send_wake.set()
 
     async def keep_forever(self) -> None:
@@ -102,7 +102,7 @@ class SafetyLane:
             while True:
                 await self._send_wake.wait()
                 self._send_wake.clear()
-                while self._kept_answers or self._newest_report is not None:
+                while self._kept_answers or self._reports:
                     await self._room.acquire()
                     # Tasks begin in this order, and each is on its way at once.
                     sending.create_task(self._send(self._next()))
@@ -110,9 +110,7 @@ class SafetyLane:
     def _next(self) -> Message:
         if self._kept_answers:
             return self._kept_answers.popleft()
-        report, self._newest_report = self._newest_report, None
-        assert report is not None  # noqa: S101 - the caller has looked
-        return report
+        return self._reports.pop(next(iter(self._reports)))
 
     async def _send(self, message: Message) -> None:
         try:

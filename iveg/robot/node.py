@@ -230,6 +230,7 @@ class RobotNode:
             self.counters[error.reason] += 1
             return
         self._echo.take(feedback.origin)
+        self._uplink.rates.told(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now))
 
@@ -244,8 +245,8 @@ class RobotNode:
                     self._lane.persist(holds)
                 case Answer(answer):
                     self._answer(answer)
-                case Report(report):
-                    self._report(report)
+                case Report(report, is_measure):
+                    self._report(report, is_measure=is_measure)
 
     def _answer(self, answer: CommandAnswer) -> None:
         self.counters[answer.result] += 1
@@ -255,11 +256,14 @@ class RobotNode:
         if not self.mute:
             self._lane.answer(self._uplink.answer(answer, self._own(clock.now())))
 
-    def _report(self, report: SafetyReport) -> None:
+    def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
         if not self.mute:
-            seq, message = self._uplink.report(report, self._own(clock.now()))
+            seq, messages = self._uplink.report(
+                report, self._own(clock.now()), is_measure=is_measure
+            )
             self._machine.reported(seq, clock.now().mono)
-            self._lane.report(message)
+            for message in messages:
+                self._lane.report(message)
 
     def _own(self, now: Instant) -> Instant:
         """The moment on the robot's own clocks: since its boot, and its wall clock."""

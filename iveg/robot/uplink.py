@@ -3,6 +3,7 @@
 Every observation gets its origin here (boot, count of its topic, the robot's clock) and
 becomes a measure.  Telemetry goes at QoS 0 and only the newest of a topic waits; what
 the broker could not take is not sent later, because by then it is no longer true.
+While Orion is behind, what the agent is spared goes straight to iVeg (``rates``).
 """
 
 from collections import Counter
@@ -23,6 +24,7 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec, names
 from iveg.robot.echo import Echo
 from iveg.robot.lane import Message
+from iveg.robot.rates import Rates
 from iveg.robot.single import SinglePayload
 
 Sensed = Odometry | LaserScan | DetectionFrame | Navigation
@@ -71,26 +73,44 @@ class Uplink:
         self._echo = echo
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({"_safety": first_report - 1})
+        self._looked: tuple[tuple[str, int], ...] = ()
+        self.rates = Rates()
         self.sent: Counter[str] = Counter()
-        """Messages made, by device suffix; the single payload's is empty."""
+        """Measures made, by device suffix; the single payload's is empty."""
+        self.spared: Counter[str] = Counter()
+        """What went straight to iVeg instead, likewise."""
 
     def send(self, observation: Sensed, at: Instant) -> None:
         """Send what a sensor said at this moment."""
         if self._single is not None and not isinstance(observation, Navigation):
             self._send_single(self._single, observation, at)
             return
+        news = isinstance(observation, DetectionFrame) and self._is_news(observation)
         suffix = _SUFFIX[type(observation)]
         stamped = replace(
             observation, robot_id=self._id, origin=self._origin(suffix, at)
         )
-        self._emit(suffix, _written(stamped))
+        self._emit(suffix, _written(stamped), at.mono, news=news)
 
-    def report(self, report: SafetyReport, at: Instant) -> tuple[int, Message]:
-        """The message of a safety report, and the ``seq`` that it carries."""
+    def _is_news(self, frame: DetectionFrame) -> bool:
+        """Whether other things are seen than before, or with another confidence."""
+        before, self._looked = self._looked, _seen(frame)
+        return self._looked != before
+
+    def report(
+        self, report: SafetyReport, at: Instant, *, is_measure: bool = True
+    ) -> tuple[int, list[Message]]:
+        """The ``seq`` of a safety report and its messages, the direct one first.
+
+        Both are the same bytes: whichever comes first counts.
+        """
         origin = self._origin("_safety", at)
         payload = codec.write_safety(replace(report, origin=origin))
-        self.sent["_safety"] += 1
-        return origin.seq or 0, Message(self._topic("_safety"), payload)
+        messages = [Message(names.direct_topic(self._id, "_safety"), payload)]
+        if is_measure:
+            self.sent["_safety"] += 1
+            messages.append(Message(self._topic("_safety"), payload))
+        return origin.seq or 0, messages
 
     def answer(self, answer: CommandAnswer, at: Instant) -> Message:
         """The message of an answer on ``cmdexe``."""
@@ -108,11 +128,18 @@ class Uplink:
             single.look(observation)
         elif isinstance(observation, Odometry):
             origin = self._origin("", at)
-            self._emit("", single.write(replace(observation, origin=origin)))
+            payload = single.write(replace(observation, origin=origin))
+            self._emit("", payload, at.mono)
 
-    def _emit(self, suffix: str, payload: bytes) -> None:
-        self.sent[suffix] += 1
-        self._offer(self._topic(suffix), payload)
+    def _emit(
+        self, suffix: str, payload: bytes, now: float, *, news: bool = False
+    ) -> None:
+        if self.rates.is_measure(suffix, now, news=news):
+            self.sent[suffix] += 1
+            self._offer(self._topic(suffix), payload)
+        else:
+            self.spared[suffix] += 1
+            self._offer(names.direct_topic(self._id, suffix), payload)
 
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)
@@ -129,6 +156,16 @@ class Uplink:
             echoes=echo is not None,
             heard=None if echo is None else echo.heard,
         )
+
+
+def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
+    """What is in a look, and how sure the detector is: below 0.5, below 0.8, above."""
+    return tuple(
+        sorted(
+            (one.class_id, (one.probability >= 0.5) + (one.probability >= 0.8))
+            for one in frame.detections
+        )
+    )
 
 
 def _written(observation: Sensed) -> bytes:

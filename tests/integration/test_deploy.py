@@ -177,7 +177,7 @@ def of_robot(robot: str) -> set[str]:
 
 def straight(robot: str) -> set[str]:
     """What a robot tells iVeg past the agent."""
-    kinds = ("safety", "odom", "lidar2D", "yolox_bounding_boxes", "single")
+    kinds = ("safety", "odom", "lidar2D", "yolox_bounding_boxes")
     return {f"/{robot}/iveg/{kind}" for kind in kinds}
 
 

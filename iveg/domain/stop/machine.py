@@ -138,9 +138,14 @@ class StopMachine(Episode):
         road: Road,
         new_id: str,
         age_s: float = 0.0,
+        *,
+        sparse: bool = False,
     ) -> list[Effect]:
-        """The robot's safety report, new by (boot, seq), ``age_s`` old at most."""
-        return words.reported(self, report, at, road, new_id, age_s)
+        """The robot's safety report, new by (boot, seq), ``age_s`` old at most.
+
+        ``sparse``: it came on a topic that has two of them a second, not ten.
+        """
+        return words.reported(self, report, at, road, new_id, age_s, sparse=sparse)
 
     def odometry(
         self,

@@ -1,8 +1,9 @@
 """Standing still, measured: what safety reports show and odometry does not contradict.
 
 Five samples at rest over at least a second, none more than half a second after the one
-before.  Both are measured on the robot's own monotonic clock where it tells it, so that
-neither a burst nor a gap on the way makes or breaks a rest::
+before (0.75 s on a topic that has two a second).  Both are measured on the robot's own
+monotonic clock where it tells it, so that neither a burst nor a gap on the way makes or
+breaks a rest::
 
     odometry that moves      before the rest began     changes nothing, however late
                              later, once               no standstill for half a second
@@ -20,6 +21,8 @@ from iveg.domain.observations import Instant, Origin
 
 STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
 """So many samples at rest, over so long, none later than this after the one before."""
+SPARSE_GAP_S = 0.75
+"""The longest gap before a sample of a topic that has two a second."""
 MOVED_SAMPLES = 3
 _UNKNOWN = Origin()
 
@@ -98,11 +101,16 @@ class Standstill:
     def _begin_anew(self) -> None:
         self.since, self._began, self._count = None, None, 0
 
-    def rested(self, at: Instant, origin: Origin = _UNKNOWN) -> bool:
-        """One more report at rest; whether the rest is a standstill."""
+    def rested(
+        self, at: Instant, origin: Origin = _UNKNOWN, *, sparse: bool = False
+    ) -> bool:
+        """One more report at rest; whether the rest is a standstill.
+
+        ``sparse``: it came on a topic that has two reports a second, not ten.
+        """
         moment = self._reports.moment(origin, at)
         gap = moment.since(self._newest)
-        if gap is None or gap > STANDING_FRESH_S:
+        if gap is None or gap > (SPARSE_GAP_S if sparse else STANDING_FRESH_S):
             # Nobody knows what it did in the gap.
             self._begin_anew()
         if self.since is None or self._began is None:

@@ -94,6 +94,8 @@ def reported(
     road: Road,
     new_id: str,
     age_s: float,
+    *,
+    sparse: bool,
 ) -> list[Effect]:
     """The robot's safety report, new by (boot, seq), ``age_s`` old at most."""
     episode.report, episode.report_at = report, at
@@ -103,11 +105,17 @@ def reported(
         return _reported_free(episode, report, at)
     if episode.attempt is not None:
         return releasing.reported(episode, episode.attempt, report)
-    return _reported_stopped(episode, report, at, road, new_id)
+    return _reported_stopped(episode, report, at, road, new_id, sparse=sparse)
 
 
 def _reported_stopped(
-    episode: Episode, report: SafetyReport, at: Instant, road: Road, new_id: str
+    episode: Episode,
+    report: SafetyReport,
+    at: Instant,
+    road: Road,
+    new_id: str,
+    *,
+    sparse: bool,
 ) -> list[Effect]:
     assert episode.stop is not None  # noqa: S101 - every such state has an episode
     stood = episode.state in ("STANDING", "STALE")
@@ -121,7 +129,8 @@ def _reported_stopped(
     episode.stop.times.note_word(at, road)
     effects = _delivered(episode, at)
     if stands(report):
-        return [*effects, *_rested(episode, episode.stop, report, at)]
+        rested = _rested(episode, episode.stop, report, at, sparse=sparse)
+        return [*effects, *rested]
     episode.standstill.forget()
     return [*effects, *(episode.again("iveg", at, new_id, "moved") if stood else [])]
 
@@ -133,10 +142,10 @@ def _lifted(episode: Episode, at: Instant, new_id: str) -> list[Effect]:
 
 
 def _rested(
-    episode: Episode, stop: Command, report: SafetyReport, at: Instant
+    episode: Episode, stop: Command, report: SafetyReport, at: Instant, *, sparse: bool
 ) -> list[Effect]:
     """One more sample at rest; five over a second are a standstill."""
-    measured = episode.standstill.rested(at, report.origin)
+    measured = episode.standstill.rested(at, report.origin, sparse=sparse)
     if not measured or episode.state == "STANDING":
         return []
     if episode.evidence_age(at) > STALE_S:

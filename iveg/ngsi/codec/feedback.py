@@ -6,7 +6,12 @@ import orjson
 from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import (
+    LONGEST_BACKLOG_S,
+    Feedback,
+    FeedbackAlert,
+    Mandate,
+)
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.ngsi import payloads
 from iveg.ngsi.codec.door import first_complaint, load_json
@@ -43,7 +48,16 @@ def read_feedback(payload: bytes) -> Feedback:
             for robot_id, mandate in value.mandates.items()
         },
         value.seen,
+        _backlog(value.backlog),
     )
+
+
+def _backlog(value: object) -> float | None:
+    """Seconds; what cannot be read is no news, and never costs the rest."""
+    told = value.get("fiware_s") if isinstance(value, dict) else None
+    if isinstance(told, bool) or not isinstance(told, int | float) or told < 0:
+        return None
+    return min(float(told), LONGEST_BACKLOG_S)
 
 
 def _alert(value: payloads.AlertValue) -> FeedbackAlert:
@@ -82,8 +96,15 @@ def write_feedback(feedback: Feedback) -> bytes:
                 for robot_id, mandate in feedback.mandates.items()
             },
             "seen": dict(feedback.seen),
+            **_write_backlog(feedback.backlog_s),
         }
     )
+
+
+def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
+    if backlog_s is None:
+        return {}
+    return {"backlog": {"fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)}}
 
 
 def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:

@@ -38,7 +38,6 @@ class Bench:
 
 SAFETY = {
     "/iveg/AGI/attrs": 1,
-    "/AGI/iveg/single": 1,
     "/iveg/AGI_safety/attrs": 1,
     "/AGI/iveg/safety": 1,
     "/iveg/AGI_yolox_bounding_boxes/attrs": 1,
@@ -88,6 +87,17 @@ def test_poses_come_straight_from_either_topic(topic: str) -> None:
 
     (read,) = bench.offered
     assert (type(read.observation), read.road) == (Odometry, "mqtt")
+
+
+@pytest.mark.parametrize(
+    ("topic", "sparse"), [("/iveg/AGI_safety/attrs", True), ("/AGI/iveg/safety", False)]
+)
+def test_a_report_says_how_many_its_topic_has(topic: str, sparse: bool) -> None:
+    bench = Bench("safety")
+
+    bench.reader.read(topic, codec.write_safety(safety_report()))
+
+    assert [one.sparse for one in bench.offered] == [sparse]
 
 
 def test_a_scope_of_safety_leaves_poses_and_scans_to_orion() -> None:

@@ -1,8 +1,12 @@
+import asyncio
 from collections.abc import Mapping
 from typing import Any
 
+import aiomqtt
+import orjson
 import pytest
 
+from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import (
     PREFIX,
@@ -10,7 +14,10 @@ from iveg.adapters.subscriptions import (
     ensure_subscriptions,
     wanted_for,
 )
+from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import embedded_fiware
+from iveg.ngsi import codec, names
+from tests.builders import detection_frame, odometry, safety_report, scan
 
 URL = "http://127.0.0.1:8000/ngsi/notifications"
 TOKEN = "ab" * 16
@@ -137,3 +144,68 @@ async def test_doubles_and_leftovers_of_ours_go_and_others_stay() -> None:
     ensured = await ensure_subscriptions(store, URL, TOKEN, WANTED)
     assert len(ensured.mended) == 2
     assert frozenset(store.kept) == ensured.ids | {theirs}
+
+
+POSE = codec.write_odometry(odometry())
+BOTH = orjson.dumps(
+    orjson.loads(POSE) | orjson.loads(codec.write_safety(safety_report()))
+)
+SINGLE = orjson.dumps({"pose": {"x": 1, "y": 2, "yaw": 0}, "timestamp": "t"})
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload", "told"),
+    [
+        ("/iveg/AGI_odom/attrs", POSE, ["odometry AGI"]),
+        ("/iveg/AGI_lidar2D/attrs", codec.write_scan(scan()), ["lidar AGI"]),
+        (
+            "/iveg/AGI_yolox_bounding_boxes/attrs",
+            codec.write_detections(detection_frame()),
+            ["detections"],
+        ),
+        (
+            "/iveg/AGI_safety/attrs",
+            codec.write_safety(safety_report()),
+            ["safety"],
+        ),
+        ("/iveg/AGI/attrs", SINGLE, ["single uplink"]),
+        ("/iveg/AGI/cmdexe", b'{"cmd": {"id": "01A", "r": "LATCHED"}}', ["commands"]),
+        ("/iveg/AGI/attrs", BOTH, ["odometry AGI", "safety"]),
+    ],
+    ids=["odometry", "scan", "look", "report", "single", "answer", "two at once"],
+)
+async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
+    topic: str, payload: bytes, told: list[str]
+) -> None:
+    heard = asyncio.Event()
+
+    async def take(request: Request) -> Response:
+        if names.CLIMATE_ID.encode() in request.body:
+            heard.set()
+        return Response(204)
+
+    async with (
+        embedded_fiware() as up,
+        OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion,
+        IotAgentClient(up.iota_url, "agroconnect", "/greenhouse") as agent,
+        http_server(take, "127.0.0.1", 0) as port,
+        aiomqtt.Client("127.0.0.1", up.mqtt_port) as mqtt,
+    ):
+        await provision(
+            agent, orion, robots=["AGI"], apikey="iveg", cbroker_url=up.orion_url
+        )
+        here = f"http://127.0.0.1:{port}/ngsi/notifications"
+        await ensure_subscriptions(orion, here, TOKEN, WANTED)
+        await mqtt.publish(topic, payload, qos=1)
+        # The agent and Orion take this one after it, and are done with it by then.
+        await mqtt.publish("/iveg/climate/attrs", b'{"temperature": 21}', qos=1)
+        async with asyncio.timeout(10):
+            await heard.wait()
+        kept = await orion.read_subscriptions()
+
+    sent = {
+        one["description"].removeprefix(PREFIX): one["notification"]["timesSent"]
+        for one in kept
+        if "timesSent" in one["notification"]
+    }
+    assert sent == dict.fromkeys([*told, "climate"], 1)

@@ -59,9 +59,11 @@ def test_a_bad_setting_stops_the_start_with_one_sentence(
     [
         [],
         ["dance"],
-        ["emulator", "--rate", "0"],
         ["emulator", "--robots", "0"],
         ["emulator", "--robots", "101"],
+        ["emulator", "--hz", "0.9"],
+        ["emulator", "--hz", "61"],
+        ["emulator", "--hz", "nan"],
         ["emulator", "--profile", "dream"],
         ["replay", "log.jsonl"],
         ["replay", "log.jsonl", "--robot", "AGI", "--speed", "0"],

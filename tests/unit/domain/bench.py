@@ -60,6 +60,7 @@ class Bench:
         released: tuple[str, ...] = (),
         road: Road = "mqtt",
         challenge: str = CHALLENGE,
+        sparse: bool = False,
     ) -> list[Effect]:
         """The robot reports; without holds named, what it would by itself."""
         report = safety_report(
@@ -72,7 +73,9 @@ class Bench:
             challenge=challenge,
         )
         return self.keep(
-            self.machine.reported(report, at(self.now), road, self.new_id())
+            self.machine.reported(
+                report, at(self.now), road, self.new_id(), sparse=sparse
+            )
         )
 
     def answer(

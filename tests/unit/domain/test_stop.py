@@ -383,6 +383,27 @@ def test_a_gap_between_samples_starts_the_standstill_anew() -> None:
     assert bench.state == "DELIVERED"
 
 
+@pytest.mark.parametrize(
+    ("sparse", "gap", "state"),
+    [
+        (False, 0.45, "STANDING"),
+        (False, 0.6, "DELIVERED"),
+        (True, 0.6, "STANDING"),
+        (True, 0.8, "DELIVERED"),
+    ],
+)
+def test_the_longest_gap_is_that_of_the_topics_own_period(
+    sparse: bool, gap: float, state: str
+) -> None:
+    bench = Bench()
+    bench.press()
+    for _ in range(5):
+        bench.report(bench.ours, sparse=sparse)
+        bench.now += gap
+
+    assert bench.state == state
+
+
 @pytest.mark.parametrize("turn", [{"linear": 0.02}, {"angular": -0.02}])
 def test_one_moving_sample_starts_the_standstill_anew(turn: dict[str, float]) -> None:
     bench = Bench()

@@ -319,6 +319,50 @@ def test_feedback_with_nothing_to_tell_says_null() -> None:
     assert written["robot_pose"] is None
 
 
+def test_a_backlog_that_nobody_knows_is_not_told() -> None:
+    assert "backlog" not in orjson.loads(
+        codec.write_feedback(Feedback("AGI", Origin()))
+    )
+
+
+@pytest.mark.parametrize(("lag", "told"), [(0.04, 0.0), (12.34, 12.3), (500.0, 60.0)])
+def test_a_backlog_is_told_in_seconds_up_to_a_minute(lag: float, told: float) -> None:
+    payload = codec.write_feedback(Feedback("AGI", Origin(), backlog_s=lag))
+
+    assert orjson.loads(payload)["backlog"] == {"fiware_s": told}
+    assert codec.read_feedback(payload).backlog_s == told
+
+
+@pytest.mark.parametrize(
+    ("told", "read"),
+    [
+        ({"fiware_s": 7}, 7.0),
+        ({"fiware_s": 1e9}, 60.0),
+        ({"fiware_s": -1}, None),
+        ({"fiware_s": True}, None),
+        ({"fiware_s": "7"}, None),
+        ({}, None),
+        (7, None),
+        (None, None),
+    ],
+)
+def test_a_backlog_that_cannot_be_read_costs_no_mandate(
+    told: object, read: float | None
+) -> None:
+    feedback = codec.read_feedback(
+        orjson.dumps(
+            {
+                "robot_id": "AGI",
+                "mandates": {"AGI": {"speed_factor": 0.5}},
+                "backlog": told,
+            }
+        )
+    )
+
+    assert feedback.backlog_s == read
+    assert feedback.mandates["AGI"].speed_factor == 0.5
+
+
 def test_another_object_is_told_as_a_stamp_alone() -> None:
     feedback = Feedback("AGI", Origin(), FeedbackAlert("", "t"))
 

@@ -81,6 +81,7 @@ class Desk:
             self.ids,
             format_stamp,
             "iveg-boot",
+            self.chain.probe.lag,
         )
         self.commander = Commander(
             robots,

@@ -87,6 +87,16 @@ def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
     assert {one.origin.boot for one in desk.fleet.told} == {"iveg-boot"}
 
 
+def test_every_robot_is_told_how_far_orion_is_behind() -> None:
+    desk = watched(Desk())
+    desk.chain.sing(Origin("iveg-boot", 1), desk.clock())
+    desk.clock.now += 7.0
+
+    desk.assessor.tell(desk.clock())
+
+    assert [one.backlog_s for one in desk.fleet.told[-2:]] == [7.0, 7.0]
+
+
 def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
     desk = watched(Desk())
     desk.look("AGII", detection("crate", 9.0))

@@ -1,5 +1,7 @@
 """The safety machine, sentence by sentence (safety.md §2.2, §3.5)."""
 
+from itertools import pairwise
+
 import pytest
 
 from iveg.domain.feedback import CLEAR, Mandate
@@ -795,3 +797,37 @@ def test_a_deaf_robot_drives_on_and_says_so_but_holds_still_bite() -> None:
     assert rig.reports[-1].speed_factor == 1.0
     rig.stop()
     assert rig.twist == REST
+
+
+def test_a_held_robot_reports_ten_times_a_second_and_twice_through_the_agent() -> None:
+    rig = moving()
+    rig.stop("01STOP")
+    rig.run(1.0)
+    began = rig.now
+
+    rig.run(4.0)
+
+    said = [
+        (when, one.is_measure)
+        for when, one in rig.log
+        if when > began and isinstance(one, Report)
+    ]
+    measures = [when for when, is_measure in said if is_measure]
+    assert len(said) >= 40
+    assert 8 <= len(measures) <= 12
+    assert max(b - a for a, b in pairwise([began, *measures])) <= 0.5
+
+
+def test_every_change_of_a_held_robot_goes_through_the_agent() -> None:
+    rig = moving()
+    for hold_id in ("01A", "01B", "01C"):
+        rig.stop(hold_id)
+        last = next(one for _, one in reversed(rig.log) if isinstance(one, Report))
+        assert last.is_measure
+        assert last.report.holds[-1].id == hold_id
+
+
+def test_a_robot_that_drives_sends_every_report_through_the_agent() -> None:
+    rig = moving().run(3.0)
+    said = [one for _, one in rig.log if isinstance(one, Report)]
+    assert all(one.is_measure for one in said[-5:])

@@ -8,6 +8,7 @@ import pytest
 
 from iveg.domain.observations import (
     CommandAnswer,
+    Detection,
     DetectionFrame,
     FeedbackRef,
     Instant,
@@ -20,6 +21,7 @@ from iveg.domain.observations import (
 from iveg.embedded.orion_numbers import print_value
 from iveg.ngsi import codec
 from iveg.robot.echo import Echo
+from iveg.robot.rates import LEVELS
 from iveg.robot.uplink import Uplink
 from tests.builders import START, detection, detection_frame, odometry, scan
 
@@ -91,13 +93,27 @@ def test_a_report_tells_its_place_in_the_count() -> None:
     wire = Wire()
     seqs = []
     for _ in range(2):
-        seq, message = wire.uplink.report(SafetyReport("AGI", BLANK, 0.5, "person"), AT)
+        seq, (direct, measure) = wire.uplink.report(
+            SafetyReport("AGI", BLANK, 0.5, "person"), AT
+        )
         seqs.append(seq)
-        (said,) = codec.read_measure("AGI_safety", message.payload).observations
+        (said,) = codec.read_measure("AGI_safety", measure.payload).observations
         assert isinstance(said, SafetyReport)
         assert said.origin.seq == seq
+        assert direct.payload == measure.payload
     assert seqs == [700, 701]
-    assert message.topic == "/iveg/AGI_safety/attrs"
+    assert direct.topic == "/AGI/iveg/safety"
+    assert measure.topic == "/iveg/AGI_safety/attrs"
+
+
+def test_a_report_for_iveg_alone_goes_past_the_agent_in_the_same_count() -> None:
+    wire = Wire()
+    report = SafetyReport("AGI", BLANK, 0.0, "hold")
+    first, messages = wire.uplink.report(report, AT, is_measure=False)
+    second, _ = wire.uplink.report(report, AT)
+    assert [one.topic for one in messages] == ["/AGI/iveg/safety"]
+    assert (first, second) == (700, 701)
+    assert wire.uplink.sent == {"_safety": 1}
 
 
 def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
@@ -134,7 +150,7 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
 def test_a_report_tells_what_had_been_heard() -> None:
     echo = Echo()
     echo.take(Origin("iveg", 41))
-    _, message = Wire(echo=echo).uplink.report(
+    _, (_, message) = Wire(echo=echo).uplink.report(
         SafetyReport("AGI", BLANK, 1.0, "clear"), AT
     )
 
@@ -175,6 +191,56 @@ def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
     assert np.array_equal(np.array(ranges, np.float32), measured)
     assert np.array_equal(np.array(by_orion, np.float32), measured)
     assert sum(len(str(one).partition(".")[2]) >= 10 for one in ranges) > 600
+
+
+# --- an agent that is behind --------------------------------------------------------
+
+
+def test_what_the_agent_is_spared_goes_straight_to_iveg_in_the_same_count() -> None:
+    wire = Wire()
+    wire.uplink.rates.level = LEVELS
+    for tick in range(30):
+        wire.uplink.send(odometry(origin=BLANK), Instant(tick / 30, START.wall))
+    topics = [topic for topic, _ in wire.sent]
+    assert set(topics) == {"/iveg/AGI_odom/attrs", "/AGI/iveg/odom"}
+    assert topics.count("/iveg/AGI_odom/attrs") in (5, 6)
+    assert wire.uplink.sent["_odom"] + wire.uplink.spared["_odom"] == 30
+    read = [
+        observation
+        for _, payload in wire.sent
+        for observation in codec.read_measure("AGI_odom", payload).observations
+    ]
+    assert [one.origin.seq for one in read if isinstance(one, Odometry)] == list(
+        range(1, 31)
+    )
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [
+        (),
+        (detection("farmer", 2.0), detection("farmer", 8.0)),
+        (detection("robot", 2.0),),
+        (detection("farmer", 2.0, probability=0.6),),
+    ],
+    ids=["nobody", "one more", "another class", "less sure"],
+)
+def test_a_look_that_sees_others_goes_through_the_agent_at_once(
+    seen: tuple[Detection, ...],
+) -> None:
+    wire = Wire()
+    wire.uplink.rates.level = LEVELS
+    before = detection_frame("AGI", detection("farmer", 2.0), origin=BLANK)
+    wire.uplink.send(before, Instant(0.0, START.wall))
+    wire.uplink.send(before, Instant(0.03, START.wall))
+    wire.uplink.send(
+        detection_frame("AGI", *seen, origin=BLANK), Instant(0.06, START.wall)
+    )
+    assert [topic for topic, _ in wire.sent] == [
+        "/iveg/AGI_yolox_bounding_boxes/attrs",
+        "/AGI/iveg/yolox_bounding_boxes",
+        "/iveg/AGI_yolox_bounding_boxes/attrs",
+    ]
 
 
 # --- the single payload -------------------------------------------------------------

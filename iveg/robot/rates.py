@@ -1,0 +1,100 @@
+"""How much of its telemetry a robot sends through the IoT Agent.
+
+One agent carries about 150 measures a second; two robots at 30 Hz have 180.  iVeg tells
+how far Orion is behind, and a robot that hears of a backlog sends less, scans first::
+
+    level  0 ───────────── 1 ───────────── 2 ───────────── 3
+    scans  all ──> 1 Hz    1 Hz            1 Hz            1 Hz
+    looks  all             all ──> 3 Hz    3 Hz            3 Hz
+    poses  all             all             all ──> 5 Hz    5 Hz
+
+The level rises while the backlog lasts and sinks slowly once it is over; each time that
+was too early, it waits twice as long before it tries again.  Nothing that is told can
+raise a rate above the sensor's own or lower it below these floors.  Safety reports are
+never fewer, nor are the single payloads of Algorithm 1, which hold all in one message.
+What is held back still goes straight to iVeg.
+"""
+
+from dataclasses import dataclass, field
+
+TOP_HZ = 30.0
+FLOOR_HZ: dict[str, float] = {
+    "_lidar2D": 1.05,
+    "_yolox_bounding_boxes": 3.2,
+    "_odom": 5.3,
+}
+"""A little above the contract's 1, 3 and 5, so that a late timer still keeps them."""
+LEVELS = float(len(FLOOR_HZ))
+
+BEHIND_S, WELL_S = 0.5, 0.25
+"""A backlog, and none; between the two the level stays."""
+FAR_BEHIND_S = 3.0
+RISE_PER_S, RISE_FAR_PER_S, SINK_PER_S = 0.5, 1.0, 0.02
+PATIENCE_S, LONGEST_PATIENCE_S = 10.0, 600.0
+_LONGEST_STEP_S = 0.5
+
+
+@dataclass(slots=True)
+class Rates:
+    """Says which message is a measure; every other is for iVeg alone.
+
+    All moments are monotonic (s).
+
+    Attributes:
+        level: 0: every message is a measure; 3: all rates are at their floors.
+    """
+
+    level: float = 0.0
+    _told_at: float | None = None
+    _well_since: float | None = None
+    _patience_s: float = PATIENCE_S
+    _sank: bool = False
+    _due: dict[str, float] = field(default_factory=dict)
+
+    def told(self, backlog_s: float | None, now: float) -> None:
+        """Orion is this far behind; None where nobody knows, which changes nothing."""
+        before, self._told_at = self._told_at, now
+        if backlog_s is None or before is None:
+            return
+        step = min(max(0.0, now - before), _LONGEST_STEP_S)
+        if backlog_s >= BEHIND_S:
+            self._rise(backlog_s, step)
+        elif backlog_s > WELL_S:
+            self._well_since = None
+        else:
+            self._sink(now, step)
+
+    def _rise(self, backlog_s: float, step: float) -> None:
+        if self._sank:
+            self._patience_s = min(2.0 * self._patience_s, LONGEST_PATIENCE_S)
+        self._sank, self._well_since = False, None
+        speed = RISE_FAR_PER_S if backlog_s >= FAR_BEHIND_S else RISE_PER_S
+        self.level = min(LEVELS, self.level + speed * step)
+
+    def _sink(self, now: float, step: float) -> None:
+        if self._well_since is None:
+            self._well_since = now
+        if self.level == 0.0:
+            self._sank, self._patience_s = False, PATIENCE_S
+        elif now - self._well_since >= self._patience_s:
+            self._sank = True
+            self.level = max(0.0, self.level - SINK_PER_S * step)
+
+    def is_measure(self, suffix: str, now: float, *, news: bool = False) -> bool:
+        """Whether a device's message is for the agent, too; news always is."""
+        interval = self._interval_s(suffix)
+        due = self._due.get(suffix, now)
+        if now < due and not news:
+            return False
+        # What came late is made up for, so that the mean rate is kept; not more.
+        self._due[suffix] = max(due, now - interval) + interval
+        return True
+
+    def _interval_s(self, suffix: str) -> float:
+        """The least time between two measures of a device (s); 0: every one."""
+        for place, (device, floor_hz) in enumerate(FLOOR_HZ.items()):
+            # From the sensor's own rate (0) to its floor (1).
+            share = min(1.0, self.level - place)
+            if device == suffix and share > 0.0:
+                return float((TOP_HZ / floor_hz) ** share / TOP_HZ)
+        return 0.0
