@@ -147,15 +147,23 @@ class Bridge:
     """Measures and answers to the broker behind, commands to the one in front.
 
     Like the agent it connects again by itself, and what comes meanwhile is lost.
+
+    Args:
+        per_s: So many messages a second reach the broker behind, in order, and what
+            comes faster waits without bound, as in a real agent; None: all at once.
     """
 
-    def __init__(self, front: BrokerAddress, behind: BrokerAddress) -> None:
+    def __init__(
+        self, front: BrokerAddress, behind: BrokerAddress, per_s: float | None = None
+    ) -> None:
+        self._per_s = per_s
+        self._waiting: asyncio.Queue[tuple[str, bytes]] = asyncio.Queue()
         self._tasks: set[asyncio.Task[None]] = set()
         self._front = MqttLink(
             front,
             "bridge-front",
             {"/+/+/attrs": 0, "/+/+/cmdexe": 1},
-            lambda topic, payload: self._pass_on(self._behind, topic, payload),
+            self._take,
         )
         self._behind = MqttLink(
             behind,
@@ -169,6 +177,23 @@ class Bridge:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._front.run())
             tasks.create_task(self._behind.run())
+            tasks.create_task(self._carry())
+
+    def _take(self, topic: str, payload: bytes) -> None:
+        if self._per_s is None:
+            self._pass_on(self._behind, topic, payload)
+        else:
+            self._waiting.put_nowait((topic, payload))
+
+    async def _carry(self) -> None:
+        """One after the other, each at its time."""
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while True:
+            topic, payload = await self._waiting.get()
+            due = max(due, loop.time() - 0.1) + 1.0 / (self._per_s or 1.0)
+            await asyncio.sleep(due - loop.time())
+            self._pass_on(self._behind, topic, payload)
 
     def _pass_on(self, link: MqttLink, topic: str, payload: bytes) -> None:
         task = asyncio.get_running_loop().create_task(_publish(link, topic, payload))
@@ -182,13 +207,15 @@ async def _publish(link: MqttLink, topic: str, payload: bytes) -> None:
 
 
 @contextmanager
-def bridge(front: BrokerAddress, behind: BrokerAddress) -> Iterator[None]:
+def bridge(
+    front: BrokerAddress, behind: BrokerAddress, per_s: float | None = None
+) -> Iterator[None]:
     """A bridge that runs in a thread of its own."""
     started = threading.Event()
     held: list[tuple[asyncio.AbstractEventLoop, asyncio.Task[None]]] = []
 
     async def run() -> None:
-        work = asyncio.create_task(Bridge(front, behind).run())
+        work = asyncio.create_task(Bridge(front, behind, per_s).run())
         held.append((asyncio.get_running_loop(), work))
         started.set()
         await asyncio.gather(work, return_exceptions=True)
