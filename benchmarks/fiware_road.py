@@ -22,7 +22,7 @@ from benchmarks.fiware_ends import HOST
 from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.subscriptions import ensure_subscriptions
+from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
 from iveg.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
@@ -82,7 +82,7 @@ async def _prepare(
         robots = [f"R{index}" for index in range(most)]
         await provision(agent, orion, robots, "iveg", f"http://{HOST}:{orion_port}")
         url = f"http://{HOST}:{notify_port}/ngsi/notifications"
-        await ensure_subscriptions(orion, url, "ab" * 16)
+        await ensure_subscriptions(orion, url, "ab" * 16, wanted_for(robots))
 
 
 def _run(

@@ -38,6 +38,16 @@ def test_a_resume_allows_motions_until_the_robot_is_held_again() -> None:
     assert (witness.starts, witness.unlicensed) == (3, 1)
 
 
+def test_what_goes_past_the_agent_is_seen_too() -> None:
+    witness = Witness(0)
+    report = safety_report("AGI", Hold("01A", "iveg", "remote"))
+    witness.take("/AGI/iveg/safety", codec.write_safety(report))
+    witness.take("/AGI/iveg/odom", codec.write_odometry(odometry("AGI", linear=0.3)))
+
+    assert witness.of("AGI").held
+    assert witness.unlicensed == 1
+
+
 def test_a_robot_that_still_brakes_keeps_its_allowance() -> None:
     witness = Witness(0)
     witness.allow("AGI")

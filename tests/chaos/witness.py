@@ -37,7 +37,8 @@ class Witness:
     robots: dict[str, Seen] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        topics = {"/iveg/+/attrs": 0}
+        # What the agent is told, and what iVeg alone is told past it.
+        topics = {"/iveg/+/attrs": 0, "/+/iveg/odom": 0, "/+/iveg/safety": 0}
         address = BrokerAddress("127.0.0.1", self.port)
         self._link = MqttLink(address, "witness", topics, self.take)
         self._thread = threading.Thread(target=self._run, name="witness")
@@ -75,7 +76,8 @@ class Witness:
 
     def take(self, topic: str, payload: bytes) -> None:
         """One message of the field broker."""
-        device = topic.split("/")[2]
+        _, first, second, last = topic.split("/")
+        device = second if first == "iveg" else f"{first}_{last}"
         if not device.endswith(("_odom", "_safety")):
             return
         for word in codec.read_measure(device, payload).observations:
