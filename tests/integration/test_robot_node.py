@@ -6,6 +6,7 @@ Mosquitto where it is installed, the embedded broker elsewhere.
 import asyncio
 import contextlib
 import time
+from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -55,17 +56,20 @@ class Cloud:
     address: BrokerAddress
     answers: list[CommandAnswer] = field(default_factory=list)
     reports: list[SafetyReport] = field(default_factory=list)
-    topics: set[str] = field(default_factory=set)
+    topics: Counter[str] = field(default_factory=Counter)
     speaks: bool = True
     mandate: Mandate | None = None
+    backlog_s: float | None = None
     seq: int = 0
     boot: str = "cloud"
 
     def __post_init__(self) -> None:
-        self.link = MqttLink(self.address, "cloud", {"/iveg/#": 1}, self.take)
+        self.link = MqttLink(
+            self.address, "cloud", {"/iveg/#": 1, "/AGI/iveg/+": 1}, self.take
+        )
 
     def take(self, topic: str, payload: bytes) -> None:
-        self.topics.add(topic)
+        self.topics[topic] += 1
         device = topic.split("/")[2]
         if topic.endswith("/cmdexe"):
             for one in codec.read_answer(device, payload).observations:
@@ -88,6 +92,7 @@ class Cloud:
                     Origin(self.boot, self.seq),
                     mandates=mandates,
                     seen={"AGI": newest},
+                    backlog_s=self.backlog_s,
                 )
                 self.link.offer(
                     "/AGII/mqtt_feedback", codec.write_feedback(feedback), qos=1
@@ -170,6 +175,20 @@ async def test_a_robot_boots_held_and_reports_it(
     assert cloud.reports[-1].holds[0].id == f"boot-{robot.node.boot}"
     assert cloud.reports[-1].speed_factor == 0.0
     assert all(twist == Twist2D(0.0, 0.0) for _, twist in robot.driven)
+
+
+async def test_a_held_robot_reports_past_the_agent_and_spares_it_poses_when_told(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    straight, measured = "/AGI/iveg/safety", "/iveg/AGI_safety/attrs"
+    async with running(robot, cloud):
+        await until(lambda: cloud.topics[straight] > 20)
+        assert cloud.topics[measured] < 0.6 * cloud.topics[straight]
+        assert cloud.topics["/AGI/iveg/odom"] == 0
+        cloud.backlog_s = 10.0
+        await until(lambda: cloud.topics["/AGI/iveg/odom"] > 5, 10.0)
+    assert cloud.topics["/iveg/AGI_odom/attrs"] > 20
 
 
 async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it_at_once(
