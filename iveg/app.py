@@ -332,7 +332,7 @@ class Dss:
 
     def is_thinned(self, subscription_id: str) -> bool:
         """Whether Orion was told to leave out most of what a subscription is about."""
-        return self.upkeep.throttle.is_throttled(subscription_id)
+        return self.provisioner.throttle.is_throttled(subscription_id)
 
     def notified(self, at: Instant) -> None:
         """A notification of Orion's came in."""

@@ -89,7 +89,7 @@ def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
 
 def test_every_robot_is_told_how_far_orion_is_behind() -> None:
     desk = watched(Desk())
-    desk.chain.sing(Origin("iveg-boot", 1), desk.clock())
+    desk.chain.sent(Origin("iveg-boot", 1), desk.clock())
     desk.clock.now += 7.0
 
     desk.assessor.tell(desk.clock())
