@@ -60,6 +60,14 @@ class Origin:
     echoes: bool = False
     heard: FeedbackRef | None = None
 
+    @property
+    def own_s(self) -> float | None:
+        """The moment on the robot's own clock (s): the one that is never set, if told.
+
+        Comparable among topics of one boot alone.
+        """
+        return self.stamp_s if self.mono is None else self.mono
+
 
 @dataclass(frozen=True, slots=True)
 class Odometry:

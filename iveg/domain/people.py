@@ -116,7 +116,7 @@ class People:
         x, y, _ = one.position
         if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
             return one
-        pose = observer.pose_at_stamp(frame.origin.stamp_s)
+        pose = observer.pose_at_stamp(frame.origin.own_s)
         if one.kind != "alert" or one.peer is not None or pose is None:
             return one
         return replace(one, doubtful=(pose, profile_of(observer.robot_id).camera_range))
@@ -172,7 +172,7 @@ def _place(
 ) -> Placed | None:
     x, y, z = detection.box.centre
     if detection.frame_id == "base_link":
-        pose = observer.pose_at_stamp(frame.origin.stamp_s)
+        pose = observer.pose_at_stamp(frame.origin.own_s)
         if pose is None:
             return None
         x, y = pose.transform(x, y)

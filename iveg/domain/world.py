@@ -131,7 +131,7 @@ class RobotState:
         )
 
     def pose_at_stamp(self, stamp_s: float | None) -> Pose2D | None:
-        """The pose at a moment of the robot's own clock, interpolated.
+        """The pose at a moment of the robot's own clock (s), interpolated.
 
         Outside the short history the nearest end counts; without a stamp the newest.
         """
@@ -175,6 +175,10 @@ class RobotState:
         """Whether a message of this identity cannot be news."""
         order = self._orders.get(kind)
         return order is not None and order.is_past(boot, seq)
+
+    def forget_poses(self) -> None:
+        """Nothing that was kept for ``pose_at_stamp`` counts any more."""
+        self._poses.clear()
 
     def remember_pose(self, moment: float, pose: Pose2D) -> None:
         """Keep a pose for ``pose_at_stamp``; a clock that jumps back starts anew."""
@@ -341,7 +345,7 @@ def _update(robot: RobotState, received: Received, moment: float | None) -> None
             _drive(robot, observation, at, moment)
         case LaserScan():
             robot.scan, robot.scan_received = observation, _dated(at, moment)
-            robot.scan_pose = robot.pose_at_stamp(observation.origin.stamp_s)
+            robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():
             robot.detections_at = _not_before(
                 robot.detections_at, robot.frame, observation.origin, moment
@@ -369,13 +373,15 @@ def _drive(
     robot: RobotState, odometry: Odometry, at: Instant, moment: float | None
 ) -> None:
     """Take the newest odometry in."""
-    origin, pose = odometry.origin, odometry.pose
-    moment = _not_before(robot.pose_at, robot.odometry, origin, moment)
+    origin, pose, before = odometry.origin, odometry.pose, robot.odometry
+    moment = _not_before(robot.pose_at, before, origin, moment)
     robot.pose_at = moment
     robot.unproven_since = _since(robot.unproven_since, at, holds=moment is None)
     robot.estimated_since = _since(robot.estimated_since, at, holds=not origin.echoes)
     robot.odometry, robot.odometry_received = odometry, at
-    robot.remember_pose(at.wall if origin.stamp_s is None else origin.stamp_s, pose)
+    if before is not None and before.origin.boot != origin.boot:
+        robot.forget_poses()  # another boot counts its seconds anew
+    robot.remember_pose(at.wall if origin.own_s is None else origin.own_s, pose)
     likely = at.mono if moment is None else moment
     robot.remember_speed(likely, odometry.twist.linear_x)
 

@@ -416,3 +416,25 @@ def test_a_scan_is_placed_with_the_pose_at_its_stamp() -> None:
     world.apply(received(scan(origin=origin(1, after=0.5)), after=1.0))
 
     assert world.robot("AGI").scan_pose == Pose2D(0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
+def test_a_clock_that_is_set_does_not_misplace_a_scan(step_s: float) -> None:
+    world = World(["AGI"])
+    for second in range(5):
+        said = replace(origin(second + 1, after=float(second)), mono=float(second))
+        world.apply(received(odometry(x=float(second), origin=said), after=second))
+
+    late = replace(origin(1, after=3.5 + step_s), mono=3.5)
+    world.apply(received(scan(origin=late), after=4.0))
+
+    assert world.robot("AGI").scan_pose == Pose2D(3.5, 0.0, 0.0)
+
+
+def test_another_boot_begins_the_history_anew() -> None:
+    world = World(["AGI"])
+    for boot, x in (("a", 1.0), ("b", 9.0)):
+        said = replace(origin(1, boot=boot), mono=5.0 if boot == "a" else 6.0)
+        world.apply(received(odometry(x=x, origin=said)))
+
+    assert world.robot("AGI").pose_at_stamp(5.5) == Pose2D(9.0, 0.0, 0.0)
