@@ -139,6 +139,36 @@ MUTANTS = (
         "if age is None:",
         ("unit/domain/test_mandates.py",),
     ),
+    Mutant(
+        "freshness: feedback of another start of iVeg proves an age",
+        "if heard is None or heard.boot != self._boot or heard.seq > self._last:",
+        "if heard is None or heard.seq > self._last:",
+        ("unit/domain/test_age.py",),
+    ),
+    Mutant(
+        "freshness: another boot of a robot inherits the proof of the one before",
+        "origin.boot is None or origin.boot != before.origin.boot:",
+        "False:",
+        ("unit/domain/test_world.py",),
+    ),
+    Mutant(
+        "freshness: what FIWARE alone brings is as young as its stamp says",
+        "lag = self._probe.lag(at) if self._probe.is_known else None",
+        "lag = 0.0",
+        ("unit/domain/test_world.py",),
+    ),
+    Mutant(
+        "STOP: a standstill is told by reports however old they are",
+        "if episode.evidence_age(at) > STALE_S:",
+        "if False:",
+        ("unit/pipeline/test_age.py",),
+    ),
+    Mutant(
+        "STOP: motion from before the rest contradicts it when it comes late",
+        "if began is None or since is None or moment.boot is None:",
+        "if True:",
+        ("unit/domain/test_standstill.py",),
+    ),
 )
 
 

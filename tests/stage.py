@@ -20,6 +20,7 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.world import REST, Rig, World
 from iveg.ngsi import codec
+from iveg.robot.echo import Echo
 from iveg.robot.effects import Drive, Effect, Report
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
@@ -63,7 +64,8 @@ class Robot:
         self.faults = Faults()
         self._rig = rig
         self._hear = hear
-        self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say)
+        self._echo = Echo()
+        self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
         self._machine = SafetyMachine(
             rig.robot_id,
             "b1",
@@ -94,6 +96,7 @@ class Robot:
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Hear iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
+        self._echo.take(feedback.origin)
         self._perform(self._machine.feedback(topic, feedback, now.mono), now)
 
     def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
