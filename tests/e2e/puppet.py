@@ -16,6 +16,7 @@ import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Origin
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, read_feedback
@@ -73,7 +74,8 @@ class Puppet:
 
     def _hear(self, topic: str, payload: bytes) -> None:
         if topic != self._orders:
-            self._echo.take(read_feedback(payload).origin)
+            with contextlib.suppress(UnreadableError):
+                self._echo.take(read_feedback(payload).origin)
         elif self.answers:
             self._obey(payload)
 
