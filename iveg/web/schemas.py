@@ -105,10 +105,18 @@ class CommandRobotJson(TypedDict):
     moved_m: float
 
 
+class NoteJson(TypedDict):
+    """A sentence: the name of its template and what fills its holes."""
+
+    key: str
+    slots: dict[str, float]
+
+
 class CommandJson(TypedDict):
-    """One STOP, release or resume."""
+    """One STOP, release or resume; ``roads`` is ``transports`` for one version more."""
 
     command_id: str
+    hold_id: str | None
     robot_id: str
     kind: str
     drill: bool
@@ -121,7 +129,10 @@ class CommandJson(TypedDict):
     age_s: float
     tries: int
     reason: str | None
+    transports: dict[str, str]
     roads: dict[str, str]
+    agent_lag_s: float | None
+    note: NoteJson | None
     robot: CommandRobotJson
     challenge_fresh: bool
 

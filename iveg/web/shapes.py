@@ -25,6 +25,9 @@ from iveg.domain.world import RobotState
 from iveg.ngsi.codec import format_stamp
 from iveg.web import schemas
 
+AGENT_LATE_S = 1.0
+"""An agent that is less behind than this is not worth a sentence."""
+
 
 def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJson:
     """One command with the robot's last word."""
@@ -32,6 +35,7 @@ def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJ
     times = of.times
     return {
         "command_id": of.command_id,
+        "hold_id": of.hold_id,
         "robot_id": of.robot_id,
         "kind": of.kind,
         "drill": of.drill,
@@ -52,7 +56,10 @@ def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJ
         "age_s": round(now.mono - times.requested.mono, 3),
         "tries": of.tries,
         "reason": of.reason,
+        "transports": dict(of.roads.items()),
         "roads": dict(of.roads.items()),
+        "agent_lag_s": rounded(of.agent_lag_s, 1),
+        "note": _note(of),
         "robot": {
             "v": 0.0 if report is None else report.linear,
             "report_age_s": rounded(age) if isfinite(age) else None,
@@ -60,6 +67,16 @@ def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJ
         },
         "challenge_fresh": machine.report_age(now) <= FRESH_S,
     }
+
+
+def _note(of: Command) -> schemas.NoteJson | None:
+    """What a late agent means for an order that went through it."""
+    lag = of.agent_lag_s
+    if lag is None or lag <= AGENT_LATE_S:
+        return None
+    direct = of.roads["direct"] not in ("off", "failed")
+    key = "stop.note.direct" if direct else "stop.note.fiware"
+    return {"key": key, "slots": {"lag": round(lag, 1)}}
 
 
 def house(greenhouse: Greenhouse) -> dict[str, Any]:

@@ -1,4 +1,8 @@
-import { whyNotRelease, whyNotResume } from "../../iveg/static/js/panels/release.js";
+import {
+  saidOfOrder,
+  whyNotRelease,
+  whyNotResume,
+} from "../../iveg/static/js/panels/release.js";
 import { command, robot } from "./builders.js";
 import { equal, test } from "./harness.js";
 
@@ -75,4 +79,24 @@ test("a robot is resumed only after it reported its release", () => {
 test("a robot that runs has nothing to resume", () => {
   const running = robot({ mode: "RUNNING", holds: [] });
   equal(whyNotResume(facts({ robot: running, command: undefined })), "not_ready");
+});
+
+/** Keys of what is said of a release. @param {Partial<import("../../iveg/static/js/protocol.js").Command>} changes */
+function said(changes) {
+  return saidOfOrder(command({ kind: "release", ...changes })).map(({ key }) => key);
+}
+
+test("a release says how it ended, and never more than the robot did", () => {
+  equal(said({ state: "RELEASING" }), ["release.sent"]);
+  equal(said({ state: "READY" }), ["release.confirmed"]);
+  equal(said({ state: "STANDING", reason: "challenge" }), ["release.refused"]);
+  equal(said({ state: "EXPIRED", reason: "release_unconfirmed" }), [
+    "release.unconfirmed",
+  ]);
+  equal(said({ state: "REPLACED", reason: "requested" }), ["release.replaced"]);
+});
+
+test("a late IoT Agent is told with the release that went past it", () => {
+  const note = { key: "stop.note.direct", slots: { lag: 12 } };
+  equal(said({ state: "RELEASING", note }), ["release.sent", "stop.note.direct"]);
 });

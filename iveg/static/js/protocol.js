@@ -63,6 +63,7 @@
  *   state: string, requested_by: string, requesters: string[],
  *   times: Record<string, string | null>, standstill_ms: number | null, tries: number,
  *   reason: string | null, roads: Record<string, string>,
+ *   note?: {key: string, slots: Record<string, number>} | null,
  *   drill?: boolean,
  *   robot: {v: number | null, report_age_s: number | null, moved_m: number | null} | null,
  *   challenge_fresh: boolean,

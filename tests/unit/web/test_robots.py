@@ -4,6 +4,7 @@ import pytest
 
 from iveg.domain.observations import Climate, CommandStatus, Hold, Navigation
 from tests.builders import detection, scan
+from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import WebDesk
 
 
@@ -85,14 +86,44 @@ async def test_the_mode_is_what_the_robot_says(
 async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
     desk = WebDesk()
     await desk.commander.stop(["AGI"], "ana", desk.clock())
+    await settle()
 
     told = await get(desk, "/robots/AGI")
 
     assert isinstance(told, dict)
     assert (told["mode"], told["stop_state"]) == ("RUNNING", "SENT")
     assert told["stop"]["requested_by"] == "ana"
-    assert told["stop"]["roads"]["direct"] in ("pending", "ok")
+    assert told["stop"]["transports"] == {"direct": "ok", "fiware": "pending"}
+    assert told["stop"]["roads"] == told["stop"]["transports"]
+    assert told["stop"]["hold_id"] == told["stop"]["command_id"]
+    assert told["stop"]["note"] is None
     assert not told["stop"]["challenge_fresh"]
+
+
+@pytest.mark.parametrize(
+    ("direct", "lag_s", "key"),
+    [
+        (True, None, None),
+        (True, 0.4, None),
+        (True, 12.34, "stop.note.direct"),
+        (False, 12.34, "stop.note.fiware"),
+    ],
+)
+async def test_an_order_says_what_a_late_agent_means_for_it(
+    direct: bool, lag_s: float | None, key: str | None
+) -> None:
+    desk = WebDesk()
+    desk.fleet.fails = not direct
+    desk.lag_s = lag_s
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+    await settle()
+
+    told = desk.views.robot("AGI", desk.clock())["stop"]
+
+    assert told is not None
+    note = told["note"]
+    assert (None if note is None else note["key"]) == key
+    assert note is None or note["slots"] == {"lag": 12.3}
 
 
 async def test_a_robot_is_stopped_when_it_says_so_and_not_when_it_was_asked() -> None:

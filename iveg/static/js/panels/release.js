@@ -35,6 +35,8 @@ export function createRelease(app, card, robotId) {
   let outcome = null;
   let status = 0;
   let isBusy = false;
+  /** @type {Command | undefined} the newest release or resume, as it goes on */
+  let order;
 
   /** @param {Robot | undefined} robot */
   function draw(robot) {
@@ -59,9 +61,22 @@ export function createRelease(app, card, robotId) {
       needPart("resume-words", card),
       words.t("release.resume", { robot: robotId }),
     );
-    setText(result, outcome ? words.t(outcome, { status }) : "");
+    setText(result, outcomeSaid());
     drawFacts(robot);
     drawHolds(robot);
+  }
+
+  function outcomeSaid() {
+    const said = order ? saidOfOrder(order) : [];
+    if (!said.length) return outcome ? words.t(outcome, { status }) : "";
+    return said.map(({ key, slots }) => words.t(key, slots)).join(" ");
+  }
+
+  /** @param {Command} command */
+  function take(command) {
+    if (command.robot_id !== robotId || command.kind === "stop") return;
+    order = command;
+    draw(shown);
   }
 
   /** @param {Robot | undefined} robot */
@@ -121,6 +136,7 @@ export function createRelease(app, card, robotId) {
   /** @param {string} verb @param {object} body */
   async function send(verb, body) {
     isBusy = true;
+    order = undefined;
     draw(shown);
     status = await post(`/api/v1/robots/${encodeURIComponent(robotId)}/${verb}`, body);
     isBusy = false;
@@ -136,6 +152,7 @@ export function createRelease(app, card, robotId) {
     send("release", { holds: (shown?.holds ?? []).map(({ id }) => id) });
   });
   resumeButton.addEventListener("click", () => send("resume", {}));
+  store.subscribe("commands/", take);
   return { draw, factsOf };
 }
 
@@ -143,6 +160,30 @@ export function createRelease(app, card, robotId) {
  * @typedef {{connection: import("../store.js").ConnectionState, role: string, robot: Robot | undefined, ageS: number,
  *   command: Command | undefined}} Facts
  */
+
+/**
+ * What became of a release or resume, and what a late IoT Agent had to do with it.
+ *
+ * @param {Command} order
+ * @returns {{key: string, slots: Record<string, string | number>}[]}
+ */
+export function saidOfOrder({ state, reason, note }) {
+  const told = endOfOrder(state, reason);
+  return note ? [told, note] : [told];
+}
+
+/**
+ * @param {string} state
+ * @param {string | null} reason
+ * @returns {{key: string, slots: Record<string, string | number>}}
+ */
+function endOfOrder(state, reason) {
+  if (state === "RELEASING") return { key: "release.sent", slots: {} };
+  if (state === "EXPIRED") return { key: "release.unconfirmed", slots: {} };
+  if (reason === null) return { key: "release.confirmed", slots: {} };
+  if (state === "REPLACED") return { key: "release.replaced", slots: {} };
+  return { key: "release.refused", slots: { why: reason } };
+}
 
 /** Key of the reason why a release cannot be asked for, or `ok`. @param {Facts} facts */
 export function whyNotRelease(facts) {
