@@ -218,7 +218,10 @@ class Settings:
         "Ring round a person or peer, inclusive (m).",
     )
     stop_direct: bool = setting(
-        "IVEG_STOP_DIRECT", _switch, True, "STOP also straight over MQTT."
+        "IVEG_STOP_DIRECT",
+        _switch,
+        True,
+        "STOP, RELEASE and RESUME also straight over MQTT.",
     )
     direct_read: Literal["all", "safety", "off"] = setting(
         "IVEG_DIRECT_READ",

@@ -92,6 +92,36 @@ MUTANTS = (
         ("unit/robot",),
     ),
     Mutant(
+        "STOP: the second copy of a refused release is judged anew",
+        "return None if attempt is None else self._verdicts.get(attempt)",
+        "return None",
+        ("unit/robot/test_safety.py",),
+    ),
+    Mutant(
+        "STOP: an old refusal ends the release that is under way",
+        "return answer.attempt == self.command.command_id",
+        "return True",
+        ("unit/domain/test_stop_release.py",),
+    ),
+    Mutant(
+        "STOP: one refused copy ends a release that another may still carry out",
+        "if attempt.refused is None or not attempt.is_spent(episode.report):",
+        "if attempt.refused is None:",
+        ("unit/domain/test_stop_release.py",),
+    ),
+    Mutant(
+        "STOP: a hold that a late release may still lift is held on to for good",
+        "return now.mono - max(heard_at, self.begun_at) > FRESH_S",
+        "return False",
+        ("unit/domain/test_stop_release.py",),
+    ),
+    Mutant(
+        "STOP: a restart asserts a hold that a release has named",
+        "if kept is not None and kept in wanted.named:",
+        "if kept is not None and kept in wanted.asked[1:]:",
+        ("unit/pipeline/test_command.py",),
+    ),
+    Mutant(
         "rule: exactly the threshold is no longer enough",
         "if confidence < self.threshold_of(class_):",
         "if confidence <= self.threshold_of(class_):",

@@ -199,6 +199,45 @@ async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> N
     ]
 
 
+async def test_a_release_and_a_resume_are_published_once_at_qos_0_and_not_kept() -> (
+    None
+):
+    sent: list[tuple[str, bytes, int, bool]] = []
+
+    class Written(MqttLink):
+        async def publish(
+            self, topic: str, payload: bytes, qos: int = 1, *, retain: bool = False
+        ) -> None:
+            sent.append((topic, payload, qos, retain))
+
+    road = MqttRoad(Written(BrokerAddress("127.0.0.1", 1), "iveg"), "iveg")
+    await road.release("AGI", ["01A", "boot-1"], "c", "01T")
+    await road.resume("AGI", "d", "01U")
+
+    assert [(topic, qos, retain) for topic, _, qos, retain in sent] == [
+        ("/iveg/AGI/cmd", 0, False)
+    ] * 2
+    assert [orjson.loads(payload)["cmd"] for _, payload, _, _ in sent] == [
+        {"release": {"ids": ["01A", "boot-1"], "ch": "c", "attempt": "01T"}},
+        {"resume": {"ch": "d", "attempt": "01U"}},
+    ]
+
+
+async def test_a_release_without_a_broker_fails_and_is_kept_for_nobody() -> None:
+    (port,) = free_ports(1)
+    heard = Heard(port, "/iveg/AGI/cmd")
+    road = MqttRoad(heard.link, "iveg")
+    async with running(heard.link):
+        with pytest.raises(HopError):
+            await road.release("AGI", ["01A"], "c", "01T")
+        async with mqtt_broker("127.0.0.1", port):
+            await until(lambda: heard.link.connected)
+            await heard.link.publish("/iveg/AGI/cmd", b"last")
+            await until(lambda: heard.messages)
+
+    assert [payload for _, payload in heard.messages] == [b"last"]
+
+
 # --- what waits to be read ----------------------------------------------------------
 
 
