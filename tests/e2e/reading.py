@@ -72,3 +72,10 @@ Those of cards may have to be scrolled to; those of the strip are always in sigh
 
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""
+
+SMALLEST_STOP = """() => Math.min(...[...document.querySelectorAll(
+  '#stops [data-stop]')].filter((stop) => stop.checkVisibility()).flatMap((stop) => {
+    const {width, height} = stop.getBoundingClientRect();
+    return [width, height];
+  }), document.querySelector('#stops [data-stop]') ? Infinity : 0)"""
+"""The shorter side of the smallest STOP of the strip (px); 0 without any."""

@@ -2,14 +2,13 @@
 
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import OpenPage
-from tests.e2e.reading import COVERED_STOPS, OVERFLOW, card, evaluate, number, serious
+from tests.e2e.reading import card, evaluate, number, serious
 from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
@@ -17,7 +16,6 @@ pytestmark = pytest.mark.e2e
 ROUTES = ("/", "/history", "/docs", "/about")
 Json = Mapping[str, Any]
 STOP_ALL = re.compile("PARAR T.DO")
-SIZES = ((360, 740), (768, 1024), (1280, 800))
 
 
 @pytest.mark.parametrize("robot", ["AGI", "AGII"])
@@ -102,46 +100,6 @@ def test_the_chosen_language_is_remembered(page: Page) -> None:
     page.reload()
 
     expect(page.locator("html")).to_have_attribute("lang", "en")
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
-@pytest.mark.parametrize("route", ROUTES)
-def test_nothing_is_wider_than_the_screen_and_no_stop_is_covered(
-    open_page: OpenPage, size: tuple[int, int], route: str, screens: Path
-) -> None:
-    page = open_page(*size, route=route)
-    page.wait_for_load_state("load")
-    page.screenshot(path=screens / f"{route.strip('/') or 'live'}-{size[0]}.png")
-
-    assert evaluate(page, OVERFLOW) <= 0
-    assert page.locator("#stops [data-stop]:visible").count() >= 1
-    assert evaluate(page, COVERED_STOPS) == []
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
-def test_no_dialog_covers_a_stop(open_page: OpenPage, size: tuple[int, int]) -> None:
-    page = open_page(*size)
-    page.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]')
-    openers = page.locator("[data-opens]:visible, .card__menu:visible")
-
-    for opener in openers.all():
-        opener.click()
-        page.wait_for_selector("dialog[open]")
-        assert evaluate(page, COVERED_STOPS) == []
-        page.keyboard.press("Escape")
-        page.wait_for_selector("dialog[open]", state="hidden")
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
-def test_a_stop_is_large_enough_for_a_glove(
-    open_page: OpenPage, size: tuple[int, int]
-) -> None:
-    page = open_page(*size)
-
-    for stop in page.locator("#stops [data-stop]:visible").all():
-        box = stop.bounding_box()
-        assert box is not None
-        assert min(box["width"], box["height"]) >= 64
 
 
 @pytest.mark.parametrize("route", ROUTES)

@@ -7,6 +7,7 @@ two tests take away the robots and then the server, so they come last.
 import re
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.e2e.reading import (
     COVERED_STOPS,
     OVERFLOW,
+    SMALLEST_STOP,
     card,
     evaluate,
     strip_stop,
@@ -52,7 +54,7 @@ def only(browser: Browser, stack: Site) -> Iterator[Page]:
     would be found over a card.
     """
     context = browser.new_context(locale="es-ES", reduced_motion="reduce")
-    context.set_default_timeout(15_000)
+    context.set_default_timeout(60_000)
     page = context.new_page()
     page.goto(stack.sign_in_link)
     yield page
@@ -163,6 +165,41 @@ def test_a_ring_on_the_map_opens_its_decision(live: Page, stack: Site) -> None:
     assert evaluate(live, COVERED_STOPS) == []
     live.keyboard.press("Escape")
     expect(panel).to_be_hidden()
+
+
+@pytest.mark.parametrize("route", ROUTES)
+def test_every_route_fits_every_screen_and_its_stops_suit_a_glove(
+    only: Page, route: str, screens: Path
+) -> None:
+    visit(only, route)
+    found = {}
+    for wide, high in {360: 740, **SIZES}.items():
+        only.set_viewport_size({"width": wide, "height": high})
+        name = route.strip("/").replace("/", "-") or "live"
+        only.screenshot(path=screens / f"{name}-{wide}.png")
+        found[wide] = (evaluate(only, OVERFLOW) <= 0, evaluate(only, COVERED_STOPS))
+        assert evaluate(only, SMALLEST_STOP) >= 64
+
+    assert found == dict.fromkeys(found, (True, []))
+
+
+@pytest.mark.parametrize("route", ["/", "/fleet"])
+def test_no_dialog_covers_a_stop(only: Page, width: int, route: str) -> None:
+    only.set_viewport_size({"width": width, "height": SIZES[width]})
+    visit(only, route)
+    only.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]', state="attached")
+    openers = only.locator("[data-opens]:visible, .card__menu:visible").all()
+    covered = []
+
+    for opener in openers:
+        opener.click()
+        only.wait_for_selector("dialog[open]")
+        covered += evaluate(only, COVERED_STOPS)
+        only.keyboard.press("Escape")
+        only.wait_for_selector("dialog[open]", state="hidden")
+
+    assert openers != []
+    assert covered == []
 
 
 def test_no_message_covers_a_stop_on_any_route(only: Page, stack: Site) -> None:

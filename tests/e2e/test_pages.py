@@ -9,7 +9,6 @@ from playwright.sync_api import Page, Route, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import (
-    COVERED_STOPS,
     OVERFLOW,
     evaluate,
     serious,
@@ -21,7 +20,6 @@ from tests.processes import Site, until
 pytestmark = pytest.mark.e2e
 
 ROUTES = ("/alerts", "/commands", "/fleet", "/climate", "/settings")
-SIZES = ((390, 844), (768, 1024), (1280, 800), (1440, 900))
 THEMES = ("dark", "sunlight")
 STANDING = re.compile(r"PARADO")
 
@@ -38,34 +36,6 @@ def shown(stack: Site) -> Site:
 
         until(is_standing, 10.0, "AGI stands")
     return stack
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
-def test_no_page_is_too_wide_and_none_covers_a_stop(
-    open_page: OpenPage, size: tuple[int, int]
-) -> None:
-    page = open_page(*size, route="/about")
-
-    found = {route: _layout(page, route) for route in ROUTES}
-
-    assert found == dict.fromkeys(ROUTES, (0, []))
-
-
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}px")
-def test_no_dialog_on_any_page_covers_a_stop(
-    open_page: OpenPage, size: tuple[int, int]
-) -> None:
-    page = open_page(*size, route="/fleet")
-    covered = []
-
-    for opener in page.locator("[data-opens]:visible").all():
-        opener.click()
-        page.wait_for_selector("dialog[open]")
-        covered += evaluate(page, COVERED_STOPS)
-        page.keyboard.press("Escape")
-        page.wait_for_selector("dialog[open]", state="hidden")
-
-    assert covered == []
 
 
 def test_every_page_is_accessible_in_every_theme(
@@ -258,11 +228,6 @@ def _fulfil(route: Route, traces: Mapping[str, Mapping[str, Any]]) -> None:
         ]
         figure["layout"]["yaxis"].pop("range", None)
     route.fulfill(response=answer, json=air)
-
-
-def _layout(page: Page, route: str) -> tuple[int, Any]:
-    visit(page, route)
-    return max(0, int(evaluate(page, OVERFLOW))), evaluate(page, COVERED_STOPS)
 
 
 def _violations(page: Page, route: str) -> list[str]:
