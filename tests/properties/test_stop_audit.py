@@ -19,6 +19,7 @@ from iveg.domain.stop import Wanted
 from tests.fakes.journal import FakeJournal
 from tests.unit.pipeline.desk import Desk, settle
 
+pytestmark = pytest.mark.slow
 TOLD = (
     *("reasserted", "adopted", "releasing", "ready", "refused", "running"),
     *("unconfirmed", "still_moving", "stale", "moved", "release_unconfirmed"),

@@ -22,6 +22,7 @@ from tests.properties.test_stop import (
     Weather,
 )
 
+pytestmark = pytest.mark.slow
 KILLS, LIVES = 500, 10
 INTERLEAVINGS = 1000
 WEATHERS: tuple[Weather, ...] = ("open", "open", "slow")

@@ -22,7 +22,7 @@ from tests.properties.test_stop import (
 RUNS = int(os.environ.get("IVEG_STOP_RUNS", "200"))
 BATCHES = 20
 STANDING_WITHIN_S = 10.0
-pytestmark = pytest.mark.timeout(max(120, RUNS))
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(max(120, RUNS))]
 
 
 class Late(Channel):
