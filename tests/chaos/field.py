@@ -17,8 +17,8 @@ from tests.brokers import MOSQUITTO, PLAIN
 from tests.ports import free_ports
 from tests.processes import EMULATOR, Program, Site, until
 
-_CONF = f"""{PLAIN}connection fiware
-address 127.0.0.1:{{south}}
+_BRIDGE = """connection fiware
+address 127.0.0.1:{south}
 bridge_protocol_version mqttv311
 try_private false
 notifications false
@@ -36,13 +36,16 @@ class Field:
 
     Attributes:
         radio: Port through which robots reach the broker; None: straight.
+        bridged: Mosquitto carries to the agent; False: a test does (``backlog``).
+        south: Port of the agent's own broker.
     """
 
     def __init__(self, place: Site, *emulator: str) -> None:
         self.place = place
         self.radio: int | None = None
+        self.bridged = True
         self._emulator = emulator or ("--held",)
-        (self._south,) = free_ports(1)
+        (self.south,) = free_ports(1)
         self.port = int(urlsplit(place.settings["IVEG_MQTT_URL"]).port or 0)
         self._broker: subprocess.Popen[bytes] | None = None
         self._running: dict[str, Program] = {}
@@ -58,7 +61,7 @@ class Field:
             self._start_broker()
         elif part == "fiware":
             # FIWARE has a broker of its own, behind the bridge.
-            self._start_at(self._south, part)
+            self._start_at(self.south, part)
         elif part == "emulator":
             broker = self.radio or self.port
             self._start_at(broker, *EMULATOR, *self._emulator)
@@ -95,7 +98,8 @@ class Field:
     def _start_broker(self) -> None:
         assert MOSQUITTO is not None
         conf = Path(self.place.directory) / "field.conf"
-        conf.write_text(_CONF.format(port=self.port, south=self._south))
+        bridge = _BRIDGE if self.bridged else ""
+        conf.write_text((PLAIN + bridge).format(port=self.port, south=self.south))
         self._broker = subprocess.Popen([MOSQUITTO, "-c", str(conf)])
         until(self._listens, 10.0, "mosquitto listens")
 
