@@ -233,6 +233,10 @@ class Stage:
     def alerts(self) -> list[Json]:
         return [dict(one) for one in self._views.alerts()]
 
+    def safety(self) -> Json:
+        """How soon robots obeyed, as the Fleet page tells it."""
+        return dict(self._views.safety(self.now))
+
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
         told = self._views.log(list(self._desk.minutes.lines))

@@ -16,7 +16,7 @@ from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.mandates import Crossing
 from iveg.domain.observations import Instant, SafetyReport
 
-FRESH_S = 0.5
+FRESH_S = 0.25
 """A ring that nobody has looked at for longer is known: who enters it is not timed."""
 _KEPT = 16
 

@@ -52,6 +52,16 @@ async def test_agii_slows_for_a_person_whom_only_agi_sees(scenario: str) -> None
     assert (line["slots"]["observer"], line["slots"]["in_sight"]) == ("AGI", False)
 
 
+async def test_a_robot_that_judges_ahead_of_iveg_is_timed_too() -> None:
+    stage = Stage("nlos")
+
+    await stage.until(lambda: stage.decisions("AGII", "person"), "AGII slows")
+    told = stage.safety()["alert_latency"]
+
+    assert told["count"] == 1
+    assert 0.0 < told["p50_ms"] <= 250.0
+
+
 async def test_agii_in_the_corridor_looks_away_and_comes_nearer_in_reverse() -> None:
     stage = Stage("nlos-field")
 
