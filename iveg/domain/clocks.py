@@ -160,10 +160,17 @@ class RobotClock:
             return None
         return newest.least + now.wall - now.mono
 
-    def warning(self, now: Instant) -> float | None:
-        """The offset to warn of (s); a warning lasts a minute, so that none flaps."""
+    def warning(self, now: Instant, late_s: float = 0.0) -> float | None:
+        """The offset to warn of (s); a warning lasts a minute, so that none flaps.
+
+        A clock that seems behind by no more than messages may be late (``late_s``) is
+        not blamed.
+        """
         offset = self.offset_s(now)
-        if offset is not None and abs(offset) > OFFSET_WARN_S:
+        if (
+            offset is not None
+            and not -OFFSET_WARN_S <= offset <= OFFSET_WARN_S + late_s
+        ):
             self._warned = (now.mono + _WARNED_S, offset)
         until, told = self._warned
         return told if now.mono < until else None

@@ -1,6 +1,7 @@
 """What is wrong now, found anew each time from decisions and robots (product.md §3)."""
 
 from collections.abc import Iterable
+from math import inf
 
 from iveg.domain.alarms import Condition
 from iveg.domain.decisions import Decision
@@ -41,13 +42,21 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
         moving = _was_moving(robot)
         key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
         yield Condition("P1" if moving else "P2", key, name, name, slots)
-    offset = robot.clock.warning(now)
+    offset = robot.clock.warning(now, _may_be_late_s(robot, now))
     if offset is not None:
         slots = {**slots, "offset": round(offset, 2)}
         yield Condition("P3", "alert.clock_offset", name, name, slots)
     unreadable = robot.unreadable_at
     if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
         yield Condition("P3", "alert.unreadable_detection", name, name, slots)
+
+
+def _may_be_late_s(robot: RobotState, now: Instant) -> float:
+    """How late messages of a robot that echoes may be (s); of others no more."""
+    if robot.odometry is None or not robot.odometry.origin.echoes:
+        return 0.0
+    age = robot.age_s(now)
+    return inf if age is None else age
 
 
 def _was_moving(robot: RobotState) -> bool:

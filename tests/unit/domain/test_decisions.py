@@ -8,7 +8,7 @@ from iveg.domain.alerts import Rule
 from iveg.domain.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.mandates import Crossing, Hazard
-from iveg.domain.observations import SafetyReport
+from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.world import RobotState, World
 from tests.builders import (
@@ -222,6 +222,21 @@ def test_a_lost_robot_is_graver_when_it_was_moving(
 def test_a_clock_a_quarter_second_off_is_told(offset: float, told: bool) -> None:
     world = World(["AGI"])
     world.apply(received(odometry(origin=origin(1, after=offset)), road="mqtt"))
+
+    found = robot_keys(world.robot("AGI"), 0.1)
+
+    assert (("P3", "alert.clock_offset") in found) is told
+
+
+@pytest.mark.parametrize(("composed", "told"), [(-0.1, True), (-12.0, False)])
+def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
+    composed: float, told: bool
+) -> None:
+    world = World(["AGI"])
+    world.ledger.composed("iveg", 1, 1, at(composed).mono)
+    heard = FeedbackRef("iveg", 1)
+    late = replace(origin(1, after=-10.0), echoes=True, heard=heard)
+    world.apply(received(odometry(origin=late), road="mqtt"))
 
     found = robot_keys(world.robot("AGI"), 0.1)
 
