@@ -144,6 +144,9 @@ class Radio:
                 free += len(piece) / self.weather.bytes_per_s
                 last = max(last, free + self.weather.delay(self._rnd))
                 await pieces.put((last, piece))
+            # The end comes after what was said before it.
+            await pieces.put((last, b""))
+            await passing
         except OSError:
             return
         finally:
@@ -155,6 +158,8 @@ class Radio:
         while True:
             due, piece = await pieces.get()
             await asyncio.sleep(max(0.0, due - self._loop.time()))
+            if not piece:
+                return
             with contextlib.suppress(OSError):
                 sink.write(piece)
                 await sink.drain()

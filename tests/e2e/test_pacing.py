@@ -69,7 +69,7 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         place.start("serve")
         place.wait_until_whole()
         port = urlsplit(place.settings["IVEG_MQTT_URL"]).port
-        words = ["--port", str(port), "--robots", "20", "--hz", "5", "--beams", "360"]
+        words = ["--port", str(port), "--robots", "20", "--hz", "2", "--beams", "360"]
         fleet = subprocess.Popen(
             [sys.executable, "-m", "tests.fleet", *words], cwd=ROOT
         )

@@ -138,8 +138,12 @@ export function connect(options) {
 
   /** @param {import("./telemetry.js").Telemetry} telemetry */
   function takeTelemetry({ frame, told }) {
-    for (const { topic, at, data } of told) store.apply(topic, data, momentOf(at));
-    pace.took(frame);
+    try {
+      for (const { topic, at, data } of told) store.apply(topic, data, momentOf(at));
+    } finally {
+      // Whatever became of it: without a word no more would ever come.
+      pace.took(frame);
+    }
   }
 
   /**
