@@ -92,6 +92,11 @@ class Radio:
     def _run(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
             self._loop.run_until_complete(self._task)
+        rest = asyncio.all_tasks(self._loop)
+        for task in rest:
+            task.cancel()
+        if rest:
+            self._loop.run_until_complete(asyncio.wait(rest))
 
     async def _serve(self) -> None:
         server = await asyncio.start_server(self._accept, sock=self._listener)
@@ -158,7 +163,7 @@ class Radio:
         while True:
             due, piece = await pieces.get()
             await asyncio.sleep(max(0.0, due - self._loop.time()))
-            if not piece:
+            if not piece or sink.is_closing():
                 return
             with contextlib.suppress(OSError):
                 sink.write(piece)

@@ -28,6 +28,8 @@ export function createRobotsPanel(app) {
   const place = need("#robots");
   /** @type {Map<string, ReturnType<typeof createCard>>} */
   const cards = new Map();
+  /** @type {Map<string, string>} */
+  const did = new Map();
   const sight = createSight();
   let ticks = 0;
 
@@ -75,6 +77,17 @@ export function createRobotsPanel(app) {
     for (const robot of store.robots().values()) drawSeen(robot);
   }
 
+  /**
+   * What it does is shown at once; where it is with the next tick.
+   *
+   * @param {Robot} robot
+   */
+  function take(robot) {
+    const does = `${robot.mode} ${robot.stop?.state} ${robot.mandate?.reason}`;
+    if (did.get(robot.robot_id) !== does) drawSeen(robot);
+    did.set(robot.robot_id, does);
+  }
+
   /** @param {Robot} robot */
   function drawSeen(robot) {
     const card = cardOf(robot.robot_id);
@@ -82,7 +95,7 @@ export function createRobotsPanel(app) {
   }
 
   for (const card of all(".card", place)) cardOf(String(card.dataset.robot));
-  store.subscribe("robots/", drawSeen);
+  store.subscribe("robots/", take);
   store.subscribe("snapshot", drawAll);
   words.onChange(drawAll);
   setInterval(tick, TICK_MS);
