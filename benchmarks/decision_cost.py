@@ -70,10 +70,11 @@ class Telling:
 
     def __init__(self) -> None:
         self.left: float | None = None
+        self._writer = codec.FeedbackWriter()
 
     def tell(self, feedback: Feedback) -> None:
         """Write one feedback."""
-        codec.write_feedback(feedback)
+        self._writer.write(feedback)
         self.left = time.perf_counter()
 
     def taken(self) -> float | None:
@@ -198,8 +199,7 @@ def cost(robots: int, seconds: float) -> dict[str, list[float]]:
     for one in record(names, seconds):
         now = Instant(one.at, WALL + one.at)
         begin = time.thread_time()
-        for received in read(one.body, now):
-            assessor.take(received)
+        assessor.take_all(read(one.body, now))
         took.setdefault(one.kind, []).append((time.thread_time() - begin) * 1e3)
         if one.at - ticked >= TICK_S:
             ticked = one.at
@@ -228,8 +228,7 @@ async def latency(robots: int, seconds: float) -> list[float]:
         # A notification that had to wait for its turn has waited since it was due.
         now = clock.now()
         fleet.taken()
-        for received in read(one.body, now):
-            assessor.take(received)
+        assessor.take_all(read(one.body, now))
         left = fleet.taken()
         if left is not None:
             took.append((left - start - one.at) * 1e3)

@@ -18,11 +18,12 @@ class MqttRoad:
     def __init__(self, link: MqttLink, apikey: str) -> None:
         self._link = link
         self._apikey = apikey
+        self._writer = codec.FeedbackWriter()
 
     def tell(self, feedback: Feedback) -> None:
         """Offer feedback; a newer one overtakes what has not left yet."""
         topic = names.FEEDBACK_TOPIC.format(robot_id=feedback.robot_id)
-        self._link.offer(topic, codec.write_feedback(feedback), qos=1)
+        self._link.offer(topic, self._writer.write(feedback), qos=1)
 
     async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
         """Publish a STOP, never retained; returns when the broker has it."""

@@ -7,6 +7,7 @@ from iveg.domain.alarms import Condition
 from iveg.domain.decisions import Decision
 from iveg.domain.events import Slot
 from iveg.domain.observations import Instant
+from iveg.domain.overload import Overload
 from iveg.domain.world import STANDING_SPEED, RobotState
 
 EXPECTED = "alert.person_slowed"
@@ -65,6 +66,13 @@ def _was_moving(robot: RobotState) -> bool:
     if report is None or at is None or at.mono < (robot.pose_at or 0.0):
         return not robot.stands
     return max(abs(report.linear), abs(report.angular)) >= STANDING_SPEED
+
+
+def of_pictures(overload: Overload) -> Iterable[Condition]:
+    """A detector says more than can be judged; who is near drives at half speed."""
+    for name in overload.since:
+        slots: dict[str, Slot] = {"robot": name}
+        yield Condition("P2", "alert.pictures_not_judged", name, name, slots)
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:

@@ -8,49 +8,22 @@ its own: a robot that is not seen, or a fleet whose eyes are shut, drives at hal
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from iveg.domain.alerts import Rule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.hazards import NOT_FAR_M, SILENCE_S, Hazard, circles_near
 from iveg.domain.observations import Instant
+from iveg.domain.overload import Overload
 from iveg.domain.people import People
 from iveg.domain.profiles import profile_of
-from iveg.domain.tracking.person import RING_S, Sighting
 from iveg.domain.world import RobotState, World
 
 RELEASE_M, RELEASE_S = 0.3, 1.0
-SILENCE_S = 1.0
-_NOT_FAR_M = 0.01
-"""So far outside a ring nobody can be inside, whatever rounding does."""
 SPEEDING_UP = 0.05
 """Faster than in the mean of its last second by more than this (m/s)."""
 OBSERVER_FORGOTTEN_S = 600.0
 """A robot that has not looked for ten minutes is no longer one of the fleet's eyes."""
-
-
-@dataclass(frozen=True, slots=True)
-class Hazard:
-    """One circle that slows whoever is inside.
-
-    Attributes:
-        cause: The person or robot at its centre.
-        observer: Who saw it; the peer itself for a peer's own odometry.
-        x: Centre in ``map`` (m); ``y`` likewise.
-        sighting: What was seen; None for a peer's own odometry.
-        recorded: A recording saw it; it slows recordings alone.
-        alert_id: Of the alert that robots hear of it.
-    """
-
-    reason: Literal["person", "robot"]
-    cause: str
-    observer: str
-    x: float
-    y: float
-    radius_m: float
-    sighting: Sighting | None = None
-    recorded: bool = False
-    alert_id: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +69,14 @@ class Mandates:
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
-        self._open: dict[tuple[str, str], Crossing] = {}
+        self._open: dict[str, dict[str, Crossing]] = {}
+        """By robot and cause."""
+        self.overload = Overload()
 
     @property
     def crossings(self) -> Iterable[Crossing]:
         """Every crossing that has begun and not ended."""
-        return self._open.values()
+        return [one for mine in self._open.values() for one in mine.values()]
 
     def evaluate(
         self,
@@ -112,57 +87,34 @@ class Mandates:
         new_id: str,
     ) -> tuple[dict[str, Mandate], list[Change]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
-        hazards = list(hazards_of(world, people, rule, now))
+        near = circles_near(world, people, rule, now, self._open)
         changes: list[Change] = []
         for robot in world.robots.values():
+            hazards = near(robot)
             changes += self._cross(robot, hazards, now, f"{new_id}-{len(changes)}")
         silent = _silent_observer(world, now)
+        bounds = self._greenhouse.bounds
+        flooded = self.overload.slowed(world, bounds.xmax - bounds.xmin)
         return {
-            robot.robot_id: self._mandate(robot, silent, now)
+            robot.robot_id: self._mandate(robot, silent, flooded, now)
             for robot in world.robots.values()
         }, changes
 
     def _cross(
-        self, robot: RobotState, hazards: list[Hazard], now: Instant, new_id: str
+        self, robot: RobotState, hazards: Iterable[Hazard], now: Instant, new_id: str
     ) -> Iterator[Change]:
-        nearest = self._nearest(robot, hazards)
+        mine = self._open.setdefault(robot.robot_id, {})
+        nearest = _nearest(robot, hazards, mine)
         for number, (cause, (depth, distance, hazard)) in enumerate(nearest.items()):
-            key = robot.robot_id, cause
-            crossing = self._open.get(key)
+            crossing = mine.get(cause)
             if crossing is not None:
-                self._open[key] = _still(crossing, depth, distance, now)
+                mine[cause] = _still(crossing, depth, distance, now)
             elif depth <= 0.0:
                 name = f"{new_id}-{number}"
                 crossing = self._enter(robot, hazard, distance, now, name)
-                self._open[key] = crossing
+                mine[cause] = crossing
                 yield Change(crossing, began=True)
-        yield from self._leave(robot.robot_id, nearest, now)
-
-    def _nearest(
-        self, robot: RobotState, hazards: Iterable[Hazard]
-    ) -> dict[str, tuple[float, float, Hazard]]:
-        """Of each cause the deepest circle: how far outside (m), distance (m), it.
-
-        Causes that the robot is far from and was not near to are left out: with a
-        fleet of ten they are nearly all, and this runs at every odometry.
-        """
-        nearest: dict[str, tuple[float, float, Hazard]] = {}
-        if robot.odometry is None:
-            return nearest
-        pose, robot_id = robot.odometry.pose, robot.robot_id
-        for hazard in hazards:
-            cause, reach = hazard.cause, hazard.radius_m + _NOT_FAR_M
-            dx, dy = hazard.x - pose.x, hazard.y - pose.y
-            is_far = dx * dx + dy * dy > reach * reach
-            if is_far and (robot_id, cause) not in self._open:
-                continue
-            if cause == robot_id or (hazard.recorded and not robot.is_replay):
-                continue
-            distance = pose.distance_to(hazard.x, hazard.y)
-            depth = distance - hazard.radius_m
-            if cause not in nearest or depth < nearest[cause][0]:
-                nearest[cause] = depth, distance, hazard
-        return nearest
+        yield from _leave(mine, nearest, now)
 
     def _enter(
         self,
@@ -191,26 +143,19 @@ class Mandates:
             speeding_up=robot.speed_gained() > SPEEDING_UP,
         )
 
-    def _leave(
-        self, robot_id: str, near: Mapping[str, object], now: Instant
-    ) -> Iterator[Change]:
-        for key, crossing in list(self._open.items()):
-            if key[0] != robot_id:
-                continue
-            if key[1] not in near and crossing.outside_since is None:
-                crossing = replace(crossing, outside_since=now.mono)
-                self._open[key] = crossing
-            since = crossing.outside_since
-            if since is not None and now.mono - since >= RELEASE_S:
-                del self._open[key]
-                yield Change(crossing, began=False)
-
-    def _mandate(self, robot: RobotState, silent: str | None, now: Instant) -> Mandate:
+    def _mandate(
+        self,
+        robot: RobotState,
+        silent: str | None,
+        flooded: Mapping[str, str],
+        now: Instant,
+    ) -> Mandate:
         """The reason that says most: a person, then a peer, then silence."""
-        mine = [one for one in self._open.values() if one.robot_id == robot.robot_id]
+        mine = self._open.get(robot.robot_id)
         if mine:
             worst = min(
-                mine, key=lambda one: (one.hazard.reason != "person", one.distance_m)
+                mine.values(),
+                key=lambda one: (one.hazard.reason != "person", one.distance_m),
             )
             return Mandate(
                 HALF_SPEED,
@@ -219,6 +164,8 @@ class Mandates:
                 worst.distance_m,
                 worst.decision_id,
             )
+        if robot.robot_id in flooded:
+            return Mandate(HALF_SPEED, "stale", flooded[robot.robot_id])
         age = robot.age_s(now)
         if age is None or age > SILENCE_S:
             return Mandate(HALF_SPEED, "stale", robot.robot_id)
@@ -230,6 +177,44 @@ class Mandates:
         return CLEAR
 
 
+def _nearest(
+    robot: RobotState, hazards: Iterable[Hazard], mine: Mapping[str, Crossing]
+) -> dict[str, tuple[float, float, Hazard]]:
+    """Of each cause the deepest circle: how far outside (m), distance (m), it.
+
+    Causes that the robot is far from and was not near to are left out.
+    """
+    nearest: dict[str, tuple[float, float, Hazard]] = {}
+    if robot.odometry is None:
+        return nearest
+    pose, robot_id = robot.odometry.pose, robot.robot_id
+    for hazard in hazards:
+        cause, reach = hazard.cause, hazard.radius_m + NOT_FAR_M
+        dx, dy = hazard.x - pose.x, hazard.y - pose.y
+        if dx * dx + dy * dy > reach * reach and cause not in mine:
+            continue
+        if cause == robot_id or (hazard.recorded and not robot.is_replay):
+            continue
+        distance = pose.distance_to(hazard.x, hazard.y)
+        depth = distance - hazard.radius_m
+        if cause not in nearest or depth < nearest[cause][0]:
+            nearest[cause] = depth, distance, hazard
+    return nearest
+
+
+def _leave(
+    mine: dict[str, Crossing], near: Mapping[str, object], now: Instant
+) -> Iterator[Change]:
+    for cause, crossing in list(mine.items()):
+        if cause not in near and crossing.outside_since is None:
+            crossing = replace(crossing, outside_since=now.mono)
+            mine[cause] = crossing
+        since = crossing.outside_since
+        if since is not None and now.mono - since >= RELEASE_S:
+            del mine[cause]
+            yield Change(crossing, began=False)
+
+
 def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
     """A crossing that goes on, or whose robot is outside since now."""
     since = None
@@ -238,43 +223,6 @@ def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> C
     if distance == crossing.distance_m and since == crossing.outside_since:
         return crossing
     return replace(crossing, distance_m=distance, outside_since=since)
-
-
-def hazards_of(
-    world: World, people: People, rule: Rule, now: Instant
-) -> Iterator[Hazard]:
-    """Every circle that slows somebody now."""
-    for person in people.known.values():
-        for sighting, radius in person.rings(rule, now):
-            yield Hazard(
-                person.class_,
-                person.person_id,
-                sighting.observer,
-                sighting.x,
-                sighting.y,
-                radius,
-                sighting,
-                world.robot(sighting.observer).is_replay,
-                person.decision_id,
-            )
-    for peer in world.robots.values():
-        since = peer.likely_pose_at()
-        # A recording cannot yield, and nobody yields to it.
-        if peer.odometry is None or since is None or peer.is_replay:
-            continue
-        age = max(0.0, now.mono - since)
-        known = peer.age_s(now)
-        if age > RING_S or (peer.stands and known is not None and known <= SILENCE_S):
-            continue
-        pose = peer.odometry.pose
-        yield Hazard(
-            "robot",
-            peer.robot_id,
-            peer.robot_id,
-            pose.x,
-            pose.y,
-            rule.radius_at(age),
-        )
 
 
 def _is_slow_already(robot: RobotState, hazard: Hazard, speed: float) -> bool:

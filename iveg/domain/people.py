@@ -13,6 +13,7 @@ from iveg.domain.alerts import WALKING_SPEED, Class, Rule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.profiles import profile_of
+from iveg.domain.spots import Spots
 from iveg.domain.suspicions import POSSIBLE_FROM, Suspicions
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.tracking.tracker import Seen, Tracker
@@ -61,6 +62,26 @@ class People:
         self._suspicions = Suspicions()
         self._tracker = Tracker()
         self._faint: dict[str, list[Placed]] = {}
+        self._spots = Spots()
+        self._indexed: dict[str, Person] = {}
+        self.turned_away = 0
+        """How many of the last look there was no room for."""
+
+    @property
+    def spots(self) -> Spots:
+        """Where the sightings of everybody are."""
+        if not self._indexed.keys() <= self.known.keys():
+            for person_id in self._indexed.keys() - self.known.keys():
+                del self._indexed[person_id]
+                self._spots.remove(person_id)
+        for person_id, person in self.known.items():
+            if self._indexed.get(person_id) is not person:
+                self._indexed[person_id] = person
+                spots = [
+                    (one.x, one.y, one.at.mono, one.reach_m) for one in person.sightings
+                ]
+                self._spots.put(person_id, spots)
+        return self._spots
 
     @property
     def known(self) -> dict[str, Person]:
@@ -143,6 +164,7 @@ class People:
             ],
             at,
         )
+        self.turned_away = tracks.count(None)
         for index, track in zip(wanting, tracks, strict=True):
             if track is not None:
                 out[index] = replace(

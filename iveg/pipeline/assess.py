@@ -1,8 +1,9 @@
 """The rule at work: every observation into the world, every change into words.
 
-``take`` applies one observation and judges the fleet; ``tick`` does what only time
-brings: silence, expiry, overdue links.  The heartbeat to the fleet is sent from here
-and nowhere else, so that a loop that hangs falls silent and slows the robots.
+``take`` applies one observation and ``settle`` judges the fleet, once for all that was
+taken; ``tick`` does what only time brings: silence, expiry, overdue links.  The
+heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
+falls silent and slows the robots.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -41,6 +42,8 @@ from iveg.pipeline.telling import Teller
 from iveg.pipeline.wording import evidence_of, speed_line
 
 HEARTBEAT_S = 0.1
+PERIOD_S = 1.0 / 30.0 - 1e-3
+"""Robots look at what they are told thirty times a second."""
 
 
 class Assessor:
@@ -78,7 +81,8 @@ class Assessor:
         self.protected_unseen = 0
         """How often a robot slowed for somebody whom it could not see itself."""
         self._mandates = Mandates(greenhouse)
-        self.looks = Looks(world, self.people, minutes, hub, new_id, stamp)
+        overload = self._mandates.overload
+        self.looks = Looks(world, self.people, minutes, hub, new_id, stamp, overload)
         self._ageing = Ageing(world, self.people, greenhouse, minutes, hub)
         other = self.looks.other
         self._teller = Teller(world, self.people, other, fleet, stamp, boot, backlog)
@@ -87,6 +91,9 @@ class Assessor:
         self._new_id = new_id
         self._applied: dict[str, tuple[float, str]] = {}
         self._notices = Notices()
+        self._moved: set[str] = set()
+        self._unjudged: Instant | None = None
+        self._untold = False
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -117,10 +124,20 @@ class Assessor:
         """How close the fleet came to people today; None before the first look."""
         return self._exposures.today
 
-    # --- one observation ----------------------------------------------------------
+    # --- what arrives -------------------------------------------------------------
+
+    def take_all(self, arrived: Iterable[Received]) -> None:
+        """Apply everything that has arrived, then judge the fleet once."""
+        for received in arrived:
+            self.take(received)
+        self.settle()
 
     def take(self, received: Received) -> bool:
-        """Apply one observation; returns whether it became part of the state."""
+        """Apply one observation; :meth:`settle` judges what follows from it.
+
+        Returns:
+            Whether it became part of the state.
+        """
         verdict = self.world.apply(received)
         observation = received.observation
         if isinstance(observation, DetectionFrame):
@@ -130,7 +147,7 @@ class Assessor:
             return False
         match observation:
             case Odometry():
-                self._moved(observation, received.at)
+                self._drove(observation, received.at)
             case Climate():
                 self._minutes.climate(observation, received.at)
             case LaserScan():
@@ -138,7 +155,7 @@ class Assessor:
             case SafetyReport():
                 self._reported(observation, received.at)
             case DetectionFrame():
-                self._judge(received.at)
+                self._unjudged = _later(self._unjudged, received.at)
         return True
 
     def _notice(self, robot_id: str, at: Instant) -> None:
@@ -146,14 +163,23 @@ class Assessor:
             if one.person is not None:
                 self._notices.seen(one.person.person_id, at)
 
-    def _moved(self, odometry: Odometry, at: Instant) -> None:
+    def settle(self) -> None:
+        """Judge the fleet once for everything that was taken since the last time."""
+        at, self._unjudged = self._unjudged, None
+        if at is None:
+            return
+        self._judge(at)
+        for robot_id in self._moved:
+            robot, mandate = self.world.robot(robot_id), self.mandates[robot_id]
+            self._minutes.odometry(robot, mandate.speed_factor, robot.link(at), at)
+        self._moved.clear()
+
+    def _drove(self, odometry: Odometry, at: Instant) -> None:
         for decision in self.decisions.open_of(odometry.robot_id):
             self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
-        self._judge(at)
-        robot = self.world.robot(odometry.robot_id)
-        mandate = self.mandates[robot.robot_id]
-        self._minutes.odometry(robot, mandate.speed_factor, robot.link(at), at)
-        self._hub.changed(f"robots/{robot.robot_id}")
+        self._unjudged = _later(self._unjudged, at)
+        self._moved.add(odometry.robot_id)
+        self._hub.changed(f"robots/{odometry.robot_id}")
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):
@@ -191,7 +217,13 @@ class Assessor:
             self._hub.changed(f"robots/{robot_id}")
             if self.world.robots[robot_id].safety is None:
                 self._log_mandate(robot_id, before[robot_id], mandates[robot_id], now)
-        if changed or changes:
+        slower = any(
+            mandates[robot_id].speed_factor < before[robot_id].speed_factor
+            for robot_id in changed
+        )
+        self._untold = self._untold or bool(changed or changes)
+        # Who must slow down never waits; what else is news, a robot's period at most.
+        if slower or (self._untold and now.mono - self._teller.told_at >= PERIOD_S):
             self.tell(now)
 
     def _crossed(self, change: Change, now: Instant) -> None:
@@ -215,6 +247,7 @@ class Assessor:
 
     def tell(self, now: Instant) -> None:
         """Send every robot what the fleet must know (Algorithm 2, line 13)."""
+        self._untold = False
         self._teller.tell(self.mandates, self.rule, now)
         for decision in self.decisions.every_open():
             self._advance(decision, decision.published(now), now)
@@ -226,6 +259,7 @@ class Assessor:
         self._ageing.tick(now)
         self.looks.forget(now)
         self._notices.forget(self.people.known)
+        self.settle()
         self._judge(now)
         if now.mono - self._teller.told_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
@@ -248,6 +282,7 @@ class Assessor:
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
+        yield from conditions.of_pictures(self._mandates.overload)
 
     def close_earlier(
         self,
@@ -293,3 +328,7 @@ class Assessor:
             after.decision_id,
         )
         self._log_speed(report, at)
+
+
+def _later(first: Instant | None, second: Instant) -> Instant:
+    return second if first is None or second.mono >= first.mono else first

@@ -6,7 +6,7 @@ from dataclasses import replace
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Link
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.mandates import Hazard
+from iveg.domain.hazards import Hazard
 from iveg.domain.observations import Instant
 from iveg.domain.records import AlertRecord, DecisionRecord
 

@@ -11,6 +11,7 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FeedbackAlert
 from iveg.domain.observations import DetectionFrame, Instant, Received
 from iveg.domain.order import Verdict
+from iveg.domain.overload import Overload
 from iveg.domain.people import People, Placed
 from iveg.domain.tracking.person import RING_S
 from iveg.domain.world import World
@@ -43,6 +44,7 @@ class Looks:
         hub: Hub,
         new_id: Ids,
         stamp: Callable[[float], str],
+        overload: Overload,
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, FeedbackAlert] = {}
@@ -52,6 +54,7 @@ class Looks:
         self._hub = hub
         self._new_id = new_id
         self._stamp = stamp
+        self._overload = overload
         self._told: dict[tuple[str, str], float] = {}
 
     @property
@@ -67,11 +70,22 @@ class Looks:
         Later than a ring lives it protects nobody, and would only show ghosts.
         """
         late = verdict == "late" and not received.asked
-        if verdict == "new" or (late and self._age_s(frame, received) <= RING_S):
-            placed = self._look(frame, received, rule)
-            if verdict == "new":
-                self.placed[frame.robot_id] = placed
-                self._hub.changed(f"detections/{frame.robot_id}")
+        if verdict != "new" and not (late and self._age_s(frame, received) <= RING_S):
+            return
+        robot_id = frame.robot_id
+        if not self._overload.admits(robot_id, received.at):
+            self._world.counters["pictures.not_judged"] += 1
+            self._overload.judged(robot_id, received.at, whole=False)
+            return
+        placed = self._look(frame, received, rule)
+        turned_away = self._people.turned_away
+        if turned_away:
+            self._world.counters["people.turned_away"] += turned_away
+        if verdict == "new" or turned_away:
+            self._overload.judged(robot_id, received.at, whole=not turned_away)
+        if verdict == "new":
+            self.placed[robot_id] = placed
+            self._hub.changed(f"detections/{robot_id}")
 
     def _age_s(self, frame: DetectionFrame, received: Received) -> float:
         """How old the look that has just come is (s)."""

@@ -3,6 +3,7 @@
 If this loop hangs, feedback stops and every robot slows down by itself (fault F14).
 """
 
+import asyncio
 from collections.abc import Callable, Iterable
 
 from iveg.domain.events import LogEvent
@@ -16,6 +17,8 @@ from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub
 
 TICK_S = 0.05
+APART_S = 0.00025
+"""Least time between two judgements for each robot of the fleet: 5 ms with twenty."""
 _HEALTH_PERIOD_S = 1.0
 
 
@@ -41,6 +44,7 @@ class RuleLoop:
         self._hub = hub
         self._clock = clock
         self._database_state = database_state
+        self._apart_s = APART_S * len(assessor.world.robots)
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._states: dict[str, HopState] = {}
@@ -48,9 +52,16 @@ class RuleLoop:
 
     async def run(self) -> None:
         """Until cancelled."""
+        taken_at = float("-inf")
         while True:
             await self._ingest.wait(TICK_S)
-            self.step(self._ingest.drain(), self._clock())
+            # What comes close together is judged together.
+            early = taken_at + self._apart_s - self._clock().mono
+            if early > 0.0:
+                await asyncio.sleep(early)
+            now = self._clock()
+            taken_at = now.mono
+            self.step(self._ingest.drain(), now)
 
     def step(self, arrived: Iterable[Received], now: Instant) -> None:
         """Take everything that arrived, then let time pass if it is due."""
@@ -63,6 +74,7 @@ class RuleLoop:
             # The second road's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
                 self._commander.take(received, self._assessor.world.age_then(received))
+        self._assessor.settle()
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)

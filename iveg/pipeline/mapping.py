@@ -18,7 +18,7 @@ from iveg.domain.costmap import (
     window_round,
 )
 from iveg.domain.geometry import Rectangle
-from iveg.domain.mandates import Hazard
+from iveg.domain.hazards import Hazard
 from iveg.domain.observations import Instant, LaserScan
 from iveg.domain.world import RobotState, World
 from iveg.pipeline.ports import Clock

@@ -9,6 +9,9 @@ from iveg.domain.people import People
 from iveg.domain.world import RobotState, World
 from iveg.pipeline.ports import Fleet
 
+MOST_ALERTS = 256
+"""A robot refuses feedback with more."""
+
 
 class Teller:
     """Writes the feedback and hands it to the fleet.
@@ -46,7 +49,7 @@ class Teller:
     def tell(self, mandates: Mapping[str, Mandate], rule: Rule, now: Instant) -> None:
         """Send every robot what the fleet must know."""
         self.told_at = now.mono
-        alerts = tuple(self._alerts(rule, now))
+        alerts = _newest(tuple(self._alerts(rule, now)))
         seen = {
             robot.robot_id: robot.safety.origin.seq
             for robot in self._world.robots.values()
@@ -100,3 +103,10 @@ class Teller:
                     radius,
                     sighting.observer,
                 )
+
+
+def _newest(alerts: tuple[FeedbackAlert, ...]) -> tuple[FeedbackAlert, ...]:
+    """As many as a robot reads; the mandates count the others, too."""
+    if len(alerts) <= MOST_ALERTS:
+        return alerts
+    return tuple(sorted(alerts, key=lambda one: one.stamp)[-MOST_ALERTS:])

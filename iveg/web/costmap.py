@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from starlette.responses import Response
 
 from iveg.domain.costmap import UNKNOWN, Costmap
-from iveg.domain.mandates import hazards_of
+from iveg.domain.hazards import hazards_of
 from iveg.domain.observations import Instant
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.mapping import Mapper

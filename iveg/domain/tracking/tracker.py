@@ -203,7 +203,7 @@ class Tracker:
         return track
 
     def _begin(self, one: Seen, at: Instant) -> str | None:
-        if len(self.known) >= MAX_PEOPLE:
+        if not self._has_room(at):
             return None
         self._drop_mark(one, at)
         self._tracks += 1
@@ -213,6 +213,20 @@ class Tracker:
             track, one.class_, one.decision_id, at, look, (look,), self._tracks
         )
         return track
+
+    def _has_room(self, now: Instant) -> bool:
+        """Whether one more can be kept, if need be for one who protects nobody.
+
+        Whoever has a ring stays, and whoever was ever seen twice.
+        """
+        if len(self.known) < MAX_PEOPLE:
+            return True
+        for person in self.known.values():
+            once = person.first_seen == person.newest.at
+            if once and person.stage(now) in ("last_seen", "gone"):
+                self._remove(person.person_id)
+                return True
+        return False
 
     def _drop_mark(self, one: Seen, at: Instant) -> None:
         """Somebody appears: the nearest last-seen mark within reach was theirs."""

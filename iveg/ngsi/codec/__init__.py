@@ -12,7 +12,7 @@ from iveg.ngsi.codec.commands import (
     write_stop,
 )
 from iveg.ngsi.codec.door import MAX_DEPTH, Problem, Reading, load_json
-from iveg.ngsi.codec.feedback import read_feedback, write_feedback
+from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
 from iveg.ngsi.codec.fields import format_stamp, parse_stamp
 from iveg.ngsi.codec.incoming import (
     read_answer,
@@ -33,6 +33,7 @@ from iveg.ngsi.codec.reports import (
 
 __all__ = [
     "MAX_DEPTH",
+    "FeedbackWriter",
     "Problem",
     "Reading",
     "format_stamp",

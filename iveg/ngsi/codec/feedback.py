@@ -1,5 +1,6 @@
 """The feedback that iVeg publishes for the fleet, both ways."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import orjson
@@ -74,28 +75,44 @@ def _alert(value: payloads.AlertValue) -> FeedbackAlert:
     )
 
 
+class FeedbackWriter:
+    """Writes feedback; what the messages of one telling share is written once."""
+
+    def __init__(self) -> None:
+        self._shared: tuple[object, ...] = ()
+        self._written: dict[str, orjson.Fragment] = {}
+
+    def write(self, feedback: Feedback) -> bytes:
+        """The bytes of ``/{robot}/mqtt_feedback``."""
+        shared = feedback.alerts, feedback.mandates, feedback.seen
+        if not _are_same(shared, self._shared):
+            self._shared = shared
+            self._written = {
+                name: orjson.Fragment(orjson.dumps(value))
+                for name, value in _write_shared(feedback).items()
+            }
+        return _write(feedback, self._written)
+
+
+def _are_same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:
+    pairs = zip(some, others, strict=False)
+    return len(some) == len(others) and all(one is other for one, other in pairs)
+
+
 def write_feedback(feedback: Feedback) -> bytes:
     """The bytes of ``/{robot}/mqtt_feedback``."""
+    return _write(feedback, _write_shared(feedback))
+
+
+def _write(feedback: Feedback, shared: Mapping[str, Any]) -> bytes:
+    alert = feedback.alert
     return orjson.dumps(
         {
             **write_origin(feedback.origin),
             "robot_id": feedback.robot_id,
-            "alert": None if feedback.alert is None else _write_alert(feedback.alert),
-            "alerts": [_write_alert(alert) for alert in feedback.alerts],
+            "alert": None if alert is None else _write_alert(alert),
             "robot_pose": _write_feedback_pose(feedback),
-            "mandates": {
-                robot_id: without_none(
-                    {
-                        "speed_factor": mandate.speed_factor,
-                        "reason": mandate.reason,
-                        "cause": mandate.cause,
-                        "distance_m": rounded(mandate.distance_m),
-                        "decision_id": mandate.decision_id,
-                    }
-                )
-                for robot_id, mandate in feedback.mandates.items()
-            },
-            "seen": dict(feedback.seen),
+            **shared,
             **_write_backlog(feedback.backlog_s),
         }
     )
@@ -105,6 +122,26 @@ def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
     if backlog_s is None:
         return {}
     return {"backlog": {"fiware_s": round(min(backlog_s, LONGEST_BACKLOG_S), 1)}}
+
+
+def _write_shared(feedback: Feedback) -> dict[str, Any]:
+    """What every robot is told alike."""
+    return {
+        "alerts": [_write_alert(alert) for alert in feedback.alerts],
+        "mandates": {
+            robot_id: without_none(
+                {
+                    "speed_factor": mandate.speed_factor,
+                    "reason": mandate.reason,
+                    "cause": mandate.cause,
+                    "distance_m": rounded(mandate.distance_m),
+                    "decision_id": mandate.decision_id,
+                }
+            )
+            for robot_id, mandate in feedback.mandates.items()
+        },
+        "seen": dict(feedback.seen),
+    }
 
 
 def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:

@@ -7,7 +7,8 @@ import pytest
 from iveg.domain.alerts import Rule
 from iveg.domain.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
-from iveg.domain.mandates import Crossing, Hazard
+from iveg.domain.hazards import Hazard
+from iveg.domain.mandates import Crossing
 from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.world import RobotState, World

@@ -7,7 +7,8 @@ import pytest
 from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision
 from iveg.domain.echoes import ECHO_S, WINDOW_S, echoes_of
-from iveg.domain.mandates import Crossing, Hazard
+from iveg.domain.hazards import Hazard
+from iveg.domain.mandates import Crossing
 from tests.builders import START, at
 
 

@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.geometry import Pose2D
-from iveg.domain.mandates import hazards_of
+from iveg.domain.hazards import hazards_of
 from iveg.domain.observations import (
     Canary,
     Climate,

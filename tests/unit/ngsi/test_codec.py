@@ -407,3 +407,17 @@ def test_navigation_is_read_with_goal_and_path() -> None:
     assert intent == Navigation(
         "AGI", Origin(), "harvest", (1.0, 2.0), ((0.0, 0.0), (1.0, 2.0))
     )
+
+
+def test_what_robots_are_told_alike_is_written_once_and_reads_the_same() -> None:
+    alert = FeedbackAlert("d1", "t", "person", "farmer", 0.9, (1.0, 2.0, 0.9), 2.0, "A")
+    told = (alert,), {"AGI": Mandate(0.5, "person", "P1", 1.0, "d1")}, {"AGI": 7}
+    writer = codec.FeedbackWriter()
+    for alerts, mandates, seen in (told, told, ((), {}, {"AGI": 8}), told):
+        for robot_id in ("AGI", "AGII"):
+            one = Feedback(
+                robot_id, Origin(), alerts=alerts, mandates=mandates, seen=seen
+            )
+            written = writer.write(one)
+            assert orjson.loads(written) == orjson.loads(codec.write_feedback(one))
+            assert codec.read_feedback(written) == one

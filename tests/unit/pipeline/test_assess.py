@@ -467,8 +467,9 @@ def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
 
 def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
     desk = watched(Desk())
-    for number in range(1100):
-        desk.look("AGII", detection(f"thing-{number}", 80.0))
+    for number in range(5):
+        things = [detection(f"thing-{number}-{n}", 80.0) for n in range(220)]
+        desk.look("AGII", *things)
     desk.clock.now = 60.0
 
     desk.loop.step([], desk.clock())

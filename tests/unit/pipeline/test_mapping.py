@@ -4,7 +4,7 @@ import math
 
 from iveg.domain.costmap import Costmap
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.mandates import Hazard
+from iveg.domain.hazards import Hazard
 from iveg.pipeline.mapping import Mapper
 from tests.builders import at, scan
 from tests.unit.domain.scene import Scene

@@ -1,0 +1,111 @@
+"""What the rule costs: ``python -m benchmarks.rule_cost [--robots 5 10 20]``.
+
+CPU seconds per 1,000 messages of the rule loop alone, everything read already: each
+robot sends odometry, a scan and four boxes at 30 Hz, feedback is written as for MQTT.
+``calm``: one person before each robot.  ``storm``: no two pictures alike.  Messages are
+taken one by one, as on an idle machine, and eight at a time, as when it is busy.
+"""
+
+import argparse
+import math
+import random
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.decision_cost import TICK_S, WALL, Telling, assessor_of
+from benchmarks.process import print_table
+from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    Instant,
+    LaserScan,
+    Observation,
+    Odometry,
+    Origin,
+    Received,
+)
+
+RATE_HZ = 30
+SECONDS = 8.0
+SCAN = np.full(720, 4.0, np.float32)
+
+
+def story(robots: tuple[str, ...], *, storm: bool) -> Iterator[Received]:
+    """What arrives, in order: robots two lanes apart, sends spread over the period."""
+    draw = random.Random(3)  # noqa: S311 - the same each time
+    for tick in range(round(SECONDS * RATE_HZ)):
+        for place in range(3 * len(robots)):
+            at = (tick + place / 3 / len(robots)) / RATE_HZ
+            number, kind = divmod(place, 3)
+            origin = Origin("b", tick, "2026-11-20T14:13:07.754Z", WALL + at)
+            told = _told(robots[number], number, kind, origin, at, draw, storm)
+            yield Received(told, Instant(at, WALL + at), "orion")
+
+
+def _told(
+    robot_id: str,
+    number: int,
+    kind: int,
+    origin: Origin,
+    at: float,
+    draw: random.Random,
+    storm: bool,
+) -> Observation:
+    x, y = 6.0 * (number % 5), 12.0 * (number // 5) + 4.0 * math.sin(at * 0.2 + number)
+    if kind == 0:
+        return Odometry(robot_id, origin, Pose2D(x, y, 1.57), Twist2D(0.5, 0.0))
+    if kind == 1:
+        return LaserScan(
+            robot_id, origin, -3.14, 0.0087, 0.1, 30.0, Pose2D(0.0, 0.0, 0.0), SCAN
+        )
+    spots = [(x, y + 4.0, "person")] + [(x + k, y + 3.0, "crate") for k in (1, 2, 3)]
+    if storm:
+        spots = [
+            (x + draw.uniform(-5, 5), y + draw.uniform(1, 6), "person")
+            for _ in range(4)
+        ]
+    found = tuple(
+        Detection(word, 0.94, Box3D(a, a + 0.5, b, b + 0.5, 0.0, 1.7), "map")
+        for a, b, word in spots
+    )
+    return DetectionFrame(robot_id, origin, found)
+
+
+def cost(count: int, batch: int, *, storm: bool) -> float:
+    """CPU seconds per 1,000 messages."""
+    robots = tuple(f"R{number:02d}" for number in range(count))
+    assessor = assessor_of(robots, Telling())
+    everything = list(story(robots, storm=storm))
+    ticked = 0.0
+    began = time.process_time()
+    for start in range(0, len(everything), batch):
+        part = everything[start : start + batch]
+        now = part[-1].at
+        assessor.take_all(part)
+        if now.mono - ticked >= TICK_S:
+            ticked = now.mono
+            assessor.tick(now)
+    return (time.process_time() - began) / len(everything) * 1000
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, nargs="+", default=[5, 10, 20])
+    rows = [
+        [
+            str(count),
+            "storm" if storm else "calm",
+            *(f"{cost(count, batch, storm=storm):.3f}" for batch in (1, 8)),
+        ]
+        for count in parser.parse_args().robots
+        for storm in (False, True)
+    ]
+    head = ("robots", "scene", "one by one", "eight at a time")
+    print_table("Rule loop, CPU seconds per 1,000 messages", head, rows)
+
+
+if __name__ == "__main__":
+    main()

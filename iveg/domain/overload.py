@@ -1,0 +1,87 @@
+"""When a detector says more than can be judged: what is bounded, and who slows for it.
+
+At most 256 people are kept and 45 pictures a second of each robot are judged.  What is
+over that drops nobody who is known, but somebody new may be among it.  So the observer
+and every robot near what it can see drive at half speed until a picture of it was
+judged whole.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import Instant
+from iveg.domain.profiles import profile_of
+from iveg.domain.world import RobotState, World
+
+PICTURES_HZ = 45.0
+"""Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
+BEYOND_M = 6.0
+"""Beyond the camera's reach: the widest ring of somebody whom it saw (m)."""
+_OPEN_FROM_M = 2000.0
+
+
+@dataclass(slots=True)
+class Overload:
+    """Which robots' newest picture was not judged whole.
+
+    Attributes:
+        since: By robot, when that began (monotonic, s).
+    """
+
+    since: dict[str, float] = field(default_factory=dict)
+    _left: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def admits(self, robot_id: str, now: Instant) -> bool:
+        """Whether one more picture of a robot may be judged; counts it if so."""
+        left, at = self._left.get(robot_id, (PICTURES_HZ, now.mono))
+        left = min(PICTURES_HZ, left + PICTURES_HZ * max(0.0, now.mono - at))
+        admitted = left >= 1.0
+        self._left[robot_id] = left - admitted, now.mono
+        return admitted
+
+    def judged(self, robot_id: str, now: Instant, *, whole: bool) -> None:
+        """A picture came; ``whole`` when everybody in it was taken."""
+        if whole:
+            self.since.pop(robot_id, None)
+        else:
+            self.since.setdefault(robot_id, now.mono)
+
+    def slowed(self, world: World, bounds_width: float) -> Mapping[str, str]:
+        """Who must drive at half speed, and for whose pictures.
+
+        Args:
+            world: Where everybody is.
+            bounds_width: Of the greenhouse (m); an open field slows the whole fleet.
+        """
+        found: dict[str, str] = {}
+        for name in self.since:
+            observer = world.robots[name]
+            whole_fleet = bounds_width > _OPEN_FROM_M
+            for robot in _near(observer, world.robots.values(), whole_fleet):
+                found.setdefault(robot.robot_id, name)
+        return found
+
+
+def _near(
+    observer: RobotState, robots: Iterable[RobotState], whole_fleet: bool
+) -> Iterable[RobotState]:
+    reach = profile_of(observer.robot_id).camera_range + BEYOND_M
+    here = _pose(observer)
+    for robot in robots:
+        # What a recording saw slows recordings alone.
+        if observer.is_replay and not robot.is_replay:
+            continue
+        there = _pose(robot)
+        if (
+            robot is observer
+            or whole_fleet
+            or here is None
+            or there is None
+            or here.distance_to(there.x, there.y) <= reach
+        ):
+            yield robot
+
+
+def _pose(robot: RobotState) -> Pose2D | None:
+    return None if robot.odometry is None else robot.odometry.pose
