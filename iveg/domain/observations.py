@@ -166,6 +166,36 @@ class Hold:
 
 
 @dataclass(frozen=True, slots=True)
+class RobotFault:
+    """What a robot finds wrong with its own data (docs/interfaces.md §1).
+
+    Attributes:
+        code: A short, stable name, such as ``no_transform``.
+        about: Which frames or topic.
+        for_s: For how long (s); None where that is not known.
+    """
+
+    code: str
+    about: str = ""
+    for_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Unplaced:
+    """Something was sensed, and where that was in ``map`` is not known.
+
+    Attributes:
+        kind: What would have been sent.
+        twist: Of odometry; a speed needs no place.
+    """
+
+    robot_id: str
+    origin: Origin
+    kind: Literal["odometry", "scan"]
+    twist: Twist2D | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SafetyReport:
     """What the robot really applies, in its own words.
 
@@ -175,6 +205,7 @@ class SafetyReport:
         challenge: Must be echoed by a release or resume.
         linear: Measured speed (m/s); ``angular`` (rad/s).
         feedback_age_s: How old the newest feedback is that the robot acts on (s).
+        faults: What it finds wrong with its own data.
     """
 
     robot_id: str
@@ -189,6 +220,7 @@ class SafetyReport:
     linear: float = 0.0
     angular: float = 0.0
     feedback_age_s: float | None = None
+    faults: tuple[RobotFault, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,14 @@ class HoldValue(Wire):
     ack: Literal["remote", "local", "auto"]
 
 
+class FaultValue(Wire):
+    """One element of ``faults``."""
+
+    code: Text
+    about: Text = ""
+    for_s: Annotated[float, Field(ge=0)] | None = None
+
+
 class SafetyValue(OriginFields):
     """``safety_state``."""
 
@@ -129,6 +137,7 @@ class SafetyValue(OriginFields):
     v: Speed = 0.0
     w: Speed = 0.0
     feedback_age_s: Annotated[float, Field(ge=0)] | None = None
+    faults: Annotated[list[FaultValue], Field(max_length=MAX_TEXT)] = []
 
 
 class PointValue(Wire):

@@ -41,9 +41,9 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Newest odometry; ``at`` monotonic (s)."""
+    """Newest odometry; ``at`` monotonic (s); ``pose`` None: it has no place in map."""
 
-    pose: Pose2D
+    pose: Pose2D | None
     twist: Twist2D
     at: float
 
@@ -64,6 +64,8 @@ class Judgement:
         self._motion: Motion | None = None
         self._applied = Applied(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
+        self.local = FREE
+        """What the robot's own software asks for, whatever iVeg says."""
 
     @property
     def cap(self) -> Cap:
@@ -92,10 +94,14 @@ class Judgement:
             and abs(motion.twist.angular_z) < STANDS_BELOW
         )
 
-    def moved(self, pose: Pose2D, twist: Twist2D, now: float) -> None:
-        """Take odometry; one that holds no number is none."""
-        numbers = pose.x, pose.y, pose.yaw, twist.linear_x, twist.angular_z
-        if all(map(math.isfinite, numbers)):
+    def moved(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
+        """Take odometry; one that holds no number is none.
+
+        Without a pose it tells how fast the robot is, which a standstill needs, and
+        not where: then nothing can be judged near, and the cap is 0.
+        """
+        place = () if pose is None else (pose.x, pose.y, pose.yaw)
+        if all(map(math.isfinite, (*place, twist.linear_x, twist.angular_z))):
             self._motion = Motion(pose, twist, now)
 
     def told(self, topic: str, feedback: Feedback, now: float) -> None:
@@ -109,6 +115,7 @@ class Judgement:
         slowed = self.cap.reason in ("person", "robot")
         raw = lowest(
             (
+                self.local,
                 self._pose_cap(now),
                 self._silence_cap(now),
                 *self._hearsay.caps(self._own(now), slowed, now),
@@ -127,7 +134,7 @@ class Judgement:
 
     def _pose_cap(self, now: float) -> Cap:
         motion = self.motion(now)
-        if motion is None:
+        if motion is None or motion.pose is None:
             return Cap(0.0, "stale")
         return Cap(HALF_SPEED, "stale") if now - motion.at > POSE_SLOW_S else FREE
 

@@ -9,6 +9,7 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -16,20 +17,21 @@ from typing import Literal
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
+from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
-    DetectionFrame,
     Hold,
     Instant,
-    LaserScan,
-    Navigation,
     Odometry,
+    RobotFault,
     SafetyReport,
+    Unplaced,
 )
 from iveg.domain.profiles import RobotProfile
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
+from iveg.robot.caps import FREE, Cap
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.gate import REST
@@ -37,7 +39,7 @@ from iveg.robot.hold_file import read_holds, write_holds
 from iveg.robot.judgement import Limits
 from iveg.robot.lane import SafetyLane
 from iveg.robot.safety import SafetyMachine, State
-from iveg.robot.uplink import Form, Uplink
+from iveg.robot.uplink import Form, Sensed, Uplink
 
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
@@ -62,6 +64,7 @@ class RobotNode:
         on_link_loss: What ``stand_s`` of silence does.
         echoes: It tells iVeg what it has heard, which proves the age of what it says;
             what a recording says was measured long ago.
+        on_feedback: Told each feedback that could be read, and its topic's robot.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class RobotNode:
         held: bool = False,
         on_link_loss: Literal["stop", "slow"] = "stop",
         echoes: bool = True,
+        on_feedback: Callable[[str, Feedback], None] | None = None,
     ) -> None:
         self.boot = secrets.token_hex(4)
         self.clock_offset_s = 0.0
@@ -90,6 +94,8 @@ class RobotNode:
         self._drive = drive
         self._started = clock.now().mono
         self._echo = Echo()
+        self._on_feedback_read = on_feedback
+        self._faults: tuple[RobotFault, ...] = ()
         self._nobody_there = held
         self._command_topic = names.command_topic(apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
@@ -183,21 +189,32 @@ class RobotNode:
         finally:
             self._drive(REST)
 
-    def sense(
-        self, observation: Odometry | LaserScan | DetectionFrame | Navigation
-    ) -> None:
+    def sense(self, observation: Sensed) -> None:
         """Take what the robot's own sensors say; the origin is filled in here."""
         now = clock.now()
         if isinstance(observation, Odometry):
             self._perform(
                 self._machine.odometry(observation.pose, observation.twist, now.mono)
             )
+        elif isinstance(observation, Unplaced) and observation.twist is not None:
+            self._perform(self._machine.odometry(None, observation.twist, now.mono))
         if self._link.connected and not self.mute:
             self._uplink.send(observation, self._own(now))
 
     def wish(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
         self._perform(self._machine.wish(twist, clock.now().mono))
+
+    def limit(self, factor: float, cause: str | None = None) -> None:
+        """Drive no faster than this from here on (0, 0.5 or 1), because of ``cause``.
+
+        Beside everything that iVeg asks for; never instead of it.
+        """
+        self._machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
+
+    def tell_faults(self, faults: tuple[RobotFault, ...]) -> None:
+        """What the next reports say is wrong with the robot's own data."""
+        self._faults = faults
 
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
         """The red button or the bumper at the robot was pressed."""
@@ -233,6 +250,8 @@ class RobotNode:
         self._uplink.rates.told(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now))
+        if self._on_feedback_read is not None:
+            self._on_feedback_read(peer, feedback)
 
     # --- effects ------------------------------------------------------------------
 
@@ -258,8 +277,9 @@ class RobotNode:
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
         if not self.mute:
+            told = replace(report, faults=self._faults)
             seq, messages = self._uplink.report(
-                report, self._own(clock.now()), is_measure=is_measure
+                told, self._own(clock.now()), is_measure=is_measure
             )
             self._machine.reported(seq, clock.now().mono)
             for message in messages:

@@ -125,10 +125,16 @@ class SafetyMachine:
         self._gate.wish(twist, now)
         return self.tick(now)
 
-    def odometry(self, pose: Pose2D, twist: Twist2D, now: float) -> tuple[Effect, ...]:
-        """The robot's sensors measured where it is and how fast."""
+    def odometry(
+        self, pose: Pose2D | None, twist: Twist2D, now: float
+    ) -> tuple[Effect, ...]:
+        """The robot's sensors measured where it is (None: not in map) and how fast."""
         self._judgement.moved(pose, twist, now)
         return self.tick(now)
+
+    def limit(self, cap: Cap) -> None:
+        """The robot's own software asks for at most this, until it says otherwise."""
+        self._judgement.local = cap
 
     def feedback(
         self, topic: str, feedback: Feedback, now: float

@@ -31,11 +31,13 @@ class SinglePayload:
         """The sweep that has not travelled yet."""
         self._detections: list[Detection] = []
         self._saw_nothing = False
+        self._unplaced = 0
 
     def look(self, frame: DetectionFrame) -> None:
         """Take a look of the detector; it replaces what is left of the one before."""
         self._detections = sorted(frame.detections, key=lambda one: one.probability)
-        self._saw_nothing = not frame.detections
+        self._saw_nothing = not frame.detections and not frame.unreadable
+        self._unplaced = frame.unreadable
 
     def write(self, odometry: Odometry) -> bytes:
         """The bytes of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
@@ -54,6 +56,10 @@ class SinglePayload:
         }
         if self._detections:
             payload |= _detected(self._detections.pop(), odometry.pose)
+        elif self._unplaced:
+            nowhere = [{"frame_id": names.UNPLACED}] * self._unplaced
+            self._unplaced = 0
+            payload |= {names.BOXES: nowhere, names.BOXES_HEADER: origin}
         elif self._saw_nothing:
             self._saw_nothing = False
             payload |= {names.BOXES: [], names.BOXES_HEADER: origin}

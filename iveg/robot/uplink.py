@@ -20,6 +20,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     SafetyReport,
+    Unplaced,
 )
 from iveg.ngsi import codec, names
 from iveg.robot.echo import Echo
@@ -27,7 +28,7 @@ from iveg.robot.lane import Message
 from iveg.robot.rates import Rates
 from iveg.robot.single import SinglePayload
 
-Sensed = Odometry | LaserScan | DetectionFrame | Navigation
+Sensed = Odometry | LaserScan | DetectionFrame | Navigation | Unplaced
 Form = Literal["per-topic", "single"]
 
 _SUFFIX: dict[type, str] = {
@@ -36,6 +37,7 @@ _SUFFIX: dict[type, str] = {
     DetectionFrame: "_yolox_bounding_boxes",
     Navigation: "_nav",
 }
+_UNPLACED = {"odometry": "_odom", "scan": "_lidar2D"}
 _ANSWERS = "cmdexe"
 
 
@@ -82,11 +84,13 @@ class Uplink:
 
     def send(self, observation: Sensed, at: Instant) -> None:
         """Send what a sensor said at this moment."""
-        if self._single is not None and not isinstance(observation, Navigation):
+        if self._single is not None and not isinstance(
+            observation, Navigation | Unplaced
+        ):
             self._send_single(self._single, observation, at)
             return
         news = isinstance(observation, DetectionFrame) and self._is_news(observation)
-        suffix = _SUFFIX[type(observation)]
+        suffix = _suffix_of(observation)
         stamped = replace(
             observation, robot_id=self._id, origin=self._origin(suffix, at)
         )
@@ -168,8 +172,16 @@ def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
     )
 
 
+def _suffix_of(observation: Sensed) -> str:
+    if isinstance(observation, Unplaced):
+        return _UNPLACED[observation.kind]
+    return _SUFFIX[type(observation)]
+
+
 def _written(observation: Sensed) -> bytes:
     match observation:
+        case Unplaced():
+            return codec.write_unplaced(observation)
         case Odometry():
             return codec.write_odometry(observation)
         case LaserScan():

@@ -48,6 +48,14 @@ class HoldJson(TypedDict):
     ack: str
 
 
+class FaultJson(TypedDict):
+    """What a robot finds wrong with its own data."""
+
+    code: str
+    about: str
+    for_s: float | None
+
+
 class AppliedJson(TypedDict):
     """What the robot itself says it applies."""
 
@@ -55,6 +63,7 @@ class AppliedJson(TypedDict):
     cause: str | None
     age_s: float
     feedback_age_s: float | None
+    faults: list[FaultJson]
 
 
 class MandateJson(TypedDict):

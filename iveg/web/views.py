@@ -133,6 +133,10 @@ class Views:
             "cause": robot.safety.cause,
             "age_s": round(now.mono - robot.safety_received.mono, 3),
             "feedback_age_s": robot.safety.feedback_age_s,
+            "faults": [
+                {"code": one.code, "about": one.about, "for_s": one.for_s}
+                for one in robot.safety.faults
+            ],
         }
 
     def motion(

@@ -5,6 +5,7 @@ import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
+import { faultsSaid } from "../../iveg/static/js/panels/robots.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
 import { createStore } from "../../iveg/static/js/store.js";
 import { createWakeLock } from "../../iveg/static/js/wakelock.js";
@@ -51,6 +52,25 @@ const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
       [key, ...Object.values(slots)].join(" "),
   })
 );
+
+test("a robot's card says what the robot finds wrong with its own data", () => {
+  const robot = /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+    /** @type {unknown} */ ({
+      applied: {
+        faults: [
+          { code: "no_transform", about: "map → odom", for_s: 2.1 },
+          { code: "unheard_of", about: "/scan", for_s: null },
+        ],
+      },
+    })
+  );
+  const known = (/** @type {string} */ key) => key === "robot.fault.no_transform";
+  equal(faultsSaid(robot, { ...words, has: known }), [
+    "robot.fault_for robot.fault.no_transform no_transform map → odom 2.1",
+    "robot.fault.other unheard_of /scan",
+  ]);
+  equal(faultsSaid({ ...robot, applied: null }, words), []);
+});
 
 test("a tape is laid with two taps, and a third begins anew", () => {
   const first = laidTo({ points: [] }, { x: 1, y: 1 });

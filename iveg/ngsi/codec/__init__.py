@@ -29,6 +29,7 @@ from iveg.ngsi.codec.reports import (
     write_odometry,
     write_safety,
     write_scan,
+    write_unplaced,
 )
 
 __all__ = [
@@ -59,4 +60,5 @@ __all__ = [
     "write_safety",
     "write_scan",
     "write_stop",
+    "write_unplaced",
 ]

@@ -23,6 +23,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     Overtaken,
+    RobotFault,
     SafetyReport,
 )
 from iveg.ngsi import names, payloads
@@ -95,6 +96,7 @@ def read_one(
 
 
 def _odometry(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
+    _refuse_unplaced(attributes[names.ODOMETRY])
     return _odometry_of(
         robot_id, payloads.OdometryValue.model_validate(attributes[names.ODOMETRY])
     )
@@ -109,7 +111,14 @@ def _odometry_of(robot_id: str, value: payloads.OdometryValue) -> Odometry:
     )
 
 
+def _refuse_unplaced(value: Any) -> None:
+    """What a robot could not place is counted and never drawn."""
+    if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
+        raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
+
+
 def _scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+    _refuse_unplaced(attributes.get(names.LIDAR_HEADER))
     return _scan_of(robot_id, attributes[names.LIDAR], attributes.get("lidar_header"))
 
 
@@ -209,6 +218,7 @@ def _safety(robot_id: str, attributes: Mapping[str, Any]) -> SafetyReport:
         value.v,
         value.w,
         value.feedback_age_s,
+        tuple(RobotFault(one.code, one.about, one.for_s) for one in value.faults),
     )
 
 

@@ -13,6 +13,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     SafetyReport,
+    Unplaced,
 )
 from iveg.ngsi import names
 from iveg.ngsi.codec.fields import (
@@ -63,7 +64,7 @@ def write_scan(value: LaserScan) -> bytes:
 
 def write_detections(value: DetectionFrame) -> bytes:
     """The bytes of ``/{apikey}/{robot}_yolox_bounding_boxes/attrs``."""
-    boxes = [
+    boxes: list[dict[str, Any]] = [
         without_none(
             {
                 "class_id": detection.class_id,
@@ -78,6 +79,8 @@ def write_detections(value: DetectionFrame) -> bytes:
         )
         for detection in value.detections
     ]
+    # Somebody is there and nobody knows where: that must not look like an empty frame.
+    boxes += [{"frame_id": names.UNPLACED}] * value.unreadable
     return _measure(
         value.origin,
         {names.BOXES: boxes, names.BOXES_HEADER: write_origin(value.origin)},
@@ -100,10 +103,40 @@ def write_safety(value: SafetyReport) -> bytes:
                 "v": round(value.linear, 4),
                 "w": round(value.angular, 4),
                 "feedback_age_s": rounded(value.feedback_age_s),
+                **_faults(value),
                 **write_origin(value.origin),
             }
         },
     )
+
+
+def _faults(value: SafetyReport) -> dict[str, Any]:
+    found = [
+        {"code": one.code, "about": one.about, "for_s": rounded(one.for_s)}
+        for one in value.faults
+    ]
+    return {"faults": found} if found else {}
+
+
+def write_unplaced(value: Unplaced) -> bytes:
+    """The bytes of odometry or a scan that has no place: read as such, or not at all.
+
+    Without numbers for x, y and yaw a reader that does not know ``unplaced`` refuses
+    the whole, so that nobody can draw it in a wrong place.
+    """
+    nowhere = {
+        "frame_id": names.UNPLACED,
+        "x": None,
+        "y": None,
+        "yaw": None,
+        **write_origin(value.origin),
+    }
+    if value.kind == "scan":
+        return _measure(value.origin, {names.LIDAR: [], names.LIDAR_HEADER: nowhere})
+    if value.twist is not None:
+        nowhere["linear_velocity"] = round(value.twist.linear_x, 4)
+        nowhere["angular_velocity"] = round(value.twist.angular_z, 4)
+    return _measure(value.origin, {names.ODOMETRY: nowhere})
 
 
 def write_navigation(value: Navigation) -> bytes:

@@ -1,9 +1,17 @@
 """The REST twins of what is live say what is known and how old it is."""
 
+from dataclasses import replace
+
 import pytest
 
-from iveg.domain.observations import Climate, CommandStatus, Hold, Navigation
-from tests.builders import detection, scan
+from iveg.domain.observations import (
+    Climate,
+    CommandStatus,
+    Hold,
+    Navigation,
+    RobotFault,
+)
+from tests.builders import detection, safety_report, scan
 from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import WebDesk
 
@@ -46,6 +54,20 @@ async def test_a_robot_is_told_with_pose_age_mandate_and_profile() -> None:
     }
     assert told["cmd_status"] == "PENDING"
     assert told["profile"]["drive"] == "differential"
+
+
+async def test_a_robot_is_told_with_what_it_finds_wrong_with_its_own_data() -> None:
+    desk = WebDesk()
+    desk.drive("AGI")
+    fault = RobotFault("no_transform", "map → odom", 2.1)
+    desk.hear(replace(safety_report("AGI"), faults=(fault,)))
+
+    told = await get(desk, "/robots/AGI")
+
+    assert isinstance(told, dict)
+    assert told["applied"]["faults"] == [
+        {"code": "no_transform", "about": "map → odom", "for_s": 2.1}
+    ]
 
 
 async def test_a_robot_that_says_nothing_of_its_speed_is_told_by_its_mandate() -> None:

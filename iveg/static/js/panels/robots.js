@@ -185,7 +185,10 @@ function createCard(app, card) {
   /** @param {Robot | undefined} robot */
   function drawMode(robot) {
     setText(fields.mode, modeSaid(robot, words));
-    setText(partOf("why"), robot ? whyOf(robot) : "");
+    setText(
+      partOf("why"),
+      robot ? [whyOf(robot), ...faultsSaid(robot, words)].join(" · ") : "",
+    );
   }
 
   /** @param {Robot} robot */
@@ -306,4 +309,18 @@ export function modeSaid(robot, words) {
   }
   if (mode !== "SLOW") return words.t(`robot.mode.${mode}`);
   return words.t("robot.mode_slow", { factor: HALF_SPEED });
+}
+
+/**
+ * What a robot finds wrong with its own data, a sentence each.
+ *
+ * @param {Robot} robot
+ * @param {import("../i18n.js").Words} words
+ */
+export function faultsSaid(robot, words) {
+  return (robot.applied?.faults ?? []).map(({ code, about, for_s }) => {
+    const known = words.has(`robot.fault.${code}`) ? code : "other";
+    const said = words.t(`robot.fault.${known}`, { code, about });
+    return for_s === null ? said : words.t("robot.fault_for", { said, seconds: for_s });
+  });
 }
