@@ -40,4 +40,4 @@ def _is_free(port: int) -> bool:
 
 def loopback(domain: int) -> DdsNetwork:
     """A network that stays on this machine."""
-    return DdsNetwork(domain, "lo", ("127.0.0.1",))
+    return DdsNetwork(domain, "127.0.0.1", ("127.0.0.1",))

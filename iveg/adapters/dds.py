@@ -55,7 +55,7 @@ class DdsNetwork:
 
     Attributes:
         domain: 0 to 232, as ``ROS_DOMAIN_ID``.
-        interface: Network interface such as ``lo``; empty: Cyclone's choice.
+        interface: Network interface by name or address; empty: Cyclone's choice.
         peers: Addresses to ask instead of the whole network; none: multicast.
         uri: What ``CYCLONEDDS_URI`` says; counts where nothing above does.
     """
@@ -72,8 +72,9 @@ class DdsNetwork:
     def _own(self) -> str:
         general = discovery = ""
         if self.interface:
-            name = quoteattr(self.interface)
-            general += f"<Interfaces><NetworkInterface name={name}/></Interfaces>"
+            key = "address" if self.interface[0].isdigit() else "name"
+            one = f"{key}={quoteattr(self.interface)}"
+            general += f"<Interfaces><NetworkInterface {one}/></Interfaces>"
         if self.peers:
             general += "<AllowMulticast>false</AllowMulticast>"
             peers = "".join(f"<Peer address={quoteattr(one)}/>" for one in self.peers)
@@ -423,5 +424,6 @@ class _Watch:
     def _tell(self) -> None:
         if self._ended.is_set():
             return
-        self._on_data()
+        # Whatever becomes of this news, the next must be heard.
         self._loop.call_later(_REARM_S, self._rearmed.set)
+        self._on_data()

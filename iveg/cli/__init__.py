@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from iveg import __version__
+from iveg.cli.words import add_robot_words
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
 from iveg.settings import Settings, default_data_directory, describe
 
@@ -56,6 +57,10 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
             from iveg.cli.doctor import run_doctor
 
             return run_doctor(settings, data)
+        case "robot":
+            from iveg.cli.robot import run_robot
+
+            return run_robot(options, settings, data, os.environ)
         case "demo":
             from iveg.cli.demo import demo
 
@@ -138,6 +143,7 @@ def _parser() -> argparse.ArgumentParser:
         part.add_argument(
             "--until-eof", action="store_true", help="end when the input closes"
         )
+    add_robot_words(commands)
     commands.add_parser("provision", help="make devices and subscriptions")
     commands.add_parser("doctor", help="try every hop once and say what is broken")
     commands.add_parser("settings", help="print docs/settings.md")

@@ -48,7 +48,7 @@ def read(message: type[_M], payload: bytes) -> _M:
     cursor = _Cursor(memoryview(payload)[4:], order)
     codec = _codec_of(message)
     codec.read(cursor)
-    return cast("_M", codec.build(iter(cursor.values)))
+    return cast("_M", codec.build(cursor.values, 0)[0])
 
 
 def write(message: Message, order: ByteOrder = "<") -> bytes:
@@ -75,6 +75,7 @@ class _Codec:
     def __init__(self, message: type[Message]) -> None:
         self._message = message
         self._fields = [(name, _nested(kind)) for name, kind in fields_of(message)]
+        self._nested = [nested for _, nested in self._fields]
         self._steps = _merged(self.leaves())
 
     def leaves(self) -> Iterator["One | _Step"]:
@@ -97,14 +98,17 @@ class _Codec:
         for step in self._steps:
             step.write(out, values)
 
-    def build(self, values: Iterator[Any]) -> Any:
-        """The message of these values."""
-        return self._message(
-            *(
-                next(values) if nested is None else nested.build(values)
-                for _, nested in self._fields
-            )
-        )
+    def build(self, values: list[Any], at: int) -> tuple[Any, int]:
+        """The message of the values from ``at`` on, and where the next begins."""
+        parts = []
+        for nested in self._nested:
+            if nested is None:
+                parts.append(values[at])
+                at += 1
+            else:
+                part, at = nested.build(values, at)
+                parts.append(part)
+        return self._message(*parts), at
 
     def flatten(self, message: Any, values: list[Any]) -> None:
         """The values of this message, in order."""
@@ -265,7 +269,7 @@ class _Messages:
         for _ in range(count):
             cursor.values = []
             self._codec.read(cursor)
-            found.append(self._codec.build(iter(cursor.values)))
+            found.append(self._codec.build(cursor.values, 0)[0])
         cursor.values = outer
         outer.append(tuple(found))
 

@@ -50,12 +50,17 @@ def full_name(name: str, namespace: str = "") -> str:
     Raises:
         UnreadableError: not a name of a ROS topic.
     """
-    if _NAME.fullmatch(name) is None:
-        raise UnreadableError("bad_topic", f"{name!r} is not a ROS topic")
-    if name.startswith("/"):
-        return name
     inside = namespace.strip("/")
-    return f"/{inside}/{name}" if inside else f"/{name}"
+    full = name if name.startswith("/") or not inside else f"/{inside}/{name}"
+    if _NAME.fullmatch(full) is None:
+        raise UnreadableError("bad_topic", f"{full!r} is not a ROS topic")
+    return full if full.startswith("/") else f"/{full}"
+
+
+def namespace_of(robot_id: str) -> str:
+    """A ROS name for a robot: ``AGI-2`` → ``agi_2``."""
+    name = robot_id.lower().replace("-", "_")
+    return name if name[0].isalpha() else f"r{name}"
 
 
 def dds_topic(name: str) -> str:

@@ -126,7 +126,7 @@ def test_a_message_of_another_layout_never_arrives(dds: Dds, domain: int) -> Non
 
 def test_a_domain_that_was_opened_otherwise_is_refused(domain: int) -> None:
     with Dds(loopback(domain)), pytest.raises(HopError, match="otherwise"):
-        Dds(type(loopback(domain))(domain, "lo", ("127.0.0.2",)))
+        Dds(type(loopback(domain))(domain, "127.0.0.1", ("127.0.0.2",)))
 
 
 def test_a_network_interface_that_does_not_exist_is_named() -> None:

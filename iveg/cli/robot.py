@@ -1,0 +1,318 @@
+"""``iveg robot``, ``iveg robot check``: a ROS 2 robot joins, or says what it lacks."""
+
+import argparse
+import asyncio
+import logging
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.cli.running import LOOPBACK, run_until_told, tell_ready
+from iveg.domain.errors import (
+    DataFileError,
+    HopError,
+    SettingsError,
+    UnreadableError,
+)
+from iveg.domain.feedback import Feedback
+from iveg.domain.geometry import Twist2D
+from iveg.domain.profiles import RobotProfile, profile_of
+from iveg.ngsi import names
+from iveg.robot.node import RobotNode
+from iveg.robot.ros2.checking import Heard, judge, lines
+from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
+from iveg.robot.ros2.rig import Network, Ros2Robot
+from iveg.robot.ros2.senses import PICTURES, TOPICS, listened
+from iveg.robot.ros2.transforms import TransformBuffer
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from iveg.settings import Settings
+
+if TYPE_CHECKING:
+    from iveg.adapters.dds import DdsNetwork
+
+_log = logging.getLogger(__name__)
+UNUSABLE = 2
+MISSING = (
+    "speaks to ROS 2 through Cyclone DDS, which is not installed: "
+    "pip install 'iveg[ros2]'."
+)
+_CHECK_S = 3.0
+
+
+def run_robot(
+    options: argparse.Namespace,
+    settings: Settings,
+    data: Path,
+    environment: Mapping[str, str],
+) -> int:
+    """Run ``iveg robot``; returns the exit code."""
+    if not names.is_robot_id(options.id):
+        allowed = "1 to 64 letters, digits and hyphens, and no name of iVeg's own"
+        raise SettingsError("--id", options.id, allowed)
+    config, classes = load_config(options, environment)
+    network = network_of(config, environment)
+    if network is None:
+        print(f"iveg: iveg robot {MISSING}", file=sys.stderr)
+        return UNUSABLE
+    if options.action == "check":
+        return asyncio.run(_check(options.id, config, network, settings))
+    if options.attended and _broker(settings).host not in LOOPBACK:
+        raise SettingsError(
+            "--attended", _broker(settings).host, "used with a broker on loopback"
+        )
+    from iveg.adapters.lease import Lease
+
+    with Lease(data / "robots" / f"{options.id}.lease", options.id):
+        work = _ride(options, settings, data, config, classes, network)
+        return run_until_told(work, until_eof=options.until_eof)
+
+
+async def _ride(
+    options: argparse.Namespace,
+    settings: Settings,
+    data: Path,
+    config: RobotConfig,
+    classes: tuple[str, ...],
+    network: "DdsNetwork",
+) -> None:
+    from iveg.adapters.dds import Dds
+
+    with Dds(network) as dds:
+        await refuse_second_gate(dds, config.full_topics.cmd_vel_out)
+        node = partial(_node, options.id, settings, data, config)
+        robot = Ros2Robot(
+            options.id, config, dds, node, classes=classes, sim_time=options.sim_time
+        )
+        if options.attended:
+            robot.node.release_locally()
+        running = asyncio.create_task(robot.run(), name=f"robot-{options.id}")
+        try:
+            tell_ready()
+            await running
+        finally:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+
+def _node(
+    robot_id: str,
+    settings: Settings,
+    data: Path,
+    config: RobotConfig,
+    drive: Callable[[Twist2D], None],
+    on_feedback: Callable[[str, Feedback], None],
+) -> RobotNode:
+    return RobotNode(
+        robot_id,
+        address=_broker(settings),
+        apikey=settings.apikey,
+        profile=_profile(robot_id, config),
+        hold_file=data / "robots" / f"{robot_id}.holds.json",
+        drive=drive,
+        slow_s=settings.feedback_slow_s,
+        stand_s=settings.feedback_stand_s,
+        uplink=settings.uplink,
+        on_feedback=on_feedback,
+    )
+
+
+def _broker(settings: Settings) -> BrokerAddress:
+    return BrokerAddress.from_url(
+        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+    )
+
+
+def _profile(robot_id: str, config: RobotConfig) -> RobotProfile:
+    known = profile_of(robot_id)
+    return replace(
+        known,
+        max_speed=config.drive.max_speed or known.max_speed,
+        max_turn=config.drive.max_turn or known.max_turn,
+    )
+
+
+async def refuse_second_gate(
+    dds: Network, topic: str, discovery_s: float = 1.0, ghost_s: float = 6.0
+) -> None:
+    """Only one program may drive a robot.
+
+    Args:
+        dds: Where.
+        topic: Of the drive.
+        discovery_s: Until everybody there is known (s).
+        ghost_s: A gate that was killed is still announced for its lease of 3 s.
+
+    Raises:
+        HopError: somebody else publishes on the topic.
+    """
+    began = clock.now().mono
+    await asyncio.sleep(discovery_s)
+    while any(
+        one.writes and one.topic == topic and not one.own for one in dds.endpoints()
+    ):
+        if clock.now().mono - began > ghost_s:
+            detail = (
+                f"{topic} has a publisher already: another gate, or a navigation that "
+                "goes round it; only one program may drive this robot"
+            )
+            raise HopError("dds", detail)
+        await asyncio.sleep(0.1)
+
+
+# --- what was said -----------------------------------------------------------------
+
+
+def load_config(
+    options: argparse.Namespace, environment: Mapping[str, str]
+) -> tuple[RobotConfig, tuple[str, ...]]:
+    """File, then words of the command line; and a detector's class list.
+
+    Raises:
+        DataFileError: a file or a name that cannot be used.
+        SettingsError: a domain that is none.
+    """
+    text, file = "", "robot.toml"
+    if getattr(options, "config", None) is not None:
+        file = str(options.config)
+        text = _text_of(options.config)
+    config = read_config(text, file)
+    if options.ros_domain is None and "[ros]" not in text:
+        options.ros_domain = _domain_of(environment)
+    config = _with_words(config, options)
+    try:
+        _ = config.full_topics
+    except UnreadableError as error:
+        raise DataFileError("command line", "", f"{error.detail}.") from error
+    if not config.class_list:
+        return config, ()
+    beside = options.config.parent if options.config is not None else Path()
+    return config, read_classes(_text_of(beside / config.class_list))
+
+
+def _domain_of(environment: Mapping[str, str]) -> int | None:
+    said = environment.get("ROS_DOMAIN_ID", "")
+    if not said:
+        return None
+    if not said.isdecimal():
+        raise SettingsError("ROS_DOMAIN_ID", said, "a whole number from 0 to 232")
+    return int(said)
+
+
+def _with_words(config: RobotConfig, options: argparse.Namespace) -> RobotConfig:
+    topics = {
+        key: value
+        for key in ("cmd_vel_in", "cmd_vel_out")
+        if (value := getattr(options, key, None)) is not None
+    }
+    if options.ros_domain is not None:
+        if not 0 <= options.ros_domain <= 232:
+            said = str(options.ros_domain)
+            raise SettingsError("--ros-domain", said, "a whole number from 0 to 232")
+        config = replace(config, domain=options.ros_domain)
+    if getattr(options, "namespace", None) is not None:
+        config = replace(config, namespace=options.namespace)
+    if options.ros_interface is not None:
+        config = replace(config, interface=options.ros_interface)
+    if options.ros_peer is not None:
+        config = replace(config, peers=tuple(options.ros_peer))
+    return replace(config, topics=replace(config.topics, **topics))
+
+
+def _text_of(file: Path) -> str:
+    try:
+        return file.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise DataFileError(str(file), "", "cannot be read.") from error
+
+
+def network_of(
+    config: RobotConfig, environment: Mapping[str, str]
+) -> "DdsNetwork | None":
+    """Where ROS 2 is; None where Cyclone DDS is not installed."""
+    try:
+        from iveg.adapters.dds import DdsNetwork
+    except ImportError as error:
+        _log.info("no DDS: %s", error)
+        return None
+    uri = environment.get("CYCLONEDDS_URI", "")
+    return DdsNetwork(config.domain, config.interface, config.peers, uri)
+
+
+# --- check -------------------------------------------------------------------------
+
+
+async def _check(
+    robot_id: str, config: RobotConfig, network: "DdsNetwork", settings: Settings
+) -> int:
+    """Listen for three seconds, publish nothing, and say what is missing."""
+    from iveg.adapters.dds import Dds
+
+    heard: dict[str, Heard] = {}
+    transforms = TransformBuffer(config.tf_max_age_s)
+    newest = 0.0
+    with Dds(network) as dds:
+        readers = {
+            topic: dds.reader(
+                name,
+                message,
+                config.qualities[topic].newest(2 if topic in PICTURES else 200),
+            )
+            for topic, (name, message) in listened(config.full_topics).items()
+        }
+        link = MqttLink(_broker(settings), f"check of {robot_id}")
+        task = asyncio.create_task(link.run(), name="broker")
+        began = clock.now().mono
+        while clock.now().mono - began < _CHECK_S:
+            await asyncio.sleep(0.05)
+            for topic, reader in readers.items():
+                for one in reader.take():
+                    newest = max(newest, _hear(topic, one.payload, heard, transforms))
+        broker = None if link.connected else _no_broker(settings)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        verdict = judge(
+            config,
+            dds.endpoints(),
+            heard,
+            transforms,
+            seconds=_CHECK_S,
+            stamp=newest,
+            broker=broker,
+        )
+    fleet = ", ".join(settings.robots)
+    missing = verdict.missing
+    if robot_id not in settings.robots:
+        missing += (f"{robot_id} is not in the fleet that IVEG_ROBOTS names: {fleet}.",)
+    print("\n".join(lines(replace(verdict, missing=missing))))
+    return 1 if missing else 0
+
+
+def _no_broker(settings: Settings) -> str:
+    address = _broker(settings)
+    return f"No MQTT broker answers at {address.host}:{address.port} (IVEG_MQTT_URL)."
+
+
+def _hear(
+    topic: str, payload: bytes, heard: dict[str, Heard], transforms: TransformBuffer
+) -> float:
+    """Count a message; returns its stamp where it is odometry's (s)."""
+    one = heard.setdefault(topic, Heard())
+    one.count += 1
+    try:
+        message = cdr.read(TOPICS[topic], payload)
+    except UnreadableError:
+        one.unreadable += 1
+        return 0.0
+    if isinstance(message, m.TFMessage):
+        transforms.add(message, static=topic == "tf_static")
+        return 0.0
+    header: m.Header = message.header  # type: ignore[attr-defined]
+    one.frame = header.frame_id
+    one.age_s = clock.now().wall - header.stamp.seconds
+    return header.stamp.seconds if topic == "odometry" else 0.0

@@ -1,0 +1,219 @@
+"""``iveg robot check``: what is on DDS, what is missing, and what goes round the gate.
+
+Pure: told what was seen during a few seconds, it says what a person would want to know
+before anything moves.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.drive import message_of
+from iveg.robot.ros2.rig import Known
+from iveg.robot.ros2.senses import listened
+from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
+from iveg.ros2.names import Qos
+from iveg.ros2.schema import Message
+
+_NEEDED = ("odometry", "tf")
+_WANTED = ("scan",)
+_LEAST_HZ = {"odometry": 5.0, "scan": 2.0, "tf": 2.0}
+
+
+@dataclass(slots=True)
+class Heard:
+    """What came on one topic.
+
+    Attributes:
+        count: Messages.
+        unreadable: Of them.
+        age_s: Of the newest by its stamp, on our clock; None: unstamped.
+        frame: Of the newest.
+    """
+
+    count: int = 0
+    unreadable: int = 0
+    age_s: float | None = None
+    frame: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table."""
+
+    topic: str
+    type: str
+    writers: int
+    rate_hz: float
+    age_s: float | None
+    remark: str
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What was found; nothing ``missing`` means that the robot may join."""
+
+    rows: tuple[Row, ...]
+    chain: str
+    missing: tuple[str, ...]
+
+
+def judge(
+    config: RobotConfig,
+    endpoints: Sequence[Known],
+    heard: Mapping[str, Heard],
+    transforms: TransformBuffer,
+    *,
+    seconds: float,
+    stamp: float,
+    broker: str | None,
+) -> Verdict:
+    """Everything that a few seconds of listening tell.
+
+    Args:
+        config: What the robot's topics are called.
+        endpoints: Who is on DDS.
+        heard: By topic key.
+        transforms: As they were heard.
+        seconds: How long was listened (s).
+        stamp: Newest stamp of odometry (s), where the tree is looked at.
+        broker: Why the MQTT broker cannot be reached; None: it can.
+    """
+    names = config.full_topics
+    others = [one for one in endpoints if not one.own]
+    rows, missing = [], [] if broker is None else [broker]
+    if not others:
+        missing.append(
+            f"Nobody speaks ROS 2 on DDS domain {config.domain}: is ROS_DOMAIN_ID "
+            "right, and does multicast pass (else name peers)?"
+        )
+    for topic, (name, message) in listened(names).items():
+        row, faults = _row(topic, name, message, config, others, heard, seconds)
+        rows.append(row)
+        missing += faults if others else []
+    chain, broken = _chain(config, heard, transforms, stamp)
+    missing += broken if others else []
+    missing += _drive(config, others) if others else []
+    return Verdict(tuple(rows), chain, tuple(missing))
+
+
+def _row(
+    topic: str,
+    name: str,
+    message: type[Message],
+    config: RobotConfig,
+    others: Sequence[Known],
+    heard: Mapping[str, Heard],
+    seconds: float,
+) -> tuple[Row, list[str]]:
+    writers = [one for one in others if one.topic == name and one.writes]
+    fitting = [one for one in writers if one.type == message.ROS]
+    one = heard.get(topic, Heard())
+    rate = one.count / seconds
+    asked = config.qualities[topic]
+    deaf = [writer for writer in fitting if not asked.hears(writer.qos)]
+    missing = _complaints(topic, name, message.ROS, writers, fitting)
+    remark = ""
+    if deaf:
+        remark = "QoS mismatch"
+        missing.append(f"{name}: {_mismatch(asked, deaf[0].qos)}; say so in [qos].")
+    elif fitting and one.unreadable:
+        remark = "unreadable"
+        missing.append(f"{name}: {one.unreadable} messages of another layout.")
+    elif fitting and rate < _LEAST_HZ.get(topic, 0.0):
+        remark = "slow"
+        missing.append(f"{name} has a publisher and comes {rate:.1f} times a second.")
+    kind = writers[0].type if writers else message.ROS
+    return Row(name, kind, len(writers), rate, one.age_s, remark), missing
+
+
+def _complaints(
+    topic: str,
+    name: str,
+    kind: str,
+    writers: Sequence[Known],
+    fitting: Sequence[Known],
+) -> list[str]:
+    if writers and not fitting:
+        return [f"{name} is {writers[0].type}, not {kind}."]
+    if not writers and topic in _NEEDED + _WANTED:
+        need = "without it the robot stands" if topic in _NEEDED else "if it has one"
+        return [f"Nobody publishes {name} ({kind}): {need}."]
+    return []
+
+
+def _mismatch(asked: Qos, offered: Qos) -> str:
+    if asked.reliable and not offered.reliable:
+        return "asked for reliably, published best effort"
+    return "asked for transient local, published volatile"
+
+
+def _chain(
+    config: RobotConfig,
+    heard: Mapping[str, Heard],
+    transforms: TransformBuffer,
+    stamp: float,
+) -> tuple[str, list[str]]:
+    frames = config.frames
+    wanted = [frames.odom, frames.base_link]
+    laser = heard.get("scan", Heard()).frame
+    if laser:
+        wanted.append(laser)
+    missing: dict[str, None] = {}
+    for inner in wanted:
+        try:
+            transforms.lookup(frames.map, inner, stamp)
+        except NoTransformError as error:
+            missing[f"TF: {error}."] = None
+    names = " → ".join(reversed(transforms.chain(laser or frames.base_link)))
+    return names, list(missing)
+
+
+def _drive(config: RobotConfig, others: Iterable[Known]) -> list[str]:
+    names, drive = config.full_topics, config.drive
+    found: list[str] = []
+    by: dict[tuple[str, bool], list[Known]] = {}
+    for one in others:
+        by.setdefault((one.topic, one.writes), []).append(one)
+    if by.get((names.cmd_vel_out, True)):
+        found.append(
+            f"Somebody else publishes {names.cmd_vel_out}: only the gate may, remap it "
+            f"to {names.cmd_vel_in}."
+        )
+    base = by.get((names.cmd_vel_out, False), [])
+    if not base:
+        found.append(f"Nobody listens on {names.cmd_vel_out}: is the base running?")
+    if by.get((names.cmd_vel_in, False)):
+        found.append(
+            f"Somebody listens on {names.cmd_vel_in} beside the gate: a base that does "
+            "goes round it."
+        )
+    wishes = by.get((names.cmd_vel_in, True), [])
+    if not wishes:
+        found.append(f"Nobody publishes {names.cmd_vel_in}: is navigation running?")
+    wanted = message_of(stamped=drive.stamped_out).ROS
+    if base and all(one.type != wanted for one in base):
+        found.append(f"{names.cmd_vel_out} is {base[0].type} there: drive.stamped_out.")
+    given = message_of(stamped=drive.stamped_in).ROS
+    if wishes and all(one.type != given for one in wishes):
+        found.append(f"{names.cmd_vel_in} is {wishes[0].type} there: drive.stamped_in.")
+    return found
+
+
+def lines(verdict: Verdict) -> list[str]:
+    """The verdict as a person reads it."""
+    table = [("topic", "type", "writers", "Hz", "age", "")]
+    for row in verdict.rows:
+        known = row.age_s is not None and math.isfinite(row.age_s)
+        age = f"{row.age_s:.2f} s" if known else "-"
+        rate = f"{row.rate_hz:.1f}"
+        table.append((row.topic, row.type, str(row.writers), rate, age, row.remark))
+    widths = [max(len(row[n]) for row in table) for n in range(len(table[0]))]
+    said = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        for row in table
+    ]
+    said = [line.rstrip() for line in said]
+    said += ["", f"TF: {verdict.chain}", ""]
+    return said + (list(verdict.missing) or ["Nothing is missing."])

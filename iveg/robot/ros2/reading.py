@@ -1,0 +1,219 @@
+"""From ROS messages to what iVeg calls things; all that cannot be meant is refused.
+
+Each function is the one place where its message is understood.  Numbers that are none
+raise ``UnreadableError`` with a short, stable reason, which is what gets counted.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Box3D, Twist2D
+from iveg.domain.observations import Detection, LaserScan, Navigation, Origin
+from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
+from iveg.robot.ros2.transforms import Rigid, rigid_of
+from iveg.ros2 import messages as m
+
+FASTEST_M_S = 20.0
+"""Faster than anything that drives between crop rows: a number that cannot be meant."""
+_FARTHEST_M = 1e6
+_TILT = math.radians(10.0)
+_LONGEST_RANGE_M = 1e4
+_FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
+
+
+def read_pose(odometry: m.Odometry) -> Rigid:
+    """Where the robot is in the odometry's frame.
+
+    Raises:
+        UnreadableError: ``not_a_number``.
+    """
+    pose = odometry.pose.pose
+    rigid = rigid_of(pose.position, pose.orientation)
+    if rigid is None or not (np.abs(rigid.move) <= _FARTHEST_M).all():
+        raise UnreadableError("not_a_number", "a pose")
+    return rigid
+
+
+def read_twist(twist: m.Twist) -> Twist2D:
+    """Forward speed and turning; a robot on wheels has no others.
+
+    Raises:
+        UnreadableError: ``not_a_number``, or ``absurd`` above 20 m/s or rad/s.
+    """
+    forward, turn = twist.linear.x, twist.angular.z
+    if not (math.isfinite(forward) and math.isfinite(turn)):
+        raise UnreadableError("not_a_number", "a twist")
+    if max(abs(forward), abs(turn)) > FASTEST_M_S:
+        raise UnreadableError("absurd", f"{forward:g} m/s, {turn:g} rad/s")
+    return Twist2D(forward, turn)
+
+
+def write_twist(twist: Twist2D) -> m.Twist:
+    """The other way."""
+    return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
+
+
+def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
+    """A sweep of a laser that is mounted level, upright or upside down.
+
+    Args:
+        scan: As it came.
+        laser: Where the laser is in ``base_link``.
+
+    Raises:
+        UnreadableError: ``no_beams``, ``too_many_beams`` (above 4,096),
+            ``not_a_number``, ``bad_range``, ``tilted_laser``.
+    """
+    count = scan.ranges.size
+    if not count:
+        raise UnreadableError("no_beams")
+    if count > MAX_BEAMS:
+        raise UnreadableError("too_many_beams", f"{count}")
+    numbers = scan.angle_min, scan.angle_increment, scan.range_min
+    if not all(math.isfinite(one) and abs(one) <= 1e4 for one in numbers):
+        raise UnreadableError("not_a_number", "a sweep")
+    if not scan.range_max > 0.0:
+        raise UnreadableError("bad_range", f"{scan.range_max}")
+    ranges = scan.ranges.astype(np.float32)
+    ranges[~((ranges >= 0.0) & (ranges <= _FARTHEST_M))] = np.inf
+    return LaserScan(
+        "",
+        Origin(),
+        scan.angle_min * _side(laser),
+        scan.angle_increment * _side(laser),
+        max(0.0, scan.range_min),
+        min(scan.range_max, _LONGEST_RANGE_M),
+        laser.flat(),
+        ranges,
+    )
+
+
+def _side(laser: Rigid) -> int:
+    """Which way its angles grow seen from above."""
+    if laser.tilt <= _TILT:
+        return 1
+    if laser.tilt >= math.pi - _TILT:
+        return -1
+    raise UnreadableError("tilted_laser", f"{math.degrees(laser.tilt):.0f}°")
+
+
+def read_detection(
+    detection: m.Detection3D, place: Rigid, classes: tuple[str, ...]
+) -> Detection:
+    """A box in ``map``: the hull of the turned one.
+
+    Args:
+        detection: As it came.
+        place: Where its frame is in ``map``.
+        classes: Names by number; empty: as sent.
+
+    Raises:
+        UnreadableError: ``no_class``, ``bad_probability``, ``not_a_number``.
+    """
+    class_id, probability = read_hypothesis(detection.results, classes)
+    box = rigid_of(detection.bbox.center.position, detection.bbox.center.orientation)
+    size = detection.bbox.size
+    half = np.array((size.x, size.y, size.z)) / 2
+    if box is None or not (np.isfinite(half).all() and (half >= 0).all()):
+        raise UnreadableError("not_a_number", "a box")
+    corners = _CORNERS * half
+    det_id = clean(detection.id) or None
+    hull = hull_of(place.compose(box).of(corners))
+    return Detection(class_id, probability, hull, "map", det_id)
+
+
+def read_hypothesis(
+    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+) -> tuple[str, float]:
+    """Class and probability of the likeliest.
+
+    Raises:
+        UnreadableError: ``no_class`` or ``bad_probability``.
+    """
+    if not results:
+        raise UnreadableError("no_class", "a detection without a hypothesis")
+    best = max(results, key=lambda one: _score(one.hypothesis)).hypothesis
+    if not 0.0 <= best.score <= 1.0:
+        raise UnreadableError("bad_probability", f"{best.score}")
+    name = clean(best.class_id)
+    if name.isdecimal() and int(name) < len(classes):
+        name = clean(classes[int(name)])
+    if not name:
+        raise UnreadableError("no_class", "a class without a name")
+    return name, best.score
+
+
+def _score(hypothesis: m.ObjectHypothesis) -> float:
+    return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
+
+
+_CORNERS = np.array(
+    [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+)
+
+
+def hull_of(points: np.ndarray) -> Box3D:
+    """The upright box about points of shape (n, 3).
+
+    Raises:
+        UnreadableError: ``not_a_number``, ``absurd``.
+    """
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    if not all(abs(side) <= _FARTHEST_M for side in (*low, *high)):
+        raise UnreadableError("absurd", "a box outside of the world")
+    return Box3D(low[0], high[0], low[1], high[1], low[2], high[2])
+
+
+def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigation:
+    """The way ahead in ``map``; a long one is thinned to 1,024 points.
+
+    Raises:
+        UnreadableError: ``not_a_number``.
+    """
+    step = max(1, math.ceil(len(path.poses) / (MAX_PATH - 1)))
+    poses = [*path.poses[::step], *path.poses[-1:]]
+    points = np.array([(p.pose.position.x, p.pose.position.y, 0.0) for p in poses])
+    if not points.size:
+        return Navigation("", Origin(), "idle")
+    if not (np.abs(points) <= _FARTHEST_M).all():
+        raise UnreadableError("not_a_number", "a path")
+    way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
+    return Navigation("", Origin(), task, way[-1], way)
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """What ``sensor_msgs/BatteryState`` says that people ask for.
+
+    Attributes:
+        percentage: 0 to 1; None when unknown.
+        voltage: (V); None when unknown.
+        charging: None when unknown.
+    """
+
+    percentage: float | None
+    voltage: float | None
+    charging: bool | None
+
+
+def read_battery(state: m.BatteryState) -> Battery:
+    """The battery; iVeg has no observation for it yet, this is where it begins.
+
+    ROS writes NaN for what is not measured, and some drivers percent for a share.
+    """
+    share: float | None = state.percentage
+    if share is None or not math.isfinite(share) or not 0.0 <= share <= 100.0:
+        share = None
+    elif share > 1.0:
+        share /= 100.0
+    volts = state.voltage if math.isfinite(state.voltage) else None
+    charging = {1: True, 2: False, 3: False, 4: False}
+    return Battery(share, volts, charging.get(state.power_supply_status))
+
+
+def clean(text: str) -> str:
+    """A text that Orion takes."""
+    return clean_text(text.translate(_FORBIDDEN)).strip()

@@ -1,0 +1,296 @@
+"""One robot between its ROS 2 topics and iVeg: Algorithms 1 and 3 at work over DDS.
+
+Thirty times a second the newest of each topic goes through the safety node to iVeg;
+each twist goes to the gate as it comes.  What the gate says is the only thing that is
+published on the drive's topic, again and again while it is zero, and when this process
+dies nothing is.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from iveg.adapters import clock
+from iveg.domain.errors import HopError
+from iveg.domain.feedback import Feedback
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import RobotFault
+from iveg.robot.node import RobotNode
+from iveg.robot.ros2 import neighbours
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.drive import DriveTopics, message_of
+from iveg.robot.ros2.senses import PICTURES, Payload, Senses, listened
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from iveg.ros2.names import Qos
+from iveg.ros2.schema import Message
+
+_log = logging.getLogger(__name__)
+RATE_HZ = 30.0
+_DEPTH = 50
+"""A topic of which this much waits after a thirtieth of a second is flooded."""
+_PICTURE_DEPTH = 2
+_LOOK_ROUND_S = 0.5
+_TELL_NEIGHBOURS_S = 0.2
+_KNOWN_WITHIN_S = 8.0
+_MET_WITHIN_S = 5.0
+
+
+class Reader(Protocol):
+    """A subscription."""
+
+    def take(self) -> Sequence[Payload]:
+        """Everything that waits, oldest first."""
+        ...
+
+
+class Writer(Protocol):
+    """A publication."""
+
+    def write(self, payload: bytes) -> None:
+        """Send it."""
+        ...
+
+
+class Known(Protocol):
+    """Somebody's writer or reader."""
+
+    @property
+    def topic(self) -> str:
+        """Full ROS name."""
+        ...
+
+    @property
+    def type(self) -> str:
+        """ROS name."""
+        ...
+
+    @property
+    def qos(self) -> Qos:
+        """What it offers or asks for."""
+        ...
+
+    @property
+    def writes(self) -> bool:
+        """A writer, else a reader."""
+        ...
+
+    @property
+    def own(self) -> bool:
+        """It is ours."""
+        ...
+
+
+class Network(Protocol):
+    """DDS, as far as a robot needs it."""
+
+    def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
+        """Subscribe."""
+        ...
+
+    def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
+        """Publish."""
+        ...
+
+    def endpoints(self) -> Sequence[Known]:
+        """All writers and readers there."""
+        ...
+
+    def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
+        """Call back soon after news."""
+        ...
+
+
+NodeMaker = Callable[
+    [Callable[[Twist2D], None], Callable[[str, Feedback], None]], RobotNode
+]
+"""Makes the safety node, given its drive and who is told feedback."""
+
+
+@dataclass(frozen=True, slots=True)
+class _In:
+    """A topic that is read; ``most`` is how much can wait."""
+
+    reader: Reader
+    most: int
+
+
+class Ros2Robot:
+    """One robot.
+
+    Args:
+        robot_id: Who it is for iVeg.
+        config: Names of topics and frames.
+        network: Where they are.
+        make_node: Makes its safety node.
+        classes: A detector's class names by number.
+        sim_time: Stamps are a simulator's.
+    """
+
+    def __init__(
+        self,
+        robot_id: str,
+        config: RobotConfig,
+        network: Network,
+        make_node: NodeMaker,
+        *,
+        classes: tuple[str, ...] = (),
+        sim_time: bool = False,
+    ) -> None:
+        self._id = robot_id
+        self._config, self._names = config, config.full_topics
+        self._network = network
+        self.senses = Senses(config, classes, sim_time=sim_time)
+        self._troubles = self.senses.troubles
+        self._topics = DriveTopics(
+            config.drive,
+            self._names.cmd_vel_in,
+            config.frames.base_link,
+            self._troubles,
+        )
+        self._neighbours = neighbours.Neighbours(robot_id)
+        self._said: frozenset[tuple[str, str]] = frozenset()
+        self._first_feedback: float | None = None
+        self._known = False
+        self._alone_since = clock.now().mono
+        self._open(network)
+        self.node = make_node(self._drive, self._on_feedback)
+
+    def _open(self, network: Network) -> None:
+        qualities, drive = self._config.qualities, self._config.drive
+        self._ins: dict[str, _In] = {}
+        for topic, (name, message) in listened(self._names).items():
+            qos = qualities[topic]
+            if topic in PICTURES:
+                reader = network.reader(name, message, qos.newest(_PICTURE_DEPTH))
+                self._ins[topic] = _In(reader, 0)
+                continue
+            qos = qos.newest(max(_DEPTH, qos.depth))
+            self._ins[topic] = _In(network.reader(name, message, qos), qos.depth)
+        self._wishes = _In(
+            network.reader(
+                self._names.cmd_vel_in,
+                message_of(stamped=drive.stamped_in),
+                qualities["cmd_vel_in"].newest(_DEPTH),
+            ),
+            _DEPTH,
+        )
+        self._out = network.writer(
+            self._names.cmd_vel_out,
+            message_of(stamped=drive.stamped_out),
+            qualities["cmd_vel_out"].newest(),
+        )
+        self._cloud, self._markers = (
+            network.writer(name, message, qualities[topic].newest())
+            if (name := getattr(self._names, topic))
+            else None
+            for topic, message in (
+                ("obstacles", m.PointCloud2),
+                ("markers", m.MarkerArray),
+            )
+        )
+
+    async def run(self) -> None:
+        """Ride on the robot until cancelled; the drive is left at rest."""
+        self._network.watch([self._wishes.reader], self._on_wish)
+        async with asyncio.TaskGroup() as tasks:
+            for name, work in (
+                ("node", self.node.run()),
+                ("senses", self._every(1 / RATE_HZ, self._sense)),
+                ("round", self._every(_LOOK_ROUND_S, self._look_round)),
+                ("tell", self._every(_TELL_NEIGHBOURS_S, self._tell_neighbours)),
+            ):
+                tasks.create_task(work, name=f"{self._id}-{name}")
+
+    async def _every(self, period: float, work: Callable[[], None]) -> None:
+        due = clock.now().mono
+        while True:
+            work()
+            due = max(due + period, clock.now().mono)
+            await asyncio.sleep(max(0.0, due - clock.now().mono))
+
+    # --- in -----------------------------------------------------------------------
+
+    def _sense(self) -> None:
+        now = clock.now()
+        for topic, one in self._ins.items():
+            self.senses.hear(topic, one.reader.take(), now.mono, one.most)
+        for observation in self.senses.tick(now):
+            self.node.sense(observation)
+        self._judge(now.mono)
+
+    def _judge(self, now: float) -> None:
+        faults = self._troubles.faults(now)
+        factor, cause = self._troubles.factor(now)
+        self.node.limit(factor, cause)
+        self.node.tell_faults(faults)
+        self._log(faults)
+
+    def _log(self, faults: tuple[RobotFault, ...]) -> None:
+        """Each trouble once when it begins and once when it is over."""
+        said = frozenset((one.code, one.about) for one in faults)
+        for code, about in said - self._said:
+            _log.warning("%s: %s, %s", self._id, code, about)
+        for code, about in self._said - said:
+            _log.warning("%s: over: %s, %s", self._id, code, about)
+        self._said = said
+
+    def _on_wish(self) -> None:
+        now = clock.now().mono
+        waited = self._wishes.reader.take()
+        if len(waited) >= self._wishes.most:
+            self._troubles.note("flood", self._names.cmd_vel_in, now)
+        if not waited:
+            return
+        wish = self._topics.read(waited[-1].payload, now)
+        if wish is not None:
+            self.node.wish(wish)
+
+    def _look_round(self) -> None:
+        """See who is there, whether somebody else drives, and whether iVeg knows us."""
+        now, out = clock.now().mono, self._names.cmd_vel_out
+        others = [one for one in self._network.endpoints() if not one.own]
+        if any(one.writes and one.topic == out for one in others):
+            self._troubles.note("second_publisher", out, now)
+        if others:
+            self._alone_since = now
+        elif now - self._alone_since > _MET_WITHIN_S:
+            self._troubles.note("nobody_there", f"DDS {self._config.domain}", now)
+        first = self._first_feedback
+        if not self._known and first is not None and now - first > _KNOWN_WITHIN_S:
+            self._troubles.note("unknown_to_iveg", self._id, now)
+
+    def _on_feedback(self, peer: str, feedback: Feedback) -> None:
+        now = clock.now().mono
+        if self._first_feedback is None:
+            self._first_feedback = now
+        self._known = self._known or self._id in feedback.seen
+        self._neighbours.take(peer, feedback, now)
+
+    # --- out ----------------------------------------------------------------------
+
+    def _drive(self, twist: Twist2D) -> None:
+        try:
+            self._out.write(self._topics.write(twist, clock.now().wall))
+        except HopError as error:
+            # Nothing arrives, so the base halts by its own time-out.
+            _log.debug("%s: %s", self._id, error)
+            out = self._names.cmd_vel_out
+            self._troubles.note("drive_refused", out, clock.now().mono)
+
+    def _tell_neighbours(self) -> None:
+        place = self.senses.place
+        if place is None:
+            return
+        now = clock.now()
+        own, stamp = place.flat(), m.Time.of(now.wall)
+        present = self._neighbours.present(own, now.mono)
+        frames = self._config.frames
+        if self._cloud is not None:
+            found = neighbours.cloud(present, own, stamp, frames.base_link)
+            self._cloud.write(cdr.write(found))
+        if self._markers is not None:
+            drawn = neighbours.markers(present, stamp, frames.map)
+            self._markers.write(cdr.write(drawn))

@@ -1,0 +1,65 @@
+"""What the documents say of ROS 2 is what the code has."""
+
+import argparse
+import json
+import re
+from dataclasses import fields
+
+import pytest
+
+from iveg.cli.words import add_robot_words
+from iveg.robot.ros2.config import RobotConfig, Topics, read_config
+from iveg.robot.ros2.senses import TOPICS
+from tests.processes import ROOT
+
+ROBOTS = (ROOT / "docs/robots.md").read_text()
+INTERFACES = (ROOT / "docs/interfaces.md").read_text()
+DEFAULTS = Topics()
+
+
+def test_the_robot_toml_of_the_page_says_the_defaults() -> None:
+    (text,) = re.findall(r"```toml\n(.*?)```", ROBOTS, re.DOTALL)
+
+    config = read_config(text, "docs/robots.md")
+
+    assert config.topics == DEFAULTS
+    assert config.frames == RobotConfig().frames
+    assert config.qualities == RobotConfig().qualities
+    assert (config.tf_max_age_s, config.p_min) == (0.5, 0.8)
+
+
+@pytest.mark.parametrize(
+    "topic", [one.name for one in fields(Topics) if getattr(DEFAULTS, one.name)]
+)
+def test_every_topic_is_in_the_contract(topic: str) -> None:
+    name = getattr(DEFAULTS, topic)
+    beside = topic in ("depth", "camera_info")  # these have the names of one camera
+
+    assert beside or f"`{name}`" in INTERFACES.partition("## 9.")[2]
+
+
+@pytest.mark.parametrize("message", [one.ROS for one in TOPICS.values()])
+def test_every_type_that_is_read_is_in_the_contract(message: str) -> None:
+    assert f"`{message}`" in INTERFACES
+
+
+def test_every_word_of_the_command_line_is_in_the_contract() -> None:
+    parser = argparse.ArgumentParser()
+    add_robot_words(parser.add_subparsers())
+
+    usage = parser.parse_args(["robot", "--id", "AGI"])
+    words = {f"--{name.replace('_', '-')}" for name in vars(usage) if name != "action"}
+
+    assert {word for word in words if f"{word}" not in INTERFACES} <= {"--until-eof"}
+
+
+@pytest.mark.parametrize("language", ["en", "es"])
+def test_every_fault_that_a_card_words_is_on_the_page(language: str) -> None:
+    words = json.loads((ROOT / f"iveg/static/i18n/{language}.json").read_text())
+
+    missing = {
+        code
+        for code in words["robot"]["fault"]
+        if code != "other" and f"`{code}`" not in ROBOTS
+    }
+    assert missing == set()

@@ -1,0 +1,125 @@
+"""``iveg robot``: what it refuses before it touches anything, and in which words."""
+
+import argparse
+import asyncio
+import sys
+from pathlib import Path
+
+import pytest
+
+from iveg.cli import main
+from iveg.cli.robot import load_config, refuse_second_gate, run_robot
+from iveg.cli.words import add_robot_words
+from iveg.domain.errors import DataFileError, HopError, SettingsError
+from iveg.ros2 import messages as m
+from iveg.settings import Settings
+from tests.fakes.ros2_network import Endpoint, FakeNetwork
+
+
+def options(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_robot_words(parser.add_subparsers())
+    return parser.parse_args(["robot", "--id", "AGI", *words])
+
+
+@pytest.mark.parametrize("robot_id", ["climate", "A B", "a" * 65, "AGI;"])
+def test_an_id_that_iveg_cannot_know_is_refused(robot_id: str, tmp_path: Path) -> None:
+    asked = options()
+    asked.id = robot_id
+
+    with pytest.raises(SettingsError, match="--id"):
+        run_robot(asked, Settings(), tmp_path, {})
+
+
+def test_without_cyclone_dds_one_sentence_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    monkeypatch.delitem(sys.modules, "iveg.adapters.dds", raising=False)
+
+    code = run_robot(options(), Settings(), tmp_path, {})
+
+    assert code == 2
+    (sentence,) = capsys.readouterr().err.splitlines()
+    assert "pip install 'iveg[ros2]'" in sentence
+
+
+def test_importing_iveg_needs_no_dds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+
+    assert main(["settings"]) == 0
+
+
+@pytest.mark.parametrize("domain", ["233", "-1"])
+def test_a_domain_that_dds_does_not_have_is_refused(domain: str) -> None:
+    with pytest.raises(SettingsError, match="0 to 232"):
+        load_config(options(f"--ros-domain={domain}"), {})
+
+
+def test_words_count_before_the_file_and_the_file_before_the_environment(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "robot.toml"
+    file.write_text('[ros]\ndomain = 7\nnamespace = "/a"\n[detector]\nclasses = "c"\n')
+    (tmp_path / "c").write_text("tomato\nfarmer\n")
+    environment = {"ROS_DOMAIN_ID": "9"}
+    words = options("--config", str(file), "--namespace", "/b", "--cmd-vel-in", "/go")
+
+    config, classes = load_config(words, environment)
+    bare, _ = load_config(options(), environment)
+    worded, _ = load_config(options("--ros-domain", "3"), environment)
+
+    assert (config.domain, bare.domain, worded.domain) == (7, 9, 3)
+    topics = config.full_topics
+    assert (topics.odometry, topics.cmd_vel_in) == ("/b/odom", "/go")
+    assert classes == ("tomato", "farmer")
+
+
+@pytest.mark.parametrize("said", ["x", "-3", "1.5"])
+def test_a_domain_of_the_environment_that_is_none_is_refused(said: str) -> None:
+    with pytest.raises(SettingsError, match="ROS_DOMAIN_ID"):
+        load_config(options(), {"ROS_DOMAIN_ID": said})
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match="cannot be read"):
+        load_config(options("--config", str(tmp_path / "none.toml")), {})
+
+
+def test_a_topic_of_the_command_line_that_is_none_is_named() -> None:
+    with pytest.raises(DataFileError, match="not a ROS topic"):
+        load_config(options("--cmd-vel-out", "cmd vel"), {})
+
+
+def test_nobody_lets_a_robot_go_over_a_broker_that_is_not_here(
+    tmp_path: Path,
+) -> None:
+    settings = Settings(mqtt_url="mqtt://farm.example:1883")
+    pytest.importorskip("cyclonedds")
+
+    with pytest.raises(SettingsError, match="--attended"):
+        run_robot(options("--attended"), settings, tmp_path, {})
+
+
+# --- one gate a robot ---------------------------------------------------------------
+
+
+async def test_a_drive_that_somebody_else_publishes_is_refused() -> None:
+    network = FakeNetwork()
+    network.others.append(Endpoint("/cmd_vel", m.Twist.ROS))
+
+    with pytest.raises(HopError, match="/cmd_vel has a publisher already"):
+        await refuse_second_gate(network, "/cmd_vel", 0.01, 0.2)
+
+
+async def test_a_gate_that_was_killed_is_waited_for_until_it_is_forgotten() -> None:
+    network = FakeNetwork()
+    network.others.append(Endpoint("/cmd_vel", m.Twist.ROS))
+    network.others.append(Endpoint("/cmd_vel", m.Twist.ROS, writes=False))
+    asyncio.get_running_loop().call_later(0.1, network.others.pop, 0)
+
+    await refuse_second_gate(network, "/cmd_vel", 0.01, 5.0)
+
+    assert [one.writes for one in network.others] == [False]

@@ -1,0 +1,129 @@
+"""What a ROS 2 robot's topics say, for tests: everything has a default."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from iveg.domain.observations import Instant
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.senses import Senses
+from iveg.robot.uplink import Sensed
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
+
+WALL = 1_700_000_000.0
+MONO = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Arrived:
+    """One message as DDS gives it."""
+
+    payload: bytes
+
+
+def at(seconds: float) -> Instant:
+    return Instant(MONO + seconds, WALL + seconds)
+
+
+def stamp(seconds: float = 0.0) -> m.Time:
+    return m.Time.of(WALL + seconds)
+
+
+def turned(yaw: float) -> m.Quaternion:
+    return m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+
+
+def link(
+    outer: str,
+    inner: str,
+    x: float = 0.0,
+    y: float = 0.0,
+    yaw: float = 0.0,
+    *,
+    after: float = 0.0,
+    z: float = 0.0,
+) -> m.TransformStamped:
+    transform = m.Transform(m.Vector3(x, y, z), turned(yaw))
+    return m.TransformStamped(m.Header(stamp(after), outer), inner, transform)
+
+
+def tf(*links: m.TransformStamped) -> m.TFMessage:
+    return m.TFMessage(links)
+
+
+def odometry(
+    x: float = 0.0,
+    v: float = 0.5,
+    *,
+    after: float = 0.0,
+    child: str = "base_link",
+    w: float = 0.0,
+) -> m.Odometry:
+    return m.Odometry(
+        m.Header(stamp(after), "odom"),
+        child,
+        m.PoseWithCovariance(m.Pose(m.Point(x))),
+        m.TwistWithCovariance(m.Twist(m.Vector3(v), m.Vector3(z=w))),
+    )
+
+
+def scan(
+    ranges: Sequence[float] = (1.0, 2.0, 3.0),
+    *,
+    after: float = 0.0,
+    frame: str = "laser",
+) -> m.LaserScan:
+    return m.LaserScan(
+        m.Header(stamp(after), frame),
+        -0.5, 0.5, 0.5, 0.0, 0.1, 0.1, 20.0,
+        np.array(ranges, np.float32),
+    )  # fmt: skip
+
+
+def seen(
+    class_id: str = "farmer",
+    score: float = 0.9,
+    x: float = 2.0,
+    *,
+    frame: str = "base_link",
+    after: float = 0.0,
+) -> m.Detection3D:
+    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis(class_id, score))
+    box = m.BoundingBox3D(m.Pose(m.Point(x, 0.0, 0.9)), m.Vector3(0.4, 0.6, 1.8))
+    return m.Detection3D(m.Header(stamp(after), frame), (sure,), box, "7")
+
+
+def look(*found: m.Detection3D, after: float = 0.0) -> m.Detection3DArray:
+    return m.Detection3DArray(m.Header(stamp(after), "base_link"), found)
+
+
+class Bench:
+    """Senses that are told messages; by default all of TF is there."""
+
+    def __init__(
+        self,
+        config: RobotConfig | None = None,
+        *,
+        tree: bool = True,
+        classes: tuple[str, ...] = (),
+    ) -> None:
+        self.senses = Senses(config or RobotConfig(), classes)
+        if tree:
+            self.hear("tf_static", tf(link("base_link", "laser", 0.3)))
+            self.hear("tf", tf(link("map", "odom", 10.0)))
+
+    def hear(self, topic: str, message: Message, after: float = 0.0) -> "Bench":
+        self.senses.hear(topic, [Arrived(cdr.write(message))], MONO + after)
+        return self
+
+    def tick(self, after: float = 0.0) -> list[Sensed]:
+        return self.senses.tick(at(after))
+
+    def faults(self, after: float = 0.0) -> dict[str, str]:
+        """Code → what about."""
+        found = self.senses.troubles.faults(MONO + after)
+        return {one.code: one.about for one in found}

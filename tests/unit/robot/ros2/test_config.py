@@ -1,0 +1,114 @@
+"""``robot.toml``: ROS's defaults where nothing is said, a line where it is wrong."""
+
+import pytest
+
+from iveg.domain.errors import DataFileError, UnreadableError
+from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
+from iveg.ros2 import names
+from iveg.ros2.names import Qos
+
+WHOLE = """\
+[ros]
+domain = 7
+namespace = "/agi"
+interface = "eth0"
+peers = ["10.0.0.5"]
+
+[topics]
+odometry = "odometry/filtered"
+tf = "/tf"
+battery = ""
+
+[frames]
+map = "/world"
+
+[drive]
+stamped_in = true
+max_speed = 0.6
+
+[transforms]
+max_age_s = 0.3
+
+[detector]
+classes = "yolox.txt"
+p_min = 0.5
+
+[qos.scan]
+reliable = true
+depth = 2
+"""
+
+
+def test_without_a_word_everything_is_as_ros_does_it() -> None:
+    config = read_config("", "robot.toml")
+
+    assert config == RobotConfig()
+    topics = config.full_topics
+    assert (topics.odometry, topics.scan, topics.tf, topics.cmd_vel_out) == (
+        "/odom",
+        "/scan",
+        "/tf",
+        "/cmd_vel",
+    )
+    assert config.qualities["scan"] == Qos(reliable=False, depth=5)
+    assert config.qualities["tf_static"].transient_local
+    assert config.qualities["tf"].reliable
+
+
+def test_what_is_said_counts_and_the_rest_stays() -> None:
+    config = read_config(WHOLE, "robot.toml")
+
+    topics = config.full_topics
+    assert (config.domain, config.interface, config.peers) == (
+        7,
+        "eth0",
+        ("10.0.0.5",),
+    )
+    assert (topics.odometry, topics.scan) == ("/agi/odometry/filtered", "/agi/scan")
+    assert (topics.tf, topics.battery) == ("/tf", "")
+    assert (config.frames.map, config.frames.odom) == ("world", "odom")
+    assert (config.drive.stamped_in, config.drive.max_speed) == (True, 0.6)
+    assert (config.tf_max_age_s, config.p_min) == (0.3, 0.5)
+    assert config.qualities["scan"] == Qos(reliable=True, depth=2)
+    assert config.qualities["tf"] == names.TF
+
+
+@pytest.mark.parametrize(
+    ("text", "where"),
+    [
+        ("[ros]\ndomain = 300\n", "line 2, ros.domain: must be a whole number"),
+        ("[ros]\n\ndomain = 1.5\n", "line 3, ros.domain"),
+        ("[ros]\ndomain = true\n", "line 2, ros.domain"),
+        ("[ros]\nnamespace = '/a b'\n", "line 2, ros.namespace: '/a b' is not a ROS"),
+        ("[ros]\npeers = '10.0.0.5'\n", "line 2, ros.peers: must be a list"),
+        ("[topics]\nscan = '1scan'\n", "line 2, topics.scan"),
+        ("[topics]\nscna = 'scan'\n", "line 2, topics.scna: is unknown; known are"),
+        ("[topic]\nscan = 'scan'\n", "line 1, topic: is unknown; known are"),
+        ("ros = 3\n", "line 1, ros: must be a table"),
+        ("[drive]\nstamped_in = 1\n", "line 2, drive.stamped_in: must be true or"),
+        ("[drive]\nmax_speed = nan\n", "line 2, drive.max_speed: must be a number"),
+        ("[frames]\nmap = ''\n", "line 2, frames.map"),
+        ("[frames]\nmap = 'a b'\n", "line 2, frames.map: must name a frame"),
+        ("[qos.scan]\nreliable = 'yes'\n", "line 1, qos.scan: reliable must be"),
+        ("[qos.scan]\ndepth = 0\n", "line 1, qos.scan: depth must be"),
+        ("[qos.nothing]\ndepth = 1\n", "line 1, qos.nothing: is unknown"),
+        ("[qos]\nscan = 3\n", "line 2, qos.scan: must be a table"),
+        ("[ros]\ndomain == 3\n", "line 2: is not TOML"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused_with_its_line(
+    text: str, where: str
+) -> None:
+    with pytest.raises(DataFileError) as error:
+        read_config(text, "robot.toml")
+
+    assert f"robot.toml, {where}" in str(error.value)
+
+
+def test_a_namespace_of_the_command_line_is_held_to_the_same_rule() -> None:
+    with pytest.raises(UnreadableError):
+        _ = RobotConfig(namespace="/a;b").full_topics
+
+
+def test_a_class_list_has_a_name_a_line() -> None:
+    assert read_classes("tomato\n\n farmer \n") == ("tomato", "farmer")

@@ -1,0 +1,98 @@
+"""Wishes in, the gate's word out."""
+
+import math
+
+import pytest
+
+from iveg.domain.geometry import Twist2D
+from iveg.robot.gate import REST
+from iveg.robot.ros2.config import Drive
+from iveg.robot.ros2.drive import DriveTopics
+from iveg.robot.ros2.trouble import Troubles
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from tests.unit.robot.ros2.said import stamp
+
+AHEAD = m.Twist(m.Vector3(0.5, 0.1, 0.2), m.Vector3(0.3, 0.4, -0.2))
+
+
+def topics(**drive: bool) -> tuple[DriveTopics, Troubles]:
+    troubles = Troubles()
+    found = DriveTopics(Drive(**drive), "/cmd_vel_nav", "base_link", troubles)
+    return found, troubles
+
+
+def wished(after: float, forward: float = 0.5) -> bytes:
+    header = m.Header(stamp(after), "base_link")
+    return cdr.write(m.TwistStamped(header, m.Twist(m.Vector3(forward))))
+
+
+def test_of_a_twist_what_wheels_can_do_is_read() -> None:
+    found, _ = topics()
+
+    assert found.read(cdr.write(AHEAD), 0.0) == Twist2D(0.5, -0.2)
+
+
+@pytest.mark.parametrize(
+    ("forward", "code"),
+    [
+        (math.nan, "not_a_number"),
+        (-math.inf, "not_a_number"),
+        (1e300, "absurd"),
+        (-21.0, "absurd"),
+    ],
+)
+def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
+    forward: float, code: str
+) -> None:
+    found, troubles = topics()
+
+    wish = found.read(cdr.write(m.Twist(m.Vector3(forward))), 5.0)
+
+    assert wish == REST
+    assert troubles.counters == {code: 1}
+    assert troubles.factor(5.0) == (0.5, code)
+
+
+def test_bytes_that_are_no_twist_are_a_wish_to_rest() -> None:
+    found, troubles = topics()
+
+    assert found.read(b"\0\1\0\0", 5.0) == REST
+    assert troubles.counters == {"too_short": 1}
+
+
+def test_a_stamped_twist_that_was_overtaken_is_dropped() -> None:
+    found, troubles = topics(stamped_in=True)
+
+    first, late = found.read(wished(1.0), 0.0), found.read(wished(0.9), 0.1)
+
+    assert (first, late) == (Twist2D(0.5, 0.0), None)
+    assert troubles.counters == {"time_back": 1}
+
+
+def test_a_sender_whose_clock_was_set_back_is_believed() -> None:
+    found, _ = topics(stamped_in=True)
+    found.read(wished(1.0), 0.0)
+
+    assert found.read(wished(-3600.0), 0.1) == Twist2D(0.5, 0.0)
+    assert found.read(wished(-3599.9), 0.2) == Twist2D(0.5, 0.0)
+
+
+def test_a_sender_that_stamps_nothing_is_believed() -> None:
+    found, _ = topics(stamped_in=True)
+    bare = cdr.write(m.TwistStamped(m.Header(), AHEAD))
+
+    assert [found.read(bare, n / 10) for n in range(2)] == [Twist2D(0.5, -0.2)] * 2
+
+
+def test_what_the_gate_says_is_written_as_the_base_wants_it() -> None:
+    plain, _ = topics()
+    stamped, _ = topics(stamped_out=True)
+    twist = Twist2D(0.25, -0.5)
+
+    bare = cdr.read(m.Twist, plain.write(twist, 12.5))
+    whole = cdr.read(m.TwistStamped, stamped.write(twist, 12.5))
+
+    assert (bare.linear.x, bare.angular.z, bare.linear.y) == (0.25, -0.5, 0.0)
+    assert whole.twist == bare
+    assert (whole.header.stamp.seconds, whole.header.frame_id) == (12.5, "base_link")

@@ -1,0 +1,196 @@
+"""Boxes in a picture, with depth: the paper's grounding, into map."""
+
+import math
+
+import numpy as np
+import pytest
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import DetectionFrame
+from iveg.robot.ros2 import pictures
+from iveg.robot.ros2.config import RobotConfig, Topics
+from iveg.ros2 import messages as m
+from tests.unit.robot.ros2 import said
+from tests.unit.robot.ros2.said import Bench, tf
+
+WIDTH, HEIGHT, FOCAL = 64, 48, 60.0
+PERSON, WALL = 3.0, 6.0
+TOPICS = Topics(detections_2d="boxes", depth="depth", camera_info="info", mask="mask")
+
+
+def info(**differs: float) -> m.CameraInfo:
+    p = np.zeros(12)
+    p[0], p[5] = differs.get("fx", FOCAL), differs.get("fy", FOCAL)
+    p[2], p[6], p[10] = (WIDTH - 1) / 2, (HEIGHT - 1) / 2, 1.0
+    header = m.Header(said.stamp(), "camera_optical")
+    return m.CameraInfo(header, HEIGHT, WIDTH, p=p)
+
+
+def scene() -> np.ndarray:
+    """A person at 3 m in the middle, before a wall at 6 m; (m)."""
+    depth = np.full((HEIGHT, WIDTH), WALL)
+    depth[10:40, 25:40] = PERSON
+    return depth
+
+
+def image(
+    pixels: np.ndarray, encoding: str, kind: str, *, big: bool = False, pad: int = 0
+) -> m.Image:
+    rows = np.ascontiguousarray(pixels.astype((">" if big else "<") + kind))
+    raw = np.frombuffer(rows.tobytes(), np.uint8).reshape(pixels.shape[0], -1)
+    raw = np.pad(raw, ((0, 0), (0, pad)))
+    header = m.Header(said.stamp(), "camera_optical")
+    return m.Image(
+        header, HEIGHT, WIDTH, encoding, int(big), raw.shape[1], raw.reshape(-1)
+    )
+
+
+def depth() -> m.Image:
+    return image(scene() * 1000, "16UC1", "u2")
+
+
+def box(score: float = 0.9, x: float = 32.0) -> m.Detection2D:
+    sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis("farmer", score))
+    place = m.PicturePose(m.Point2D(x, 25.0))
+    return m.Detection2D(m.Header(), (sure,), m.BoundingBox2D(place, 20.0, 34.0), "")
+
+
+def look(*boxes: m.Detection2D) -> m.Detection2DArray:
+    return m.Detection2DArray(m.Header(said.stamp(), "camera_optical"), boxes)
+
+
+def bench() -> Bench:
+    """A camera 1 m above the floor, 10 m east of map's origin, looking east."""
+    found = Bench(RobotConfig(topics=TOPICS), tree=False)
+    optical = m.Quaternion(-0.5, 0.5, -0.5, 0.5)
+    place = m.Transform(m.Vector3(10.0, 0.0, 1.0), optical)
+    header = m.Header(said.stamp(), "map")
+    found.hear("tf_static", tf(m.TransformStamped(header, "camera_optical", place)))
+    return found
+
+
+def grounded(bench: Bench, after: float = 0.0) -> DetectionFrame:
+    (found,) = bench.tick(after)
+    assert isinstance(found, DetectionFrame)
+    return found
+
+
+def test_a_box_and_depth_become_a_box_in_map() -> None:
+    found = grounded(
+        bench()
+        .hear("depth", depth())
+        .hear("camera_info", info())
+        .hear("detections_2d", look(box()))
+    )
+
+    (one,) = found.detections
+    assert (one.class_id, one.frame_id) == ("farmer", "map")
+    assert one.box.xmin == pytest.approx(13.0, abs=0.05)
+    assert one.box.xmax == pytest.approx(13.0, abs=0.05)
+    assert 0.4 < one.box.ymax - one.box.ymin < 0.8
+    assert one.box.zmax - one.box.zmin == pytest.approx(1.3, abs=0.3)
+
+
+def test_a_mask_says_which_pixels_are_whose() -> None:
+    mask = np.zeros((HEIGHT, WIDTH))
+    mask[10:40, 25:33] = 1
+    mask[10:40, 33:40] = 2
+    found = grounded(
+        bench()
+        .hear("depth", depth())
+        .hear("camera_info", info())
+        .hear("mask", image(mask, "mono8", "u1"))
+        .hear("detections_2d", look(box(), box()))
+    )
+
+    left, right = (one.box for one in found.detections)
+    assert left.ymin > right.ymax - 0.1
+    assert left.ymin > -0.1
+
+
+def test_a_look_waits_for_its_depth_picture() -> None:
+    one = bench().hear("camera_info", info()).hear("detections_2d", look(box()))
+    early = one.tick()
+
+    found = grounded(one.hear("depth", depth(), 0.1), 0.1)
+
+    assert early == []
+    assert len(found.detections) == 1
+
+
+def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
+    one = bench().hear("camera_info", info()).hear("detections_2d", look(box()))
+    one.tick()
+
+    found = grounded(one, 0.4)
+
+    assert (found.detections, found.unreadable) == ((), 1)
+    assert one.faults(0.4)["no_depth"] == "/boxes"
+
+
+def test_a_camera_without_a_place_counts_everybody_as_lost() -> None:
+    one = Bench(RobotConfig(topics=TOPICS), tree=False).hear("depth", depth())
+
+    found = grounded(one.hear("camera_info", info()).hear("detections_2d", look(box())))
+
+    assert found.unreadable == 1
+    assert one.faults()["no_transform"] == "map → camera_optical"
+
+
+def test_an_empty_look_needs_no_depth() -> None:
+    one = bench().hear("depth", depth()).hear("camera_info", info())
+
+    found = grounded(one.hear("detections_2d", look()))
+
+    assert (found.detections, found.unreadable) == ((), 0)
+
+
+def test_who_is_not_sure_enough_is_left_out_and_not_lost() -> None:
+    one = bench().hear("depth", depth()).hear("camera_info", info())
+
+    found = grounded(one.hear("detections_2d", look(box(0.4))))
+
+    assert (found.detections, found.unreadable) == ((), 0)
+
+
+@pytest.mark.parametrize("x", [math.nan, -500.0])
+def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
+    one = bench().hear("depth", depth()).hear("camera_info", info())
+
+    found = grounded(one.hear("detections_2d", look(box(x=x))))
+
+    assert found.unreadable == 1
+
+
+@pytest.mark.parametrize(
+    "picture",
+    [
+        depth(),
+        image(scene() * 1000, "16UC1", "u2", big=True, pad=6),
+        image(scene(), "32FC1", "f4"),
+        image(scene() * 1000, "mono16", "u2", pad=2),
+    ],
+)
+def test_depth_is_read_in_every_encoding_that_ros_uses(picture: m.Image) -> None:
+    read = pictures.read_depth(picture, info())
+
+    assert np.allclose(read.depth, scene(), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("picture", "camera", "reason"),
+    [
+        (image(scene(), "rgb8", "u1"), info(), "bad_encoding"),
+        (m.Image(height=9, width=9, encoding="16UC1", step=18), info(), "bad_picture"),
+        (depth(), info(fx=math.nan), "bad_camera"),
+        (depth(), info(fy=90.0), "bad_camera"),
+        (depth(), m.CameraInfo(height=4, width=4), "bad_camera"),
+    ],
+)
+def test_a_picture_that_cannot_be_used_is_named(
+    picture: m.Image, camera: m.CameraInfo, reason: str
+) -> None:
+    with pytest.raises(UnreadableError) as error:
+        pictures.read_depth(picture, camera)
+
+    assert error.value.reason == reason

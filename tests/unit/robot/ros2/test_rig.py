@@ -1,0 +1,160 @@
+"""A ROS 2 robot's topics and its safety node, on a network in memory."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.feedback import Feedback
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Origin
+from iveg.domain.profiles import AGI
+from iveg.robot.node import RobotNode
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.rig import Ros2Robot
+from iveg.ros2 import messages as m
+from tests.fakes.ros2_network import Endpoint, FakeNetwork
+from tests.ports import free_ports
+
+
+async def until(true: Callable[[], object], within_s: float = 5.0) -> None:
+    deadline = time.monotonic() + within_s
+    while not true():
+        assert time.monotonic() < deadline, "did not come true in time"
+        await asyncio.sleep(0.005)
+
+
+@dataclass
+class Site:
+    """A robot that runs; no broker answers it."""
+
+    robot: Ros2Robot
+    network: FakeNetwork
+    feedback: Callable[[str, Feedback], None]
+    task: asyncio.Task[None]
+
+    @property
+    def driven(self) -> list[m.Twist]:
+        """All that the base was told."""
+        return self.network.writers["/agi/cmd_vel"].said()
+
+    def faults(self) -> set[str]:
+        now = clock.now().mono
+        return {one.code for one in self.robot.senses.troubles.faults(now)}
+
+
+@contextlib.asynccontextmanager
+async def riding(folder: Path) -> AsyncIterator[Site]:
+    (port,) = free_ports(1)
+    network = FakeNetwork()
+    told: list[Callable[[str, Feedback], None]] = []
+
+    def node(
+        drive: Callable[[Twist2D], None], hear: Callable[[str, Feedback], None]
+    ) -> RobotNode:
+        told.append(hear)
+        return RobotNode(
+            "AGI",
+            address=BrokerAddress("127.0.0.1", port),
+            apikey="iveg",
+            profile=AGI,
+            hold_file=folder / "holds.json",
+            drive=drive,
+            on_feedback=hear,
+        )
+
+    robot = Ros2Robot("AGI", RobotConfig(namespace="/agi"), network, node)
+    task = asyncio.create_task(robot.run())
+    site = Site(robot, network, told[0], task)
+    try:
+        yield site
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+
+
+@pytest.fixture
+async def site(tmp_path: Path) -> AsyncIterator[Site]:
+    async with riding(tmp_path) as found:
+        yield found
+
+
+def placed(network: FakeNetwork) -> None:
+    """Odometry in map, as a localised robot has it."""
+    header = m.Header(m.Time.of(clock.now().wall), "map")
+    links = (m.TransformStamped(header, "odom"),)
+    network.publish("/agi/tf", m.TFMessage(links))
+    odom = m.Header(header.stamp, "odom")
+    network.publish("/agi/odom", m.Odometry(odom, "base_link"))
+
+
+async def test_while_it_is_held_the_base_is_told_zero_again_and_again(
+    site: Site,
+) -> None:
+    for _ in range(10):
+        site.network.publish("/agi/cmd_vel_nav", m.Twist(m.Vector3(0.5)))
+
+    await until(lambda: len(site.driven) >= 20)
+
+    assert set(site.driven) == {m.Twist()}
+
+
+async def test_a_second_publisher_of_the_drives_topic_makes_it_stand(
+    site: Site,
+) -> None:
+    placed(site.network)
+    site.network.others.append(Endpoint("/agi/cmd_vel", m.Twist.ROS))
+
+    await until(lambda: "second_publisher" in site.faults())
+    await until(lambda: site.robot.node.speed_factor == 0.0)
+
+
+async def test_our_own_writer_is_no_second_publisher(site: Site) -> None:
+    site.network.others.append(Endpoint("/agi/cmd_vel", m.Twist.ROS, own=True))
+    site.network.others.append(Endpoint("/agii/cmd_vel", m.Twist.ROS))
+
+    await until(lambda: len(site.driven) >= 20)
+
+    assert "second_publisher" not in site.faults()
+
+
+async def test_a_flood_of_wishes_is_named(site: Site) -> None:
+    site.network.publish("/agi/cmd_vel_nav", m.Twist(), times=50)
+
+    await until(lambda: "flood" in site.faults())
+
+
+async def test_who_is_near_goes_out_for_the_costmap_and_for_rviz(site: Site) -> None:
+    peer = Feedback("AGII", Origin("c", 1), pose=Pose2D(3.0, 0.0, 0.0), seen={})
+    placed(site.network)
+    site.feedback("AGII", peer)
+
+    cloud, markers = (
+        site.network.writers[f"/agi/iveg/{name}"] for name in ("obstacles", "markers")
+    )
+    await until(lambda: markers.sent and markers.said()[-1].markers)
+
+    assert cloud.said()[-1].header.frame_id == "base_link"
+    assert {one.text for one in markers.said()[-1].markers} == {"", "AGII"}
+
+
+async def test_what_is_wrong_goes_out_with_the_next_report(site: Site) -> None:
+    await until(lambda: "no_data" in site.faults())
+
+    assert site.robot.senses.troubles.counters["no_data"] > 0
+    await until(lambda: site.robot.node.speed_factor < 1.0)
+
+
+async def test_when_it_ends_the_base_is_told_to_rest(tmp_path: Path) -> None:
+    async with riding(tmp_path) as site:
+        await until(lambda: site.driven)
+        before = len(site.driven)
+
+    assert len(site.driven) > before
+    assert site.driven[-1] == m.Twist()

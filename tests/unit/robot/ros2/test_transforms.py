@@ -1,0 +1,157 @@
+"""The TF tree: through it, between two moments, and what it says when it cannot."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from iveg.domain.geometry import Pose2D
+from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer, rigid_of
+from iveg.ros2 import messages as m
+from tests.unit.robot.ros2.said import WALL, link, stamp, tf
+
+SMALL = st.floats(-10, 10)
+ANGLE = st.floats(-3.1, 3.1)
+
+
+def tree(*moving: m.TransformStamped) -> TransformBuffer:
+    found = TransformBuffer(0.5)
+    found.add(tf(link("base_link", "laser", 0.3, 0.0, math.pi / 2)), static=True)
+    found.add(tf(*moving), static=False)
+    return found
+
+
+def test_a_chain_is_followed_up_and_down() -> None:
+    found = tree(link("map", "odom", 10.0), link("odom", "base_link", 1.0, 2.0))
+
+    laser = found.lookup("map", "laser", WALL).flat()
+    back = found.lookup("laser", "map", WALL).flat()
+
+    assert (laser.x, laser.y, laser.yaw) == pytest.approx((11.3, 2.0, math.pi / 2))
+    assert laser.compose(back).x == pytest.approx(0.0)
+
+
+def test_frames_are_found_through_what_they_share() -> None:
+    found = TransformBuffer(0.5)
+    found.add(
+        tf(link("base_link", "laser", 0.3), link("base_link", "camera", 0.5)),
+        static=True,
+    )
+
+    assert found.lookup("laser", "camera", WALL).flat().x == pytest.approx(0.2)
+
+
+def test_a_frame_is_where_it_is_in_itself() -> None:
+    assert TransformBuffer().lookup("map", "map", WALL).flat() == Pose2D(0, 0, 0)
+
+
+def test_between_two_moments_a_transform_is_interpolated_turning_least() -> None:
+    found = tree(
+        link("map", "odom", 0.0, 0.0, math.pi - 0.1),
+        link("map", "odom", 1.0, 0.0, -math.pi + 0.3, after=1.0),
+    )
+
+    half = found.lookup("map", "odom", WALL + 0.5).flat()
+
+    assert half.x == pytest.approx(0.5)
+    assert math.cos(half.yaw - (math.pi + 0.1)) == pytest.approx(1.0)
+
+
+@given(SMALL, SMALL, ANGLE, SMALL, SMALL, ANGLE, st.floats(0.0, 1.0))
+def test_interpolation_is_that_of_poses_on_the_floor(
+    x0: float, y0: float, a0: float, x1: float, y1: float, a1: float, part: float
+) -> None:
+    found = tree(
+        link("map", "odom", x0, y0, a0), link("map", "odom", x1, y1, a1, after=1.0)
+    )
+    flat = Pose2D(x0, y0, a0).interpolate(Pose2D(x1, y1, a1), part)
+
+    between = found.lookup("map", "odom", stamp(part).seconds).flat()
+
+    assert between.x == pytest.approx(flat.x, abs=1e-4)
+    turn = math.cos(between.yaw - flat.yaw)
+    opposite = abs(abs(a1 - a0) - math.pi) < 1e-3
+    assert opposite or turn == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_moment_after_the_newest_it_still_counts_and_then_it_is_named() -> None:
+    found = tree(link("map", "odom", 1.0))
+
+    assert found.lookup("map", "odom", WALL + 0.5).flat().x == 1.0
+    with pytest.raises(NoTransformError, match=r"no map → odom for 2\.1 s") as error:
+        found.lookup("map", "odom", WALL + 2.1)
+    assert error.value.for_s == pytest.approx(2.1)
+
+
+def test_a_link_that_never_was_is_named_by_what_it_would_join() -> None:
+    found = tree(link("odom", "base_link"))
+
+    with pytest.raises(NoTransformError, match=r"^no map → odom$"):
+        found.lookup("map", "laser", WALL)
+
+
+def test_long_before_the_oldest_nothing_is_known() -> None:
+    found = tree(link("map", "odom"))
+
+    with pytest.raises(NoTransformError):
+        found.lookup("map", "odom", WALL - 0.6)
+
+
+def test_only_ten_seconds_are_kept() -> None:
+    found = tree(*(link("map", "odom", float(n), after=n / 2) for n in range(40)))
+
+    assert found.lookup("map", "odom", WALL + 10.0).flat().x == 20.0
+    with pytest.raises(NoTransformError):
+        found.lookup("map", "odom", WALL + 5.0)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        link("map", "odom", math.nan),
+        link("map", "map"),
+        link("", "odom"),
+        m.TransformStamped(
+            m.Header(stamp(), "map"),
+            "odom",
+            m.Transform(m.Vector3(), m.Quaternion(0.0, 0.0, 0.0, 0.0)),
+        ),
+    ],
+)
+def test_what_is_no_transform_is_refused(bad: m.TransformStamped) -> None:
+    assert TransformBuffer().add(tf(bad), static=False) == 1
+
+
+def test_an_older_transform_changes_nothing() -> None:
+    found = tree(link("map", "odom", 1.0, after=1.0))
+
+    refused = found.add(tf(link("map", "odom", 9.0)), static=False)
+
+    assert refused == 1
+    assert found.lookup("map", "odom", WALL + 1.0).flat().x == 1.0
+
+
+def test_two_frames_that_are_each_others_parent_end_nowhere() -> None:
+    found = TransformBuffer()
+    found.add(tf(link("a", "b"), link("b", "a")), static=True)
+
+    with pytest.raises(NoTransformError):
+        found.lookup("map", "a", WALL)
+
+
+def test_as_many_frames_as_somebody_invents_take_no_memory() -> None:
+    found = TransformBuffer()
+
+    refused = found.add(tf(*(link("map", f"f{n}") for n in range(300))), static=False)
+
+    assert refused == 300 - 256
+
+
+def test_a_quaternion_of_any_length_is_a_turn() -> None:
+    rigid = rigid_of(m.Vector3(), m.Quaternion(0.0, 0.0, 3.0, 3.0))
+
+    assert rigid is not None
+    assert rigid.flat().yaw == pytest.approx(math.pi / 2)
+    assert np.allclose(rigid.turn @ rigid.turn.T, np.eye(3))
