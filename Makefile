@@ -11,9 +11,10 @@ SIDE_BY_SIDE := -n $(WORKERS) --dist loadscope --no-loadscope-reorder
 export PYTHONPATH := $(CURDIR)
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo test quick setup format check bench deep chaos mutants soak migration lock clean
+.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos mutants soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
+demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
 test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
 quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
 setup: $(DEV)
@@ -21,7 +22,7 @@ format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
 bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
-chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest tests/chaos/test_kills.py tests/chaos/test_backlog.py
+chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"

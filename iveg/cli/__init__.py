@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from iveg import __version__
-from iveg.cli.words import add_robot_words
+from iveg.cli.words import add_network_words, add_robot_words
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
 from iveg.settings import Settings, default_data_directory, describe
 
@@ -65,7 +65,9 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
             from iveg.cli.demo import demo
 
             emulator = not options.no_emulator
-            return demo(settings, os.environ, data, emulator=emulator)
+            return demo(
+                settings, os.environ, data, emulator=emulator, ros2=options.ros2
+            )
         case _:
             from iveg.cli import parts
 
@@ -84,6 +86,9 @@ def _parser() -> argparse.ArgumentParser:
     demo = commands.add_parser("demo", help="everything on one machine")
     demo.add_argument(
         "--no-emulator", action="store_true", help="no robots: for `iveg replay`"
+    )
+    demo.add_argument(
+        "--ros2", action="store_true", help="the robots speak ROS 2, as real ones do"
     )
     serve = commands.add_parser("serve", help="the DSS and its page")
     serve.add_argument("--demo", action="store_true", help=argparse.SUPPRESS)
@@ -117,6 +122,10 @@ def _parser() -> argparse.ArgumentParser:
     emulator.add_argument(
         "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
     )
+    emulator.add_argument(
+        "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
+    )
+    add_network_words(emulator)
     replay = commands.add_parser("replay", help="recorded logs as robots")
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")
     replay.add_argument(

@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 
 from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link
 from iveg.domain.errors import SettingsError
+from iveg.ros2.names import namespace_of
 from iveg.settings import Settings
 
 _log = logging.getLogger(__name__)
@@ -41,6 +42,7 @@ def demo(
     data: Path,
     *,
     emulator: bool = True,
+    ros2: bool = False,
 ) -> int:
     """Run the demo; returns the exit code."""
     directory = data / "demo"
@@ -57,8 +59,40 @@ def demo(
         **environment,
         **placed.to_environment(),
     }
-    parts = [["fiware"], ["serve", "--demo"], *([["emulator"]] if emulator else [])]
+    parts = [["fiware"], ["serve", "--demo"]]
+    if ros2:
+        parts += _ros2_parts(placed.robots)
+    elif emulator:
+        parts.append(["emulator"])
     return run_until_told(_supervise(parts, placed, child_environment))
+
+
+def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
+    """Robots that speak ROS 2 on loopback, and the software that rides on each."""
+    place = ["--ros-domain", str(_free_domain()), "--ros-interface", "127.0.0.1"]
+    place += ["--ros-peer", "127.0.0.1"]
+    parts = [["emulator", "--dds", *place]]
+    for robot in robots:
+        name = f"/{namespace_of(robot)}"
+        who = ["--id", robot, "--namespace", name, "--attended"]
+        parts.append(["robot", *who, *place])
+    return parts
+
+
+def _free_domain() -> int:
+    """A DDS domain of which nobody on this machine has the first port.
+
+    Raises:
+        SettingsError: there is none.
+    """
+    for domain in range(1, 100):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                probe.bind(("127.0.0.1", 7400 + 250 * domain + 10))
+            except OSError:
+                continue
+        return domain
+    raise SettingsError("ROS_DOMAIN_ID", "any", "a DDS domain that is free")
 
 
 def _on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:

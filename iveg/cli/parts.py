@@ -4,10 +4,12 @@ import argparse
 import asyncio
 import contextlib
 import logging
+import os
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 import uvicorn
@@ -23,6 +25,9 @@ from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.settings import Settings
 from iveg.web.bounded import BoundedSocket
+
+if TYPE_CHECKING:
+    from iveg.adapters.dds import Dds
 
 _log = logging.getLogger(__name__)
 _LIVE_ROBOT_S = 10.0
@@ -134,7 +139,10 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     if options.robots is not None:
         more = range(len(robots) + 1, options.robots + 1)
         robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
-    with TemporaryDirectory(prefix="iveg-robots-") as directory:
+    with (
+        TemporaryDirectory(prefix="iveg-robots-") as directory,
+        _network(options) as network,
+    ):
         running = asyncio.create_task(
             run_emulator(
                 robots=robots,
@@ -152,6 +160,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 rate_hz=options.hz,
                 faults=read_words(options.fault, robots),
                 fault_port=options.fault_port,
+                network=network,
             ),
             name="emulator",
         )
@@ -161,6 +170,24 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         finally:
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
+
+
+@contextlib.contextmanager
+def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
+    """DDS for robots that speak ROS 2, where that was asked for."""
+    if not options.dds:
+        yield None
+        return
+    from iveg.cli.robot import MISSING, load_config, network_of
+
+    config, _ = load_config(options, os.environ)
+    network = network_of(config, os.environ)
+    if network is None:
+        raise DataFileError("--dds", "", MISSING)
+    from iveg.adapters.dds import Dds
+
+    with Dds(network) as dds:
+        yield dds
 
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:

@@ -6,7 +6,8 @@ bursts.  A slot that comes too late is skipped, never made up for.
 
 import asyncio
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,12 +29,16 @@ from iveg.emulator.orders import FaultOrder, Order
 from iveg.emulator.pacing import every
 from iveg.emulator.radio import Radio
 from iveg.emulator.relay import Relay
+from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import World, climate_at
+from iveg.emulator.world import Rig, World, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.rig import Network
 from iveg.robot.uplink import Form
+from iveg.ros2.names import namespace_of
 
 _log = logging.getLogger(__name__)
 _CLIMATE_EVERY_S = 10.0
@@ -57,6 +62,8 @@ async def run_emulator(
     faults: Sequence[FaultOrder] = (),
     fault_port: int | None = None,
     on_fault_port: Callable[[int], None] | None = None,
+    network: Network | None = None,
+    ros2: Mapping[str, RobotConfig] | None = None,
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -77,6 +84,9 @@ async def run_emulator(
         faults: What is wrong from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
         on_fault_port: Told which port it became.
+        network: DDS: the robots speak ROS 2 there, and ``iveg robot`` rides on them.
+        ros2: What each one's topics are called; below ``/`` and its id in small letters
+            where nothing is said.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the house.
@@ -93,7 +103,11 @@ async def run_emulator(
     )
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
     is_radio_bad = bool(faults) or fault_port is not None
-    fleet = Fleet(world, settings, radio_seed=seed if is_radio_bad else None)
+    bases = None
+    if network is not None:
+        bases = partial(_base, world, network, ros2 or {}, rate_hz)
+    radio_seed = seed if is_radio_bad and network is None else None
+    fleet = Fleet(world, settings, radio_seed=radio_seed, bases=bases)
     if fault_port is None:
         await fleet.run(incidents)
         return
@@ -105,25 +119,44 @@ async def run_emulator(
         await fleet.run(incidents)
 
 
+def _base(
+    world: World,
+    network: Network,
+    configs: Mapping[str, RobotConfig],
+    rate_hz: float,
+    rig: Rig,
+) -> Ros2Base:
+    usual = RobotConfig(namespace=f"/{namespace_of(rig.robot_id)}")
+    config = configs.get(rig.robot_id, usual)
+    return Ros2Base(rig, world, network, config, rate_hz)
+
+
 class Fleet:
     """The robots and people of a run, kept going in time.
 
     Args:
         radio_seed: Of the chance in the robots' radios, which then obey orders; None
             leads the robots straight to the broker.
+        bases: Makes robots that speak ROS 2 and carry no software of iVeg's.
     """
 
     def __init__(
-        self, world: World, settings: FleetSettings, radio_seed: int | None = None
+        self,
+        world: World,
+        settings: FleetSettings,
+        radio_seed: int | None = None,
+        bases: Callable[[Rig], Ros2Base] | None = None,
     ) -> None:
         self._world = world
         self._settings = settings
         self._started = clock.now()
         settings.state_directory.mkdir(parents=True, exist_ok=True)
-        self._robots = {
+        self._robots: Mapping[str, EmulatedRobot | Ros2Base] = {
             robot_id: EmulatedRobot(
                 rig, world, settings, _relay(settings, robot_id, place, radio_seed)
             )
+            if bases is None
+            else bases(rig)
             for place, (robot_id, rig) in enumerate(world.rigs.items())
         }
 

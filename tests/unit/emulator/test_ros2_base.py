@@ -1,0 +1,144 @@
+"""An emulated robot that speaks ROS 2: its base halts alone, its topics add up."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+
+import pytest
+
+from iveg.adapters import clock
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import DetectionFrame, LaserScan, Navigation, Odometry
+from iveg.emulator.camera import DETECTORS
+from iveg.emulator.layout import lay_out
+from iveg.emulator.orders import FaultOrder
+from iveg.emulator.ros2_base import TIMEOUT_S, Base, Ros2Base
+from iveg.emulator.ros2_base import Navigation as Nav
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.world import REST, World
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.senses import TOPICS, Senses
+from iveg.robot.uplink import Sensed
+from iveg.ros2 import messages as m
+from tests.fakes.ros2_network import Arrived, FakeNetwork
+
+AHEAD = Twist2D(0.5, 0.1)
+
+
+# --- the base -----------------------------------------------------------------------
+
+
+def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
+    base = Base()
+    before = base.command(0.0)
+    base.told(AHEAD, 10.0)
+
+    assert (before, base.command(10.0 + TIMEOUT_S)) == (REST, AHEAD)
+    assert base.command(10.0 + TIMEOUT_S + 0.001) == REST
+
+
+# --- navigation ---------------------------------------------------------------------
+
+
+def test_navigation_that_makes_no_progress_asks_for_rest_and_tries_again() -> None:
+    nav = Nav()
+    asked = [nav.wish(AHEAD, REST, n / 10) for n in range(40)]
+
+    assert asked[0] == AHEAD
+    rests = [n for n, twist in enumerate(asked) if twist == REST]
+    assert len(rests) * 0.1 > 0.5
+    assert rests[0] * 0.1 == pytest.approx(1.1)
+    assert asked[rests[0] + 9] == AHEAD
+
+
+def test_navigation_that_drives_never_gives_up() -> None:
+    nav = Nav()
+
+    assert {nav.wish(AHEAD, AHEAD, n / 10) for n in range(40)} == {AHEAD}
+
+
+# --- topics -------------------------------------------------------------------------
+
+
+class Emulated:
+    """AGII of the demo on a network in memory."""
+
+    def __init__(self) -> None:
+        house = load_greenhouse("mvsim-20x20")
+        layout = lay_out(scenario_named("demo"), ["AGI", "AGII"], house)
+        self.world = World(house, layout, DETECTORS["perfect"], 1)
+        self.rig = self.world.rigs["AGII"]
+        self.network = FakeNetwork()
+        self.config = RobotConfig(namespace="/agii")
+        self.base = Ros2Base(self.rig, self.world, self.network, self.config, 30.0)
+
+    def sensed(self) -> list[Sensed]:
+        """What Algorithm 1 makes of everything that was published."""
+        senses = Senses(self.config)
+        now = clock.now()
+        for topic in TOPICS:
+            writer = self.network.writers.get(getattr(self.config.full_topics, topic))
+            if writer is not None:
+                senses.hear(topic, [Arrived(one) for one in writer.sent], now.mono)
+        return senses.tick(now)
+
+
+@pytest.fixture
+async def emulated() -> AsyncIterator[Emulated]:
+    found = Emulated()
+    task = asyncio.create_task(found.base.run(clock.now().mono, 0.0))
+    await found.base.started.wait()
+    yield found
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)
+
+
+async def until(true: Callable[[], object]) -> None:
+    deadline = clock.now().mono + 10.0
+    while not true():
+        assert clock.now().mono < deadline, "did not come true in time"
+        await asyncio.sleep(0.01)
+
+
+async def until_it_has_said(emulated: Emulated, topic: str, times: int) -> None:
+    await until(lambda: len(emulated.network.writers[topic].sent) >= times)
+
+
+async def test_algorithm_1_finds_the_robot_where_it_believes_itself(
+    emulated: Emulated,
+) -> None:
+    await until_it_has_said(emulated, "/agii/detections_3d", 3)
+
+    found = {type(one): one for one in emulated.sensed()}
+
+    odometry = found[Odometry]
+    assert isinstance(odometry, Odometry)
+    believed = emulated.rig.odometry().pose
+    assert odometry.pose.x == pytest.approx(believed.x, abs=0.05)
+    assert odometry.pose.y == pytest.approx(believed.y, abs=0.05)
+    assert odometry.pose.yaw == pytest.approx(believed.yaw, abs=0.05)
+    assert {LaserScan, DetectionFrame, Navigation} <= set(found)
+
+
+async def test_it_drives_as_it_is_told_and_halts_when_nothing_comes(
+    emulated: Emulated,
+) -> None:
+    def drives() -> bool:
+        emulated.network.publish("/agii/cmd_vel", m.Twist(m.Vector3(0.5)))
+        return emulated.rig.vehicle.twist.linear_x > 0.1
+
+    await until(drives)
+    await until(lambda: emulated.rig.vehicle.twist == REST)
+
+    assert emulated.rig.command == REST
+
+
+async def test_odometry_that_is_frozen_falls_silent(emulated: Emulated) -> None:
+    await until_it_has_said(emulated, "/agii/odom", 2)
+    emulated.base.obey(FaultOrder(robot="AGII", freeze_odometry=True))
+    said = len(emulated.network.writers["/agii/odom"].sent)
+
+    scans = len(emulated.network.writers["/agii/scan"].sent)
+    await until_it_has_said(emulated, "/agii/scan", scans + 3)
+
+    assert len(emulated.network.writers["/agii/odom"].sent) == said
