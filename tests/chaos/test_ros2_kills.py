@@ -1,0 +1,98 @@
+"""Gate, broker or iVeg die while a ROS 2 robot drives: its base halts in time.
+
+Three kills in ``make test``; ``make chaos`` does a series, each line of which is in
+``test-output/ros2-kills.jsonl``.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Any
+
+import pytest
+
+from iveg.domain.profiles import profile_of
+from iveg.emulator.ros2_base import TIMEOUT_S
+from tests.chaos.ros2_field import (
+    ROBOT,
+    SETTINGS,
+    STAND_S,
+    Operator,
+    Ros2Field,
+    Witness,
+    ros2_field,
+)
+from tests.processes import ROOT, site, until
+
+KILLS = int(os.environ.get("IVEG_CHAOS_KILLS", "3"))
+VICTIMS = ("robot", "serve", "fiware")
+LATE_S = 0.4
+"""Two cores that many share: a tick of the base, of the gate and of the witness."""
+WITHIN_S = {"robot": TIMEOUT_S, "serve": STAND_S, "fiware": STAND_S}
+"""From the death of each to the first command to halt, or the base's own time-out."""
+
+
+@pytest.fixture(scope="module")
+def driven(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[tuple[Ros2Field, Witness]]:
+    folder = tmp_path_factory.mktemp("ros2")
+    with site(folder, **SETTINGS) as place, ros2_field(place) as found:
+        yield found
+
+
+@pytest.mark.slow
+def test_over_the_whole_path_stop_stands_and_only_a_resume_drives_on(
+    driven: tuple[Ros2Field, Witness],
+) -> None:
+    field, witness = driven
+    field.drive(witness)
+
+    def drives_on() -> bool:
+        return operator.let_go() == "RUNNING" and witness.drives
+
+    with closing(Operator(field.place)) as operator:
+        accepted = operator.stop()
+        until(lambda: operator.look()["stop_state"] == "STANDING", 10.0, "it stands")
+        stood = witness.drives
+        until(drives_on, 15.0, "it drives on")
+
+    assert (accepted, stood) == (202, False)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(120 + 40 * KILLS)
+def test_whoever_dies_the_base_halts_within_its_time_out(
+    driven: tuple[Ros2Field, Witness],
+) -> None:
+    field, witness = driven
+    lines: list[dict[str, Any]] = []
+    for number in range(KILLS):
+        victim = VICTIMS[number % len(VICTIMS)]
+        field.drive(witness)
+        died = field.kill(victim)
+        stood = until(
+            lambda died=died: witness.stood_after(died),  # type: ignore[misc]
+            8.0,
+            f"the base stands after {victim} died",
+        )
+        braking = witness.speed_at(died) / profile_of(ROBOT).braking
+        starved = witness.starved_s(died, died + stood)
+        allowed = WITHIN_S[victim] + braking + LATE_S + starved
+        lines.append(
+            {
+                "n": number,
+                "victim": victim,
+                "stood_s": round(stood, 3),
+                "allowed_s": round(allowed, 3),
+                "starved_s": round(starved, 3),
+            }
+        )
+    folder = ROOT / "test-output"
+    folder.mkdir(exist_ok=True)
+    log = "\n".join(json.dumps(line) for line in lines) + "\n"
+    (folder / "ros2-kills.jsonl").write_text(log)
+
+    late = [line for line in lines if line["stood_s"] > line["allowed_s"]]
+    assert late == [], log
