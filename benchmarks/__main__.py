@@ -12,6 +12,7 @@ BENCHMARKS = (
     "fiware_road",
     "notify_cost",
     "paint",
+    "ros2_cost",
     "tracking",
     "glass",
 )

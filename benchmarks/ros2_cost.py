@@ -1,0 +1,355 @@
+"""What the ROS 2 side of a robot costs: ``python -m benchmarks.ros2_cost``.
+
+In one run, on the same messages: ``iveg robot`` (with a broker and a small iVeg) beside
+a bare subscriber that decodes them with Cyclone's own Python, and beside an echo that
+answers each twist.  Wanted: processor time ≤ 2 × the subscriber's, twist in → twist out
+P95 ≤ 3 × the echo's.
+"""
+
+import asyncio
+import math
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from cyclonedds.core import (
+    InstanceState,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.idl import make_idl_struct, types
+from cyclonedds.pub import DataWriter
+from cyclonedds.qos import Policy, Qos
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from benchmarks.process import Usage, machine, pause, percentile, print_table
+from iveg.adapters.dds import Dds, DdsReader, DdsWriter
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Origin, SafetyReport
+from iveg.ngsi import codec
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as m
+from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
+from tests.brokers import broker_on
+from tests.dds import free_domain, loopback
+from tests.ports import free_ports
+from tests.processes import Site, site
+
+RATE_HZ, TWISTS_HZ = 30.0, 15.0
+WARM_UP_S, MEASURED_S = 6.0, 20.0
+SENSORS: dict[str, type[Message]] = {
+    "/odom": m.Odometry,
+    "/scan": m.LaserScan,
+    "/tf": m.TFMessage,
+    "/detections_3d": m.Detection3DArray,
+}
+_ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
+
+
+# --- the two that are compared with --------------------------------------------------
+
+
+def idl(message: type[Message]) -> Any:
+    """A message as Cyclone's Python has it, which then decodes it."""
+    typename = names.dds_type(message.ROS).replace("::", ".")
+    members = {name: _member(kind) for name, kind in fields_of(message)}
+    return make_idl_struct(message.__name__, typename, members)
+
+
+def _member(kind: One | Many | Text | Structure) -> Any:
+    match kind:
+        case One("boolean"):
+            return bool
+        case One(primitive):
+            return getattr(types, primitive)
+        case Many(primitive, None):
+            return types.sequence[getattr(types, primitive)]
+        case Many(primitive, count):
+            return types.array[getattr(types, primitive), count]
+        case Text():
+            return str
+        case Structure(message, many):
+            return types.sequence[idl(message)] if many else idl(message)
+
+
+def _qos(*, reliable: bool) -> Qos:
+    return Qos(
+        Policy.Reliability.Reliable(duration(milliseconds=100))
+        if reliable
+        else Policy.Reliability.BestEffort,
+        Policy.History.KeepLast(50),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
+
+
+def bare(domain: int) -> None:
+    """Take and decode every message, as they come."""
+    participant, waitset, readers = _participant(domain)
+    for name, message in SENSORS.items():
+        topic = Topic(participant, names.dds_topic(name), idl(message))
+        readers.append(DataReader(participant, topic, _qos(reliable=False)))
+    conditions = [ReadCondition(reader, _ANY) for reader in readers]
+    for condition in conditions:
+        waitset.attach(condition)
+    while True:
+        waitset.wait(duration(seconds=1))
+        for reader in readers:
+            reader.take(50)
+
+
+def echo(domain: int) -> None:
+    """Answer each twist with itself, decoded and encoded."""
+    participant, waitset, _ = _participant(domain)
+    kind = idl(m.Twist)
+    heard = Topic(participant, names.dds_topic("/echo_in"), kind)
+    said = Topic(participant, names.dds_topic("/echo_out"), kind)
+    reader = DataReader(participant, heard, _qos(reliable=False))
+    writer = DataWriter(participant, said, _qos(reliable=True))
+    condition = ReadCondition(reader, _ANY)
+    waitset.attach(condition)
+    while True:
+        waitset.wait(duration(seconds=1))
+        for twist in reader.take(50):
+            if isinstance(twist, kind):  # else its writer has gone
+                writer.write(twist)
+
+
+_kept: list[Any] = []
+
+
+def _participant(domain: int) -> tuple[Any, Any, list[Any]]:
+    _kept.append(Domain(domain, loopback(domain).config()))
+    participant = DomainParticipant(domain)
+    return participant, WaitSet(participant), []
+
+
+# --- what they are given -------------------------------------------------------------
+
+
+class Robot:
+    """Publishes what a robot's sensors say, and asks it to drive."""
+
+    def __init__(self, dds: Dds) -> None:
+        self._writers = {
+            name: dds.writer(name, kind, names.DEFAULT)
+            for name, kind in SENSORS.items()
+        }
+        self._static = dds.writer("/tf_static", m.TFMessage, names.TF_STATIC)
+        header = m.Header(m.Time.of(time.time()), "base_link")
+        mount = m.TransformStamped(header, "laser")
+        self._static.write(cdr.write(m.TFMessage((mount,))))
+        self._ranges = np.linspace(1.0, 20.0, 720, dtype=np.float32)
+
+    def say(self) -> None:
+        """Everything once."""
+        stamp = m.Time.of(time.time())
+        in_map, in_odom = m.Header(stamp, "map"), m.Header(stamp, "odom")
+        base = m.Header(stamp, "base_link")
+        sure = m.ObjectHypothesisWithPose(m.ObjectHypothesis("tomato", 0.9))
+        said: dict[str, Message] = {
+            "/tf": m.TFMessage(
+                (
+                    m.TransformStamped(in_map, "odom"),
+                    m.TransformStamped(in_odom, "base_link"),
+                )
+            ),
+            "/odom": m.Odometry(in_odom, "base_link"),
+            "/scan": m.LaserScan(
+                m.Header(stamp, "laser"),
+                *(-math.pi, math.pi, math.tau / 720, 0.0, 0.03, 0.1, 25.0),
+                self._ranges,
+            ),
+            "/detections_3d": m.Detection3DArray(
+                base, tuple(m.Detection3D(base, (sure,)) for _ in range(3))
+            ),
+        }
+        for name, message in said.items():
+            self._writers[name].write(cdr.write(message))
+
+
+async def iveg(address: BrokerAddress, ended: asyncio.Event) -> None:
+    """A small iVeg: names the robot's newest report five times a second."""
+    seen = {"AGI": 0}
+
+    def take(topic: str, payload: bytes) -> None:
+        for one in codec.read_measure(topic.split("/")[2], payload).observations:
+            if isinstance(one, SafetyReport):
+                seen["AGI"] = one.origin.seq or 0
+
+    link = MqttLink(address, "iveg", {"/iveg/AGI_safety/attrs": 1}, take)
+    running = asyncio.create_task(link.run())
+    seq = 0
+    while not ended.is_set():
+        await asyncio.sleep(0.1)
+        seq += 1
+        said = Feedback("AGI", Origin("b", seq), seen=dict(seen))
+        link.offer("/AGI/mqtt_feedback", codec.write_feedback(said), 1)
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+
+
+class Times:
+    """When each twist went and came back, by its own forward speed."""
+
+    def __init__(self, reader: DdsReader, writer: DdsWriter) -> None:
+        self._reader, self._writer = reader, writer
+        self._sent: dict[float, float] = {}
+        self.took: list[float] = []
+
+    def send(self, speed: float) -> None:
+        """Ask for this speed."""
+        payload = cdr.write(m.Twist(m.Vector3(speed)))
+        self._sent[speed] = time.perf_counter()
+        self._writer.write(payload)
+
+    def listen(self) -> None:
+        """Take what came back."""
+        for one in self._reader.take():
+            now = time.perf_counter()
+            speed = cdr.read(m.Twist, one.payload).linear.x
+            if speed in self._sent:
+                self.took.append(now - self._sent.pop(speed))
+
+
+# --- the run -------------------------------------------------------------------------
+
+
+def measure(dds: Dds, programs: dict[str, int]) -> tuple[dict[str, Times], Any]:
+    """Say and ask for ``MEASURED_S``; processor time of each program."""
+    robot = Robot(dds)
+    times = {
+        name: Times(
+            dds.reader(out, m.Twist, names.SENSOR_DATA.newest(50)),
+            dds.writer(in_, m.Twist, names.DEFAULT.newest(1)),
+        )
+        for name, in_, out in (
+            ("iveg robot", "/cmd_vel_nav", "/cmd_vel"),
+            ("echo", "/echo_in", "/echo_out"),
+        )
+    }
+    ended = threading.Event()
+
+    def listen() -> None:
+        while not ended.is_set():
+            for one in times.values():
+                one.listen()
+            pause(0.00005)
+
+    def every(hz: float, work: Callable[[], object]) -> None:
+        due = time.perf_counter()
+        while not ended.is_set():
+            work()
+            due += 1 / hz
+            pause(max(0.0, due - time.perf_counter()))
+
+    threads = [
+        threading.Thread(target=listen),
+        threading.Thread(target=every, args=(RATE_HZ, robot.say)),
+    ]
+    for thread in threads:
+        thread.start()
+    _ask(times, WARM_UP_S, rests_s=2.0)
+    for one in times.values():
+        one.took.clear()
+    before = {name: Usage.of(pid).cpu_s for name, pid in programs.items()}
+    _ask(times, MEASURED_S)
+    used = {name: Usage.of(pid).cpu_s - before[name] for name, pid in programs.items()}
+    ended.set()
+    for thread in threads:
+        thread.join()
+    return times, used
+
+
+def _ask(times: dict[str, Times], seconds: float, rests_s: float = 0.0) -> None:
+    """Twists that fall ever so little, so that the gate passes each as it is."""
+    for number in range(round(seconds * TWISTS_HZ)):
+        speed = 0.2 - number * 1e-6
+        if number < rests_s * TWISTS_HZ:
+            speed = 0.0
+        for one in times.values():
+            one.send(speed)
+            pause(0.5 / TWISTS_HZ)
+
+
+async def run(place: Site) -> None:
+    domain = free_domain()
+    (port,) = free_ports(1)
+    network = ["--ros-domain", str(domain), "--ros-interface", "127.0.0.1"]
+    network += ["--ros-peer", "127.0.0.1"]
+    place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{port}"
+    ended = asyncio.Event()
+    others = {}
+    for name in ("bare", "echo"):
+        others[name] = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "benchmarks.ros2_cost", name, str(domain)
+        )
+    try:
+        async with broker_on(port, place.directory) as address:
+            cloud = asyncio.create_task(iveg(address, ended))
+            robot = place.start("robot", "--id", "AGI", "--attended", *network)
+            await asyncio.to_thread(robot.wait_until_ready)
+            programs = {name: one.pid for name, one in others.items()}
+            with Dds(loopback(domain)) as dds:
+                times, used = await asyncio.to_thread(
+                    measure, dds, {"iveg robot": robot.pid, **programs}
+                )
+            ended.set()
+            await cloud
+            place.stop_all()
+    finally:
+        for one in others.values():
+            if one.returncode is None:
+                one.kill()
+            await one.wait()
+    report(times, used)
+
+
+def report(times: dict[str, Times], used: dict[str, float]) -> None:
+    rows = []
+    for name, one in times.items():
+        took = sorted(one.took)
+        rows.append(
+            (
+                name,
+                str(len(took)),
+                *(f"{percentile(took, p) * 1e3:.2f} ms" for p in (0.5, 0.95, 0.99)),
+            )
+        )
+    print_table(
+        f"Twist in → twist out ({machine()})", ("", "n", "P50", "P95", "P99"), rows
+    )
+    cpu = {name: spent / MEASURED_S for name, spent in used.items()}
+    shares = [(name, f"{share:.1%}") for name, share in cpu.items()]
+    print_table("Processor, share of one core", ("", "core"), shares)
+    p95 = {name: percentile(sorted(one.took), 0.95) for name, one in times.items()}
+    print(f"\nCPU {cpu['iveg robot'] / cpu['bare']:.2f} × the bare subscriber (≤ 2)")
+    print(f"P95 {p95['iveg robot'] / p95['echo']:.2f} × the echo (≤ 3)")
+
+
+def main() -> None:
+    match sys.argv[1:]:
+        case ["bare", domain]:
+            bare(int(domain))
+        case ["echo", domain]:
+            echo(int(domain))
+        case _:
+            with (
+                tempfile.TemporaryDirectory() as folder,
+                site(Path(folder)) as place,
+            ):
+                asyncio.run(run(place))
+
+
+if __name__ == "__main__":
+    main()
