@@ -74,6 +74,7 @@ class Radio:
         self._broker = broker
         self._rnd = Random(seed)  # noqa: S311 - repeatable on purpose
         self._open: set[asyncio.StreamWriter] = set()
+        self._carrying: set[asyncio.Task[None]] = set()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
         self._thread = threading.Thread(target=self._run, name="radio")
@@ -92,11 +93,6 @@ class Radio:
     def _run(self) -> None:
         with contextlib.suppress(asyncio.CancelledError):
             self._loop.run_until_complete(self._task)
-        rest = asyncio.all_tasks(self._loop)
-        for task in rest:
-            task.cancel()
-        if rest:
-            self._loop.run_until_complete(asyncio.wait(rest))
 
     async def _serve(self) -> None:
         server = await asyncio.start_server(self._accept, sock=self._listener)
@@ -109,6 +105,8 @@ class Radio:
                         writer.transport.abort()
         finally:
             server.close()
+            for carrier in self._carrying:
+                carrier.cancel()
             for writer in list(self._open):
                 writer.transport.abort()
             # A last turn for those that carried them.
@@ -128,7 +126,9 @@ class Radio:
             asyncio.create_task(self._carry(reader, back)),
             asyncio.create_task(self._carry(there, writer)),
         ]
+        self._carrying.update(carrying)
         await asyncio.wait(carrying, return_when=asyncio.FIRST_COMPLETED)
+        self._carrying.difference_update(carrying)
         for task in carrying:
             task.cancel()
         self._open.discard(writer)
