@@ -15,6 +15,8 @@ EXPECTED = "alert.person_slowed"
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """So long a robot may take to say that it is a recording."""
 UNREADABLE_SHOWN_S = 10.0
+STORM_SHOWN_S = 10.0
+"""So that a detector at its bound is one alert and not one a second."""
 
 
 def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
@@ -68,11 +70,16 @@ def _was_moving(robot: RobotState) -> bool:
     return max(abs(report.linear), abs(report.angular)) >= STANDING_SPEED
 
 
-def of_pictures(overload: Overload) -> Iterable[Condition]:
-    """A detector says more than can be judged; who is near drives at half speed."""
-    for name in overload.since:
-        slots: dict[str, Slot] = {"robot": name}
-        yield Condition("P2", "alert.pictures_not_judged", name, name, slots)
+def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
+    """Detectors that say more than can be judged: one notice names them all."""
+    names = [
+        name
+        for name, at in overload.last.items()
+        if name in overload.since or now.mono - at < STORM_SHOWN_S
+    ]
+    if names:
+        slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}
+        yield Condition("P2", "alert.pictures_not_judged", "fleet", None, slots)
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:

@@ -27,9 +27,11 @@ class Overload:
 
     Attributes:
         since: By robot, when that began (monotonic, s).
+        last: By robot, when it was last so; never forgotten.
     """
 
     since: dict[str, float] = field(default_factory=dict)
+    last: dict[str, float] = field(default_factory=dict)
     _left: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def admits(self, robot_id: str, now: Instant) -> bool:
@@ -46,6 +48,7 @@ class Overload:
             self.since.pop(robot_id, None)
         else:
             self.since.setdefault(robot_id, now.mono)
+            self.last[robot_id] = now.mono
 
     def slowed(self, world: World, bounds_width: float) -> Mapping[str, str]:
         """Who must drive at half speed, and for whose pictures.

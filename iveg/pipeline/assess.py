@@ -42,8 +42,6 @@ from iveg.pipeline.telling import Teller
 from iveg.pipeline.wording import evidence_of, speed_line
 
 HEARTBEAT_S = 0.1
-PERIOD_S = 1.0 / 30.0 - 1e-3
-"""Robots look at what they are told thirty times a second."""
 
 
 class Assessor:
@@ -222,8 +220,8 @@ class Assessor:
             for robot_id in changed
         )
         self._untold = self._untold or bool(changed or changes)
-        # Who must slow down never waits; what else is news, a robot's period at most.
-        if slower or (self._untold and now.mono - self._teller.told_at >= PERIOD_S):
+        # Who must slow down never waits; what else is news, while robots can use it.
+        if slower or (self._untold and self._teller.may_tell(now)):
             self.tell(now)
 
     def _crossed(self, change: Change, now: Instant) -> None:
@@ -282,7 +280,7 @@ class Assessor:
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
-        yield from conditions.of_pictures(self._mandates.overload)
+        yield from conditions.of_pictures(self._mandates.overload, now)
 
     def close_earlier(
         self,

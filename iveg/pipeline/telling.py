@@ -9,6 +9,8 @@ from iveg.domain.people import People
 from iveg.domain.world import RobotState, World
 from iveg.pipeline.ports import Fleet
 
+USED_HZ, BURST = 30.0, 8.0
+"""What robots can use of feedback, and how many may come at once (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
 
@@ -45,10 +47,21 @@ class Teller:
         self._boot = boot
         self._backlog = backlog
         self._seq = 0
+        self._left, self._left_at = BURST, float("-inf")
+
+    def may_tell(self, now: Instant) -> bool:
+        """Whether robots can use one more: 30 Hz in the mean, a few close together."""
+        return self._allowance(now) >= 1.0
+
+    def _allowance(self, now: Instant) -> float:
+        since = max(0.0, now.mono - self._left_at)
+        return min(BURST, self._left + USED_HZ * since)
 
     def tell(self, mandates: Mapping[str, Mandate], rule: Rule, now: Instant) -> None:
         """Send every robot what the fleet must know."""
         self.told_at = now.mono
+        self._left = max(0.0, self._allowance(now) - 1.0)
+        self._left_at = now.mono
         alerts = _newest(tuple(self._alerts(rule, now)))
         seen = {
             robot.robot_id: robot.safety.origin.seq

@@ -76,9 +76,7 @@ class Tracker:
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
-        return [
-            track if track is None else merged.get(track, track) for track in tracks
-        ]
+        return [_name_now(track, merged) for track in tracks]
 
     def drop(self, person_id: str, sighting: Sighting) -> Person:
         """Somebody has looked there in vain: this look protects nobody any more."""
@@ -267,7 +265,9 @@ class Tracker:
         apart = self._together.get(track, set())
         for other in self.known.values():
             if (
-                other is not person
+                # First what nearly all fail: in a storm this is asked of everybody.
+                abs(other.newest.x - person.newest.x) <= self.merge_m
+                and other is not person
                 and other.class_ == person.class_
                 and other.person_id not in apart
                 and other.age_s(at) <= SEEN_S
