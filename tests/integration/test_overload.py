@@ -92,7 +92,7 @@ def throttled(place: Site) -> set[str]:
     return {one["description"] for one in kept if one.get("throttling")}
 
 
-def test_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_lost(
+def test_f52_f53_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_lost(
     running: tuple[Site, Gate],
 ) -> None:
     place, straight = running
