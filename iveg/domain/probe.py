@@ -62,6 +62,10 @@ class ProbeLag:
         """Whether a probe has come back; until then ``lag`` only says "at least"."""
         return bool(self._back)
 
+    def has_passed(self, sent_at: float) -> bool:
+        """Whether a probe that left then (monotonic, s), or a later one, came back."""
+        return sent_at <= self._newest
+
     @property
     def transit_s(self) -> float:
         """How long the newest probe that came back took (s); 0 before the first."""

@@ -160,12 +160,22 @@ class HealthMonitor:
         state = self._by_age(age, now, self._agent_down_s)
         if broken and state != "ok":
             return Hop("iot_agent", "unknown", age)
-        lag, growing = self.probe.lag(now), self.probe.grows(now)
+        lag, growing = self._lag(now)
         if state == "ok" or (state == "late" and self._was_behind):
             state, detail = self._agent_says(lag, growing=growing)
         else:
             detail = "" if state == "unknown" else "measures do not reach Orion"
         return Hop("iot_agent", state, age, detail, lag, growing)
+
+    def _lag(self, now: Instant) -> tuple[float | None, bool]:
+        """How far the agent is behind (s), and whether that grows.
+
+        Of a probe that Orion has and that did not come back the agent is not at fault:
+        notifications are, and nothing tells its lag.
+        """
+        if self.stored_at is not None and not self.probe.has_passed(self.stored_at):
+            return None, False
+        return self.probe.lag(now), self.probe.grows(now)
 
     def _agent_says(
         self, lag_s: float | None, *, growing: bool

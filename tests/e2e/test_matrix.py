@@ -187,7 +187,8 @@ def test_every_route_fits_every_screen_and_its_stops_suit_a_glove(
 def test_no_dialog_covers_a_stop(only: Page, width: int, route: str) -> None:
     only.set_viewport_size({"width": width, "height": SIZES[width]})
     visit(only, route)
-    only.wait_for_selector('[data-robot="AGI"][data-link="LIVE"]', state="attached")
+    ready = '[data-stop="AGI"][data-state="ready"]'
+    only.wait_for_selector(ready, state="attached")
     openers = only.locator("[data-opens]:visible, .card__menu:visible").all()
     covered = []
 

@@ -36,7 +36,10 @@ def test_without_cyclone_dds_one_sentence_says_what_to_install(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    # Another test of this process may have imported parts of it already.
+    imported = [name for name in sys.modules if name.startswith("cyclonedds.")]
+    for name in ("cyclonedds", *imported):
+        monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delitem(sys.modules, "iveg.adapters.dds", raising=False)
 
     code = run_robot(options(), Settings(), tmp_path, {})

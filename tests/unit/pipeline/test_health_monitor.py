@@ -85,6 +85,18 @@ def test_f8_notifications_that_stopped_are_found_while_orion_answers() -> None:
     assert hop(chain, "notifications", 20.0).detail == chain.notify_detail
 
 
+def test_f9_a_probe_that_orion_has_and_nobody_brought_blames_no_agent() -> None:
+    chain = healthy(10.0)
+    for seq, second in enumerate((12.0, 14.0, 16.0)):
+        chain.sent(Origin("b", seq), at(second))
+        chain.stored(Origin("b", seq))
+    chain.orion_ok_at = at(17.0).mono
+
+    found = states(chain, 17.0)
+
+    assert (found["iot_agent"], found["notifications"]) == ("ok", "down")
+
+
 def test_f8_a_subscription_that_had_to_be_mended_is_told_while_others_arrive() -> None:
     chain = healthy(10.0)
     chain.notify_error = "Subscribed to odometry."
