@@ -1,8 +1,10 @@
 """What a person does at the page with a robot: let it go again."""
 
+from contextlib import suppress
 from typing import Any
 
-from playwright.sync_api import APIResponse, Page
+from playwright import sync_api
+from playwright.sync_api import APIResponse, Locator, Page
 
 from tests.e2e.reading import card
 from tests.processes import Site, until
@@ -14,8 +16,25 @@ _OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
 
 def open_menu(page: Page, robot: str) -> None:
     """Open the menu of a robot's card."""
-    card(page, robot).locator(".card__menu").click()
+    press_open(page, card(page, robot).locator(".card__menu"))
     card(page, robot).locator("dialog[open]").wait_for()
+
+
+def press_open(page: Page, opener: Locator) -> None:
+    """Press until a panel is open, as a person does.
+
+    Cards grow and lose lines: on a busy machine a button may move away between the
+    finger's down and up, and that press then meets nothing.
+    """
+
+    def is_open() -> bool:
+        opener.click()
+        with suppress(sync_api.TimeoutError):
+            page.wait_for_selector("dialog[open]", timeout=5000)
+            return True
+        return False
+
+    until(is_open, 60.0, "a panel opens")
 
 
 def ask(page: Page, stack: Site, path: str, body: object) -> APIResponse:

@@ -14,6 +14,7 @@ import pytest
 from playwright import sync_api
 from playwright.sync_api import Browser, Page, expect
 
+from tests.e2e.hands import press_open
 from tests.e2e.reading import (
     COVERED_STOPS,
     OVERFLOW,
@@ -193,8 +194,7 @@ def test_no_dialog_covers_a_stop(only: Page, width: int, route: str) -> None:
     covered = []
 
     for opener in openers:
-        opener.click()
-        only.wait_for_selector("dialog[open]")
+        press_open(only, opener)
         covered += evaluate(only, COVERED_STOPS)
         only.keyboard.press("Escape")
         only.wait_for_selector("dialog[open]", state="hidden")
