@@ -1,4 +1,4 @@
-"""Two robots at their full rate before an agent that carries 100 measures a second.
+"""Two robots at their full rate before an agent that carries 70 measures a second.
 
 They have about 190 to send.  Everything runs for real; what limits the rate is the way
 to the agent, not the product.  Longer runs are on the virtual clock, in
@@ -28,7 +28,8 @@ pytestmark = [
         MOSQUITTO is None and "CI" not in os.environ, reason="Mosquitto is missing"
     ),
 ]
-CARRIED_PER_S = 100.0
+CARRIED_PER_S = 70.0
+"""Less than the 100 that a slow machine's robots may just reach."""
 SETTLES_WITHIN_S, STAYS_S = 90.0, 6.0
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 
@@ -59,7 +60,6 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Ga
         place.wait_until_served()
         place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{front}"
         place.start("emulator")
-        place.wait_until_live()
         yield place, straight
 
 
@@ -98,7 +98,7 @@ def test_f52_f53_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_l
     place, straight = running
     with place.api() as api:
         health = Health(api)
-        until(health.was_late, 20.0, "the agent is behind at first")
+        until(health.was_late, 60.0, "the agent is behind at first")
         until(lambda: health.well_for_s() > STAYS_S, SETTLES_WITHIN_S, "it settles")
         robots = api.get("robots").raise_for_status().json()["items"]
         assert {one["link"] for one in robots} == {"LIVE"}
