@@ -13,6 +13,7 @@ from typing import Any, Literal
 from urllib.parse import urlsplit
 
 from iveg.domain.errors import SettingsError
+from iveg.domain.limits import LIMITS
 
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 _RESERVED = frozenset({"climate", "iveg-canary", "iveg-doctor"})
@@ -208,13 +209,13 @@ class Settings:
     confidence_threshold: float = setting(
         "IVEG_CONFIDENCE_THRESHOLD",
         _number(0.0, 1.0),
-        0.80,
+        LIMITS.detection_threshold,
         "Least confidence that raises an alert, inclusive.",
     )
     safety_radius_m: float = setting(
         "IVEG_SAFETY_RADIUS_M",
-        _number(0.5, 6.0),
-        2.0,
+        _number(LIMITS.ring_least_m, LIMITS.ring_most_m),
+        LIMITS.ring_default_m,
         "Ring round a person or peer, inclusive (m).",
     )
     stop_direct: bool = setting(
@@ -234,13 +235,13 @@ class Settings:
     feedback_slow_s: float = setting(
         "IVEG_FEEDBACK_SLOW_S",
         _number(0.1, 10.0),
-        1.0,
+        LIMITS.feedback_slow_s,
         "Age of feedback at which a robot halves its speed (s).",
     )
     feedback_stand_s: float = setting(
         "IVEG_FEEDBACK_STAND_S",
         _number(0.2, 60.0),
-        3.0,
+        LIMITS.feedback_stand_s,
         "Age of feedback at which a robot stands (s).",
     )
     drill_days: float = setting(

@@ -51,7 +51,7 @@ class Mutant:
 MUTANTS = (
     Mutant(
         "STOP: standing is believed before it has lasted",
-        "and (moment.since(self._began) or 0.0) >= STANDING_S",
+        "and (moment.since(self._began) or 0.0) >= LIMITS.standing_for_s",
         "",
         ("unit/domain/test_stop.py",),
     ),
@@ -111,7 +111,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a hold that a late release may still lift is held on to for good",
-        "return now.mono - max(heard_at, self.begun_at) > FRESH_S",
+        "return now.mono - max(heard_at, self.begun_at) > LIMITS.report_fresh_s",
         "return False",
         ("unit/domain/test_stop_release.py",),
     ),
@@ -141,7 +141,7 @@ MUTANTS = (
     ),
     Mutant(
         "rule: a robot is let go on the border, at every flutter",
-        "    if depth > RELEASE_M:",
+        "    if depth > LIMITS.release_beyond_m:",
         "    if depth > 0.0:",
         ("unit/domain/test_mandates.py",),
     ),
@@ -153,7 +153,7 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: a robot without a pose of its own drives as if it had one",
-        "if motion is None or now - motion.at > POSE_STAND_S:",
+        "if motion is None or now - motion.at > LIMITS.pose_stand_s:",
         "if motion is None:",
         ("unit/robot/test_safety.py",),
     ),
@@ -165,7 +165,7 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: a robot that is not seen keeps its speed",
-        "if age is None or age > SILENCE_S:",
+        "if age is None or age > LIMITS.silence_s:",
         "if age is None:",
         ("unit/domain/test_mandates.py",),
     ),
@@ -189,7 +189,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a standstill is told by reports however old they are",
-        "if episode.evidence_age(at) > STALE_S:",
+        "if episode.evidence_age(at) > LIMITS.report_stale_s:",
         "if False:",
         ("unit/pipeline/test_age.py",),
     ),

@@ -15,6 +15,7 @@ import orjson
 
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
 _SETTINGS = "settings"
@@ -74,7 +75,10 @@ class FileRules:
         where = f"line {number}"
         try:
             rule = Rule(**orjson.loads(line))
-            usable = 0.0 <= rule.threshold <= 1.0 and 0.5 <= rule.radius_m <= 6.0
+            usable = (
+                0.0 <= rule.threshold <= 1.0
+                and LIMITS.ring_least_m <= rule.radius_m <= LIMITS.ring_most_m
+            )
         except (orjson.JSONDecodeError, TypeError) as error:
             raise DataFileError(str(self._path), where, str(error)) from error
         if not usable:

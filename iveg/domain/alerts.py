@@ -8,16 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from iveg.domain.limits import LIMITS, ring_radius
+
 Class = Literal["person", "robot"]
 Kind = Literal["alert", "faint", "other"]
-
-PAPER_RADIUS_M = 2.0
-PAPER_THRESHOLD = 0.80
-WALKING_SPEED = 1.6
-"""How fast a person may walk (m/s, ISO 13855; safety.md §6.1)."""
-GROWTH_GRACE_S = 0.32
-"""Age up to which the ring keeps its size: the paper's P95 from robot to broker."""
-MAX_RADIUS_M = 6.0
 
 ALIASES: Mapping[str, Class] = {
     "person": "person",
@@ -59,9 +53,9 @@ class Rule:
 
     id: str = "fleet-alert"
     version: int = 1
-    threshold: float = PAPER_THRESHOLD
+    threshold: float = LIMITS.detection_threshold
     class_thresholds: Mapping[Class, float] = field(default_factory=dict)
-    radius_m: float = PAPER_RADIUS_M
+    radius_m: float = LIMITS.ring_default_m
     aliases: Mapping[str, Class] = field(default_factory=lambda: ALIASES)
     possible_people: bool = False
     author: str = "settings"
@@ -85,6 +79,5 @@ class Rule:
         return Verdict("other" if class_ is None else "alert", class_)
 
     def radius_at(self, age_s: float) -> float:
-        """The ring of a sighting that is ``age_s`` old (m; safety.md §3.4)."""
-        grown = self.radius_m + WALKING_SPEED * max(0.0, age_s - GROWTH_GRACE_S)
-        return max(self.radius_m, min(MAX_RADIUS_M, grown))
+        """The ring of a sighting that is ``age_s`` old (m)."""
+        return ring_radius(self.radius_m, age_s)

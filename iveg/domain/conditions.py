@@ -6,9 +6,10 @@ from math import inf
 from iveg.domain.alarms import Condition
 from iveg.domain.decisions import Decision
 from iveg.domain.events import Slot
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.overload import Overload
-from iveg.domain.world import STANDING_SPEED, RobotState
+from iveg.domain.world import RobotState
 
 EXPECTED = "alert.person_slowed"
 """The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
@@ -67,7 +68,7 @@ def _was_moving(robot: RobotState) -> bool:
     report, at = robot.safety, robot.safety_received
     if report is None or at is None or at.mono < (robot.pose_at or 0.0):
         return not robot.stands
-    return max(abs(report.linear), abs(report.angular)) >= STANDING_SPEED
+    return max(abs(report.linear), abs(report.angular)) >= LIMITS.standing_speed
 
 
 def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:

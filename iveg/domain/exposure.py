@@ -9,13 +9,12 @@ their absence alone and was never measured.  A day is one of UTC.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.margins import Margin
 from iveg.domain.observations import Instant
 
 PERIOD_S = 0.5
 """How often margins are looked at."""
-FRESH_S = 1.0
-"""Older positions are remembered, not measured (safety.md §3.3)."""
 _LONGEST_S = 2 * PERIOD_S
 """A look after a longer silence does not stand for all of it."""
 _DAY_S = 86_400.0
@@ -86,7 +85,7 @@ class Exposures:
                 since=now, looked=now if before is None else before.looked
             )
         past = min(max(0.0, now.mono - before.looked.mono), _LONGEST_S)
-        known = [one for one in margins if one.known and one.age_s <= FRESH_S]
+        known = [one for one in margins if one.known and one.age_s <= LIMITS.seen_s]
         least = min(known, key=lambda one: one.margin_m, default=None)
         self.today = replace(
             _spend(before, past, least, whole=seen and len(known) == len(margins)),

@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Origin
 
 FULL_SPEED = 1.0
 LONGEST_BACKLOG_S = 60.0
-HALF_SPEED = 0.5
+HALF_SPEED = LIMITS.slow_factor
 """The factor inside a ring; a constant of the paper, not a setting."""
 
 

@@ -10,14 +10,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from iveg.domain.alerts import GROWTH_GRACE_S, MAX_RADIUS_M, WALKING_SPEED, Rule
+from iveg.domain.alerts import Rule
+from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Instant
 from iveg.domain.people import People
 from iveg.domain.spots import Floats
-from iveg.domain.tracking.person import RING_S, Person, Sighting
+from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.world import RobotState, World
 
-SILENCE_S = 1.0
 NOT_FAR_M = 0.01
 """So far outside a ring nobody can be inside, whatever rounding does."""
 _FEW_PAIRS = 150
@@ -82,7 +82,8 @@ def _peers(world: World, rule: Rule, now: Instant) -> Iterator[Hazard]:
             continue
         age = max(0.0, now.mono - since)
         known = peer.age_s(now)
-        if age > RING_S or (peer.stands and known is not None and known <= SILENCE_S):
+        at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
+        if at_rest or age > LIMITS.ring_lasts_s:
             continue
         pose = peer.odometry.pose
         yield Hazard(
@@ -143,9 +144,9 @@ def _people_near(
     spots = people.spots
     x, y, seen_at, reach = spots.columns
     age = np.maximum(0.0, now.mono - seen_at)
-    grown = rule.radius_m + WALKING_SPEED * np.maximum(0.0, age - GROWTH_GRACE_S)
-    ring = np.maximum(rule.radius_m, np.minimum(MAX_RADIUS_M, grown))
-    limit = np.where(age <= RING_S, np.maximum(reach, ring) + 2 * NOT_FAR_M, -1.0)
+    ring = ring_radius(rule.radius_m, age, np.minimum, np.maximum)
+    ring = np.maximum(reach, ring) + 2 * NOT_FAR_M
+    limit = np.where(age <= LIMITS.ring_lasts_s, ring, -1.0)
     robots, columns = _pairs(world, x, y, limit)
     near: dict[str, set[str]] = {}
     for robot_id, column in zip(robots, columns, strict=True):

@@ -12,18 +12,16 @@ from dataclasses import dataclass, replace
 from iveg.domain.alerts import Rule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, Mandate
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.hazards import NOT_FAR_M, SILENCE_S, Hazard, circles_near
+from iveg.domain.hazards import NOT_FAR_M, Hazard, circles_near
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.overload import Overload
 from iveg.domain.people import People
 from iveg.domain.profiles import profile_of
 from iveg.domain.world import RobotState, World
 
-RELEASE_M, RELEASE_S = 0.3, 1.0
 SPEEDING_UP = 0.05
 """Faster than in the mean of its last second by more than this (m/s)."""
-OBSERVER_FORGOTTEN_S = 600.0
-"""A robot that has not looked for ten minutes is no longer one of the fleet's eyes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,10 +165,10 @@ class Mandates:
         if robot.robot_id in flooded:
             return Mandate(HALF_SPEED, "stale", flooded[robot.robot_id])
         age = robot.age_s(now)
-        if age is None or age > SILENCE_S:
+        if age is None or age > LIMITS.silence_s:
             return Mandate(HALF_SPEED, "stale", robot.robot_id)
         blinded = robot.unreadable_at
-        if blinded is not None and now.mono - blinded <= SILENCE_S:
+        if blinded is not None and now.mono - blinded <= LIMITS.silence_s:
             return Mandate(HALF_SPEED, "stale", robot.robot_id)
         if silent is not None and not robot.is_replay:
             return Mandate(HALF_SPEED, "stale", silent or None)
@@ -210,7 +208,7 @@ def _leave(
             crossing = replace(crossing, outside_since=now.mono)
             mine[cause] = crossing
         since = crossing.outside_since
-        if since is not None and now.mono - since >= RELEASE_S:
+        if since is not None and now.mono - since >= LIMITS.release_after_s:
             del mine[cause]
             yield Change(crossing, began=False)
 
@@ -218,7 +216,7 @@ def _leave(
 def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
     """A crossing that goes on, or whose robot is outside since now."""
     since = None
-    if depth > RELEASE_M:
+    if depth > LIMITS.release_beyond_m:
         since = crossing.outside_since or now.mono
     if distance == crossing.distance_m and since == crossing.outside_since:
         return crossing
@@ -255,8 +253,10 @@ def _silent_observer(world: World, now: Instant) -> str | None:
         for robot in world.live_robots()
         if robot.detections_at is not None
     }
-    eyes = {name: age for name, age in ages.items() if age <= OBSERVER_FORGOTTEN_S}
+    eyes = {
+        name: age for name, age in ages.items() if age <= LIMITS.observer_forgotten_s
+    }
     if not eyes:
         return ""
     slowest = max(eyes, key=lambda name: eyes[name])
-    return slowest if eyes[slowest] > SILENCE_S else None
+    return slowest if eyes[slowest] > LIMITS.silence_s else None

@@ -18,25 +18,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.alerts import WALKING_SPEED
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
 from iveg.domain.profiles import profile_of
-from iveg.domain.tracking.person import RING_S, Person, Sighting
+from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.world import RobotState
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
-REACTION_S = 0.79
-"""Camera to brakes on the other robot, every step at its P95 (safety.md §6.1)."""
-ONWARD_S = 0.29
-"""The part of it that follows iVeg's knowledge: rule, downlink, ticks, drive."""
-UNCERTAINTY_M = 0.40
-"""Of a detection (0.30 m) and of a pose (0.10 m)."""
-PERSON_RADIUS_M = 0.30
-POSE_LOST_S = 1.5
-"""An older pose says nothing of where a robot is (safety.md §3.3)."""
 _UNKNOWN_M = 1e6
-CLEAR_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +57,7 @@ class Margin:
     @property
     def needs_m(self) -> float:
         """S_p (m)."""
-        return self.walks_m + self.reaction_m + self.braking_m + UNCERTAINTY_M
+        return self.walks_m + self.reaction_m + self.braking_m + LIMITS.uncertainty_m
 
     @property
     def margin_m(self) -> float:
@@ -81,7 +71,7 @@ class Margin:
             return "unknown"
         if self.margin_m < 0.0:
             return "inside"
-        return "tight" if self.margin_m < CLEAR_M else "clear"
+        return "tight" if self.margin_m < LIMITS.margin_clear_m else "clear"
 
 
 def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
@@ -90,7 +80,9 @@ def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
     None where there is no pair: the robot was never seen, or nobody has seen the
     person for ten seconds.
     """
-    looks = [look for look in person.sightings if look.age_s(now) <= RING_S]
+    looks = [
+        look for look in person.sightings if look.age_s(now) <= LIMITS.ring_lasts_s
+    ]
     margins = [_to_look(robot, person, look, now) for look in looks]
     return least(one for one in margins if one is not None)
 
@@ -134,7 +126,7 @@ class LeastMargins:
             (person, look)
             for person in people
             for look in person.sightings
-            if look.age_s(now) <= RING_S
+            if look.age_s(now) <= LIMITS.ring_lasts_s
         ]
         self._row = {one.robot_id: row for row, one in enumerate(self._robots)}
         self._columns: dict[str, list[int]] = {}
@@ -174,11 +166,15 @@ def _all_pairs(
     x, y, speed, braking, half, age = told.reshape(-1, 6).T[:, :, np.newaxis]
     seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
     to_x, to_y, look_age = seen.reshape(-1, 3).T
-    reaction = np.maximum(REACTION_S, np.maximum(age, look_age) + ONWARD_S)
-    gap = np.hypot(x - to_x, y - to_y) - half - PERSON_RADIUS_M
-    walks = WALKING_SPEED * (reaction + speed / braking)
-    needs = walks + speed * reaction + speed * speed / (2 * braking) + UNCERTAINTY_M
-    margins: NDArray[np.float64] = gap - needs - _UNKNOWN_M * (age > POSE_LOST_S)
+    reaction = np.maximum(
+        LIMITS.reaction_s, np.maximum(age, look_age) + LIMITS.onward_s
+    )
+    gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
+    walks = LIMITS.walking_m_s * (reaction + speed / braking)
+    needs = (
+        walks + speed * reaction + speed * speed / (2 * braking) + LIMITS.uncertainty_m
+    )
+    margins: NDArray[np.float64] = gap - needs - _UNKNOWN_M * (age > LIMITS.pose_lost_s)
     return margins
 
 
@@ -198,17 +194,17 @@ def _to_look(
     profile = profile_of(robot.robot_id)
     braking, speed = profile.assumed_braking, abs(odometry.twist.linear_x)
     age = max(pose_age, look.age_s(now))
-    reaction = max(REACTION_S, age + ONWARD_S)
-    footprints = profile.length / 2 + PERSON_RADIUS_M
+    reaction = max(LIMITS.reaction_s, age + LIMITS.onward_s)
+    footprints = profile.length / 2 + LIMITS.person_radius_m
     return Margin(
         robot.robot_id,
         person.person_id,
         gap_m=odometry.pose.distance_to(look.x, look.y) - footprints,
-        walks_m=WALKING_SPEED * (reaction + speed / braking),
+        walks_m=LIMITS.walking_m_s * (reaction + speed / braking),
         reaction_m=speed * reaction,
         braking_m=speed * speed / (2 * braking),
         age_s=age,
         speed=speed,
         braking=braking,
-        known=pose_age <= POSE_LOST_S,
+        known=pose_age <= LIMITS.pose_lost_s,
     )

@@ -10,14 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.profiles import profile_of
 from iveg.domain.world import RobotState, World
 
 PICTURES_HZ = 45.0
 """Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
-BEYOND_M = 6.0
-"""Beyond the camera's reach: the widest ring of somebody whom it saw (m)."""
 _OPEN_FROM_M = 2000.0
 
 
@@ -69,7 +68,7 @@ class Overload:
 def _near(
     observer: RobotState, robots: Iterable[RobotState], whole_fleet: bool
 ) -> Iterable[RobotState]:
-    reach = profile_of(observer.robot_id).camera_range + BEYOND_M
+    reach = profile_of(observer.robot_id).camera_range + LIMITS.ring_most_m
     here = _pose(observer)
     for robot in robots:
         # What a recording saw slows recordings alone.

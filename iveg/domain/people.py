@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.alerts import WALKING_SPEED, Class, Rule
+from iveg.domain.alerts import Class, Rule
 from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.profiles import profile_of
 from iveg.domain.spots import Spots
@@ -212,7 +213,7 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
         if peer is observer or peer.odometry is None or since is None:
             continue
         reach = _PEER_GATE_M + profile_of(peer.robot_id).length / 2
-        reach += WALKING_SPEED * min(1.0, max(0.0, at.mono - since))
+        reach += LIMITS.walking_m_s * min(1.0, max(0.0, at.mono - since))
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):
             nearest = (residual, peer.robot_id)

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class RobotProfile:
     turning_radius: float = 0.0
     acceleration: float = 0.5
     braking: float = 1.0
-    assumed_braking: float = 0.5
+    assumed_braking: float = LIMITS.least_braking_m_s2
     camera: Pose2D = Pose2D(0.4, 0.0, 0.0)
     camera_height: float = 0.6
     camera_fov: float = math.radians(69.0)

@@ -8,11 +8,12 @@ import math
 
 from iveg.domain.geometry import wrap_angle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.people import People
 from iveg.domain.profiles import profile_of
-from iveg.domain.tracking.person import RING_S, SEEN_S, Person, Sighting
-from iveg.domain.world import LIVE_S, RobotState, World
+from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.world import RobotState, World
 
 CLEAR_S = 1.0
 _EDGE_RAD = math.radians(5.0)
@@ -37,7 +38,7 @@ class AllClear:
         cleared: list[Person] = []
         for person in list(people.known.values()):
             for sighting in list(person.sightings):
-                if not SEEN_S < sighting.age_s(now) <= RING_S:
+                if not LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s:
                     continue
                 if sighting.reach_m > 0.0:  # nobody knows where to look
                     continue
@@ -78,7 +79,7 @@ def can_see(
 ) -> bool:
     """Whether a robot's camera looks at a spot now, nothing in between."""
     age, looked = robot.age_s(now), robot.detections_at
-    if robot.odometry is None or age is None or age > LIVE_S or looked is None:
+    if robot.odometry is None or age is None or age > LIMITS.live_s or looked is None:
         return False
     if now.mono - looked > _FRESH_LOOK_S:
         return False

@@ -15,6 +15,7 @@ from iveg.domain.age import FeedbackLedger
 from iveg.domain.clocks import RobotClock
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     Canary,
     Climate,
@@ -37,12 +38,9 @@ from iveg.domain.transports import Feeds
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
-LIVE_S, LATE_S = 1.0, 3.0
-STANDING_SPEED = 0.02
-"""Below this (m/s and rad/s) a robot stands (safety.md §2.2)."""
 REPLAY_TASK = "replay"
 _HISTORY = 128
-_ASKED_AGE_S, _THINNED_AGE_S = LATE_S + 0.1, LIVE_S + 0.1
+_ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 GAIN_OVER_S = 1.0
 
 
@@ -108,11 +106,11 @@ class RobotState:
         age = self.age_s(now)
         if age is None:
             since = self.unproven_since
-            lost = since is not None and now.mono - since > LATE_S
+            lost = since is not None and now.mono - since > LIMITS.late_s
             return "LOST" if lost else "UNKNOWN"
-        if age <= LIVE_S:
+        if age <= LIMITS.live_s:
             return "LIVE"
-        return "LATE" if age <= LATE_S else "LOST"
+        return "LATE" if age <= LIMITS.late_s else "LOST"
 
     @property
     def is_replay(self) -> bool:
@@ -126,8 +124,8 @@ class RobotState:
             return False
         twist = self.odometry.twist
         return (
-            abs(twist.linear_x) < STANDING_SPEED
-            and abs(twist.angular_z) < STANDING_SPEED
+            abs(twist.linear_x) < LIMITS.standing_speed
+            and abs(twist.angular_z) < LIMITS.standing_speed
         )
 
     def pose_at_stamp(self, stamp_s: float | None) -> Pose2D | None:

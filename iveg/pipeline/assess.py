@@ -15,8 +15,9 @@ from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.feedback import CLEAR, Mandate
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.mandates import Change, Crossing, Mandates
-from iveg.domain.margins import POSE_LOST_S, margins_of
+from iveg.domain.margins import margins_of
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
@@ -271,7 +272,7 @@ class Assessor:
         fleet = list(self.world.live_robots())
         margins = [*margins_of(fleet, self.people.known.values(), now)]
         ages = [robot.age_s(now) for robot in fleet]
-        seen = any(age is not None and age <= POSE_LOST_S for age in ages)
+        seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
         self._exposures.look(margins, now, seen=seen)
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from iveg.domain.alerts import Rule
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FeedbackAlert
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
 from iveg.domain.order import Verdict
 from iveg.domain.overload import Overload
 from iveg.domain.people import People, Placed
-from iveg.domain.tracking.person import RING_S
 from iveg.domain.world import World
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Ids
@@ -70,7 +70,9 @@ class Looks:
         Later than a ring lives it protects nobody, and would only show ghosts.
         """
         late = verdict == "late" and not received.asked
-        if verdict != "new" and not (late and self._age_s(frame, received) <= RING_S):
+        if verdict != "new" and not (
+            late and self._age_s(frame, received) <= LIMITS.ring_lasts_s
+        ):
             return
         robot_id = frame.robot_id
         if not self._overload.admits(robot_id, received.at):
@@ -123,7 +125,9 @@ class Looks:
         """Do not remember for ever what was told of whom."""
         if len(self._told) > _MAX_SUBJECTS:
             self._told = {
-                key: at for key, at in self._told.items() if now.mono - at < RING_S
+                key: at
+                for key, at in self._told.items()
+                if now.mono - at < LIMITS.ring_lasts_s
             }
 
 

@@ -9,9 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
-
-RELEASE_AFTER_S = 1.0
-RELEASE_BEYOND_M = 0.3
+from iveg.domain.limits import LIMITS
 
 _REASONS = ("clear", "stale", "watchdog", "robot", "person")
 """What a report may give as reason for a cap; at equal factors the last one is told."""
@@ -69,6 +67,6 @@ class Applied:
         if self.waiting is None:
             return Applied(self.cap, raw, now)
         waiting = lowest((self.waiting, raw))
-        if now - self.since < RELEASE_AFTER_S:
+        if now - self.since < LIMITS.release_after_s:
             return Applied(self.cap, waiting, self.since)
         return Applied(waiting).settle(raw, now)

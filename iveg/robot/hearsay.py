@@ -18,17 +18,12 @@ from iveg.domain.feedback import (
     Mandate,
 )
 from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Origin
-from iveg.robot.caps import FREE, RELEASE_BEYOND_M, Cap, known_reason, quantised
+from iveg.robot.caps import FREE, Cap, known_reason, quantised
 
-STANDS_BELOW = 0.02
-"""|v| (m/s) and |ω| (rad/s) of a robot that stands."""
-PEER_FRESH_S = 1.0
-RING_M = 2.0
-KEPT_S = 10.0
 MOVED_ON_S = 1.0
 MYSELF_WITHIN_M = 1.0
-WALK_M_S, FRESH_S, WIDEST_RING_M = 1.6, 0.32, 6.0
 _MAX_TOPICS, _MAX_ALERTS, _MAX_BOOTS = 64, 512, 32
 
 _Key = tuple[str, str | None, str | None, int]
@@ -67,9 +62,9 @@ class _Peer:
     def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
         """What the peer asks of a robot at ``own``."""
         age = now - self.at
-        if age > KEPT_S or (self.stands and age <= PEER_FRESH_S):
+        if age > LIMITS.ring_lasts_s or (self.stands and age <= LIMITS.silence_s):
             return FREE
-        ring = min(WIDEST_RING_M, RING_M + _growth(age)) + beyond
+        ring = ring_radius(LIMITS.ring_default_m, age) + beyond
         near = own.distance_to(self.pose.x, self.pose.y) <= ring
         return Cap(HALF_SPEED, "robot", name) if near else FREE
 
@@ -126,16 +121,16 @@ class Hearsay:
             slowed: The robot is slow for a person or peer: rings let go later.
             now: Monotonic (s).
         """
-        beyond = RELEASE_BEYOND_M if slowed else 0.0
+        beyond = LIMITS.release_beyond_m if slowed else 0.0
         for name, topic in self._topics.items():
             silence = now - topic.at
-            if silence > KEPT_S:
+            if silence > LIMITS.ring_lasts_s:
                 continue
             yield _mandated(topic.mandate)
             for kept in topic.alerts.values():
                 if kept.myself or not _alive(kept, topic, now):
                     continue
-                ring = _ring(kept.alert, _growth(silence)) + beyond
+                ring = _ring(kept.alert, silence) + beyond
                 if _inside(kept.alert, topic.peer, own, ring):
                     yield _alerted(kept.alert)
             if topic.peer is not None and own is not None:
@@ -149,7 +144,7 @@ class Hearsay:
         twist, stamp = feedback.twist, feedback.pose_stamp
         stands = (
             twist is not None
-            and max(abs(twist.linear_x), abs(twist.angular_z)) < STANDS_BELOW
+            and max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed
         )
         repeated = before is not None and stamp is not None and before.stamp == stamp
         at = before.at if before is not None and repeated else now
@@ -198,7 +193,7 @@ def _alive(kept: _Kept, topic: _Topic, now: float) -> bool:
     """Whether an alert still counts: told lately, and its topic has not moved on."""
     missing = kept.missing_since
     moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
-    return not moved_on and now - kept.at <= KEPT_S
+    return not moved_on and now - kept.at <= LIMITS.ring_lasts_s
 
 
 def _newer(origin: Origin, topic: _Topic) -> bool:
@@ -233,10 +228,6 @@ def _whose(alert: FeedbackAlert) -> tuple[str, str | None, str | None]:
     return alert.decision_id, alert.observer, alert.class_
 
 
-def _growth(age: float) -> float:
-    return WALK_M_S * max(0.0, age - FRESH_S)
-
-
 def _mandated(mandate: Mandate) -> Cap:
     factor = quantised(mandate.speed_factor)
     if factor == FULL_SPEED:
@@ -253,9 +244,9 @@ def _mandated_free(mandate: Mandate, alert: FeedbackAlert) -> bool:
     )
 
 
-def _ring(alert: FeedbackAlert, growth: float) -> float:
-    told = RING_M if alert.radius_m is None else alert.radius_m
-    return max(told, min(WIDEST_RING_M, told + growth))
+def _ring(alert: FeedbackAlert, silence: float) -> float:
+    told = LIMITS.ring_default_m if alert.radius_m is None else alert.radius_m
+    return ring_radius(told, silence)
 
 
 def _inside(

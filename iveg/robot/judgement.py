@@ -10,11 +10,11 @@ from typing import Literal
 
 from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.limits import LIMITS
 from iveg.robot.caps import FREE, Applied, Cap, lowest
-from iveg.robot.hearsay import STANDS_BELOW, Hearsay
+from iveg.robot.hearsay import Hearsay
 from iveg.robot.watchdog import Watchdog
 
-POSE_SLOW_S, POSE_STAND_S = 0.2, 0.5
 _REST = Twist2D(0.0, 0.0)
 
 
@@ -31,8 +31,8 @@ class Limits:
 
     max_speed: float = 1.0
     max_turn: float = 1.0
-    slow_s: float = 1.0
-    stand_s: float = 3.0
+    slow_s: float = LIMITS.feedback_slow_s
+    stand_s: float = LIMITS.feedback_stand_s
     on_link_loss: Literal["stop", "slow"] = "stop"
 
 
@@ -80,7 +80,7 @@ class Judgement:
     def motion(self, now: float) -> Motion | None:
         """Newest odometry; None when it is lost (0.5 s)."""
         motion = self._motion
-        if motion is None or now - motion.at > POSE_STAND_S:
+        if motion is None or now - motion.at > LIMITS.pose_stand_s:
             return None
         return motion
 
@@ -90,8 +90,8 @@ class Judgement:
         if motion is None:
             return False
         return (
-            abs(motion.twist.linear_x) < STANDS_BELOW
-            and abs(motion.twist.angular_z) < STANDS_BELOW
+            abs(motion.twist.linear_x) < LIMITS.standing_speed
+            and abs(motion.twist.angular_z) < LIMITS.standing_speed
         )
 
     def moved(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
@@ -136,7 +136,9 @@ class Judgement:
         motion = self.motion(now)
         if motion is None or motion.pose is None:
             return Cap(0.0, "stale")
-        return Cap(HALF_SPEED, "stale") if now - motion.at > POSE_SLOW_S else FREE
+        return (
+            Cap(HALF_SPEED, "stale") if now - motion.at > LIMITS.pose_slow_s else FREE
+        )
 
     def _silence_cap(self, now: float) -> Cap:
         age = self.watchdog.age(now)

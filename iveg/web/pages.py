@@ -15,6 +15,7 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
+from iveg.domain import limits
 from iveg.domain.alerts import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.contexts import (
@@ -225,6 +226,11 @@ def _theme(wanted: str | None) -> Theme:
     return "auto"
 
 
+def limits_text() -> str:
+    """The table of safety numbers, as ``static/js/limits.js`` reads it."""
+    return json.dumps({row.name: row.value for row in limits.rows()})
+
+
 def _environment(words: Words) -> Environment:
     """Templates that speak one language."""
     environment = Environment(
@@ -247,5 +253,11 @@ def _environment(words: Words) -> Environment:
             attribute, words.say(key, **slots), attribute, key, data
         )
 
-    environment.globals.update(t=words.say, say=say, label=label)
+    environment.globals.update(
+        t=words.say,
+        say=say,
+        label=label,
+        limits=limits.LIMITS,
+        limits_text=limits_text(),
+    )
     return environment

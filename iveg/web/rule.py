@@ -9,6 +9,7 @@ from starlette.responses import Response
 from typing_extensions import TypedDict
 
 from iveg.domain.alerts import Class, Rule
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.rules import Rules
@@ -18,6 +19,7 @@ from iveg.web.robots import Json
 
 T = TypeVar("T")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+_RADIUS = Field(ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m, allow_inf_nan=False)
 _MOST_ALIASES = 200
 
 
@@ -34,7 +36,7 @@ class RuleChange(BaseModel):
     """The version that the person saw; 409 when it is no longer in force."""
     confidence_threshold: _Share | None = None
     class_thresholds: dict[Literal["person", "robot"], _Share] | None = None
-    radius_m: Annotated[float, Field(ge=0.5, le=6.0, allow_inf_nan=False)] | None = None
+    radius_m: Annotated[float, _RADIUS] | None = None
     aliases: (
         Annotated[
             dict[str, Literal["person", "robot"]], Field(max_length=_MOST_ALIASES)

@@ -9,18 +9,19 @@ from math import isfinite
 from typing import Any
 
 from iveg.domain.alarms import Alarm, Occurrence
-from iveg.domain.alerts import WALKING_SPEED, Rule
+from iveg.domain.alerts import Rule
 from iveg.domain.echoes import ECHO_S, WINDOW_S, Echoes
 from iveg.domain.exposure import Exposure
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.margins import UNCERTAINTY_M, Margin
+from iveg.domain.limits import LIMITS
+from iveg.domain.margins import Margin
 from iveg.domain.observations import Detection, Instant
 from iveg.domain.people import Placed
 from iveg.domain.profiles import profile_of
 from iveg.domain.records import LogRecord
-from iveg.domain.stop import FRESH_S, Command, StopMachine
+from iveg.domain.stop import Command, StopMachine
 from iveg.domain.world import RobotState
 from iveg.ngsi.codec import format_stamp
 from iveg.web import schemas
@@ -65,7 +66,7 @@ def command(of: Command, machine: StopMachine, now: Instant) -> schemas.CommandJ
             "report_age_s": rounded(age) if isfinite(age) else None,
             "moved_m": round(machine.moved_m(now), 2),
         },
-        "challenge_fresh": machine.report_age(now) <= FRESH_S,
+        "challenge_fresh": machine.report_age(now) <= LIMITS.report_fresh_s,
     }
 
 
@@ -240,11 +241,11 @@ def margin(of: Margin | None) -> schemas.MarginJson | None:
             "person_walks_m": round(of.walks_m, 2),
             "reaction_m": round(of.reaction_m, 2),
             "braking_m": round(of.braking_m, 2),
-            "uncertainty_m": UNCERTAINTY_M,
+            "uncertainty_m": LIMITS.uncertainty_m,
         },
         "age_s": round(of.age_s, 3),
         "braking": of.braking,
-        "walking_speed": WALKING_SPEED,
+        "walking_speed": LIMITS.walking_m_s,
     }
 
 

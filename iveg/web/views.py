@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from iveg.domain.echoes import echoes_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins, least, margins_of
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
-from iveg.domain.stop import STALE_S, Command, StopMachine
+from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
 from iveg.domain.world import RobotState, World
 from iveg.ngsi.codec import format_stamp
@@ -118,7 +119,9 @@ class Views:
         """
         factor = self._assessor.mandates[robot.robot_id].speed_factor
         report, received = robot.safety, robot.safety_received
-        is_fresh = received is not None and now.mono - received.mono <= STALE_S
+        is_fresh = (
+            received is not None and now.mono - received.mono <= LIMITS.report_stale_s
+        )
         if report is not None and is_fresh:
             factor = 0.0 if report.holds else report.speed_factor
         if factor <= 0.0 or machine.state == "STANDING":

@@ -6,8 +6,8 @@ import threading
 from dataclasses import dataclass, field
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Odometry, SafetyReport
-from iveg.domain.world import STANDING_SPEED
 from iveg.ngsi import codec
 
 
@@ -89,11 +89,11 @@ class Witness:
                 seen.factor = word.speed_factor
                 seen.held = any(hold.ack != "auto" for hold in word.holds)
                 # Only a robot at rest: one that brakes has not been stopped yet.
-                if seen.held and seen.speed < STANDING_SPEED:
+                if seen.held and seen.speed < LIMITS.standing_speed:
                     seen.allowed = False
 
     def _moves(self, seen: Seen, speed: float) -> None:
-        begins = seen.speed < STANDING_SPEED <= speed
+        begins = seen.speed < LIMITS.standing_speed <= speed
         seen.starts += begins
         seen.unlicensed += begins and not seen.allowed
         seen.speed = speed

@@ -1,7 +1,7 @@
 import { linkOf } from "../../iveg/static/js/clock.js";
+import { LIMITS } from "../../iveg/static/js/limits.js";
 import {
   doubtOf,
-  STANDING_LIMIT_S,
   viewOfFleet,
   viewOfRobot,
 } from "../../iveg/static/js/panels/stop_view.js";
@@ -240,7 +240,7 @@ function everything() {
 test("I12 no control is drawn as ready or standing from data older than its limit", () => {
   const limits = new Map([
     ["ready", 1],
-    ["standing", STANDING_LIMIT_S],
+    ["standing", LIMITS.report_stale_s],
   ]);
   const cases = everything();
   const shown = cases.map((one) => ({ one, state: viewOfRobot(one).state }));
@@ -255,7 +255,7 @@ test("I12 no control is drawn as ready or standing from data older than its limi
 
 test("I12 a fleet of such robots is not drawn as ready or standing either", () => {
   const wrong = everything()
-    .filter((one) => one.ageS > STANDING_LIMIT_S)
+    .filter((one) => one.ageS > LIMITS.report_stale_s)
     .map((one) => {
       const { link, ageS, connection, nowMs } = one;
       const robots = [{ view: viewOfRobot(one), link, ageS }];

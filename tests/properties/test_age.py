@@ -19,11 +19,12 @@ from iveg.domain.alerts import Rule
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.mandates import Mandates
 from iveg.domain.observations import Instant, Odometry, Origin, Received, Road
 from iveg.domain.people import People
 from iveg.domain.probe import ProbeLag
-from iveg.domain.world import LIVE_S, World
+from iveg.domain.world import World
 from iveg.robot.echo import Echo
 from tests.builders import START, odometry, origin
 
@@ -217,7 +218,7 @@ def check(rig: Rig) -> None:
     if true is None:
         return
     assert shown is None or shown >= true - 0.2
-    if true > LIVE_S + 0.2:
+    if true > LIMITS.live_s + 0.2:
         assert rig.robot.link(rig.at()) != "LIVE"
         assert not rig.is_clear()
 

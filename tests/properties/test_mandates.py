@@ -6,7 +6,7 @@ import math
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.mandates import RELEASE_M, RELEASE_S
+from iveg.domain.limits import LIMITS
 from tests.unit.domain.scene import Scene, person
 
 noise = st.lists(st.floats(-0.149, 0.149), min_size=60, max_size=60)
@@ -82,12 +82,12 @@ def test_nothing_is_let_go_before_a_second_outside_the_wider_ring(
     for distance, pause in walked:
         scene.now += pause
         before, factor = factor, step(scene, distance)
-        if distance <= 2.0 + RELEASE_M:
+        if distance <= 2.0 + LIMITS.release_beyond_m:
             outside_since = math.inf
         elif outside_since == math.inf:
             outside_since = scene.now
         if (before, factor) == (0.5, 1.0):
-            assert scene.now - outside_since >= RELEASE_S - 1e-9
+            assert scene.now - outside_since >= LIMITS.release_after_s - 1e-9
 
 
 @given(st.lists(st.floats(-1.9, 1.9), min_size=1, max_size=8))

@@ -5,7 +5,7 @@ import random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.tracking.person import RING_S
+from iveg.domain.limits import LIMITS
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -52,7 +52,7 @@ def test_every_robots_newest_look_keeps_its_ring(
         if radius >= 2.0
     ]
     for observer, (when, (x, y)) in newest.items():
-        if scene.now - when <= RING_S:
+        if scene.now - when <= LIMITS.ring_lasts_s:
             assert (observer, round(x, 6), round(y, 6)) in rings
 
 

@@ -11,7 +11,7 @@ from random import Random
 
 import pytest
 
-from iveg.domain.stop import STANDING_FRESH_S, STANDING_S
+from iveg.domain.limits import LIMITS
 from tests.properties.test_stop import (
     SORTS,
     TICK_S,
@@ -124,7 +124,9 @@ def test_f11_half_a_second_of_latency_makes_no_false_standstill(batch: int) -> N
         rig.press_with_brakes_of(rnd)
         took = rig.until_it_stands(STANDING_WITHIN_S)
         assert took < STANDING_WITHIN_S, f"run {number}: {rig.iveg.state}"
-        false += [number for _, rested in rig.stood if rested < STANDING_S - TICK_S]
+        false += [
+            number for _, rested in rig.stood if rested < LIMITS.standing_for_s - TICK_S
+        ]
 
     assert false == []
 
@@ -140,7 +142,7 @@ def test_f12_a_third_of_everything_lost_still_stands_in_ten_seconds(batch: int) 
         assert rig.iveg.stop is not None
         tries.append(rig.iveg.stop.tries)
         # A move between two samples may be lost with them; one that goes on may not.
-        assert all(rested >= STANDING_FRESH_S - TICK_S for _, rested in rig.stood)
+        assert all(rested >= LIMITS.standing_gap_s - TICK_S for _, rested in rig.stood)
 
     assert max(took) <= STANDING_WITHIN_S
     assert min(tries) >= 1

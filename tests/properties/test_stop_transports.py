@@ -13,8 +13,9 @@ from random import Random
 
 import pytest
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import CommandAnswer
-from iveg.domain.stop import MOST_HOLDS, Changed, Effect, SendStop
+from iveg.domain.stop import Changed, Effect, SendStop
 from tests.properties.test_stop import DOWN, SORTS, TICK_S, Channel
 from tests.properties.test_stop_kills import Watched
 
@@ -111,7 +112,7 @@ class Late(Watched):
         asked = self.disk.asked
         super().iveg_restarts()
         again = self.iveg.hold_id
-        assert again not in self.named or len(asked) >= MOST_HOLDS
+        assert again not in self.named or len(asked) >= LIMITS.most_holds
 
     def the_robot_reboots(self) -> None:
         super().the_robot_reboots()
@@ -168,7 +169,7 @@ def test_two_late_transports_lose_no_hold_and_pile_up_none(batch: int) -> None:
         told |= set(rig.keys)
         released += rig.asked
 
-        assert rig.most <= MOST_HOLDS, f"life {number}: {rig.most} holds"
+        assert rig.most <= LIMITS.most_holds, f"life {number}: {rig.most} holds"
 
     assert {"release_unconfirmed", "reasserted", "ready", "running"} <= told
     assert released

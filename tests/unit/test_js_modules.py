@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page
 
+from iveg.web.pages import limits_text
 from tests.browsers import running_browser
 
 _ROOT = Path(__file__).parents[2]
@@ -18,7 +19,10 @@ _POLICY = (
     "default-src 'self'; img-src data:; connect-src 'self' {connect}; "
     "require-trusted-types-for 'script'"
 )
-_PAGE = b"<!doctype html><html lang=en><link rel=icon href=data:,><body></body></html>"
+_PAGE = (
+    "<!doctype html><html lang=en><link rel=icon href=data:,>"
+    f"<body data-limits='{limits_text()}'></body></html>"
+).encode()
 
 
 class Files(SimpleHTTPRequestHandler):

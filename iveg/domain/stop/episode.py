@@ -7,6 +7,7 @@ What people, robots and time do to an episode is in ``people``, ``words`` and
 from math import isfinite
 
 from iveg.domain.errors import CommandRefusedError
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Hold, Instant, SafetyReport
 from iveg.domain.stop.attempt import Attempt
 from iveg.domain.stop.commands import Command, Press, Times
@@ -15,12 +16,6 @@ from iveg.domain.stop.sends import Progress, Sends
 from iveg.domain.stop.standstill import Standstill
 from iveg.domain.stop.table import STEPS, State
 
-UNCONFIRMED_S = 1.0
-STALE_S = 1.5
-"""A standstill that was measured longer ago may be over (docs/safety.md, "Age")."""
-FRESH_S = 1.0
-MOST_HOLDS = 3
-"""A robot that reports so many STOPs of iVeg gets no further one beside them."""
 PLAIN = Press()
 
 
@@ -141,7 +136,7 @@ class Episode:
         self.attempt, self.begun_at = None, at.mono
         self.doubt = None if kept is None else doubt
         self.standstill.forget()
-        self.deadline = at.mono + UNCONFIRMED_S
+        self.deadline = at.mono + LIMITS.unconfirmed_after_s
         self.sends.begin()
         # First, because sends to a standing robot are planned five seconds apart.
         changed = self.enter("REQUESTED", key)
@@ -157,7 +152,8 @@ class Episode:
         would only make a pile; then one of those is held on to.
         """
         ours = [hold for hold in self.holds if hold.source == "iveg"]
-        many = len(ours) >= MOST_HOLDS and self.report_age(at) <= FRESH_S
+        is_fresh = self.report_age(at) <= LIMITS.report_fresh_s
+        many = len(ours) >= LIMITS.most_holds and is_fresh
         kept = self.shown if many else None
         doubt = self.doubt
         if self.attempt is not None:

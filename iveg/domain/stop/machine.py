@@ -12,6 +12,7 @@ unconfirmed it becomes a STOP.
 from collections.abc import Iterable
 from math import inf
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
     Instant,
@@ -22,7 +23,7 @@ from iveg.domain.observations import (
 from iveg.domain.stop import people, releasing, words
 from iveg.domain.stop.commands import Command, Press
 from iveg.domain.stop.effects import Effect
-from iveg.domain.stop.episode import FRESH_S, PLAIN, STALE_S, Episode
+from iveg.domain.stop.episode import PLAIN, Episode
 from iveg.domain.stop.table import Transport
 from iveg.domain.stop.wanted import Wanted
 
@@ -177,7 +178,7 @@ class StopMachine(Episode):
                 return [self.enter("UNCONFIRMED", "unconfirmed")]
             case "DELIVERED" if late:
                 return [self.enter("STILL_MOVING", "still_moving")]
-            case "STANDING" if self.evidence_age(now) > STALE_S:
+            case "STANDING" if self.evidence_age(now) > LIMITS.report_stale_s:
                 self.standstill.forget()
                 self.sends.direct_now()
                 return [self.enter("STALE", "stale")]
@@ -190,4 +191,4 @@ class StopMachine(Episode):
         if self.doubt is None or not self.wants_stop or self.state == "RELEASING":
             return False
         heard_at = float("-inf") if self.report_at is None else self.report_at.mono
-        return now.mono - max(heard_at, self.begun_at) > FRESH_S
+        return now.mono - max(heard_at, self.begun_at) > LIMITS.report_fresh_s

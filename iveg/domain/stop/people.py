@@ -8,21 +8,14 @@ from collections.abc import Iterable
 from typing import Literal
 
 from iveg.domain.errors import CommandRefusedError
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.stop.attempt import Attempt
 from iveg.domain.stop.commands import Command, Press, Times
 from iveg.domain.stop.effects import Changed, Effect, SendOnce
-from iveg.domain.stop.episode import FRESH_S, MOST_HOLDS, STALE_S, Episode
+from iveg.domain.stop.episode import Episode
 from iveg.domain.stop.table import State, Transport
 from iveg.domain.stop.wanted import Wanted
-from iveg.domain.world import STANDING_SPEED
-
-RELEASE_S = 2.0
-UNSEEN_S = 2.0
-"""A release is confirmed by holding a control this long; a STOP that joined in that
-time was not seen by whoever releases."""
-CRAWL_SPEED = 0.2
-"""At most this fast a robot may be stopped for a drill (m/s)."""
 
 
 def press(
@@ -47,7 +40,7 @@ def restore(episode: Episode, wanted: Wanted, at: Instant, new_id: str) -> list[
     """
     kept, doubt = wanted.hold_id, None
     if kept is not None and kept in wanted.named:
-        many = len(wanted.asked) >= MOST_HOLDS
+        many = len(wanted.asked) >= LIMITS.most_holds
         kept, doubt = (kept, wanted.challenge) if many else (None, None)
     return episode.begin(wanted.by, at, new_id, "reasserted", kept=kept, doubt=doubt)
 
@@ -73,7 +66,7 @@ def drill(
         raise _refused(episode, "Drill", f"its state is {episode.state}")
     if episode.report is None or not _is_fresh(episode, at):
         raise _refused(episode, "Drill", "its report is not fresh")
-    if max(episode.speed, abs(episode.report.linear)) > CRAWL_SPEED:
+    if max(episode.speed, abs(episode.report.linear)) > LIMITS.drill_speed_m_s:
         raise _refused(episode, "Drill", "it is moving")
     return episode.begin(by, at, new_id, "requested", press)
 
@@ -87,7 +80,7 @@ def release(
         CommandRefusedError: not standing, no fresh report, the set has changed, or
             somebody has just joined the STOP.
     """
-    if at.mono - episode.joined_at < UNSEEN_S:
+    if at.mono - episode.joined_at < LIMITS.joined_unseen_s:
         raise _refused(episode, "Release", "somebody has pressed STOP just now")
     report = _may(episode, "Release", at, allowed=("STANDING", "RUNNING"))
     remote = [hold.id for hold in report.holds if hold.ack == "remote"]
@@ -128,12 +121,14 @@ def _may(
 
 def _is_fresh(episode: Episode, at: Instant) -> bool:
     """Whether the robot's last word has just come, and was not old when it came."""
-    return episode.report_age(at) <= FRESH_S and episode.evidence_age(at) <= STALE_S
+    if episode.report_age(at) > LIMITS.report_fresh_s:
+        return False
+    return episode.evidence_age(at) <= LIMITS.report_stale_s
 
 
 def stands(report: SafetyReport) -> bool:
     """Whether a robot says that it is at rest."""
-    return max(abs(report.linear), abs(report.angular)) < STANDING_SPEED
+    return max(abs(report.linear), abs(report.angular)) < LIMITS.standing_speed
 
 
 def _refused(episode: Episode, asked: str, why: str) -> CommandRefusedError:
@@ -155,7 +150,7 @@ def _send_once(
     if not episode.sends.has_direct:
         transports, once.roads["direct"] = ("fiware",), "off"
     episode.attempt = Attempt(once, challenge, ids)
-    episode.deadline = at.mono + RELEASE_S
+    episode.deadline = at.mono + LIMITS.release_within_s
     ours = tuple(hold.id for hold in report.holds if hold.source == "iveg")
     sending = SendOnce(
         robot_id,

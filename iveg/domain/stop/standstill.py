@@ -17,13 +17,9 @@ with its count.  No wall clock ever protects a standstill.
 from dataclasses import dataclass, field
 from math import inf
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin
 
-STANDING_SAMPLES, STANDING_S, STANDING_FRESH_S = 5, 1.0, 0.5
-"""So many samples at rest, over so long, none later than this after the one before."""
-SPARSE_GAP_S = 0.75
-"""The longest gap before a sample of a topic that has two a second."""
-MOVED_SAMPLES = 3
 _UNKNOWN = Origin()
 
 
@@ -110,7 +106,8 @@ class Standstill:
         """
         moment = self._reports.moment(origin, at)
         gap = moment.since(self._newest)
-        if gap is None or gap > (SPARSE_GAP_S if sparse else STANDING_FRESH_S):
+        longest = LIMITS.standing_gap_sparse_s if sparse else LIMITS.standing_gap_s
+        if gap is None or gap > longest:
             # Nobody knows what it did in the gap.
             self._begin_anew()
         if self.since is None or self._began is None:
@@ -118,8 +115,8 @@ class Standstill:
         self._newest = moment
         self._count += 1
         measured = (
-            self._count >= STANDING_SAMPLES
-            and (moment.since(self._began) or 0.0) >= STANDING_S
+            self._count >= LIMITS.standing_samples
+            and (moment.since(self._began) or 0.0) >= LIMITS.standing_for_s
             and not self._moved_lately(moment, at)
         )
         if measured and self._stood is None:
@@ -133,7 +130,7 @@ class Standstill:
         ago = moment.since(self._moved)
         # Where the robot's clock does not tell, the arrival must.
         ago = at.mono - self._moved_at if ago is None else ago
-        return ago < STANDING_FRESH_S
+        return ago < LIMITS.standing_gap_s
 
     def odometry(
         self, at: Instant, origin: Origin = _UNKNOWN, age_s: float = inf, *, moves: bool
@@ -150,7 +147,7 @@ class Standstill:
         self._moving_samples = self._moving_samples + 1 if moves else 0
         if moves:
             self._moved, self._moved_at = moment, at.mono
-        return self._moving_samples >= MOVED_SAMPLES
+        return self._moving_samples >= LIMITS.standing_contradicted_by
 
     def _is_before_the_rest(self, moment: Moment, not_before: float) -> bool:
         """Whether the robot's own clock says so, and nothing proves it wrong."""

@@ -5,6 +5,7 @@ Only a robot's own word moves an episode on; that a road took our message does n
 
 from collections import deque
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
     Instant,
@@ -15,13 +16,9 @@ from iveg.domain.observations import (
 from iveg.domain.stop import releasing
 from iveg.domain.stop.commands import Command, Times
 from iveg.domain.stop.effects import Effect, SetLevel
-from iveg.domain.stop.episode import STALE_S, Episode
+from iveg.domain.stop.episode import Episode
 from iveg.domain.stop.people import stands
-from iveg.domain.world import STANDING_SPEED
 
-ASSUMED_BRAKING = 0.5
-"""Least braking that may be counted on (m/s²)."""
-BRAKING_EXTRA_S, BRAKING_CAP_S = 1.5, 5.0
 _REMEMBERED = 64
 
 
@@ -78,9 +75,9 @@ def answered(
 def _delivered(episode: Episode, at: Instant) -> list[Effect]:
     if episode.state not in ("REQUESTED", "SENT", "UNCONFIRMED"):
         return []
-    braking = min(episode.speed / ASSUMED_BRAKING + BRAKING_EXTRA_S, BRAKING_CAP_S)
+    braking = episode.speed / LIMITS.least_braking_m_s2 + LIMITS.braking_extra_s
     # From the robot's word on: before it, a robot out of reach could not brake.
-    episode.deadline = at.mono + braking
+    episode.deadline = at.mono + min(braking, LIMITS.braking_most_s)
     return [episode.enter("DELIVERED", "delivered")]
 
 
@@ -148,7 +145,7 @@ def _rested(
     measured = episode.standstill.rested(at, report.origin, sparse=sparse)
     if not measured or episode.state == "STANDING":
         return []
-    if episode.evidence_age(at) > STALE_S:
+    if episode.evidence_age(at) > LIMITS.report_stale_s:
         return []  # it stood; nobody knows whether it stands
     if stop.times.standing is None:
         stop.times.standing = first = episode.standstill.since
@@ -174,7 +171,7 @@ def _adopt(episode: Episode, hold_id: str, at: Instant) -> list[Effect]:
     episode.standstill.forget()
     episode.sends.begin()
     episode.sends.now(at)
-    episode.deadline = at.mono + BRAKING_CAP_S
+    episode.deadline = at.mono + LIMITS.braking_most_s
     level = SetLevel(robot_id, "stopped", (hold_id,))
     return [level, *closed, episode.enter("DELIVERED", "adopted")]
 
@@ -192,7 +189,7 @@ def moved(
     age_s: float,
 ) -> list[Effect]:
     """A speed; three moving ones in a row, measured later, contradict a standstill."""
-    moves = max(abs(linear), abs(angular)) >= STANDING_SPEED
+    moves = max(abs(linear), abs(angular)) >= LIMITS.standing_speed
     contradicted = episode.standstill.odometry(at, origin, age_s, moves=moves)
     if contradicted is None:
         return []

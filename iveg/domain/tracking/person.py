@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.alerts import Class, Rule
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
 Stage = Literal["seen", "remembered", "last_seen", "gone"]
-
-SEEN_S, RING_S, LAST_SEEN_S = 1.0, 10.0, 600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,17 +70,19 @@ class Person:
     def stage(self, now: Instant) -> Stage:
         """Where in the life of a sighting this person stands."""
         age = self.age_s(now)
-        if age <= SEEN_S:
+        if age <= LIMITS.seen_s:
             return "seen"
-        if age <= RING_S:
+        if age <= LIMITS.ring_lasts_s:
             return "remembered"
-        return "last_seen" if age <= LAST_SEEN_S else "gone"
+        return "last_seen" if age <= LIMITS.last_seen_s else "gone"
 
     def observers(self, now: Instant) -> list[str]:
         """Robots that see this person now, in the order in which they began to."""
         return list(
             dict.fromkeys(
-                look.observer for look in self.sightings if look.age_s(now) <= SEEN_S
+                look.observer
+                for look in self.sightings
+                if look.age_s(now) <= LIMITS.seen_s
             )
         )
 
@@ -89,5 +90,5 @@ class Person:
         """Every circle that protects this person, with its radius now (m)."""
         for sighting in self.sightings:
             age = sighting.age_s(now)
-            if age <= RING_S:
+            if age <= LIMITS.ring_lasts_s:
                 yield sighting, max(sighting.reach_m, rule.radius_at(age))

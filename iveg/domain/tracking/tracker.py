@@ -17,10 +17,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from iveg.domain.alerts import WALKING_SPEED, Class
+from iveg.domain.alerts import Class
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
-from iveg.domain.tracking.person import RING_S, SEEN_S, Person, Sighting
+from iveg.domain.tracking.person import Person, Sighting
 
 MAX_PEOPLE = 256
 GATE_M, GATE_CAP_M = 1.0, 2.0
@@ -106,14 +107,14 @@ class Tracker:
             (person, look)
             for person in self.known.values()
             for look in person.sightings
-            if look.observer == observer and look.age_s(at) <= RING_S
+            if look.observer == observer and look.age_s(at) <= LIMITS.ring_lasts_s
         ]
         for is_live in (True, False):
             wanting = [index for index, old in enumerate(out) if old is None]
             offered = [
                 (person, look)
                 for person, look in own
-                if (look.age_s(at) <= SEEN_S) is is_live
+                if (look.age_s(at) <= LIMITS.seen_s) is is_live
             ]
             costs = [
                 [_chain_cost(picture[i], person, look, at) for person, look in offered]
@@ -142,7 +143,7 @@ class Tracker:
     ) -> list[str | None]:
         tracks: list[str | None] = [None] * len(picture)
         for index, old in enumerate(chains):
-            if old is not None and old[1].age_s(at) <= SEEN_S:
+            if old is not None and old[1].age_s(at) <= LIMITS.seen_s:
                 tracks[index] = old[0]
         self._assign_tracks(picture, tracks, at, is_live=True)
         taken = set(tracks)
@@ -168,8 +169,8 @@ class Tracker:
             person
             for person in self.known.values()
             if person.person_id not in taken
-            and (person.age_s(at) <= SEEN_S) is is_live
-            and person.age_s(at) <= RING_S
+            and (person.age_s(at) <= LIMITS.seen_s) is is_live
+            and person.age_s(at) <= LIMITS.ring_lasts_s
         ]
         cost = _live_cost if is_live else _lost_cost
         costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
@@ -191,7 +192,9 @@ class Tracker:
         if track is None:
             return self._begin(one, at)
         person, sighting = self.known[track], one.sighting
-        kept = tuple(look for look in person.sightings if look.age_s(at) <= RING_S)
+        kept = tuple(
+            look for look in person.sightings if look.age_s(at) <= LIMITS.ring_lasts_s
+        )
         newest = max(person.newest, sighting, key=lambda look: look.at.mono)
         self.known[track] = replace(
             person,
@@ -270,7 +273,7 @@ class Tracker:
                 and other is not person
                 and other.class_ == person.class_
                 and other.person_id not in apart
-                and other.age_s(at) <= SEEN_S
+                and other.age_s(at) <= LIMITS.seen_s
                 and not other.newest.reach_m
                 and not person.newest.reach_m
                 and _distance(other.newest, person.newest) <= self.merge_m
@@ -322,7 +325,7 @@ def _live_cost(one: Seen, person: Person, at: Instant) -> float:
             distance
             for look in person.sightings
             if not look.reach_m
-            and look.age_s(at) <= SEEN_S
+            and look.age_s(at) <= LIMITS.seen_s
             and (distance := _distance(look, one.sighting)) <= _gate(look, at)
         ),
         default=math.inf,
@@ -345,4 +348,4 @@ def _distance(one: Sighting, other: Sighting) -> float:
 
 def _gate(look: Sighting, at: Instant) -> float:
     """How far one may have walked since a look (m, capped)."""
-    return min(GATE_CAP_M, GATE_M + WALKING_SPEED * abs(at.mono - look.at.mono))
+    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - look.at.mono))

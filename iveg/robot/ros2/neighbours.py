@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
 from iveg.ros2 import messages as m
 
-SILENT_S = 3.0
+SILENT_S = LIMITS.feedback_stand_s
 """Feedback that is older tells nobody's place."""
 PERSON_M, PEER_M = 0.35, 0.75
 REACH_M = 8.0
@@ -88,7 +89,7 @@ class Neighbours:
                 continue
             radius = PERSON_M if alert.class_ == "person" else PEER_M
             name = alert.class_id or alert.class_
-            ring = alert.radius_m or 2.0
+            ring = alert.radius_m or LIMITS.ring_default_m
             yield Neighbour(alert.class_, name, x, y, radius, ring)
 
 

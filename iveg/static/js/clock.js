@@ -6,9 +6,7 @@
  * date shows right ages, and silence alone turns LIVE into LATE and LATE into LOST.
  */
 
-/** Youngest age (s) that is no longer LIVE, and no longer LATE (product limits). */
-export const LIVE_LIMIT_S = 1;
-export const LATE_LIMIT_S = 3;
+import { LIMITS } from "./limits.js";
 
 /**
  * @typedef {"LIVE" | "LATE" | "LOST" | "UNKNOWN"} Link
@@ -39,8 +37,8 @@ export function ageOf(data, nowMs = performance.now()) {
  */
 export function linkOf(ageS) {
   if (ageS === Number.POSITIVE_INFINITY) return "UNKNOWN";
-  if (ageS <= LIVE_LIMIT_S) return "LIVE";
-  return ageS <= LATE_LIMIT_S ? "LATE" : "LOST";
+  if (ageS <= LIMITS.live_s) return "LIVE";
+  return ageS <= LIMITS.late_s ? "LATE" : "LOST";
 }
 
 /**

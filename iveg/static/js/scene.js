@@ -43,14 +43,9 @@
  * }} Scene
  */
 
-import { ageOf, LATE_LIMIT_S, LIVE_LIMIT_S, linkOf } from "./clock.js";
+import { ageOf, linkOf } from "./clock.js";
+import { LIMITS, ringRadius } from "./limits.js";
 
-/** Ring growth after the last sighting (safety: 1.6 m/s from 0.32 s on, at most 6 m). */
-const WALK_M_S = 1.6;
-const GRACE_S = 0.32;
-const RING_MAX_M = 6;
-/** From here on only a marker is left of a person. */
-const REMEMBERED_LIMIT_S = 10;
 /** The server is silent for two seconds when the line is called lost; one more. */
 const VEIL_AFTER_MS = 1000;
 /** Commands whose robot may still be driving without anybody knowing. */
@@ -152,7 +147,7 @@ export function readPerson(person, nowMs) {
     x: person.position.x,
     y: person.position.y,
     ageS,
-    ringM: stage === "seen" ? person.radius_m : grownRing(person, ageS),
+    ringM: ringNow(person, stage, ageS),
     confidence: person.confidence,
     observers: person.observers,
     acting: person.acting,
@@ -164,17 +159,12 @@ export function readPerson(person, nowMs) {
  * The ring as the server drew it, grown on for as long as the server has been silent.
  *
  * @param {Person} person
+ * @param {ScenePerson["stage"]} stage
  * @param {number} ageS
  */
-function grownRing(person, ageS) {
-  const walkedS = beyondGrace(ageS) - beyondGrace(person.age_s ?? 0);
-  const limit = Math.max(RING_MAX_M, person.radius_m);
-  return Math.min(limit, person.radius_m + WALK_M_S * walkedS);
-}
-
-/** @param {number} ageS */
-function beyondGrace(ageS) {
-  return Math.max(0, ageS - GRACE_S);
+function ringNow(person, stage, ageS) {
+  if (stage === "seen") return person.radius_m;
+  return ringRadius(person.radius_m, ageS, person.age_s ?? 0);
 }
 
 /**
@@ -185,8 +175,8 @@ function beyondGrace(ageS) {
  * @returns {Person["stage"]}
  */
 function stageAt(stage, ageS) {
-  if (stage === "last_seen" || ageS > REMEMBERED_LIMIT_S) return "last_seen";
-  return stage === "seen" && ageS <= LIVE_LIMIT_S ? "seen" : "remembered";
+  if (stage === "last_seen" || ageS > LIMITS.ring_lasts_s) return "last_seen";
+  return stage === "seen" && ageS <= LIMITS.seen_s ? "seen" : "remembered";
 }
 
 /** @param {Store} store @param {number} nowMs */
@@ -194,7 +184,7 @@ function readDetections(store, nowMs) {
   /** @type {SceneDetection[]} */
   const detections = [];
   for (const [robotId, look] of store.looks()) {
-    if (ageOf(look, nowMs) > LIVE_LIMIT_S) continue;
+    if (ageOf(look, nowMs) > LIMITS.live_s) continue;
     const yaw = store.robots().get(robotId)?.pose?.yaw ?? 0;
     const slot = store.slotOf(robotId);
     look.items.forEach((item, i) => {
@@ -247,6 +237,6 @@ function readScans(store, nowMs) {
  * @param {number} ageS
  */
 function strengthAt(ageS) {
-  if (ageS <= LIVE_LIMIT_S) return 1;
-  return ageS <= LATE_LIMIT_S ? 0.35 : 0;
+  if (ageS <= LIMITS.live_s) return 1;
+  return ageS <= LIMITS.late_s ? 0.35 : 0;
 }

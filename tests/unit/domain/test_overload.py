@@ -2,13 +2,13 @@
 
 import pytest
 
-from iveg.domain.overload import BEYOND_M, PICTURES_HZ, Overload
-from iveg.domain.tracking.person import RING_S, SEEN_S
+from iveg.domain.limits import LIMITS
+from iveg.domain.overload import PICTURES_HZ, Overload
 from iveg.domain.tracking.tracker import MAX_PEOPLE
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
-REACH_M = 8.0 + BEYOND_M
+REACH_M = 8.0 + LIMITS.ring_most_m
 """Of AGI's camera, and beyond."""
 
 
@@ -45,7 +45,7 @@ def test_who_was_seen_once_long_ago_gives_way_and_who_was_seen_twice_never() -> 
     scene = full()
     scene.now = 0.5
     scene.look("AGI", person(0.0))
-    scene.now = RING_S + SEEN_S
+    scene.now = LIMITS.ring_lasts_s + LIMITS.seen_s
     crowd(scene, 3, first=MAX_PEOPLE)
     left = {one.person_id for one in scene.everyone}
     assert {"P1", "P257", "P258", "P259"} <= left

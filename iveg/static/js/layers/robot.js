@@ -5,6 +5,7 @@
  * last pose.  Each kind of drive has its own body, so hue never carries identity alone.
  */
 
+import { LIMITS } from "../limits.js";
 import { screenX, screenY } from "../viewport.js";
 import { circle, isolated, label, pill } from "./paint.js";
 
@@ -17,10 +18,6 @@ import { circle, isolated, label, pill } from "./paint.js";
 /** A body is never drawn shorter than this (px), however far away the eye is. */
 const SHORTEST_PX = 20;
 const PADLOCK_PX = 12;
-/** A robot that was seen to be held longer ago than this may drive by now (s). */
-const HELD_FRESH_S = 1.5;
-/** What SLOW means, also of a robot that has not said yet how fast it may be. */
-const HALF_SPEED = 0.5;
 
 /** @param {Paint} paint */
 export function draw(paint) {
@@ -214,7 +211,7 @@ function drawHeading(ctx, length, width, hue, ink) {
  * @param {Pick<SceneRobot, "mode" | "ageS">} robot
  */
 export const isSeenHeld = ({ mode, ageS }) =>
-  mode === "STOPPED" && ageS <= HELD_FRESH_S;
+  mode === "STOPPED" && ageS <= LIMITS.report_stale_s;
 
 /**
  * A dark octagon with a padlock: held, and not by accident.
@@ -281,7 +278,7 @@ function tagsOf({ theme, words }, robot) {
   if (robot.link === "LATE") tags.push([words.age(robot.ageS), theme.alarm[1]]);
   if (robot.link === "LOST") tags.push([words.ago(robot.ageS), theme.muted]);
   if (robot.mode === "SLOW" && robot.link !== "LOST") {
-    tags.push([words.percent(HALF_SPEED), theme.text]);
+    tags.push([words.percent(LIMITS.slow_factor), theme.text]);
   }
   if (robot.replay) tags.push([words.replay(), theme.muted]);
   return tags;

@@ -8,6 +8,7 @@
  */
 
 import { ageOf } from "../clock.js";
+import { LIMITS } from "../limits.js";
 import { make, need, needPart, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
@@ -15,8 +16,6 @@ import { make, need, needPart, setText } from "./dom.js";
 /** @typedef {import("../protocol.js").Command} Command */
 
 const HOLD_MS = 2000;
-const FRESH_S = 1;
-const STANDING_M_S = 0.02;
 const RELEASERS = new Set(["operator", "admin"]);
 
 /**
@@ -212,7 +211,7 @@ export function whyNotAtAll({ connection, role, ageS }) {
   if (connection === "signed-out") return "signed_out";
   if (connection !== "open") return "no_link";
   if (!RELEASERS.has(role)) return "role";
-  return ageS > FRESH_S ? "not_fresh" : null;
+  return ageS > LIMITS.report_fresh_s ? "not_fresh" : null;
 }
 
 /** @param {Facts} facts */
@@ -221,8 +220,8 @@ function isStanding({ robot, command }) {
   const twist = robot?.twist;
   return (
     robot?.mode === "STOPPED" &&
-    Math.abs(twist?.linear ?? 1) < STANDING_M_S &&
-    Math.abs(twist?.angular ?? 1) < STANDING_M_S
+    Math.abs(twist?.linear ?? 1) < LIMITS.standing_speed &&
+    Math.abs(twist?.angular ?? 1) < LIMITS.standing_speed
   );
 }
 

@@ -5,6 +5,7 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
+import { LIMITS } from "../limits.js";
 import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
@@ -18,8 +19,6 @@ const TICK_MS = 200;
 /** Cards that nobody sees are drawn at every so many ticks: a second. */
 const UNSEEN_TICKS = 5;
 const DEFAULT_MAX = 1;
-/** What SLOW means, also of a robot that has not said yet how fast it may be. */
-const HALF_SPEED = 0.5;
 const DEGREES = 180 / Math.PI;
 
 /** @param {App} app */
@@ -308,7 +307,7 @@ export function modeSaid(robot, words) {
     return words.t("robot.mode_stopping", { state });
   }
   if (mode !== "SLOW") return words.t(`robot.mode.${mode}`);
-  return words.t("robot.mode_slow", { factor: HALF_SPEED });
+  return words.t("robot.mode_slow", { factor: LIMITS.slow_factor });
 }
 
 /**

@@ -26,6 +26,8 @@
  * }} RobotFacts `isBlind`: the session is over and may still stop; `nowMs` is `performance.now()`, `serverNowS` Unix time
  */
 
+import { LIMITS } from "../limits.js";
+
 /** @type {Record<string, StopState>} */
 const BY_COMMAND = {
   REQUESTED: "asked",
@@ -64,9 +66,6 @@ const LOUDEST_FIRST = /** @type {StopState[]} */ ([
 
 /** Presses older than this without an answer are said to be so (ms). */
 export const TAKEN_LIMIT_MS = 500;
-
-/** A standstill that was last reported longer ago than this is one of the past (s). */
-export const STANDING_LIMIT_S = 1.5;
 
 /**
  * One robot's control.
@@ -155,7 +154,7 @@ function shownState({ command, nowMs }) {
   const state = stateOfCommand(command);
   if (!command || state !== "standing") return state;
   const ageS = doubtOf(command, nowMs)?.ageS ?? Number.POSITIVE_INFINITY;
-  return ageS > STANDING_LIMIT_S ? "stale" : "standing";
+  return ageS > LIMITS.report_stale_s ? "stale" : "standing";
 }
 
 /**

@@ -1,0 +1,186 @@
+"""Every number that safety rests on: once, with its unit and where it comes from.
+
+The rule, the machine of STOP, the software on a robot and the pages take them from
+here, the pages through what the server writes into each (``static/js/limits.js``).
+Where a setting may change one, this is its default.  Numbers of an algorithm that
+nobody outside of it relies on stay where the algorithm is.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Number = TypeVar("_Number", int, float)
+_OneOrMany = TypeVar("_OneOrMany", float, NDArray[np.float64])
+
+
+def _limit(value: _Number, unit: str, source: str, says: str) -> _Number:
+    """A row of the table."""
+    facts = {"unit": unit, "source": source, "says": says}
+    row: _Number = field(default=value, metadata=facts)
+    return row
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """The table; what a row says, its unit and its source are its metadata."""
+
+    detection_threshold: float = _limit(
+        0.80, "share", "paper, Algorithm 2", "least confidence that raises an alert"
+    )
+    ring_default_m: float = _limit(
+        2.0, "m", "paper, Algorithm 3", "ring of a fresh sighting, unless the rule says"
+    )
+    ring_least_m: float = _limit(
+        0.5, "m", "chosen: half a robot's length", "least ring that a rule may ask for"
+    )
+    ring_most_m: float = _limit(
+        6.0, "m", "chosen: seen 2.8 s ago", "widest ring, asked for or grown"
+    )
+    walking_m_s: float = _limit(
+        1.6, "m/s", "ISO 13855", "how fast a person may walk, and a ring grow"
+    )
+    growth_grace_s: float = _limit(
+        0.32, "s", "paper, P95 to the broker", "age up to which a ring keeps its size"
+    )
+    slow_factor: float = _limit(
+        0.5, "share", "paper, Algorithm 3", "speed inside a ring"
+    )
+    release_beyond_m: float = _limit(
+        0.3, "m", "chosen: noise of poses", "so far outside the ring a robot is let go"
+    )
+    release_after_s: float = _limit(
+        1.0, "s", "chosen: noise of poses", "and so long after; also on the robot"
+    )
+
+    live_s: float = _limit(1.0, "s", "chosen", "age up to which a robot is LIVE")
+    late_s: float = _limit(3.0, "s", "chosen", "age up to which it is LATE, then LOST")
+    silence_s: float = _limit(
+        1.0, "s", "chosen", "older poses, detections or peers slow whoever needs them"
+    )
+    pose_slow_s: float = _limit(
+        0.2, "s", "Husky 0.25 s", "age of a robot's own pose that halves its speed"
+    )
+    pose_stand_s: float = _limit(
+        0.5, "s", "twist_mux 0.5 s", "age of a robot's own pose that stops it"
+    )
+    pose_lost_s: float = _limit(
+        1.5, "s", "Autoware 1.0 s", "an older pose says nothing of where a robot is"
+    )
+    feedback_slow_s: float = _limit(
+        1.0, "s", "Nav2 2.0 s", "age of feedback that halves a robot's speed"
+    )
+    feedback_stand_s: float = _limit(
+        3.0, "s", "Spot 3 s", "age of feedback that stops a robot"
+    )
+    seen_s: float = _limit(1.0, "s", "chosen", "age up to which one is seen")
+    ring_lasts_s: float = _limit(
+        10.0, "s", "chosen", "age up to which a sighting has a ring"
+    )
+    last_seen_s: float = _limit(
+        600.0, "s", "chosen", "age up to which a mark stays on the map"
+    )
+    observer_forgotten_s: float = _limit(
+        600.0, "s", "chosen", "a detector that is silent so long is not missed"
+    )
+
+    standing_speed: float = _limit(
+        0.02, "m/s, rad/s", "chosen: noise at rest", "below this a robot stands"
+    )
+    standing_samples: int = _limit(5, "reports", "chosen", "so many at rest")
+    standing_for_s: float = _limit(1.0, "s", "chosen", "over so long are a standstill")
+    standing_gap_s: float = _limit(
+        0.5, "s", "chosen", "none later than this after the one before"
+    )
+    standing_gap_sparse_s: float = _limit(
+        0.75, "s", "two reports a second", "or this, through the agent"
+    )
+    standing_contradicted_by: int = _limit(
+        3, "samples", "chosen", "of odometry that move, in a row"
+    )
+
+    least_braking_m_s2: float = _limit(
+        0.5, "m/s²", "wet floor, not measured", "least braking that may be counted on"
+    )
+    braking_extra_s: float = _limit(
+        1.5, "s", "standstill and way back", "added to the time that braking takes"
+    )
+    braking_most_s: float = _limit(
+        5.0, "s", "chosen", "longest wait before a robot counts as STILL_MOVING"
+    )
+
+    unconfirmed_after_s: float = _limit(
+        1.0, "s", "chosen", "without a robot's word a STOP is UNCONFIRMED"
+    )
+    report_fresh_s: float = _limit(
+        1.0, "s", "chosen", "oldest report that a release or a drill may rest on"
+    )
+    report_stale_s: float = _limit(
+        1.5, "s", "0.5 s one way", "a standstill reported longer ago may be over"
+    )
+    release_within_s: float = _limit(
+        2.0, "s", "chosen", "an unconfirmed release becomes a STOP"
+    )
+    joined_unseen_s: float = _limit(
+        2.0, "s", "hold to confirm", "whoever releases has not seen a newer press"
+    )
+    most_holds: int = _limit(
+        3, "holds", "chosen", "of iVeg's at one robot; no further one beside them"
+    )
+    drill_speed_m_s: float = _limit(
+        0.2, "m/s", "chosen", "fastest that a robot may be stopped for a drill"
+    )
+
+    reaction_s: float = _limit(
+        0.79, "s", "sum of P95s", "camera to brakes on the other robot"
+    )
+    onward_s: float = _limit(
+        0.29, "s", "sum of P95s", "the part of it after iVeg knows"
+    )
+    uncertainty_m: float = _limit(
+        0.40, "m", "detection 0.30, pose 0.10", "added to a protective distance"
+    )
+    person_radius_m: float = _limit(0.30, "m", "chosen", "a person's footprint")
+    margin_clear_m: float = _limit(1.0, "m", "chosen", "a margin from here on is clear")
+
+
+LIMITS = SafetyLimits()
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One number of the table as documents print it."""
+
+    name: str
+    value: float
+    unit: str
+    source: str
+    says: str
+
+
+def rows() -> Iterator[Row]:
+    """The table, in order."""
+    for one in fields(LIMITS):
+        facts = one.metadata
+        value = getattr(LIMITS, one.name)
+        yield Row(one.name, value, facts["unit"], facts["source"], facts["says"])
+
+
+def ring_radius(
+    radius_m: float,
+    age_s: _OneOrMany,
+    least: Callable[..., Any] = min,
+    most: Callable[..., Any] = max,
+) -> _OneOrMany:
+    """How wide the ring of a sighting is that is ``age_s`` old (m).
+
+    It keeps its size for as long as a healthy way takes, grows as fast as a person
+    walks, and never shrinks.  ``numpy.minimum`` and ``numpy.maximum`` as ``least`` and
+    ``most`` judge an array of ages.
+    """
+    walked = LIMITS.walking_m_s * most(0.0, age_s - LIMITS.growth_grace_s)
+    grown: _OneOrMany = most(radius_m, least(LIMITS.ring_most_m, radius_m + walked))
+    return grown

@@ -1,0 +1,24 @@
+import { LIMITS, ringRadius } from "../../iveg/static/js/limits.js";
+import { equal, near, test } from "./harness.js";
+
+const RINGS = await (await fetch("/tests/data/rings.json")).json();
+
+test("the ring's law gives the cases that the server's gives", () => {
+  equal(RINGS.length > 50, true);
+  for (const { radius_m, age_s, ring_m } of RINGS)
+    near(ringRadius(radius_m, age_s), ring_m, 1e-6);
+});
+
+test("a ring that goes on growing here ends where the server's would", () => {
+  const atTwo = ringRadius(2, 2);
+
+  near(ringRadius(atTwo, 2.5, 2), ringRadius(2, 2.5));
+});
+
+test("a ring never shrinks, even if an age runs backwards", () => {
+  near(ringRadius(4, 1, 3), 4);
+});
+
+test("the page knows the server's numbers", () => {
+  equal([LIMITS.live_s, LIMITS.late_s, LIMITS.ring_lasts_s], [1, 3, 10]);
+});

@@ -1,0 +1,72 @@
+"""The safety numbers stand once; what judges by them agrees."""
+
+import json
+import re
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from iveg.domain.alerts import Rule
+from iveg.domain.limits import LIMITS, Row, ring_radius, rows
+from iveg.robot.judgement import Limits
+from iveg.settings import Settings
+from tests.processes import ROOT
+
+RINGS = json.loads((ROOT / "tests/data/rings.json").read_text())
+"""Cases that ``tests/js/limits.test.js`` judges, too."""
+
+
+@pytest.mark.parametrize("case", RINGS, ids=lambda one: f"{one}")
+def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
+    rule = Rule(radius_m=case["radius_m"])
+
+    assert rule.radius_at(case["age_s"]) == pytest.approx(case["ring_m"], abs=1e-6)
+
+
+def test_the_ring_law_judges_an_array_as_it_judges_each_age() -> None:
+    ages = np.linspace(0.0, 12.0, 500)
+
+    rings = ring_radius(2.0, ages, np.minimum, np.maximum)
+
+    assert rings.tolist() == [ring_radius(2.0, age) for age in ages.tolist()]
+
+
+def test_nobody_can_change_a_limit() -> None:
+    with pytest.raises(FrozenInstanceError):
+        LIMITS.ring_default_m = 0.1  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("row", [*rows()], ids=lambda row: row.name)
+def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Row) -> None:
+    assert row.unit
+    assert row.source
+    assert row.says
+    assert row.value > 0
+
+
+def test_rule_robot_and_settings_begin_with_the_limits() -> None:
+    settings, robot = Settings(), Limits()
+
+    assert settings.safety_radius_m == Rule().radius_m == LIMITS.ring_default_m
+    assert settings.feedback_stand_s == robot.stand_s == LIMITS.feedback_stand_s
+    assert settings.feedback_slow_s == robot.slow_s == LIMITS.feedback_slow_s
+
+
+@pytest.mark.parametrize("row", [*rows()], ids=lambda row: row.name)
+def test_the_safety_page_prints_the_limit(row: Row) -> None:
+    page = (ROOT / "docs/safety.md").read_text()
+
+    line = f"| `{row.name}` | {row.value:g} {row.unit} | {row.says} | {row.source} |"
+    assert f"\n{line}\n" in page
+
+
+def test_no_page_writes_a_safety_number_of_its_own() -> None:
+    law = re.compile(r"\b(0\.32|1\.6)\b")
+    written = [
+        file.name
+        for file in (ROOT / "iveg/static/js").rglob("*.js")
+        if law.search(file.read_text())
+    ]
+
+    assert written == []
