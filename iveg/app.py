@@ -31,7 +31,6 @@ from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.domain.alerts import Rule
-from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
@@ -40,6 +39,7 @@ from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
+from iveg.pipeline.earlier import remember
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
@@ -71,7 +71,6 @@ from iveg.web.signin import SignInLink
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
-_HISTORY_AGAIN_S = 5.0
 
 
 def new_id() -> str:
@@ -247,19 +246,14 @@ class Dss:
     async def _remember(self) -> None:
         """Take up what earlier runs left in the history, as soon as it answers."""
         await self.recorder.caught_up()
-        while True:
-            try:
-                left_open = await self.queries.open_commands()
-                decisions = await self.queries.open_decisions()
-                alerted = await self.queries.open_alerts()
-                drilled = await self.queries.last_drills()
-            except HopError:
-                await asyncio.sleep(_HISTORY_AGAIN_S)
-            else:
-                self.commander.close_earlier(left_open, clock.now())
-                self.commander.drills.remember(drilled)
-                self.assessor.close_earlier(decisions, alerted, clock.now())
-                return
+        await remember(
+            self.queries,
+            self.commander,
+            self.assessor,
+            self.minutes,
+            self.chain,
+            clock.now,
+        )
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A part that must live has died: say so and stop; the robots slow down."""

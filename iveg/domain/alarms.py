@@ -137,6 +137,19 @@ class AlarmBook:
             self._alarms[alarm.condition.key, alarm.condition.subject] = alarm
         return alarm
 
+    def remember(self, alarms: Iterable[Alarm]) -> None:
+        """Take up alarms that are over and that nobody has seen; what is known stays.
+
+        One whose condition holds again already stands beside it under its own name.
+        """
+        for alarm in alarms:
+            key = alarm.condition.key, alarm.condition.subject
+            if key in self._alarms:
+                named = replace(alarm.condition, subject=alarm.alert_id)
+                alarm = replace(alarm, condition=named)
+                key = named.key, named.subject
+            self._alarms[key] = alarm
+
     def find(self, alert_id: str) -> Alarm | None:
         """An alarm that is active or was not long ago."""
         found = (one for one in self._alarms.values() if one.alert_id == alert_id)

@@ -37,6 +37,11 @@ class Alarming:
         """Whether an alarm is of this run, active or over not long ago."""
         return self._book.find(alert_id) is not None
 
+    def remember(self, earlier: Iterable[Alarm]) -> None:
+        """Take up what nobody saw in an earlier run."""
+        self._book.remember(one for one in earlier if not self.knows(one.alert_id))
+        self._hub.changed("alerts")
+
     def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
         """Take what is wrong now."""
         changed = self._book.sync(wrong, now, self._new_id())

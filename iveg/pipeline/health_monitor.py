@@ -19,6 +19,7 @@ from iveg.domain.probe import ProbeLag, lag_in_words
 
 HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
+Earlier = Literal["known", "reading", "unknown"]
 
 PROBE_PERIOD_S = 2.0
 LATE_S, DOWN_S = 4.0, 5.5
@@ -26,6 +27,8 @@ GRACE_S = 6.0
 """After the start nobody is accused for this long."""
 SLOW_S = 1.0
 """A probe or an answer that takes longer is late."""
+EARLIER_GRACE_S = 2.0
+"""A history that has not told what earlier runs left by then is said to be missing."""
 _LONGEST_GAP_S = 30.0
 
 
@@ -66,6 +69,7 @@ class HealthMonitor:
         notified_at: When the newest notification of any kind came (s, monotonic).
         probe: How far the whole chain is behind.
         database: The recorder's state.
+        earlier_read: Whether what earlier runs left in the history is taken up.
     """
 
     def __init__(self, start: Instant) -> None:
@@ -85,6 +89,7 @@ class HealthMonitor:
         self._last_return: float | None = None
         self._gap_s = 0.0
         self.database: HopState = "unknown"
+        self.earlier_read = False
 
     # --- the heartbeat probe --------------------------------------------------------
 
@@ -119,6 +124,13 @@ class HealthMonitor:
             self._notifications(now, blind=blind or mqtt.state == "down"),
             Hop("database", self.database),
         ]
+
+    def earlier(self, now: Instant) -> Earlier:
+        """Whether alerts and log of earlier runs are known."""
+        if self.earlier_read:
+            return "known"
+        is_young = now.mono - self._start.mono < EARLIER_GRACE_S
+        return "reading" if is_young else "unknown"
 
     def whole(self, now: Instant) -> bool:
         """Whether every hop of FIWARE is well."""

@@ -68,6 +68,15 @@ class Minutes:
         self._sink.offer(record)
         self._hub.append("log", record)
 
+    def recall(self, earlier: Iterable[LogRecord]) -> None:
+        """Put lines of an earlier run before those of this one; any order."""
+        first = self.lines[0].id if self.lines else self._next_id + 1
+        before = sorted((one for one in earlier if one.id < first), key=_number)
+        before = before[-(_KEPT_LINES - len(self.lines)) :]
+        if before and len(self.lines) < _KEPT_LINES:
+            self.lines.extendleft(reversed(before))
+            self._hub.append("log/earlier", before)
+
     def decision(self, decision: Decision, now: Instant) -> None:
         """A decision is new or has grown a link."""
         self._sink.offer(record_of(decision, now))
@@ -253,6 +262,10 @@ class Minutes:
             )
         )
         self._hub.changed("alerts")
+
+
+def _number(line: LogRecord) -> int:
+    return line.id
 
 
 def _member(one: Occurrence) -> dict[str, str | float | None]:

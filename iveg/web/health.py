@@ -37,6 +37,7 @@ def health_of(
         "hops": hops,
         "counters": dict(sorted(counters().items())),
         "safety": safety(now),
+        "earlier": chain.earlier(now),
     }
 
 

@@ -116,6 +116,8 @@ class Encoder:
         now = self._clock()
         if isinstance(item, LogRecord):
             data = log_line(item)
+        elif topic == "log/earlier" and isinstance(item, list):
+            data = [log_line(line) for line in item]
         elif isinstance(item, Command):
             data = self._views.command(item, now)
         return text(topic, data, now)

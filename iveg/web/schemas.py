@@ -383,6 +383,7 @@ class HealthJson(TypedDict):
     hops: list[HopJson]
     counters: dict[str, int]
     safety: SafetyJson
+    earlier: Literal["known", "reading", "unknown"]
 
 
 class ClimateJson(TypedDict):

@@ -279,7 +279,13 @@ test("a flood is told apart from a rate that a person can bear", () => {
 /** The bell over a store; what sounded is in `heard`. */
 function bell() {
   document.body.replaceChildren();
-  for (const id of ["alerts-button", "alerts-count", "alerts-flood", "alerts-empty"]) {
+  for (const id of [
+    "alerts-button",
+    "alerts-count",
+    "alerts-flood",
+    "alerts-empty",
+    "alerts-earlier",
+  ]) {
     const element = document.createElement(id === "alerts-button" ? "button" : "p");
     element.id = id;
     document.body.append(element);

@@ -125,6 +125,22 @@ class Queries:
 
         return await self._ask(read)
 
+    async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
+        """The newest P1s that nobody has acknowledged, active or over."""
+        a = alerts.c
+        wanted = (
+            select(alerts)
+            .where(a.priority == "P1", a.acknowledged_at.is_(None))
+            .order_by(a.last_raised_at.desc(), a.alert_id.desc())
+            .limit(most)
+        )
+
+        def read(connection: Connection) -> tuple[AlertRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(AlertRecord, row) for row in rows)
+
+        return await self._ask(read)
+
     async def drills(
         self, robot: str | None = None, most: int = 100
     ) -> tuple[CommandRecord, ...]:
@@ -171,6 +187,10 @@ class Queries:
             return tuple(record_of(CommandEventRecord, row) for row in rows)
 
         return await self._ask(read)
+
+    async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
+        """The newest lines of the log, newest first."""
+        return (await self.log(Filter(limit=most))).items
 
     async def newest_log_id(self) -> int:
         """The highest number of the log, so that a restart counts on; 0 when empty."""

@@ -106,6 +106,7 @@
  *   hops: {hop: string, state: "ok" | "late" | "down" | "unknown", age_s: number | null,
  *     key: string, detail: string | null, lag_s?: number | null, growing?: boolean}[],
  *   counters: Record<string, number>, safety?: Safety,
+ *   earlier?: "known" | "reading" | "unknown",
  * }} Health
  *
  * @typedef {{

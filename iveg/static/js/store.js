@@ -98,6 +98,14 @@ export function createStore(options = {}) {
     return true;
   }
 
+  /** Lines of before the server's restart. @param {Entry[]} entries oldest first */
+  function keepEarlier(entries) {
+    const first = log.length ? log[0].id : Infinity;
+    const before = entries.filter(({ id }) => id < first);
+    log = [...before, ...log].slice(-LOG_SIZE);
+    return before.length > 0;
+  }
+
   /** Makes room, so that months of commands cost no more than the last ones. */
   function keepCommand(/** @type {string} */ topic) {
     commands.delete(topic);
@@ -135,6 +143,7 @@ export function createStore(options = {}) {
   function keep(topic, data) {
     const [head, id, leaf] = topic.split("/");
     if (topic === "log") return keepEntry(data);
+    if (topic === "log/earlier") return keepEarlier(data);
     if (head === "commands") keepCommand(topic);
     if (head === "robots" && !leaf) return keepRobot(data);
     if (head === "robots") scans.set(id, data);

@@ -198,3 +198,27 @@ def test_of_two_conditions_of_one_kind_and_subject_the_graver_counts() -> None:
     (raised,) = book.sync([LOST, replace(LOST, priority="P3")], at(0), "a")
 
     assert raised.priority == "P1"
+
+
+def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> None:
+    earlier, book = AlarmBook(), AlarmBook()
+    earlier.sync([LOST], at(0), "a")
+    (over,) = earlier.sync([], at(5), "b")
+
+    book.remember([over])
+    book.sync([LOST], at(8), "c")
+
+    (waiting,) = book.waiting
+    assert (waiting.alert_id, waiting.count) == (over.alert_id, 2)
+
+
+def test_13_6_what_is_raised_before_the_history_answers_hides_nothing_earlier() -> None:
+    earlier, book = AlarmBook(), AlarmBook()
+    earlier.sync([LOST], at(0), "a")
+    (over,) = earlier.sync([], at(5), "b")
+
+    (now,) = book.sync([LOST], at(8), "c")
+    book.remember([over])
+    book.acknowledge(now.alert_id, "ana", "", at(9))
+
+    assert over.alert_id in {one.alert_id for one in book.waiting}

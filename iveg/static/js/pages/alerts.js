@@ -5,6 +5,7 @@
 import { dayAndTime } from "../history/madrid.js";
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
 import { createMembers, floodSaid } from "../panels/alert_members.js";
+import { earlierUnknown } from "../panels/alerts.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createChips, createRows, soon } from "./rows.js";
@@ -30,13 +31,16 @@ export function start({ store, words, tone }) {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
     list.draw(alerts);
-    setHidden(need("#active-empty"), alerts.length > 0);
+    const isUnknown = earlierUnknown(store);
+    setHidden(need("#active-empty"), alerts.length > 0 || isUnknown);
+    setHidden(need("#earlier-unknown"), !isUnknown);
   }
 
   store.subscribe("alerts", () => {
     draw();
     reload();
   });
+  store.subscribe("health", draw);
   function drawFlood() {
     /** @type {import("../protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");

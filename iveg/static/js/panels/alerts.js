@@ -25,7 +25,9 @@ export function createAlertsPanel({ store, words }, tone) {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
     const open = [...alerts].sort(byUrgency);
-    setText(need("#alerts-count"), String(open.length));
+    const isUnknown = earlierUnknown(store);
+    setText(need("#alerts-count"), isUnknown ? `${open.length}?` : String(open.length));
+    setHidden(need("#alerts-earlier"), !isUnknown);
     setAttribute(button, "data-worst", open[0]?.priority ?? "none");
     /** @type {import("../protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");
@@ -35,7 +37,7 @@ export function createAlertsPanel({ store, words }, tone) {
     button.toggleAttribute("data-flood", Boolean(flood?.since));
     setText(need("#alerts-flood"), rate);
     need("#alerts-flood").toggleAttribute("data-flood", Boolean(flood?.since));
-    setHidden(need("#alerts-empty"), alerts.length > 0);
+    setHidden(need("#alerts-empty"), alerts.length > 0 || isUnknown);
     list.draw(alerts);
   }
 
@@ -56,8 +58,18 @@ export function createAlertsPanel({ store, words }, tone) {
     sound();
   });
   store.subscribe("flood", draw);
+  store.subscribe("health", draw);
   words.onChange(draw);
   draw();
+}
+
+/**
+ * Whether the server cannot tell what earlier runs left unseen.
+ *
+ * @param {import("../store.js").Store} store
+ */
+export function earlierUnknown(store) {
+  return store.get("health")?.earlier === "unknown";
 }
 
 /** It sounds until somebody has seen it, also when it is over. @param {Alert} alert */

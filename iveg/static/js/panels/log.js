@@ -106,6 +106,7 @@ export function createLogPanel(app, decision) {
     list.focus();
   });
   store.subscribe("log", add);
+  store.subscribe("log/earlier", rebuild);
   store.subscribe("snapshot", rebuild);
   words.onChange(() => {
     chips.draw();
