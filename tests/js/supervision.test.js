@@ -50,6 +50,7 @@ const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
   /** @type {unknown} */ ({
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
+    language: () => "es",
   })
 );
 
@@ -191,6 +192,18 @@ test("only who may acknowledge is asked to", () => {
   document.body.dataset.role = "operator";
   draw([alarm()]);
   equal(list.querySelector("form")?.hidden, false);
+});
+
+test("an alert that did not change is not drawn again when another did", () => {
+  let told = 0;
+  const counting = { ...words, t: (/** @type {string} */ key) => `${key}${told++}` };
+  const { draw } = createAlertList(document.createElement("ul"), counting);
+  draw([alarm({ alert_id: "a" })]);
+  const once = told;
+  draw([alarm({ alert_id: "a" })]);
+  equal(told, once);
+  draw([alarm({ alert_id: "a", count: 2 })]);
+  equal(told > once, true);
 });
 
 test("an acknowledgement that failed says so and can be tried again", async () => {

@@ -27,6 +27,8 @@ export function createAlertList(list, words, send = acknowledge) {
   const members = new Map();
   /** @type {Map<string, number>} HTTP status of acknowledgements that failed */
   const failures = new Map();
+  /** @type {Map<string, string>} what an item was drawn from */
+  const drawn = new Map();
   /** @type {Alert[]} */
   let shown = [];
 
@@ -48,6 +50,7 @@ export function createAlertList(list, words, send = acknowledge) {
   function drop(id) {
     items.get(id)?.remove();
     items.delete(id);
+    drawn.delete(id);
     members.delete(id);
     failures.delete(id);
   }
@@ -71,22 +74,27 @@ export function createAlertList(list, words, send = acknowledge) {
 
   /** @param {HTMLElement} item @param {Alert} alert */
   function drawItem(item, alert) {
+    const role = document.body.dataset.role ?? "";
+    const failure = failures.get(alert.alert_id);
+    const source = JSON.stringify([alert, words.language(), role, failure]);
+    // Each change of one alert tells them all again.
+    if (drawn.get(alert.alert_id) === source) return;
+    drawn.set(alert.alert_id, source);
     setAttribute(item, "data-priority", alert.priority);
     setAttribute(item, "data-alert", alert.key);
     const priority = words.t(`alert.priority.${alert.priority}`);
     setText(need("b", item), `${priority}: ${sentenceOf(alert, words)}`);
     setText(need("small", item), factsOf(alert, words));
     members.get(alert.alert_id)?.draw(alert);
-    const may = ACKNOWLEDGERS.has(document.body.dataset.role ?? "");
+    const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
     const input = /** @type {HTMLInputElement} */ (need("input", item));
     input.placeholder = words.t("alert.note");
     input.setAttribute("aria-label", words.t("alert.note"));
     setText(need("button", item), words.t("alert.acknowledge"));
-    const status = failures.get(alert.alert_id);
     setText(
       need("p", item),
-      status === undefined ? "" : words.t("alert.failed", { status }),
+      failure === undefined ? "" : words.t("alert.failed", { status: failure }),
     );
   }
 
