@@ -26,6 +26,7 @@ import numpy as np
 import orjson
 
 from iveg.adapters import clock
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.alerts import Rule
 from iveg.domain.feedback import Feedback
@@ -94,7 +95,7 @@ def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Assessor:
     hub, numbers = Hub(), itertools.count()
     start = Instant(0.0, WALL)
     return Assessor(
-        World(robots),
+        World(load_fleet(words=robots)),
         load_greenhouse("agroconnect"),
         Rule(),
         fleet,

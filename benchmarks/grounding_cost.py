@@ -11,10 +11,10 @@ from functools import partial
 
 import numpy as np
 
+from iveg.adapters.fleet_files import built_in
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
-from iveg.domain.profiles import AGI
 from iveg.emulator.depth import DepthCamera, Foliage, View, person_shape, take
 from iveg.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.locate import Mount, body_of, look
@@ -28,6 +28,8 @@ AISLE = Scenery.of(
         rows=(Rectangle(-2.0, 1.2, 12.0, 1.8), Rectangle(-2.0, -1.8, 12.0, -1.2)),
     )
 )
+
+AGI = built_in().of_robot("AGI").profile
 
 
 def cost(work: Callable[[], object]) -> float:

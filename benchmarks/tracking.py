@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import motmetrics
 import numpy as np
 
+from iveg.adapters.fleet_files import built_in
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.alerts import Rule
 from iveg.domain.greenhouse import Greenhouse
@@ -67,7 +68,7 @@ class Run:
         layout = lay_out(scenario_named(self.scenario), ROBOTS, self.house)
         detector = DETECTORS[layout.detector or self.profile]
         self.emulated = Emulated(self.house, layout, detector, self.seed)
-        self.world, self.rule = World(ROBOTS), Rule()
+        self.world, self.rule = World(built_in()), Rule()
         self.people = People(self.house.bounds)
         self.all_clear, self.truth = AllClear(), Truth()
         self.score = motmetrics.MOTAccumulator(auto_id=True)

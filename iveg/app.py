@@ -18,6 +18,7 @@ from ulid import ULID
 from iveg import __version__
 from iveg.adapters import clock, floods
 from iveg.adapters.direct import DirectReader
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.engine import sqlite_file, sqlite_url
 from iveg.adapters.history.queries import Queries
@@ -105,6 +106,7 @@ class Dss:
             settings.notify_token or secrets.token_hex(32)
         )
         self._demo = demo
+        self.fleet = load_fleet(settings.fleet, settings.robots)
         url = settings.database_url or sqlite_url(data_directory / "iveg.sqlite")
         beside = sqlite_file(url)
         directory = data_directory if beside is None else beside.parent
@@ -115,12 +117,12 @@ class Dss:
         self.queries = Queries(url)
         self.minutes = Minutes(self.hub, self.recorder, start)
         self.chain = HealthMonitor(start)
-        world = World(settings.robots, self.chain.probe)
+        world = World(self.fleet, self.chain.probe)
         self.ingest = Ingest(world.robots.__contains__, self._rejected, world.is_past)
         self.journal = FileJournal(directory / "commands.jsonl")
         self._direct = DirectReader(
             settings.apikey,
-            settings.robots,
+            self.fleet.ids,
             clock.now,
             self.ingest.offer,
             self.ingest.reject,
@@ -163,7 +165,7 @@ class Dss:
         )
         self.rules = Rules(self.assessor, rule_store, self.minutes, versions)
         self.commander = Commander(
-            settings.robots,
+            self.fleet.ids,
             road,
             OrionRoad(self.orion),
             self.journal,
@@ -193,7 +195,7 @@ class Dss:
             self.chain,
             self.ingest,
             world.feeds,
-            robots=settings.robots,
+            robots=self.fleet.ids,
             apikey=settings.apikey,
             context_broker_url=settings.iota_cb_url or settings.orion_url,
             notify_url=settings.notify_url or notify_url_of(settings),
@@ -291,7 +293,7 @@ class Dss:
 
     def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
         """Everything that is known, for a browser that has just come."""
-        views, ids = self.views, self.settings.robots
+        views, ids = self.views, self.fleet.ids
         frames = {robot_id: views.frame(robot_id, now) for robot_id in ids}
         return {
             "t": format_stamp(now.wall),
@@ -336,7 +338,7 @@ class Dss:
         """What every page says of this server."""
         return Site(
             self.assessor.greenhouse.name,
-            self.settings.robots,
+            self.fleet.ids,
             __version__,
             self._demo,
         )
@@ -385,6 +387,7 @@ def create_app(dss: Dss) -> FastAPI:
             threshold=lambda: dss.assessor.rule.threshold,
             present=lambda name: dss.assessor.decision_record(name, clock.now()),
             flood=dss.views.flood,
+            fleet=dss.fleet,
         )
     )
     app.include_router(health.router(clock.now, dss.health))

@@ -13,10 +13,8 @@ from typing import Any, Literal
 from urllib.parse import urlsplit
 
 from iveg.domain.errors import SettingsError
+from iveg.domain.fleet import split_word
 from iveg.domain.limits import LIMITS
-
-_ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
-_RESERVED = frozenset({"climate", "iveg-canary", "iveg-doctor"})
 
 
 class _NotAllowedError(Exception):
@@ -99,13 +97,14 @@ def _url(*schemes: str) -> Callable[[str], str]:
 
 
 def _robots(value: str) -> tuple[str, ...]:
-    robots = tuple(name.strip() for name in value.split(","))
-    usable = all(_ROBOT_ID.fullmatch(name) and name not in _RESERVED for name in robots)
-    if not usable or len(set(robots)) != len(robots):
+    words = tuple(word.strip() for word in value.split(","))
+    names = {read[0] for word in words if (read := split_word(word)) is not None}
+    if len(names) != len(words):
         raise _NotAllowedError(
-            "different names of letters, digits and hyphens, separated by commas"
+            "different names of letters, digits and hyphens, separated by commas, "
+            "each with :recording behind it where a replay plays that robot"
         )
-    return robots
+    return words
 
 
 _SECRETS = frozenset(
@@ -179,8 +178,19 @@ class Settings:
         "iveg",
         "First part of every measure topic.",
     )
+    fleet: str = setting(
+        "IVEG_FLEET",
+        _text,
+        "",
+        "File that says what each robot is (docs/robots.md); empty: iVeg's own, which "
+        "describes AGI and AGII.",
+    )
     robots: tuple[str, ...] = setting(
-        "IVEG_ROBOTS", _robots, ("AGI", "AGII"), "The fleet."
+        "IVEG_ROBOTS",
+        _robots,
+        (),
+        "Who is in the fleet, such as `AGI,AGII`; `D1:recording` for a robot that "
+        "`iveg replay` plays. Empty: every robot of `IVEG_FLEET`.",
     )
     database_url: str = setting(
         "IVEG_DATABASE_URL",

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import orjson
 
+from iveg.adapters.fleet_files import built_in, load_fleet
+from iveg.domain.fleet import FleetDescription
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
     Detection,
@@ -21,6 +23,9 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi.codec import format_stamp
 
+AGI = built_in().of_robot("AGI").profile
+AGII = built_in().of_robot("AGII").profile
+
 START = Instant(mono=1000.0, wall=1_700_000_000.0)
 """When tests begin, on both clocks (s)."""
 
@@ -28,6 +33,11 @@ START = Instant(mono=1000.0, wall=1_700_000_000.0)
 def at(seconds: float) -> Instant:
     """The moment this long after ``START``."""
     return START.later(seconds)
+
+
+def fleet_of(*words: str) -> FleetDescription:
+    """Robots as ``IVEG_ROBOTS`` names them; iVeg describes AGI and AGII itself."""
+    return load_fleet(words=words)
 
 
 def origin(

@@ -10,6 +10,7 @@ from pathlib import Path
 from iveg import __version__
 from iveg.cli.words import add_network_words, add_robot_words
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
+from iveg.domain.fleet import is_robot_id
 from iveg.settings import Settings, default_data_directory, describe
 
 UNUSABLE = 2
@@ -146,6 +147,12 @@ def _parser() -> argparse.ArgumentParser:
         help="a ROS bag plays by when it was recorded, not by its stamps",
     )
     replay.add_argument(
+        "--frame",
+        type=_frame,
+        metavar="NAME",
+        help="map that the recordings share, such as `shared` (default: each its own)",
+    )
+    replay.add_argument(
         "--force", action="store_true", help="also where a live robot may be listening"
     )
     for part in (serve, fiware, emulator, replay):
@@ -173,6 +180,12 @@ def _rate(text: str) -> float:
     if not 1.0 <= rate <= 60.0:
         raise argparse.ArgumentTypeError("a rate from 1 to 60 (Hz)")
     return rate
+
+
+def _frame(text: str) -> str:
+    if not is_robot_id(text):
+        raise argparse.ArgumentTypeError("a name of letters, digits and hyphens")
+    return text
 
 
 def _speed(text: str) -> float:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from iveg.adapters.fleet_files import load_fleet
 from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.ros2.names import namespace_of
@@ -61,7 +62,7 @@ def demo(
     }
     parts = [["fiware"], ["serve", "--demo"]]
     if ros2:
-        parts += _ros2_parts(placed.robots)
+        parts += _ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
     elif emulator:
         parts.append(["emulator"])
     return run_until_told(_supervise(parts, placed, child_environment))

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 import uvicorn
 
 from iveg.adapters import clock
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.engine import sqlite_url
 from iveg.adapters.history.migrate import upgrade
@@ -23,6 +24,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.app import Dss, broker_of, create_app
 from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
+from iveg.domain.fleet import FleetDescription
 from iveg.settings import Settings
 from iveg.web.bounded import BoundedSocket
 
@@ -135,7 +137,8 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     from iveg.emulator.fleet import run_emulator
     from iveg.emulator.orders import read_words
 
-    robots = list(settings.robots)
+    fleet = load_fleet(settings.fleet, settings.robots)
+    robots = [one.robot_id for one in fleet.members.values() if one.kind == "live"]
     if options.robots is not None:
         more = range(len(robots) + 1, options.robots + 1)
         robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
@@ -161,6 +164,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 faults=read_words(options.fault, robots),
                 fault_port=options.fault_port,
                 network=network,
+                description=fleet,
             ),
             name="emulator",
         )
@@ -195,7 +199,8 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
     from iveg.adapters.bags import BagTopics
     from iveg.emulator.replay import run_replay
 
-    await _refuse_replay(options, settings)
+    fleet = load_fleet(settings.fleet, settings.robots)
+    await _refuse_replay(options, settings, fleet)
     with TemporaryDirectory(prefix="iveg-replay-") as directory:
         await run_replay(
             options.files,
@@ -208,19 +213,25 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
             slow_s=settings.feedback_slow_s,
             stand_s=settings.feedback_stand_s,
             state_directory=Path(directory),
+            fleet=fleet,
             topics=BagTopics(options.odom_topic, options.scan_topic),
             bag_time=options.bag_time,
+            frame=options.frame,
         )
 
 
-async def _refuse_replay(options: argparse.Namespace, settings: Settings) -> None:
+async def _refuse_replay(
+    options: argparse.Namespace, settings: Settings, fleet: FleetDescription
+) -> None:
     """A recording must never be taken for a robot that is really there."""
-    strangers = [name for name in options.robot if name not in settings.robots]
-    if strangers:
-        fleet = ", ".join(settings.robots)
-        raise DataFileError(
-            "--robot", strangers[0], f"is not in the fleet (IVEG_ROBOTS: {fleet})"
-        )
+    for name in options.robot:
+        if name not in fleet.members:
+            known = ", ".join(fleet.ids)
+            reason = f"is not in the fleet (IVEG_ROBOTS: {known})"
+            raise DataFileError("--robot", name, reason)
+        if fleet.of_robot(name).kind == "live":
+            reason = f"is a live robot of the fleet; {name}:recording in IVEG_ROBOTS"
+            raise DataFileError("--robot", name, f"{reason} makes it a recording")
     if options.force:
         return
     host = broker_of(settings).host
@@ -264,7 +275,7 @@ def provision_fleet(settings: Settings) -> int:
             done = await provision(
                 agent,
                 orion,
-                robots=settings.robots,
+                robots=load_fleet(settings.fleet, settings.robots).ids,
                 apikey=settings.apikey,
                 cbroker_url=settings.iota_cb_url or settings.orion_url,
             )

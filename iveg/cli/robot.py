@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iveg.adapters import clock
+from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.cli.running import LOOPBACK, run_until_told, tell_ready
 from iveg.domain.errors import (
@@ -20,8 +21,13 @@ from iveg.domain.errors import (
     UnreadableError,
 )
 from iveg.domain.feedback import Feedback
+from iveg.domain.fleet import (
+    UNDESCRIBED_SPEED,
+    FleetDescription,
+    RobotDescription,
+    RobotProfile,
+)
 from iveg.domain.geometry import Twist2D
-from iveg.domain.profiles import RobotProfile, profile_of
 from iveg.ngsi import names
 from iveg.robot.node import RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
@@ -112,7 +118,7 @@ def _node(
         robot_id,
         address=_broker(settings),
         apikey=settings.apikey,
-        profile=_profile(robot_id, config),
+        profile=_profile(_fleet(settings).of_robot(robot_id), config),
         hold_file=data / "robots" / f"{robot_id}.holds.json",
         drive=drive,
         slow_s=settings.feedback_slow_s,
@@ -128,11 +134,17 @@ def _broker(settings: Settings) -> BrokerAddress:
     )
 
 
-def _profile(robot_id: str, config: RobotConfig) -> RobotProfile:
-    known = profile_of(robot_id)
+def _fleet(settings: Settings) -> FleetDescription:
+    return load_fleet(settings.fleet, settings.robots)
+
+
+def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:
+    """What the gate holds the robot to; one that nobody described drives slowly."""
+    known = robot.profile
+    speed = known.max_speed if robot.is_described else UNDESCRIBED_SPEED
     return replace(
         known,
-        max_speed=config.drive.max_speed or known.max_speed,
+        max_speed=config.drive.max_speed or speed,
         max_turn=config.drive.max_turn or known.max_turn,
     )
 
@@ -285,9 +297,10 @@ async def _check(
             stamp=newest,
             broker=broker,
         )
-    fleet = ", ".join(settings.robots)
+    known = _fleet(settings).ids
     missing = verdict.missing
-    if robot_id not in settings.robots:
+    if robot_id not in known:
+        fleet = ", ".join(known)
         missing += (f"{robot_id} is not in the fleet that IVEG_ROBOTS names: {fleet}.",)
     print("\n".join(lines(replace(verdict, missing=missing))))
     return 1 if missing else 0

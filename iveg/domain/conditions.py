@@ -14,8 +14,10 @@ from iveg.domain.world import RobotState
 EXPECTED = "alert.person_slowed"
 """The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
 ESTIMATED_SHOWN_AFTER_S = 5.0
-"""So long a robot may take to say that it is a recording."""
+"""So long a robot may take to hear its first feedback."""
 UNREADABLE_SHOWN_S = 10.0
+KIND_SHOWN_S = 10.0
+"""How long after its last message a robot of the wrong kind is told of."""
 STORM_SHOWN_S = 10.0
 """So that a detector at its bound is one alert and not one a second."""
 
@@ -55,6 +57,20 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
         yield Condition("P3", "alert.unreadable_detection", name, name, slots)
 
 
+def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """What a robot is by its messages, where the fleet says something else."""
+    slots: dict[str, Slot] = {"robot": robot.robot_id}
+    name = robot.robot_id
+    if _is_recent(robot.live_at, now):
+        yield Condition("P1", "alert.recording_is_live", name, name, slots)
+    if _is_recent(robot.refused_at, now):
+        yield Condition("P2", "alert.replay_refused", name, name, slots)
+
+
+def _is_recent(moment: float | None, now: Instant) -> bool:
+    return moment is not None and now.mono - moment < KIND_SHOWN_S
+
+
 def _may_be_late_s(robot: RobotState, now: Instant) -> float:
     """How late messages of a robot that echoes may be (s); of others no more."""
     if robot.odometry is None or not robot.odometry.origin.echoes:
@@ -84,13 +100,19 @@ def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
-    """Robots whose age is only estimated: one notice names them all."""
-    names = [
+    """Robots whose age is only estimated, or that nobody described: one notice each."""
+    fleet = list(robots)
+    estimated = [
         robot.robot_id
-        for robot in robots
+        for robot in fleet
         if robot.estimated_since is not None
         and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
     ]
-    if names:
-        slots: dict[str, Slot] = {"robots": ", ".join(names)}
-        yield Condition("P3", "alert.age_estimated", "fleet", None, slots)
+    undescribed = [one.robot_id for one in fleet if not one.description.is_described]
+    for key, names in (
+        ("alert.age_estimated", estimated),
+        ("alert.robots_not_described", undescribed),
+    ):
+        if names:
+            slots: dict[str, Slot] = {"robots": ", ".join(names)}
+            yield Condition("P3", key, "fleet", None, slots)

@@ -33,7 +33,8 @@ class Hazard:
         observer: Who saw it; the peer itself for a peer's own odometry.
         x: Centre in ``map`` (m); ``y`` likewise.
         sighting: What was seen; None for a peer's own odometry.
-        recorded: A recording saw it; it slows recordings alone.
+        recording: The map frame of the recording that saw it, which slows recordings
+            of that frame alone; None: a live robot saw it.
         alert_id: Of the alert that robots hear of it.
     """
 
@@ -44,7 +45,7 @@ class Hazard:
     y: float
     radius_m: float
     sighting: Sighting | None = None
-    recorded: bool = False
+    recording: str | None = None
     alert_id: str | None = None
 
 
@@ -69,7 +70,7 @@ def _circles_of(
             sighting.y,
             radius,
             sighting,
-            world.robot(sighting.observer).is_replay,
+            world.robot(sighting.observer).recording,
             person.decision_id,
         )
 

@@ -17,7 +17,6 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.overload import Overload
 from iveg.domain.people import People
-from iveg.domain.profiles import profile_of
 from iveg.domain.world import RobotState, World
 
 SPEEDING_UP = 0.05
@@ -191,7 +190,7 @@ def _nearest(
         dx, dy = hazard.x - pose.x, hazard.y - pose.y
         if dx * dx + dy * dy > reach * reach and cause not in mine:
             continue
-        if cause == robot_id or (hazard.recorded and not robot.is_replay):
+        if cause == robot_id or hazard.recording not in (None, robot.recording):
             continue
         distance = pose.distance_to(hazard.x, hazard.y)
         depth = distance - hazard.radius_m
@@ -232,7 +231,7 @@ def _is_slow_already(robot: RobotState, hazard: Hazard, speed: float) -> bool:
     """
     if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
         return False
-    slow = HALF_SPEED * profile_of(robot.robot_id).max_speed
+    slow = HALF_SPEED * robot.profile.max_speed
     return not _is_ahead(robot, hazard) or speed <= slow
 
 

@@ -18,9 +18,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
-from iveg.domain.profiles import profile_of
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.world import RobotState
 
@@ -121,7 +121,7 @@ class LeastMargins:
             age = one.age_s(now)
             if one.odometry is not None and age is not None:
                 self._robots.append(one)
-                facts.append(_facts(one.robot_id, one.odometry, age))
+                facts.append(_facts(one.profile, one.odometry, age))
         self._looks = [
             (person, look)
             for person in people
@@ -178,10 +178,11 @@ def _all_pairs(
     return margins
 
 
-def _facts(robot_id: str, odometry: Odometry, age_s: float) -> tuple[float, ...]:
+def _facts(
+    profile: RobotProfile, odometry: Odometry, age_s: float
+) -> tuple[float, ...]:
     """x, y (m), speed (m/s), braking (m/s²), half the length (m), age (s)."""
     place, speed = odometry.pose, abs(odometry.twist.linear_x)
-    profile = profile_of(robot_id)
     return place.x, place.y, speed, profile.assumed_braking, profile.length / 2, age_s
 
 
@@ -191,7 +192,7 @@ def _to_look(
     odometry, pose_age = robot.odometry, robot.age_s(now)
     if odometry is None or pose_age is None:
         return None
-    profile = profile_of(robot.robot_id)
+    profile = robot.profile
     braking, speed = profile.assumed_braking, abs(odometry.twist.linear_x)
     age = max(pose_age, look.age_s(now))
     reaction = max(LIMITS.reaction_s, age + LIMITS.onward_s)

@@ -50,6 +50,8 @@ class Origin:
         mono: The robot's monotonic seconds since this boot, one axis for all topics.
         echoes: The sender tells what it has heard; its age can be proven.
         heard: The newest feedback that it had heard; None before the first.
+        replay: A recording is played: the name of the map frame that it is in, so that
+            only recordings of one frame meet.  None: a live robot says this.
     """
 
     boot: str | None = None
@@ -59,6 +61,7 @@ class Origin:
     mono: float | None = None
     echoes: bool = False
     heard: FeedbackRef | None = None
+    replay: str | None = None
 
     @property
     def own_s(self) -> float | None:

@@ -10,7 +10,8 @@ from typing import Literal
 
 from iveg.domain.observations import Origin
 
-Verdict = Literal["new", "late", "duplicate"]
+Verdict = Literal["new", "late", "duplicate", "refused"]
+"""``refused``: it calls itself a replay, and its robot is live."""
 
 _REMEMBERED_SEQS = 512
 """Copies of the last ten seconds and more, at 30 Hz, are known for copies."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.profiles import profile_of
 from iveg.domain.world import RobotState, World
 
 PICTURES_HZ = 45.0
@@ -68,11 +67,11 @@ class Overload:
 def _near(
     observer: RobotState, robots: Iterable[RobotState], whole_fleet: bool
 ) -> Iterable[RobotState]:
-    reach = profile_of(observer.robot_id).camera_range + LIMITS.ring_most_m
+    reach = observer.profile.camera_range + LIMITS.ring_most_m
     here = _pose(observer)
     for robot in robots:
-        # What a recording saw slows recordings alone.
-        if observer.is_replay and not robot.is_replay:
+        # What a recording saw slows recordings of its frame alone.
+        if observer.recording not in (None, robot.recording):
             continue
         there = _pose(robot)
         if (

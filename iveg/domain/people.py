@@ -13,7 +13,6 @@ from iveg.domain.alerts import Class, Rule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
-from iveg.domain.profiles import profile_of
 from iveg.domain.spots import Spots
 from iveg.domain.suspicions import POSSIBLE_FROM, Suspicions
 from iveg.domain.tracking.person import Person, Sighting
@@ -141,7 +140,7 @@ class People:
         pose = observer.pose_at_stamp(frame.origin.own_s)
         if one.kind != "alert" or one.peer is not None or pose is None:
             return one
-        return replace(one, doubtful=(pose, profile_of(observer.robot_id).camera_range))
+        return replace(one, doubtful=(pose, observer.profile.camera_range))
 
     def _assign(
         self, placed: Sequence[Placed], observer: str, at: Instant, new_id: str
@@ -212,7 +211,12 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
         since = peer.likely_pose_at()
         if peer is observer or peer.odometry is None or since is None:
             continue
-        reach = _PEER_GATE_M + profile_of(peer.robot_id).length / 2
+        if peer.recording != observer.recording:
+            continue
+        reach = _PEER_GATE_M
+        if peer.description.is_described:
+            # Of a body of unknown size one sighting more is safer than one less.
+            reach += peer.profile.length / 2
         reach += LIMITS.walking_m_s * min(1.0, max(0.0, at.mono - since))
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):

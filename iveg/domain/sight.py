@@ -11,7 +11,6 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.people import People
-from iveg.domain.profiles import profile_of
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.world import RobotState, World
 
@@ -41,6 +40,8 @@ class AllClear:
                 if not LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s:
                     continue
                 if sighting.reach_m > 0.0:  # nobody knows where to look
+                    continue
+                if world.robot(sighting.observer).is_replay:  # no place of today
                     continue
                 lookers = [
                     robot.robot_id
@@ -83,7 +84,7 @@ def can_see(
         return False
     if now.mono - looked > _FRESH_LOOK_S:
         return False
-    profile = profile_of(robot.robot_id)
+    profile = robot.profile
     camera = robot.odometry.pose.compose(profile.camera)
     distance = camera.distance_to(x, y)
     if not _NEAR_M <= distance <= _RANGE_SHARE * profile.camera_range:

@@ -6,7 +6,7 @@ counted.  Nothing here reads a clock: ages come from the ``now`` that is handed 
 
 from bisect import bisect_left
 from collections import Counter, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from math import inf
 from typing import Literal
@@ -14,11 +14,13 @@ from typing import Literal
 from iveg.domain.age import FeedbackLedger
 from iveg.domain.clocks import RobotClock
 from iveg.domain.errors import UnknownRobotError
+from iveg.domain.fleet import FleetDescription, RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     Canary,
     Climate,
+    CommandAnswer,
     DetectionFrame,
     Instant,
     LaserScan,
@@ -38,7 +40,6 @@ from iveg.domain.transports import Feeds
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
-REPLAY_TASK = "replay"
 _HISTORY = 128
 _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 GAIN_OVER_S = 1.0
@@ -60,9 +61,15 @@ class RobotState:
             nothing is known, the moment that is likely.
         scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
         unreadable_at: When a detection last could not be used (monotonic, s).
+        live_at: When a live safety node last spoke for a robot that the fleet calls a
+            recording (monotonic, s): from then on it counts as live.
+        refused_at: When a message that calls itself a replay was last refused, because
+            the robot is live (monotonic, s).
+        map_frame: Of a recording, the frame that its messages name.
     """
 
     robot_id: str
+    description: RobotDescription
     odometry: Odometry | None = None
     odometry_received: Instant | None = None
     pose_at: float | None = None
@@ -82,6 +89,9 @@ class RobotState:
     navigation: Navigation | None = None
     command_status: str | None = None
     heard_at: float | None = None
+    live_at: float | None = None
+    refused_at: float | None = None
+    map_frame: str | None = None
     clock: RobotClock = field(default_factory=RobotClock)
     _orders: dict[type[Observation], Order] = field(default_factory=dict)
     _poses: deque[tuple[float, Pose2D]] = field(
@@ -113,9 +123,22 @@ class RobotState:
         return "LATE" if age <= LIMITS.late_s else "LOST"
 
     @property
+    def profile(self) -> RobotProfile:
+        """What this robot is."""
+        return self.description.profile
+
+    @property
     def is_replay(self) -> bool:
-        """Whether a recording plays this robot."""
-        return self.navigation is not None and self.navigation.task == REPLAY_TASK
+        """Whether a recording plays this robot: by the fleet, while no live one speaks.
+
+        What a robot calls its task has no say in it.
+        """
+        return self.description.kind == "recording" and self.live_at is None
+
+    @property
+    def recording(self) -> str | None:
+        """The map frame of a recording: its own unless told; None for a live robot."""
+        return (self.map_frame or self.robot_id) if self.is_replay else None
 
     @property
     def stands(self) -> bool:
@@ -192,16 +215,24 @@ class World:
     """All robots of the fleet and the air around them.
 
     Args:
+        fleet: Who is in it; ids alone are robots that nobody described.
         probe: Tells how late FIWARE is; without one nobody asks.
 
     Attributes:
         ledger: When iVeg's own feedback was composed, which robots echo.
     """
 
-    def __init__(self, robot_ids: Sequence[str], probe: ProbeLag | None = None) -> None:
+    def __init__(
+        self, fleet: FleetDescription | Iterable[str], probe: ProbeLag | None = None
+    ) -> None:
         self.ledger = FeedbackLedger()
         self._probe = probe
-        self.robots = {robot_id: RobotState(robot_id) for robot_id in robot_ids}
+        if not isinstance(fleet, FleetDescription):
+            fleet = FleetDescription.undescribed(fleet)
+        self.robots = {
+            robot_id: RobotState(robot_id, one)
+            for robot_id, one in fleet.members.items()
+        }
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
         self.canary_at: float | None = None
@@ -236,14 +267,17 @@ class World:
             UnknownRobotError: from a robot that is not in the fleet.
         """
         observation, at = received.observation, received.at
-        if isinstance(observation, Climate):
-            self.climate, self.climate_received = observation, at
-            return "new"
-        if isinstance(observation, Canary):
-            self.canary_at = at.mono
+        if isinstance(observation, Climate | Canary):
+            self._note(observation, at)
             return "new"
         robot = self.robot(observation.robot_id)
         origin = getattr(observation, "origin", Origin())
+        if self.refuses(received):
+            # What Orion kept may be of a time when the robot was a recording.
+            robot.refused_at = robot.refused_at if received.asked else at.mono
+            self.counters[f"{kind_of(observation).__name__}.refused"] += 1
+            return "refused"
+        _tell_kind(robot, received, origin)
         verdict = robot.judge(observation, origin, asked=received.asked)
         if isinstance(observation, Overtaken) and verdict == "new":
             # Its stream was past it, and has since met sixteen other boots.
@@ -265,6 +299,25 @@ class World:
         if verdict == "new":
             _update(robot, received, self._measured_at(origin, received, likely))
         return verdict
+
+    def _note(self, observation: Climate | Canary, at: Instant) -> None:
+        """What no robot says."""
+        if isinstance(observation, Climate):
+            self.climate, self.climate_received = observation, at
+        else:
+            self.canary_at = at.mono
+
+    def refuses(self, received: Received) -> bool:
+        """Whether a message calls itself a replay while its robot is live.
+
+        Nothing of it counts: whoever plays it is not that robot.
+        """
+        observation = received.observation
+        if getattr(observation, "origin", Origin()).replay is None:
+            return False
+        robot_id = getattr(observation, "robot_id", None)
+        robot = None if robot_id is None else self.robots.get(robot_id)
+        return robot is not None and not robot.is_replay
 
     def _likely_age(
         self, robot: RobotState, received: Received, origin: Origin
@@ -327,6 +380,20 @@ class World:
     def live_robots(self) -> Iterable[RobotState]:
         """Robots that are not recordings."""
         return (robot for robot in self.robots.values() if not robot.is_replay)
+
+
+def _tell_kind(robot: RobotState, received: Received, origin: Origin) -> None:
+    """Learn of a recording which frame it is in, and whether it is none at all.
+
+    Orion's answer may be of a time when the robot was live; a safety node that speaks
+    now is live unless it says that it plays a recording.
+    """
+    if robot.description.kind == "live" or received.asked:
+        return
+    if origin.replay is not None:
+        robot.map_frame = origin.replay
+    elif isinstance(received.observation, SafetyReport | CommandAnswer):
+        robot.live_at = received.at.mono
 
 
 def _age_when_asked(origin: Origin, at: Instant) -> float:

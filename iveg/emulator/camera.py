@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Box3D, Pose2D, wrap_angle
 from iveg.domain.observations import Detection
-from iveg.domain.profiles import RobotProfile
 from iveg.emulator.greenhouse import Body, Disc, Scenery
 
 PERSON = "farmer"

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
-from iveg.domain.profiles import RobotProfile
 from iveg.emulator.camera import PERSON_HEIGHT_M, ROBOT_HEIGHT_M
 from iveg.emulator.greenhouse import Body, Disc, Floats, Scenery
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole

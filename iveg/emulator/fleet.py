@@ -15,6 +15,7 @@ import numpy as np
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.emulated_robot import (
@@ -64,6 +65,7 @@ async def run_emulator(
     on_fault_port: Callable[[int], None] | None = None,
     network: Network | None = None,
     ros2: Mapping[str, RobotConfig] | None = None,
+    description: FleetDescription | None = None,
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -87,6 +89,7 @@ async def run_emulator(
         network: DDS: the robots speak ROS 2 there, and ``iveg robot`` rides on them.
         ros2: What each one's topics are called; below ``/`` and its id in small letters
             where nothing is said.
+        description: What each robot is; None: iVeg's own.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the house.
@@ -95,7 +98,7 @@ async def run_emulator(
     if profile not in DETECTORS:
         known = ", ".join(DETECTORS)
         raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
-    layout = lay_out(scenario_named(scenario), robots, greenhouse)
+    layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
     world = World(greenhouse, layout, detector, seed)
     settings = FleetSettings(

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D, wrap_angle
-from iveg.domain.profiles import RobotProfile
 from iveg.emulator.greenhouse import Disc, Floats
 from iveg.emulator.kinematics import clip
 from iveg.emulator.routes import SPACING_M, Route, Station

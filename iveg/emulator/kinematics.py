@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D, wrap_angle
-from iveg.domain.profiles import RobotProfile
 from iveg.emulator.greenhouse import Body
 
 _TURN_ACCELERATION = 1.5

@@ -9,10 +9,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from iveg.adapters.fleet_files import built_in
 from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane
-from iveg.domain.profiles import profile_of
 from iveg.emulator.people import Stop
 from iveg.emulator.routes import route_of
 from iveg.emulator.scripts import TESTBED, Incident, RobotScript, Scenario
@@ -28,35 +29,56 @@ class Layout:
     """A scenario laid out for one fleet in one house."""
 
     robots: Mapping[str, RobotScript]
+    profiles: Mapping[str, RobotProfile]
     people: tuple[tuple[Stop, ...], ...]
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
 
 
-def lay_out(scenario: Scenario, robots: Sequence[str], house: Greenhouse) -> Layout:
+def lay_out(
+    scenario: Scenario,
+    robots: Sequence[str],
+    house: Greenhouse,
+    fleet: FleetDescription | None = None,
+) -> Layout:
     """Fit a scenario to a fleet and a house.
+
+    Args:
+        scenario: What happens.
+        robots: Who drives.
+        house: Where.
+        fleet: What each robot is; None: iVeg's own.
 
     Raises:
         DataFileError: the house has no room for so many robots, or is not the one that
             the scenario is about.
     """
     extra = scenario.incidents, scenario.detector
+    profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
     if scenario.house not in (TESTBED, house.name):
         reason = f"is about {scenario.house}, not {house.name}: see IVEG_GREENHOUSE."
         raise DataFileError(f"scenario {scenario.name!r}", "", reason)
     if house.name == scenario.house and set(robots) <= set(scenario.robots):
         scripts = {robot_id: scenario.robots[robot_id] for robot_id in robots}
-        return Layout(scripts, scenario.people, *extra)
+        return Layout(scripts, profiles, scenario.people, *extra)
     if house.name == TESTBED:
-        return Layout(_on_the_ring(robots), scenario.people, *extra)
+        return Layout(_on_the_ring(robots), profiles, scenario.people, *extra)
     if not house.lanes:
-        return Layout(_in_a_field(robots), _around_the_field(robots), *extra)
-    lanes = _lanes_for(robots, house)
+        people = _around_the_field(robots)
+        return Layout(_in_a_field(robots), profiles, people, *extra)
+    lanes = _lanes_for(profiles, house)
     scripts = {
         robot_id: _up_and_down(lane.area, house)
         for robot_id, lane in zip(robots, lanes, strict=True)
     }
-    return Layout(scripts, tuple(_beside(lane.area) for lane in lanes[:4]), *extra)
+    people = tuple(_beside(lane.area) for lane in lanes[:4])
+    return Layout(scripts, profiles, people, *extra)
+
+
+def _body(robot_id: str, fleet: FleetDescription) -> RobotProfile:
+    """What to build; of a robot that nobody described one like AGI."""
+    one = fleet.of_robot(robot_id)
+    return one.profile if one.is_described else built_in().of_robot("AGI").profile
 
 
 def _on_the_ring(robots: Sequence[str]) -> dict[str, RobotScript]:
@@ -101,7 +123,7 @@ def _around_the_field(robots: Sequence[str]) -> tuple[tuple[Stop, ...], ...]:
     )
 
 
-def _lanes_for(robots: Sequence[str], house: Greenhouse) -> list[Lane]:
+def _lanes_for(robots: Mapping[str, RobotProfile], house: Greenhouse) -> list[Lane]:
     """A lane each: the one its start lies in, else the longest that is left.
 
     Who needs most room to turn chooses first.
@@ -116,7 +138,7 @@ def _lanes_for(robots: Sequence[str], house: Greenhouse) -> list[Lane]:
         if here:
             chosen[robot_id] = here[0]
             lanes.remove(here[0])
-    needy = sorted(robots, key=lambda robot_id: -profile_of(robot_id).turning_radius)
+    needy = sorted(robots, key=lambda robot_id: -robots[robot_id].turning_radius)
     for robot_id in needy:
         if robot_id not in chosen:
             chosen[robot_id] = lanes.pop(0)

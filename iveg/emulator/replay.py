@@ -16,6 +16,7 @@ from iveg.adapters import clock
 from iveg.adapters.bags import BagTopics
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
     DetectionFrame,
@@ -24,7 +25,6 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.domain.profiles import profile_of
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
 from iveg.emulator.recordings import open_recording
@@ -32,7 +32,7 @@ from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
 TASK = "replay"
-"""The navigation task by which iVeg knows a replayed robot."""
+"""What a replayed robot calls its task; iVeg knows it by the mark of its messages."""
 
 _REST = Twist2D(0.0, 0.0)
 _PERIOD_S = 0.05
@@ -56,6 +56,7 @@ class ReplaySettings:
     slow_s: float
     stand_s: float
     state_directory: Path
+    frame: str | None
 
 
 async def run_replay(
@@ -72,6 +73,8 @@ async def run_replay(
     state_directory: Path,
     topics: BagTopics | None = None,
     bag_time: bool = False,
+    fleet: FleetDescription | None = None,
+    frame: str | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -88,22 +91,27 @@ async def run_replay(
         state_directory: Where the robots keep their hold files; made if missing.
         topics: Which of a ROS bag are read; see ``open_recording``.
         bag_time: Bags play by when they were recorded; see ``open_recording``.
+        fleet: What each robot is; None: nobody described them.
+        frame: The map that all recordings are in; None: each is in one of its own, and
+            nobody in it slows another robot.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
     """
     _check(files, robots, speed)
+    known = fleet or NOBODY
+    profiles = [known.of_robot(robot_id).profile for robot_id in robots]
     recordings = [
-        open_recording(file, profile_of(robot_id).laser, topics, bag_time=bag_time)
-        for file, robot_id in zip(files, robots, strict=True)
+        open_recording(file, profile.laser, topics, bag_time=bag_time)
+        for file, profile in zip(files, profiles, strict=True)
     ]
     playbacks = [Playback(one.entries, loop=loop) for one in recordings]
     settings = ReplaySettings(
-        address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory
+        address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory, frame
     )
     replayed = [
-        ReplayedRobot(robot_id, playback, settings)
-        for robot_id, playback in zip(robots, playbacks, strict=True)
+        ReplayedRobot(robot_id, profile, playback, settings)
+        for robot_id, profile, playback in zip(robots, profiles, playbacks, strict=True)
     ]
     try:
         await _play(replayed)
@@ -155,13 +163,17 @@ class ReplayedRobot:
     """One recording under its own safety node."""
 
     def __init__(
-        self, robot_id: str, playback: Playback, settings: ReplaySettings
+        self,
+        robot_id: str,
+        profile: RobotProfile,
+        playback: Playback,
+        settings: ReplaySettings,
     ) -> None:
         self.robot_id = robot_id
         self.ended = asyncio.Event()
         self._playback = playback
         self._speed = settings.speed
-        self._profile = profile_of(robot_id)
+        self._profile = profile
         self._told = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
         self._told_scan: LaserScan | None = None
         self._command = _REST
@@ -178,7 +190,7 @@ class ReplayedRobot:
             slow_s=settings.slow_s,
             stand_s=settings.stand_s,
             uplink=settings.uplink,
-            echoes=False,
+            replay=settings.frame or robot_id,
         )
 
     async def run(self) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
@@ -19,7 +20,6 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.domain.profiles import RobotProfile, profile_of
 from iveg.emulator.camera import (
     PERSON,
     Detector,
@@ -54,12 +54,13 @@ class Rig:
     def __init__(
         self,
         robot_id: str,
+        profile: RobotProfile,
         script: RobotScript,
         detector: DetectorModel,
         rng: np.random.Generator,
     ) -> None:
         self.robot_id = robot_id
-        self.profile: RobotProfile = profile_of(robot_id)
+        self.profile = profile
         self.command = REST
         self.false_person: tuple[float, float] | None = None
         self.hides_people = False
@@ -160,7 +161,7 @@ class World:
         generators = [np.random.default_rng(stream) for stream in streams]
         self.scenery = Scenery.of(house)
         self.rigs: Mapping[str, Rig] = {
-            robot_id: Rig(robot_id, script, detector, rng)
+            robot_id: Rig(robot_id, layout.profiles[robot_id], script, detector, rng)
             for (robot_id, script), rng in zip(
                 layout.robots.items(), generators, strict=False
             )

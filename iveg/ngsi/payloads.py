@@ -57,6 +57,7 @@ class OriginFields(Wire):
     stamp: Text | None = None
     mono: Annotated[float, Field(ge=0, le=1e12)] | None = None
     heard: HeardValue | None = None
+    replay: Text | None = None
 
 
 class OdometryValue(OriginFields):

@@ -138,6 +138,8 @@ class Assessor:
             Whether it became part of the state.
         """
         verdict = self.world.apply(received)
+        if verdict == "refused":
+            return False
         observation = received.observation
         if isinstance(observation, DetectionFrame):
             self.looks.take(observation, received, verdict, self.rule)
@@ -280,6 +282,7 @@ class Assessor:
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
+            yield from conditions.of_kind(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_pictures(self._mandates.overload, now)
 

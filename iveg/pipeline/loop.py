@@ -69,7 +69,7 @@ class RuleLoop:
             fresh = self._assessor.take(received)
             if isinstance(received.observation, Canary):
                 self._chain.received(received.observation.origin, received.at)
-            if received.asked:
+            if received.asked or self._assessor.world.refuses(received):
                 continue
             # The second road's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):

@@ -118,5 +118,5 @@ def _costs(
     return occupancy.costs(
         Ring(hazard.x, hazard.y, hazard.radius_m)
         for hazard in hazards
-        if not hazard.recorded
+        if hazard.recording is None
     )

@@ -18,6 +18,7 @@ from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
@@ -28,7 +29,6 @@ from iveg.domain.observations import (
     SafetyReport,
     Unplaced,
 )
-from iveg.domain.profiles import RobotProfile
 from iveg.ngsi import names
 from iveg.ngsi.codec import read_feedback
 from iveg.robot.caps import FREE, Cap
@@ -62,8 +62,8 @@ class RobotNode:
         held: Nobody is at the robot while it starts: ``release_locally`` does nothing
             before ``run``.
         on_link_loss: What ``stand_s`` of silence does.
-        echoes: It tells iVeg what it has heard, which proves the age of what it says;
-            what a recording says was measured long ago.
+        replay: It plays a recording, which is in this map frame: its messages are
+            marked, and echo nothing, since what they say was measured long ago.
         on_feedback: Told each feedback that could be read, and its topic's robot.
     """
 
@@ -81,7 +81,7 @@ class RobotNode:
         uplink: Form = "per-topic",
         held: bool = False,
         on_link_loss: Literal["stop", "slow"] = "stop",
-        echoes: bool = True,
+        replay: str | None = None,
         on_feedback: Callable[[str, Feedback], None] | None = None,
     ) -> None:
         self.boot = secrets.token_hex(4)
@@ -115,7 +115,8 @@ class RobotNode:
             self._link.offer,
             form=uplink,
             first_report=1 + secrets.randbelow(2**31),
-            echo=self._echo if echoes else None,
+            echo=self._echo if replay is None else None,
+            replay=replay,
         )
         limits = Limits(
             profile.max_speed, profile.max_turn, slow_s, stand_s, on_link_loss

@@ -53,6 +53,7 @@ class Uplink:
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
         echo: What was heard of iVeg; None proves no age, as recordings cannot.
+        replay: The map frame of a recording, by which its messages are marked.
 
     Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
     """
@@ -67,12 +68,14 @@ class Uplink:
         form: Form = "per-topic",
         first_report: int = 1,
         echo: Echo | None = None,
+        replay: str | None = None,
     ) -> None:
         self._id = robot_id
         self._apikey = apikey
         self._boot = boot
         self._offer = offer
         self._echo = echo
+        self._replay = replay
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({"_safety": first_report - 1})
         self._looked: tuple[tuple[str, int], ...] = ()
@@ -159,6 +162,7 @@ class Uplink:
             at.mono,
             echoes=echo is not None,
             heard=None if echo is None else echo.heard,
+            replay=self._replay,
         )
 
 

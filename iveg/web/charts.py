@@ -21,7 +21,7 @@ from iveg.adapters.history.series import (
     ConfidenceCount,
     SpeedSeries,
 )
-from iveg.domain.profiles import profile_of
+from iveg.domain.fleet import FleetDescription
 
 _Trace = Mapping[str, object]
 
@@ -32,13 +32,13 @@ _STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
 _BIN = 1.0 / CONFIDENCE_BINS
 
 
-def speed_figure(series: Sequence[SpeedSeries]) -> bytes:
+def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> bytes:
     """Speed (m/s) of each robot with its mandated limit as a step line, as JSON.
 
     The limit is the mandated factor of the robot's greatest speed.  Lines break where
     nothing was heard for 5 s: a line through silence would be invented.
     """
-    traces = [trace for one in series for trace in _speed_traces(one)]
+    traces = [trace for one in series for trace in _speed_traces(one, fleet)]
     return _figure(traces, ("time", "speed"), {"yaxis": {"rangemode": "tozero"}})
 
 
@@ -131,8 +131,9 @@ def _ids_in(script: bytes) -> list[bytes]:
     return sorted(set(_STYLE_ID.findall(script)))
 
 
-def _speed_traces(series: SpeedSeries) -> Iterator[_Trace]:
-    robot, fastest = series.robot_id, profile_of(series.robot_id).max_speed
+def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Trace]:
+    robot = series.robot_id
+    fastest = fleet.of_robot(robot).profile.max_speed
     at = [_ms(moment) for moment in series.at]
     lines: tuple[tuple[str, Sequence[float | None], _Trace], ...] = (
         ("speed", [round(v, 3) for v in series.linear], {}),

@@ -17,6 +17,7 @@ from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
+from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.flood import Flood
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, Record
@@ -68,6 +69,7 @@ def router(
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
     flood: Callable[[], schemas.FloodJson] = lambda: shapes.flood(Flood()),
+    fleet: FleetDescription = NOBODY,
     read_clock: Callable[[], Instant] = clock.now,
 ) -> APIRouter:
     """The routes of the history.
@@ -78,6 +80,7 @@ def router(
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         flood: How fast alerts come.
+        fleet: Whose greatest speeds the chart is about.
         read_clock: What "the last 15 minutes" end at.
     """
     routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
@@ -103,7 +106,7 @@ def router(
     )
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
-        return await _charts(queries, since, until, asked.robot, threshold())
+        return await _charts(queries, since, until, asked.robot, threshold(), fleet)
 
     @routes.get(
         "/api/v1/history/climate",
@@ -233,6 +236,7 @@ async def _charts(
     until: float,
     robot: str | None,
     threshold: float | None,
+    fleet: FleetDescription,
 ) -> Response:
     speeds, counts, stops = await asyncio.gather(
         queries.speed_series(since, until, robot),
@@ -243,7 +247,7 @@ async def _charts(
     def draw() -> bytes:
         parts = (
             orjson.dumps(_library()).removesuffix(b"}"),
-            b'"speed":' + charts.speed_figure(speeds),
+            b'"speed":' + charts.speed_figure(speeds, fleet),
             b'"detections":' + charts.confidence_figure(counts, threshold),
             b'"stops":' + charts.stop_figure(stops) + b"}",
         )

@@ -13,13 +13,13 @@ from iveg.domain.alerts import Rule
 from iveg.domain.echoes import ECHO_S, WINDOW_S, Echoes
 from iveg.domain.exposure import Exposure
 from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.margins import Margin
 from iveg.domain.observations import Detection, Instant
 from iveg.domain.people import Placed
-from iveg.domain.profiles import profile_of
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.world import RobotState
@@ -214,9 +214,8 @@ def navigation(robot: RobotState) -> schemas.NavigationJson | None:
     }
 
 
-def profile(robot_id: str) -> schemas.ProfileJson:
+def profile(body: RobotProfile) -> schemas.ProfileJson:
     """The body of a robot."""
-    body = profile_of(robot_id)
     return {
         "drive": body.drive,
         "length": body.length,

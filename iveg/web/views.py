@@ -100,7 +100,7 @@ class Views:
             "clock_offset_s": shapes.rounded(robot.clock.offset_s(now)),
             "road": robot.frame_road,
             "transport": self._world.feeds.of(robot_id).transport(now.mono),
-            "profile": shapes.profile(robot_id),
+            "profile": shapes.profile(robot.profile),
             "margin": shapes.margin(
                 margins.of_robot(robot_id)
                 if margins is not None and not robot.is_replay

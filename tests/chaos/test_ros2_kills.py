@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from iveg.domain.profiles import profile_of
+from iveg.adapters.fleet_files import built_in
 from iveg.emulator.ros2_base import TIMEOUT_S
 from tests.chaos.ros2_field import (
     ROBOT,
@@ -77,7 +77,7 @@ def test_whoever_dies_the_base_halts_within_its_time_out(
             8.0,
             f"the base stands after {victim} died",
         )
-        braking = witness.speed_at(died) / profile_of(ROBOT).braking
+        braking = witness.speed_at(died) / built_in().of_robot(ROBOT).profile.braking
         starved = witness.starved_s(died, died + stood)
         allowed = WITHIN_S[victim] + braking + LATE_S + starved
         lines.append(

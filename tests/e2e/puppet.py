@@ -146,10 +146,27 @@ class Puppet:
         )
 
 
+def described(directory: Path, *robots: str) -> str:
+    """A file that says what these robots are, as IVEG_FLEET names it."""
+    file = directory / "fleet.toml"
+    file.write_text("".join(_DESCRIPTION.format(robot) for robot in robots))
+    return str(file)
+
+
+_DESCRIPTION = """
+[[robots]]
+id = "{}"
+body = {{ length_m = 0.99, width_m = 0.57 }}
+drive = {{ type = "differential", max_speed_m_s = 1.0 }}
+camera = {{ x_m = 0.4, fov_deg = 69, range_m = 8 }}
+"""
+
+
 @contextlib.contextmanager
 def stage(directory: Path, **settings: str) -> Iterator[tuple[Site, Puppet]]:
     """FIWARE, dashboard and one puppet; no emulator."""
-    with site(directory, IVEG_ROBOTS="AGV", **settings) as place:
+    fleet = described(directory, "AGV")
+    with site(directory, IVEG_FLEET=fleet, **settings) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()

@@ -14,7 +14,7 @@ from playwright.sync_api import Locator, Page, expect
 
 from tests.e2e.conftest import OpenPage
 from tests.e2e.hands import ask, let_go, look, open_menu
-from tests.e2e.puppet import CRUISE, Puppet, puppet
+from tests.e2e.puppet import CRUISE, Puppet, described, puppet
 from tests.e2e.reading import card, evaluate, strip_stop
 from tests.processes import EMULATOR, Program, Site, site, until
 
@@ -39,7 +39,9 @@ _WATCH = """([robot]) => {
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with site(tmp_path_factory.mktemp("stop"), IVEG_ROBOTS="AGI,AGV") as place:
+    directory = tmp_path_factory.mktemp("stop")
+    settings = {"IVEG_ROBOTS": "AGI,AGV", "IVEG_FLEET": described(directory, "AGV")}
+    with site(directory, **settings) as place:
         place.start("fiware").wait_until_ready()
         place.start("serve")
         place.wait_until_served()

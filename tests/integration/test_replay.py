@@ -17,6 +17,7 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
     Odometry,
+    SafetyReport,
 )
 from iveg.emulator.replay import run_replay
 from tests import data
@@ -87,6 +88,8 @@ async def test_a_log_is_played_to_its_end_and_the_robot_then_stands(
     assert farthest(cloud) == pytest.approx(4.0, abs=0.05)
     assert {(o.pose.x, o.twist.linear_x) for o in last} == {(0.0, 0.0)}
     assert {o.task for o in cloud.of("AGI", Navigation)} == {"replay"}
+    assert {o.origin.replay for o in cloud.of("AGI", SafetyReport)} == {"AGI"}
+    assert {o.origin.replay for o in cloud.of("AGI", LaserScan)} == {"AGI"}
     assert {(d.class_id, d.frame_id) for d in people} == {("farmer", "map")}
     assert cloud.of("AGI", DetectionFrame)[-1].detections == ()
     assert cloud.of("AGI", LaserScan)[0].mount.x == 0.1
@@ -255,7 +258,8 @@ def test_a_broken_bag_ends_the_command_with_one_sentence_and_status_two(
     file = place.directory / "log.mcap"
     file.write_bytes(b"no bag")
 
-    replaying = place.start("replay", str(file), "--robot", "AGI", "--force")
+    place.settings["IVEG_ROBOTS"] = "D1:recording"
+    replaying = place.start("replay", str(file), "--robot", "D1", "--force")
 
     assert replaying.process.wait(30.0) == 2
     (said,) = replaying.text().splitlines()

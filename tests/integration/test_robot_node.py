@@ -15,6 +15,7 @@ import pytest
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
@@ -23,7 +24,6 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.domain.profiles import RobotProfile
 from iveg.ngsi import codec
 from iveg.robot.node import RobotNode
 from tests.brokers import broker_on

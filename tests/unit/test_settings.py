@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from iveg.adapters.fleet_files import load_fleet
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings, default_data_directory, describe
 
@@ -27,6 +28,8 @@ BAD = [
     ("IVEG_ROBOTS", "AGI,", "different names"),
     ("IVEG_ROBOTS", "climate", "different names"),
     ("IVEG_ROBOTS", "a+b", "different names"),
+    ("IVEG_ROBOTS", "D1,D1:recording", "different names"),
+    ("IVEG_ROBOTS", "D1:played", ":recording behind it"),
     ("IVEG_DATABASE_URL", "mysql://x/y", "an SQLAlchemy address"),
     ("IVEG_CONFIDENCE_THRESHOLD", "1.01", "a number from 0 to 1"),
     ("IVEG_CONFIDENCE_THRESHOLD", "nan", "a number from 0 to 1"),
@@ -91,7 +94,7 @@ def test_an_empty_environment_gives_the_defaults_of_the_contract() -> None:
     settings = Settings.from_environment({})
 
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
-    assert settings.robots == ("AGI", "AGII")
+    assert load_fleet(settings.fleet, settings.robots).ids == ("AGI", "AGII")
     assert (settings.confidence_threshold, settings.safety_radius_m) == (0.80, 2.0)
     assert (settings.stop_direct, settings.direct_read) == (True, "all")
     assert settings.fiware_service == "agroconnect"
@@ -130,7 +133,7 @@ GOOD = {
     "IVEG_FIWARE_SERVICE": "farm_1",
     "IVEG_FIWARE_SERVICEPATH": "/a/b",
     "IVEG_APIKEY": "key-1",
-    "IVEG_ROBOTS": "AGI,AGII,AG3",
+    "IVEG_ROBOTS": "AGI,AGII,D1:recording",
     "IVEG_DATABASE_URL": "postgresql+psycopg://u:p@db/iveg",
     "IVEG_DATA_DIRECTORY": "/var/lib/iveg",
     "IVEG_API_TOKEN": "a-long-enough-token!",
@@ -144,6 +147,7 @@ GOOD = {
     "IVEG_DRILL_DAYS": "7",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",
+    "IVEG_FLEET": "/etc/iveg/fleet.toml",
 }
 
 

@@ -297,7 +297,7 @@ def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> Detection
     return DetectionFrame(robot_id, _stamped(attributes), found, 1 - len(found))
 
 
-_PROOF = ("mono", "heard")
+_PROOF = ("mono", "heard", "replay")
 
 
 def _stamped(attributes: Mapping[str, Any]) -> Origin:

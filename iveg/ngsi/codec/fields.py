@@ -41,6 +41,7 @@ def read_origin(value: payloads.OriginFields) -> Origin:
         # A robot that has heard nothing yet says so with ``null``.
         echoes="heard" in value.model_fields_set,
         heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
+        replay=value.replay,
     )
 
 
@@ -58,6 +59,8 @@ def write_origin(origin: Origin) -> dict[str, Any]:
         fields["heard"] = (
             None if heard is None else {"boot": heard.boot, "seq": heard.seq}
         )
+    if origin.replay is not None:
+        fields["replay"] = origin.replay
     return fields
 
 

@@ -170,9 +170,14 @@ def write_answer(value: CommandAnswer) -> bytes:
                 "seq": value.origin.seq,
                 "why": value.why,
                 "attempt": value.attempt,
+                **_mark(value.origin),
             }
         }
     )
+
+
+def _mark(origin: Origin) -> dict[str, str]:
+    return {} if origin.replay is None else {"replay": origin.replay}
 
 
 def write_climate(value: Climate, stamp: str) -> bytes:

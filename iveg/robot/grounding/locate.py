@@ -15,9 +15,9 @@ from typing import Literal
 import numpy as np
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Box3D, Pose2D
 from iveg.domain.observations import Detection, DetectionFrame, Origin
-from iveg.domain.profiles import RobotProfile
 from iveg.robot.grounding.cloud import DepthPicture, Floats, cloud_index, top_left
 from iveg.robot.grounding.mask import (
     Mask,

@@ -84,6 +84,13 @@ def test_a_recording_of_a_robot_outside_the_fleet_is_refused(
     assert "AGX" in capsys.readouterr().err
 
 
+def test_nothing_is_played_as_a_live_robot_even_by_force(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["replay", "log.jsonl", "--robot", "AGI", "--force"]) == UNUSABLE
+    assert "AGI:recording in IVEG_ROBOTS" in capsys.readouterr().err
+
+
 def test_robots_of_recordings_may_be_named_one_by_one(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -97,8 +104,9 @@ def test_a_recording_is_not_played_on_a_broker_elsewhere(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("IVEG_MQTT_URL", "mqtt://greenhouse.test")
+    monkeypatch.setenv("IVEG_ROBOTS", "D1:recording")
 
-    assert run(["replay", "log.jsonl", "--robot", "AGI"]) == UNUSABLE
+    assert run(["replay", "log.jsonl", "--robot", "D1"]) == UNUSABLE
     assert "not on loopback" in capsys.readouterr().err
 
 

@@ -22,6 +22,7 @@ from tests.builders import (
     at,
     detection,
     detection_frame,
+    fleet_of,
     odometry,
     origin,
     received,
@@ -39,17 +40,20 @@ class Scene:
     """World, people and mandates on one clock.
 
     Attributes:
+        robots: As ``IVEG_ROBOTS`` names them, recordings included.
         now: Seconds since the start.
+        replay: The map frame by which every message is marked.
     """
 
     robots: tuple[str, ...] = ("AGI", "AGII")
     house: Greenhouse = FIELD
     rule: Rule = field(default_factory=Rule)
     now: float = 0.0
+    replay: str | None = None
     changes: list[Change] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.world = World(self.robots)
+        self.world = World(fleet_of(*self.robots))
         self.people = People()
         self.mandates = Mandates(self.house)
         self.all_clear = AllClear()
@@ -100,12 +104,13 @@ class Scene:
         )
         self._apply(received(said, after=self.now))
 
-    def play_back(self, robot_id: str) -> None:
-        """This robot is a recording."""
-        self._apply(received(Navigation(robot_id, self._origin(), "replay")))
+    def navigate(self, robot_id: str, task: str) -> None:
+        """A robot says what it is about."""
+        self._seq += 1
+        self._apply(received(Navigation(robot_id, self._origin(), task)))
 
     def _origin(self) -> Origin:
-        return origin(self._seq, after=self.now)
+        return replace(origin(self._seq, after=self.now), replay=self.replay)
 
     def _apply(self, one: Received) -> None:
         self.world.apply(replace(one, at=at(self.now)))

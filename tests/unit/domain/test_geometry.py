@@ -7,7 +7,6 @@ import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Rectangle, wrap_angle
 from iveg.domain.greenhouse import Greenhouse, Lane
-from iveg.domain.profiles import AGI, AGII, profile_of
 from tests.builders import scan
 
 QUARTER = math.pi / 2
@@ -101,8 +100,3 @@ def test_a_scan_keeps_the_returns_that_count_and_turns_with_its_mount() -> None:
 
     assert points.dtype == np.float32
     np.testing.assert_allclose(points, [[3.0, 0.0], [1.0, -3.0]], atol=1e-6)
-
-
-def test_a_robot_that_nobody_described_drives_like_agi() -> None:
-    assert profile_of("AGIII") == AGI
-    assert profile_of("AGII") == AGII

@@ -343,18 +343,18 @@ def test_an_unreadable_detection_slows_its_observer_for_a_second(
 
 # --- recordings -------------------------------------------------------------------
 
+RECORDED = ("AGI", "AGII:recording")
+
 
 def test_what_a_recording_saw_slows_no_live_robot() -> None:
-    scene = watching(Scene())
-    scene.play_back("AGII")
+    scene = watching(Scene(robots=RECORDED))
     scene.look("AGII", person(1.0))
 
     assert scene.judge()["AGI"] == CLEAR
 
 
 def test_a_recording_that_drives_past_slows_no_live_robot() -> None:
-    scene = watching(Scene())
-    scene.play_back("AGII")
+    scene = watching(Scene(robots=RECORDED))
     scene.drive("AGII", 1.0)
 
     mandates = scene.judge()
@@ -363,17 +363,39 @@ def test_a_recording_that_drives_past_slows_no_live_robot() -> None:
     assert mandates["AGII"].reason == "robot"
 
 
-def test_what_a_recording_saw_slows_the_recording() -> None:
+def test_a_live_robot_whose_task_is_called_replay_keeps_its_protection() -> None:
     scene = watching(Scene())
-    scene.play_back("AGII")
+    for name in ("AGI", "AGII"):
+        scene.navigate(name, "replay")
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"].reason == "person"
+    assert {one.robot_id for one in scene.world.live_robots()} == {"AGI", "AGII"}
+
+
+def test_whom_one_recording_saw_slows_no_other_robot() -> None:
+    scene = watching(Scene(robots=("AGI:recording", "AGII:recording")))
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+def test_recordings_that_share_a_map_slow_for_each_others_people() -> None:
+    scene = Scene(robots=("AGI:recording", "AGII:recording"), replay="shared")
+    watching(scene).look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_what_a_recording_saw_slows_the_recording() -> None:
+    scene = watching(Scene(robots=RECORDED))
     scene.look("AGII", person(50.5))
 
     assert scene.judge()["AGII"].reason == "person"
 
 
 def test_a_recordings_silence_shuts_nobodys_eyes() -> None:
-    scene = watching(Scene())
-    scene.play_back("AGII")
+    scene = watching(Scene(robots=RECORDED))
     scene.now = 5.0
     scene.drive("AGI", 0.0)
     scene.look("AGI")

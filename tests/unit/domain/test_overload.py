@@ -65,8 +65,8 @@ def test_thirty_pictures_a_second_are_judged_for_ever() -> None:
     assert all(overload.admits("AGI", at(n / 30)) for n in range(3000))
 
 
-def fleet(*places: float) -> Scene:
-    scene = Scene(("AGI", *(f"R{number}" for number in range(len(places)))))
+def fleet(*places: float, observer: str = "AGI") -> Scene:
+    scene = Scene((observer, *(f"R{number}" for number in range(len(places)))))
     scene.drive("AGI", 0.0)
     for number, x in enumerate(places):
         scene.drive(f"R{number}", x)
@@ -112,8 +112,7 @@ def test_it_ends_with_the_first_picture_that_was_judged_whole() -> None:
 
 
 def test_what_a_recording_saw_slows_no_live_robot() -> None:
-    scene = fleet(3.0, 40.0)
-    scene.play_back("AGI")
+    scene = fleet(3.0, 40.0, observer="AGI:recording")
     scene.mandates.overload.judged("AGI", at(0.0), whole=False)
     assert factors(scene)[2] == 1.0
     assert set(scene.mandates.overload.slowed(scene.world, 10.0)) == {"AGI"}

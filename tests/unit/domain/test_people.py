@@ -178,6 +178,24 @@ def test_of_two_peers_the_nearer_one_is_seen() -> None:
     assert placed.peer == "AG3"
 
 
+def test_of_a_peer_of_unknown_size_one_sighting_more_is_kept() -> None:
+    scene = Scene(robots=("AGI", "AG3"))
+    scene.drive("AG3", 5.0)
+
+    (placed,) = scene.look("AGI", machine(6.2))
+
+    assert placed.peer is None
+
+
+def test_a_recording_is_no_peer_of_a_robot_that_is_seen_today() -> None:
+    scene = Scene(robots=("AGI", "AGII:recording"))
+    scene.drive("AGII", 5.0)
+
+    (placed,) = scene.look("AGI", machine(5.0))
+
+    assert placed.peer is None
+
+
 def test_a_robot_is_not_told_of_itself() -> None:
     scene = Scene()
     scene.drive("AGI", 5.0)

@@ -84,10 +84,25 @@ def test_a_spot_behind_crop_cannot_be_cleared() -> None:
 
 
 def test_a_recording_clears_nothing() -> None:
-    scene = remembered(Scene())
-    scene.play_back("AGI")
+    scene = remembered(Scene(robots=("AGI:recording", "AGII")))
 
     assert watched(scene, 3.0) == []
+
+
+def test_whom_a_recording_saw_no_look_of_today_clears() -> None:
+    scene = remembered(Scene(robots=("AGI", "AGII:recording")))
+
+    assert watched(scene, 3.0) == []
+
+
+def test_a_robot_that_nobody_described_clears_nothing() -> None:
+    scene = Scene(robots=("AG3", "AGII"))
+    scene.look("AGII", person(4.0))
+    scene.now = 1.1
+    scene.drive("AG3", 0.0)
+    scene.look("AG3")
+
+    assert not can_see(scene.world.robot("AG3"), 4.0, 0.0, scene.house, at(1.1))
 
 
 def test_only_the_circles_that_were_looked_at_go() -> None:

@@ -6,11 +6,13 @@ import pytest
 
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import UnknownRobotError
+from iveg.domain.fleet import RobotDescription
 from iveg.domain.geometry import Pose2D
 from iveg.domain.hazards import hazards_of
 from iveg.domain.observations import (
     Canary,
     Climate,
+    CommandAnswer,
     CommandStatus,
     FeedbackRef,
     Navigation,
@@ -25,6 +27,7 @@ from tests.builders import (
     START,
     at,
     detection_frame,
+    fleet_of,
     hold,
     odometry,
     origin,
@@ -356,11 +359,87 @@ def test_the_agents_opinion_is_kept_for_display() -> None:
     assert world.robot("AGI").command_status == "PENDING"
 
 
-def test_a_robot_that_a_recording_plays_says_so_in_its_task() -> None:
-    world = world_with(Navigation("AGI", origin(), "replay"))
+# --- live or recorded -------------------------------------------------------------
+
+PLAYED = replace(origin(), replay="AGI")
+
+
+def recording() -> World:
+    """AGI is a recording, AGII is live."""
+    return World(fleet_of("AGI:recording", "AGII"))
+
+
+def test_a_recording_is_one_because_the_fleet_says_so() -> None:
+    world = recording()
 
     assert world.robot("AGI").is_replay
     assert [robot.robot_id for robot in world.live_robots()] == ["AGII"]
+
+
+def test_what_a_robot_calls_its_task_makes_it_no_recording() -> None:
+    world = world_with(Navigation("AGI", origin(), "replay"))
+
+    assert not world.robot("AGI").is_replay
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        odometry(origin=PLAYED),
+        scan(origin=PLAYED),
+        detection_frame(unreadable=1, origin=PLAYED),
+        safety_report(origin=PLAYED),
+        Navigation("AGI", PLAYED, "patrol"),
+        CommandAnswer("AGI", PLAYED, "01J", "LATCHED"),
+    ],
+)
+def test_what_calls_itself_a_replay_counts_for_nothing_in_a_live_robot(
+    said: Observation,
+) -> None:
+    world = World(fleet_of("AGI"))
+
+    assert world.apply(received(said)) == "refused"
+
+    untouched = World(fleet_of("AGI")).robot("AGI")
+    untouched.refused_at = START.mono
+    assert world.robot("AGI") == untouched
+
+
+def test_a_recording_is_in_a_map_of_its_own_until_it_names_another() -> None:
+    world = recording()
+    assert world.robot("AGI").recording == "AGI"
+
+    world.apply(received(odometry(origin=replace(origin(), replay="shared"))))
+
+    assert world.robot("AGI").recording == "shared"
+    assert world.robot("AGII").recording is None
+
+
+def test_a_recording_whose_safety_node_marks_nothing_counts_as_live() -> None:
+    world = recording()
+    world.apply(received(odometry()))
+    assert world.robot("AGI").is_replay
+
+    world.apply(received(safety_report()))
+
+    assert not world.robot("AGI").is_replay
+    assert world.apply(received(odometry(origin=PLAYED))) == "refused"
+
+
+def test_what_orion_kept_of_an_earlier_day_makes_no_recording_live() -> None:
+    world = recording()
+
+    world.apply(asked(safety_report()))
+
+    assert world.robot("AGI").is_replay
+
+
+def test_what_orion_kept_of_a_replay_is_refused_and_not_told() -> None:
+    world = World(fleet_of("AGI"))
+
+    assert world.apply(asked(odometry(origin=PLAYED))) == "refused"
+
+    assert world.robot("AGI").refused_at is None
 
 
 # --- poses in the past ------------------------------------------------------------
@@ -389,7 +468,7 @@ def test_without_a_stamp_the_newest_pose_counts() -> None:
 
 
 def test_without_any_pose_there_is_none() -> None:
-    assert RobotState("AGI").pose_at_stamp(START.wall) is None
+    assert RobotState("AGI", RobotDescription("AGI")).pose_at_stamp(START.wall) is None
 
 
 def test_a_clock_that_jumps_back_begins_the_history_anew() -> None:

@@ -8,7 +8,6 @@ import pytest
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Detection
-from iveg.domain.profiles import AGI
 from iveg.emulator.camera import (
     DETECTORS,
     FIELD_COUNTS,
@@ -19,6 +18,7 @@ from iveg.emulator.camera import (
     robot_target,
 )
 from iveg.emulator.greenhouse import Body, Disc, Scenery
+from tests.builders import AGI
 
 BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)
 OPEN = Scenery.of(Greenhouse("yard", BOUNDS))

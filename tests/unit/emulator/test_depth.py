@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Post
-from iveg.domain.profiles import AGI, AGII, RobotProfile
 from iveg.emulator.depth import (
     DepthCamera,
     Foliage,
@@ -28,6 +28,7 @@ from iveg.robot.grounding.locate import (
     to_detection,
 )
 from iveg.robot.grounding.mask import read_mask
+from tests.builders import AGI, AGII
 
 BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)
 OPEN = Scenery.of(Greenhouse("yard", BOUNDS))

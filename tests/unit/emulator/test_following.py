@@ -3,12 +3,13 @@ import math
 import numpy as np
 import pytest
 
+from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.profiles import AGI, AGII, RobotProfile
 from iveg.emulator.following import CLEARANCE_M, Follower
 from iveg.emulator.greenhouse import Disc
 from iveg.emulator.kinematics import Vehicle
 from iveg.emulator.routes import SPACING_M, Route, Station, route_of
+from tests.builders import AGI, AGII
 
 DT = 0.05
 SQUARE = ((0.0, 0.0), (8.0, 0.0), (8.0, 8.0), (0.0, 8.0))

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.profiles import AGI, AGII
 from iveg.emulator.kinematics import Odometer, Vehicle
+from tests.builders import AGI, AGII
 
 DT = 1 / 30
 ORIGIN = Pose2D(0.0, 0.0, 0.0)

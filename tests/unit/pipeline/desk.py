@@ -29,6 +29,7 @@ from iveg.pipeline.publish import Hub
 from tests.builders import (
     START,
     detection_frame,
+    fleet_of,
     odometry,
     origin,
     safety_report,
@@ -64,7 +65,8 @@ class Desk:
         self.sink = FakeRecorder()
         self.hub = Hub()
         self.minutes = Minutes(self.hub, self.sink, START)
-        self.world = World(robots)
+        self.description = fleet_of(*robots)
+        self.world = World(self.description)
         self.rejected: list[tuple[str, str]] = []
         self.ingest = Ingest(
             self.world.robots.__contains__,
@@ -84,7 +86,7 @@ class Desk:
             self.chain.probe.lag,
         )
         self.commander = Commander(
-            robots,
+            self.description.ids,
             self.fleet,
             self.broker,
             self.journal,

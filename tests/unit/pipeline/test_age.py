@@ -9,7 +9,6 @@ from iveg.domain.observations import (
     DetectionFrame,
     FeedbackRef,
     Hold,
-    Navigation,
     Odometry,
     Origin,
     SafetyReport,
@@ -205,9 +204,8 @@ async def test_robots_whose_age_is_estimated_are_named_in_one_notice() -> None:
 
 
 async def test_neither_a_robot_that_echoes_nor_a_recording_is_named() -> None:
-    desk = Desk()
+    desk = Desk(("AGI", "AGII:recording"))
     robot = Robot(desk)
-    desk.hear(Navigation("AGII", origin(1), "replay"))
     for _ in range(60):
         robot.live()
         desk.drive("AGII", 50.0)

@@ -97,7 +97,7 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)
     field.tick()
-    recorded = Hazard("person", "P1", "AGI", 15.0, 15.0, 2.0, recorded=True)
+    recorded = Hazard("person", "P1", "AGI", 15.0, 15.0, 2.0, recording="D1")
 
     assert not knows(field.shared(recorded), 15.0, 15.0)
 

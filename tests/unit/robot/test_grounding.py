@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Pose2D
 from iveg.domain.observations import Detection, Origin
-from iveg.domain.profiles import AGI
 from iveg.robot.grounding.cloud import (
     DepthPicture,
     Pinhole,
@@ -34,6 +33,7 @@ from iveg.robot.grounding.mask import (
     read_mask,
     write_mask,
 )
+from tests.builders import AGI
 
 LENS = Pinhole(40, 30, 20.0, 19.5, 14.5)
 AS_IS = Grounding(iterations=0, rim=0)

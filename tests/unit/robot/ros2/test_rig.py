@@ -14,11 +14,11 @@ from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
-from iveg.domain.profiles import AGI
 from iveg.robot.node import RobotNode
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import messages as m
+from tests.builders import AGI
 from tests.fakes.ros2_network import Endpoint, FakeNetwork
 from tests.ports import free_ports
 

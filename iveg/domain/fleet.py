@@ -1,0 +1,125 @@
+"""The fleet as data: which robots there are, live or recorded, and what each one is.
+
+Files are read in ``adapters/fleet_files``; here are the values.  A robot that nobody
+described gets the most cautious profile: the largest body, the weakest brakes, and a
+camera that can clear no spot.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS
+
+Kind = Literal["live", "recording"]
+
+ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
+RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
+"""Ids of devices that are no robots (docs/interfaces.md §1)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotProfile:
+    """What a robot is; the defaults are those of one that nobody described.
+
+    Attributes:
+        drive: ``differential`` (turns on the spot) or ``ackermann``.
+        length: Along x (m); ``width`` along y (m).
+        max_speed: What it may drive at most (m/s); ``max_turn`` (rad/s).
+        turning_radius: Least radius (m); 0 for one that turns on the spot.
+        acceleration: (m/s²); ``braking`` (m/s²) what the drive does when asked to halt.
+        assumed_braking: What margins may count on (m/s²).
+        camera: Pose of the camera in ``base_link``; ``camera_height`` (m).
+        camera_fov: What the camera sees across (rad); 0: nobody knows, so that a spot
+            is never taken for empty.
+        camera_range: How far it may see (m).
+        laser: Pose of the laser in ``base_link``.
+    """
+
+    drive: Literal["differential", "ackermann"] = "differential"
+    length: float = 2.0
+    width: float = 1.2
+    max_speed: float = 1.0
+    max_turn: float = 0.5
+    turning_radius: float = 0.0
+    acceleration: float = 0.5
+    braking: float = LIMITS.least_braking_m_s2
+    assumed_braking: float = LIMITS.least_braking_m_s2
+    camera: Pose2D = Pose2D(0.0, 0.0, 0.0)
+    camera_height: float = 0.6
+    camera_fov: float = 0.0
+    camera_range: float = 15.0
+    laser: Pose2D = Pose2D(0.0, 0.0, 0.0)
+
+
+CAUTIOUS = RobotProfile()
+UNDESCRIBED_SPEED = 0.5
+"""What software on a robot that nobody described lets it drive at most (m/s)."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotDescription:
+    """One robot of the fleet.
+
+    Attributes:
+        kind: ``recording``: a replay plays it; it never slows or frees a live robot.
+        is_described: Whether somebody said what it is; else the profile is cautious.
+    """
+
+    robot_id: str
+    kind: Kind = "live"
+    profile: RobotProfile = CAUTIOUS
+    is_described: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FleetDescription:
+    """Every robot of the fleet, by id, in the order that people see."""
+
+    members: Mapping[str, RobotDescription] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, robots: Iterable[RobotDescription]) -> "FleetDescription":
+        """The fleet of these robots."""
+        return cls({one.robot_id: one for one in robots})
+
+    @classmethod
+    def undescribed(cls, robot_ids: Iterable[str]) -> "FleetDescription":
+        """Live robots of which nothing but the id is known."""
+        return cls.of(RobotDescription(robot_id) for robot_id in robot_ids)
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Of all robots."""
+        return tuple(self.members)
+
+    def of_robot(self, robot_id: str) -> RobotDescription:
+        """A robot's description; the most cautious where there is none."""
+        return self.members.get(robot_id) or RobotDescription(robot_id)
+
+
+NOBODY = FleetDescription()
+"""A fleet of which nothing is known."""
+
+
+def is_robot_id(text: str) -> bool:
+    """Whether a robot may be called so."""
+    return ROBOT_ID.fullmatch(text) is not None and text not in RESERVED_IDS
+
+
+def split_word(word: str) -> tuple[str, Kind | None] | None:
+    """A robot's id and kind in the short form: ``D1`` or ``D1:recording``.
+
+    Returns:
+        None where it is neither; kind None where the word says none.
+    """
+    robot_id, colon, kind = word.strip().partition(":")
+    if not is_robot_id(robot_id):
+        return None
+    if not colon:
+        return robot_id, None
+    if kind == "live":
+        return robot_id, "live"
+    return (robot_id, "recording") if kind == "recording" else None

@@ -1,0 +1,124 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from iveg.adapters.fleet_files import built_in, load_fleet, read_fleet
+from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import CAUTIOUS, RobotDescription
+from iveg.domain.geometry import Pose2D
+from tests.processes import ROOT
+
+ONE = """\
+[[robots]]
+id = "B1"
+kind = "recording"
+
+[robots.body]
+length_m = 1.1
+width_m = 0.7
+
+[robots.drive]
+type = "ackermann"
+max_speed_m_s = 0.6
+turning_radius_m = 1.5
+braking_m_s2 = 0.9
+assumed_braking_m_s2 = 0.4
+
+[[robots]]
+id = "B2"
+camera = { x_m = 0.2, fov_deg = 90, range_m = 5.0 }
+"""
+
+
+def complaint(text: str) -> str:
+    with pytest.raises(DataFileError) as refused:
+        read_fleet(text, "fleet.toml")
+    return str(refused.value)
+
+
+def test_what_the_file_says_of_a_robot_is_what_is_known_of_it() -> None:
+    one = read_fleet(ONE, "fleet.toml").of_robot("B1")
+
+    assert (one.kind, one.is_described) == ("recording", True)
+    assert (one.profile.length, one.profile.width) == (1.1, 0.7)
+    assert (one.profile.drive, one.profile.turning_radius) == ("ackermann", 1.5)
+    assert (one.profile.max_speed, one.profile.assumed_braking) == (0.6, 0.4)
+    assert one.profile.camera_fov == CAUTIOUS.camera_fov
+
+
+def test_a_robot_without_body_and_drive_is_one_that_nobody_described() -> None:
+    one = read_fleet(ONE, "fleet.toml").of_robot("B2")
+
+    assert (one.kind, one.is_described) == ("live", False)
+    assert one.profile.camera == Pose2D(0.2, 0.0, 0.0)
+    assert one.profile.camera_fov == pytest.approx(math.pi / 2)
+    assert one.profile.length == CAUTIOUS.length
+
+
+def test_margins_never_count_on_better_brakes_than_the_drive_has() -> None:
+    text = ONE.replace("assumed_braking_m_s2 = 0.4\n", "").replace("= 0.9", "= 0.2")
+
+    assert read_fleet(text, "").of_robot("B1").profile.assumed_braking == 0.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("length_m = 1.1", "length_m = -1", "fleet.toml:6:1, robots[0].body.length_m:"),
+        ("length_m = 1.1", "lenght_m = 1", "fleet.toml:6:1, robots[0].body.lenght_m:"),
+        ("width_m = 0.7\n", "", "fleet.toml:5:1, robots[0].body.width_m:"),
+        ('"B1"', '"B 1"', "fleet.toml:2:1, robots[0].id: must be 1 to 64 letters"),
+        ('"B2"', '"B1"', "fleet.toml:17:1, robots[1].id: B1 is in the list twice"),
+        ('"B2"', '"climate"', "fleet.toml:17:1, robots[1].id:"),
+        ("fov_deg = 90", 'fov_deg = "wide"', "fleet.toml:18:23, robots[1].camera.fov"),
+        ('"recording"', '"maybe"', "fleet.toml:3:1, robots[0].kind:"),
+        ("= 0.4", "= 1.4", "fleet.toml:9:1, robots[0].drive: assumed_braking_m_s2 m"),
+        ("kind =", "kind", "fleet.toml:3:6: is not TOML:"),
+    ],
+)
+def test_what_is_wrong_is_named_by_file_line_and_column(
+    old: str, new: str, place: str
+) -> None:
+    assert complaint(ONE.replace(old, new)).startswith(place)
+
+
+def test_a_file_that_is_cut_off_or_empty_is_refused_at_its_place() -> None:
+    assert complaint("").startswith("fleet.toml:1:1, robots:")
+    assert complaint('[[robots]]\nid = "B1').startswith("fleet.toml:2:")
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DataFileError, match="cannot be read"):
+        load_fleet(str(tmp_path / "fleet.toml"))
+
+
+def test_without_a_word_the_fleet_is_everybody_in_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.toml"
+    file.write_text(ONE)
+
+    assert load_fleet(str(file)).ids == ("B1", "B2")
+    assert load_fleet().ids == ("AGI", "AGII")
+
+
+def test_words_choose_who_is_in_the_fleet_and_what_plays(tmp_path: Path) -> None:
+    file = tmp_path / "fleet.toml"
+    file.write_text(ONE)
+
+    fleet = load_fleet(str(file), ("B1:live", "AGII", "D1:recording"))
+
+    assert fleet.ids == ("B1", "AGII", "D1")
+    assert (fleet.of_robot("B1").kind, fleet.of_robot("B1").profile.length) == (
+        "live",
+        1.1,
+    )
+    assert fleet.of_robot("AGII") == built_in().of_robot("AGII")
+    assert fleet.of_robot("D1") == RobotDescription("D1", "recording")
+
+
+def test_the_example_of_the_documents_can_be_used() -> None:
+    fleet = load_fleet(str(ROOT / "deploy/fleet.example.toml"))
+
+    assert fleet.ids == ("AGI", "CARRIER-2", "D1")
+    assert [one.kind for one in fleet.members.values()] == ["live", "live", "recording"]
+    assert fleet.of_robot("CARRIER-2").is_described
