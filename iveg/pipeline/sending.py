@@ -153,7 +153,7 @@ class Sender:
 
         A transport whose failure stayed untold would count as busy for ever.
         """
-        ok = False
+        ok, left = False, self._clock()
         try:
             await sending
             ok = True
@@ -162,7 +162,9 @@ class Sender:
         finally:
             at = self._clock()
             doubtful = transport == "fiware" and self._fiware_is_cut(at)
-            effects = machine.sent(transport, command_id, at, ok=ok, doubtful=doubtful)
+            effects = machine.sent(
+                transport, command_id, at, ok=ok, doubtful=doubtful, left=left
+            )
             self._came_back(machine, effects, at)
 
     def _start_level(self, level: SetLevel) -> None:

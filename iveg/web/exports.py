@@ -6,7 +6,7 @@ is never held in memory.
 
 import csv
 import io
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import fields
 from typing import Literal, TypeVar
 
@@ -55,11 +55,13 @@ async def write_csv(
 
 
 async def write_ndjson(
-    view: Callable[[R], View], pages: AsyncIterator[Sequence[R]]
+    view: Callable[[Sequence[R]], Awaitable[Sequence[View]]],
+    pages: AsyncIterator[Sequence[R]],
 ) -> AsyncIterator[bytes]:
     """Rows as one JSON value a line, each as the list has it."""
     async for records in pages:
-        lines = (view(record).model_dump_json(by_alias=True) for record in records)
+        views = await view(records)
+        lines = (one.model_dump_json(by_alias=True) for one in views)
         yield "".join(f"{line}\n" for line in lines).encode()
 
 

@@ -20,7 +20,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.flood import Flood
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.records import CommandRecord, DecisionRecord, Record
 from iveg.ngsi.codec import format_stamp
 from iveg.web import charts, exports, schemas, shapes
 from iveg.web.exports import MEDIA_TYPES, Form
@@ -56,7 +56,7 @@ class _List(Generic[R]):
     path: str
     of: ListOf[R]
     ask: Callable[[Filter], Awaitable[Page[R]]]
-    view: Callable[[R], View]
+    view: Callable[[Sequence[R]], Awaitable[list[View]]]
     listing: type[Listing[Any]]
     says: str
     more: Callable[[], dict[str, Any]] = dict
@@ -134,12 +134,16 @@ def router(
 def _lists(
     queries: Queries, flood: Callable[[], schemas.FloodJson]
 ) -> tuple[_List[Any], ...]:
+    async def audited(records: Sequence[CommandRecord]) -> list[View]:
+        steps = await queries.steps_of([one.command_id for one in records])
+        return [view_command(one, steps.get(one.command_id, ())) for one in records]
+
     return (
         _List(
             "decisions",
             lists.DECISIONS,
             queries.decisions,
-            view_decision,
+            _each(view_decision),
             Listing[DecisionView],
             "Why robots were slowed, by when it began",
         ),
@@ -147,7 +151,7 @@ def _lists(
             "detections",
             lists.DETECTIONS,
             queries.detections,
-            view_detection,
+            _each(view_detection),
             Listing[DetectionView],
             "What robots saw, by when it reached iVeg",
         ),
@@ -155,7 +159,7 @@ def _lists(
             "commands",
             lists.COMMANDS,
             queries.commands,
-            view_command,
+            audited,
             Listing[CommandView],
             "Every STOP, release and resume, by when it was asked",
         ),
@@ -163,7 +167,7 @@ def _lists(
             "alerts",
             lists.ALERTS,
             queries.alerts,
-            view_alert,
+            _each(view_alert),
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
             lambda: {"flood": flood()},
@@ -172,7 +176,7 @@ def _lists(
             "log",
             lists.LOG,
             queries.log,
-            view_entry,
+            _each(view_entry),
             Listing[EntryView],
             "The action and inference log",
         ),
@@ -193,13 +197,22 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
         form = filters.format or exports.form_of(request.headers)
         asked = filter_of(filters, one.of)
         if form == "json":
-            return _listing(await one.ask(asked), one)
+            return await _listing(await one.ask(asked), one)
         return await _file(one, filters, asked, form)
 
 
-def _listing(page: Page[R], one: _List[R]) -> Response:
+def _each(view: Callable[[R], View]) -> Callable[[Sequence[R]], Awaitable[list[View]]]:
+    """Rows of which each says all that is told of it."""
+
+    async def views(records: Sequence[R]) -> list[View]:
+        return [view(record) for record in records]
+
+    return views
+
+
+async def _listing(page: Page[R], one: _List[R]) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
-    items = [one.view(record) for record in page.items]
+    items = await one.view(page.items)
     listing = one.listing(items=items, next=after, **one.more())
     text = listing.model_dump_json(by_alias=True, serialize_as_any=True)
     return Response(text, media_type=MEDIA_TYPES["json"])

@@ -1,5 +1,6 @@
 """Remembered records as integrators read them: the names of the live topics."""
 
+from collections.abc import Sequence
 from typing import Generic, TypeVar
 
 import orjson
@@ -8,11 +9,13 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from iveg.adapters.history.series import ClimateSeries
 from iveg.domain.records import (
     AlertRecord,
+    CommandEventRecord,
     CommandRecord,
     DecisionRecord,
     DetectionRecord,
     LogRecord,
 )
+from iveg.domain.stop.outcome import outcome_of, was_loud
 from iveg.ngsi.codec import format_stamp
 from iveg.web import schemas
 
@@ -69,8 +72,16 @@ class CommandTimes(View):
     standing: str | None
 
 
+class StepView(View):
+    """One line of the audit trail of a command."""
+
+    at: str
+    state: str
+    why: str
+
+
 class CommandView(View):
-    """One STOP, release or resume."""
+    """One STOP, release or resume, how it ended, and each of its steps."""
 
     command_id: str
     robot_id: str
@@ -82,6 +93,9 @@ class CommandView(View):
     standstill_ms: float | None
     tries: int
     reason: str | None
+    outcome: str
+    was_loud: bool
+    steps: list[StepView]
 
 
 class AlertView(View):
@@ -190,7 +204,9 @@ def view_detection(record: DetectionRecord) -> DetectionView:
     )
 
 
-def view_command(record: CommandRecord) -> CommandView:
+def view_command(
+    record: CommandRecord, steps: Sequence[CommandEventRecord] = ()
+) -> CommandView:
     """As ``GET /commands`` lists it."""
     return CommandView(
         command_id=record.command_id,
@@ -211,6 +227,12 @@ def view_command(record: CommandRecord) -> CommandView:
         standstill_ms=record.standstill_ms,
         tries=record.tries,
         reason=record.reason,
+        outcome=outcome_of(record),
+        was_loud=was_loud((record.state, *(step.state for step in steps))),
+        steps=[
+            StepView(at=format_stamp(step.at), state=step.state, why=step.why)
+            for step in steps
+        ],
     )
 
 

@@ -111,7 +111,8 @@ def router(
         found = await queries.command(command_id)
         if found is None:
             raise HTTPException(404, "There is no such command.")
-        return Json(view_command(found).model_dump(by_alias=True))
+        steps = await queries.command_events(command_id)
+        return Json(view_command(found, steps).model_dump(by_alias=True))
 
     @routes.get("/drills", response_model=DrillList)
     async def drills(robot: str | None = None) -> Response:

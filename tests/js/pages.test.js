@@ -1,5 +1,10 @@
 import { judgeChain, ORDER, sentenceOf } from "../../iveg/static/js/pages/chain.js";
-import { statOf, summaryOf, tookOf } from "../../iveg/static/js/pages/latency.js";
+import {
+  endSaid,
+  statOf,
+  summaryOf,
+  tookOf,
+} from "../../iveg/static/js/pages/latency.js";
 import { equal, test } from "./harness.js";
 
 /** @param {Record<string, "ok" | "late" | "down" | "unknown">} states */
@@ -79,6 +84,7 @@ test("without the server nothing else is known", () => {
 
 test("each road is measured from the press on, and silence is no number", () => {
   equal(tookOf(order()), {
+    accepted: null,
     sentDirect: 2,
     direct: null,
     sentFiware: 4,
@@ -93,10 +99,28 @@ test("release and resume are left out of what a STOP takes", () => {
 });
 
 test("a STOP that nobody confirmed is counted", () => {
-  equal(
-    summaryOf([order({ state: "UNCONFIRMED", standstill_ms: null })]).unconfirmed,
-    1,
+  equal(summaryOf([order({ state: "RUNNING", was_loud: true })]).unconfirmed, 1);
+});
+
+test("13.7: a STOP pressed while the server was dead has one zero: the press", () => {
+  const { times } = order();
+  const took = tookOf(
+    order({
+      times: { ...times, pressed: "2026-11-20T11:59:20.000Z" },
+      standstill_ms: 40412,
+    }),
   );
+  equal([took.accepted, took.sentDirect, took.fiware], [40000, 40002, 40050]);
+  equal(took.standing, 40412);
+});
+
+test("13.7: a refused resume reads refused, with the reason", () => {
+  const words = {
+    t: (/** @type {string} */ key, /** @type {any} */ slots) => `${key} ${slots.why}`,
+  };
+  const resume = order({ kind: "resume", state: "READY", reason: "held" });
+  const said = endSaid({ ...resume, outcome: "refused" }, /** @type {any} */ (words));
+  equal(said, "commandspage.end.refused held");
 });
 
 test("the median is a number that was measured", () => {

@@ -5,7 +5,7 @@ holds up the event loop nor takes the threads that a STOP's journal needs.
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -185,6 +185,26 @@ class Queries:
         def read(connection: Connection) -> tuple[CommandEventRecord, ...]:
             rows = connection.execute(wanted).mappings()
             return tuple(record_of(CommandEventRecord, row) for row in rows)
+
+        return await self._ask(read)
+
+    async def steps_of(
+        self, command_ids: Sequence[str]
+    ) -> dict[str, list[CommandEventRecord]]:
+        """The audit trails of some commands, each oldest first."""
+        events = command_events.c
+        wanted = (
+            select(command_events)
+            .where(events.command_id.in_(command_ids))
+            .order_by(events.at, events.row_id)
+        )
+
+        def read(connection: Connection) -> dict[str, list[CommandEventRecord]]:
+            steps: dict[str, list[CommandEventRecord]] = {}
+            for row in connection.execute(wanted).mappings():
+                step = record_of(CommandEventRecord, row)
+                steps.setdefault(step.command_id, []).append(step)
+            return steps
 
         return await self._ask(read)
 

@@ -90,7 +90,7 @@ class CommandLatency:
         direct_ms: To the answer on the direct road; ``fiware_ms`` on the other.
         standstill_ms: To the first standing sample.
         accepted_ms: To this server, where the page told when it was pressed.
-        sent_direct_ms: To the broker's word; ``sent_fiware_ms`` to Orion's.
+        sent_direct_ms: Until it left for the broker; ``sent_fiware_ms`` for Orion.
     """
 
     command_id: str

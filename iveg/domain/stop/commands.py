@@ -120,17 +120,20 @@ class Command:
         return (self.held_as or self.command_id) if self.kind == "stop" else None
 
     def note_sent(
-        self, transport: Transport, at: Instant, *, ok: bool, doubtful: bool
+        self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
     ) -> None:
-        """A transport took it or failed; taken is not yet arrived.
+        """A transport took what ``left`` for it, or failed; taken is not yet arrived.
+
+        Sent is when it left: the robot's answer is often here before the word of who
+        took it, and no answer comes before its question.
 
         Only a broker's word that it has a STOP (PUBACK) says something; Orion's 204
         and an order at QoS 0 say nothing until the robot answers.
         """
         if ok and transport == "direct":
-            self.times.sent_direct = self.times.sent_direct or at
+            self.times.sent_direct = self.times.sent_direct or left
         elif ok:
-            self.times.sent_fiware = self.times.sent_fiware or at
+            self.times.sent_fiware = self.times.sent_fiware or left
         confirms = transport == "direct" and self.kind == "stop"
         if self.roads[transport] == "ok" and not confirms:
             return  # The robot's answer was faster than the word of who took it.

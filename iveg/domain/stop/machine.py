@@ -96,6 +96,7 @@ class StopMachine(Episode):
         *,
         ok: bool,
         doubtful: bool = False,
+        left: Instant | None = None,
     ) -> list[Effect]:
         """A transport took our message (PUBACK, 2xx) or failed; neither is evidence.
 
@@ -105,13 +106,14 @@ class StopMachine(Episode):
             at: This moment.
             ok: Whether it was taken.
             doubtful: It is known that what lies behind does not pass anything on.
+            left: When it was handed to the transport; this moment, if nobody says.
         """
         command = self._command(command_id)
         if command is None:
             return []
         if road == "fiware" and command is self.stop:
             self.sends.came_back(at)
-        command.note_sent(road, at, ok=ok, doubtful=doubtful)
+        command.note_sent(road, left or at, ok=ok, doubtful=doubtful)
         if not ok or doubtful:
             return []
         return [self.enter("SENT", "sent")] if self.state == "REQUESTED" else []

@@ -344,6 +344,20 @@ async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() 
     await desk.commander.close()
 
 
+async def test_13_7_an_order_was_sent_when_it_left_not_when_orion_says_so() -> None:
+    desk = Desk()
+    desk.broker.opened.clear()
+    command = await press(desk)
+    left = desk.clock()
+    desk.clock.now += 0.4
+
+    desk.broker.opened.set()
+    await settle()
+
+    assert command.times.sent_fiware == left
+    await desk.commander.close()
+
+
 async def test_the_journal_knows_what_a_release_names_before_it_goes_out() -> None:
     desk = Desk()
     command = await press(desk)

@@ -21,6 +21,7 @@ from tests.fakes.records import (
     NOON,
     alert_record,
     climate_record,
+    command_event_record,
     command_record,
     decision_record,
     detection_record,
@@ -139,7 +140,26 @@ async def test_a_command_reads_as_the_contract_says(
         "standstill_ms": None,
         "tries": 1,
         "reason": None,
+        "outcome": "open",
+        "was_loud": False,
+        "steps": [],
     }
+
+
+async def test_13_7_a_command_tells_each_step_and_that_it_was_not_confirmed(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(
+        command_record(state="RUNNING", standing_at=NOON + 2.0),
+        command_event_record(at=NOON, state="REQUESTED"),
+        command_event_record(at=NOON + 1.0, state="UNCONFIRMED"),
+        command_event_record(command_id="another", at=NOON + 1.0),
+    )
+
+    [item] = (await client.get("/api/v1/commands")).json()["items"]
+
+    assert (item["outcome"], item["was_loud"]) == ("stood", True)
+    assert [step["state"] for step in item["steps"]] == ["REQUESTED", "UNCONFIRMED"]
 
 
 async def test_alerts_and_log_read_as_their_live_topics_do(

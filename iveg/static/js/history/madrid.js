@@ -77,3 +77,13 @@ export function dayAndTime(at, { withYear = false } = {}) {
   const shown = withYear ? `${date}/${month}/${year}` : `${date}/${month}`;
   return `${shown} ${time.slice(0, 8)}`;
 }
+
+/**
+ * Time of day to the millisecond, for evidence.
+ *
+ * @param {string | number} at ISO-8601 or Unix milliseconds
+ * @returns {string} `13:04:11.123`
+ */
+export function millisecondsOf(at) {
+  return wallText(new Date(at).getTime()).slice(11);
+}

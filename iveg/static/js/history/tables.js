@@ -4,6 +4,7 @@
  * @typedef {{items: any[], next: string | null}} Page
  */
 
+import { endSaid, tookOf, zeroOf } from "../pages/latency.js";
 import { make, need, setHidden } from "../panels/dom.js";
 import { dayAndTime } from "./madrid.js";
 
@@ -87,17 +88,15 @@ export function decisionCells(item, words) {
  * @param {import("../i18n.js").Words} words
  */
 export function commandCells(item, words) {
-  const { times } = item;
-  const since = (/** @type {string | null} */ at) =>
-    at === null ? null : Date.parse(at) - Date.parse(times.requested);
+  const took = tookOf(item);
   return [
-    make("td", "", dayAndTime(times.requested)),
+    make("td", "", dayAndTime(zeroOf(item.times))),
     make("td", "", item.robot_id),
     make("td", "", words.t(`history.kind.${item.kind}`)),
-    make("td", "", words.t(`history.state.${item.state}`)),
+    make("td", "rows__what", endSaid(item, words)),
     make("td", "", item.requested_by),
-    numberCell(since(times.answer_direct), 0, words),
-    numberCell(since(times.answer_fiware), 0, words),
+    numberCell(took.direct, 0, words),
+    numberCell(took.fiware, 0, words),
     numberCell(item.standstill_ms, 0, words),
     numberCell(item.tries, 0, words),
   ];

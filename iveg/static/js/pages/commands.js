@@ -2,22 +2,24 @@
  * The Commands page: every order with what each of its roads took, to study and print.
  */
 
-import { dayAndTime } from "../history/madrid.js";
+import { dayAndTime, millisecondsOf } from "../history/madrid.js";
 import { all, make, need, needPart, setText } from "../panels/dom.js";
 import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
-import { summaryOf, tookOf } from "./latency.js";
+import { endSaid, summaryOf, tookOf, zeroOf } from "./latency.js";
 import { createChips, createRows, soon } from "./rows.js";
 
 /** @typedef {import("../i18n.js").Words} Words */
 
 /** @param {import("../page.js").Page} page */
 export function start({ store, words }) {
+  /** @type {Set<string>} orders whose steps somebody reads */
+  const opened = new Set();
   const isChosen = createChips("data-kind-chip", () => rows.draw());
   const rows = createRows({
     name: "orders",
     path: "commands",
     words,
-    cells: (command) => cellsOf(command, words),
+    cells: (command) => cellsOf(command, words, opened),
     admits: ({ kind }) => isChosen(kind),
     onItems: (items) => drawSummary(items, words),
   });
@@ -75,17 +77,22 @@ function createDrills(store, words) {
   return { load, draw };
 }
 
-/** @param {import("./latency.js").Order} command @param {Words} words */
-function cellsOf(command, words) {
+/**
+ * @param {import("./latency.js").Order} command
+ * @param {Words} words
+ * @param {Set<string>} opened
+ */
+function cellsOf(command, words, opened) {
   const took = tookOf(command);
   const number = (/** @type {number | null} */ value) =>
     make("td", "number", value === null ? "—" : words.number(value, 0));
   return [
-    make("td", "time", dayAndTime(command.times.requested)),
+    make("td", "time", dayAndTime(zeroOf(command.times))),
     make("td", "", command.robot_id),
     make("td", "", orderSaid(command, words)),
-    make("td", "", words.t(`history.state.${command.state}`)),
+    endOf(command, words, opened),
     make("td", "", command.requested_by),
+    number(took.accepted),
     number(took.sentDirect),
     number(took.direct),
     number(took.sentFiware),
@@ -93,6 +100,34 @@ function cellsOf(command, words) {
     number(took.standing),
     number(command.tries),
   ];
+}
+
+/**
+ * How it ended, and each step of it on demand.
+ *
+ * @param {import("./latency.js").Order} command
+ * @param {Words} words
+ * @param {Set<string>} opened
+ */
+function endOf(command, words, opened) {
+  const cell = make("td", "what", endSaid(command, words));
+  if (!command.steps?.length) return cell;
+  const steps = make("details", "members");
+  // The table is written anew while somebody reads it.
+  steps.open = opened.has(command.command_id);
+  steps.addEventListener("toggle", () => {
+    if (steps.open) opened.add(command.command_id);
+    else opened.delete(command.command_id);
+  });
+  const list = make("ol");
+  for (const { at, state } of command.steps) {
+    const line = make("li", "", `${millisecondsOf(at)} `);
+    line.append(words.t(`history.state.${state}`));
+    list.append(line);
+  }
+  steps.append(make("summary", "", words.t("commandspage.steps")), list);
+  cell.append(steps);
+  return cell;
 }
 
 /** @param {import("./latency.js").Order} command @param {Words} words */

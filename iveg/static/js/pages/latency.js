@@ -3,29 +3,55 @@
  *
  * @typedef {{command_id: string, robot_id: string, kind: string, state: string,
  *   requested_by: string, tries: number, drill?: boolean, standstill_ms: number | null,
- *   times: {requested: string, sent_fiware: string | null, sent_direct: string | null,
- *     answer_fiware: string | null, answer_direct: string | null,
- *     standing: string | null}}} Order
+ *   reason?: string | null, outcome?: string, was_loud?: boolean,
+ *   steps?: {at: string, state: string, why: string}[],
+ *   times: {pressed?: string | null, requested: string, sent_fiware: string | null,
+ *     sent_direct: string | null, answer_fiware: string | null,
+ *     answer_direct: string | null, standing: string | null}}} Order
  * @typedef {{median: number, worst: number}} Stat (ms)
  */
 
 const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
 
 /**
+ * The one zero of an order's times: the press, or the server's yes where no page told.
+ *
+ * @param {Order["times"]} times
+ */
+export function zeroOf({ pressed, requested }) {
+  return pressed ?? requested;
+}
+
+/**
  * @param {Order} order
- * @returns {Record<"sentDirect" | "direct" | "sentFiware" | "fiware" | "standing",
- *   number | null>} (ms) since it was asked for; null where nothing came
+ * @returns {Record<"accepted" | "sentDirect" | "direct" | "sentFiware" | "fiware" |
+ *   "standing", number | null>} (ms) from the press on; null where nothing came
  */
 export function tookOf({ times, standstill_ms }) {
+  const zero = Date.parse(zeroOf(times));
   const since = (/** @type {string | null} */ at) =>
-    at === null ? null : Date.parse(at) - Date.parse(times.requested);
+    at === null ? null : Date.parse(at) - zero;
   return {
+    accepted: times.pressed ? since(times.requested) : null,
     sentDirect: since(times.sent_direct),
     direct: since(times.answer_direct),
     sentFiware: since(times.sent_fiware),
     fiware: since(times.answer_fiware),
     standing: standstill_ms,
   };
+}
+
+/**
+ * What became of an order, never what its robot does now.
+ *
+ * @param {Order} order
+ * @param {import("../i18n.js").Words} words
+ */
+export function endSaid({ state, reason, outcome = "open", was_loud }, words) {
+  const slots = { state: words.t(`history.state.${state}`), why: reason ?? "" };
+  const said = words.t(`commandspage.end.${outcome}`, slots);
+  const isLoudNow = outcome === "open" && LOUD.has(state);
+  return was_loud && !isLoudNow ? `${said} ${words.t("commandspage.was_loud")}` : said;
 }
 
 /**
@@ -38,7 +64,7 @@ export function summaryOf(orders) {
   const took = stops.map(tookOf);
   return {
     count: stops.length,
-    unconfirmed: stops.filter(({ state }) => LOUD.has(state)).length,
+    unconfirmed: stops.filter(({ was_loud }) => was_loud).length,
     direct: statOf(took.map(({ direct }) => direct)),
     fiware: statOf(took.map(({ fiware }) => fiware)),
     standing: statOf(took.map(({ standing }) => standing)),

@@ -1,0 +1,48 @@
+"""How an order ended, for whoever reads of it later (docs/interfaces.md §5).
+
+A row keeps the state of the machine when the order was followed no more, and that is
+the robot's state: "running" is no answer to what became of a STOP.
+"""
+
+from collections.abc import Iterable
+from typing import Literal
+
+from iveg.domain.records import CommandRecord
+
+Outcome = Literal[
+    "open",
+    "stood",
+    "not_seen_standing",
+    "released",
+    "resumed",
+    "refused",
+    "expired",
+    "replaced",
+]
+LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
+
+
+def outcome_of(record: CommandRecord) -> Outcome:
+    """What became of an order; ``open`` while it is followed."""
+    if record.state == "EXPIRED":
+        return "expired"
+    if record.state == "REPLACED":
+        return "replaced"
+    if record.kind == "stop":
+        return _of_stop(record)
+    if record.state == "RELEASING":
+        return "open"
+    if record.reason is not None:
+        return "refused"
+    return "released" if record.kind == "release" else "resumed"
+
+
+def _of_stop(record: CommandRecord) -> Outcome:
+    if record.state not in ("RUNNING", "READY"):
+        return "open"
+    return "not_seen_standing" if record.standing_at is None else "stood"
+
+
+def was_loud(states: Iterable[str]) -> bool:
+    """Whether it was, at any time, not confirmed or not obeyed."""
+    return not LOUD.isdisjoint(states)
