@@ -10,7 +10,6 @@ import logging
 import random
 import socket
 import ssl
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
@@ -18,6 +17,7 @@ from urllib.parse import unquote, urlsplit
 import aiomqtt
 
 from iveg.adapters.floods import quiet
+from iveg.adapters.mqtt_inbox import GreedyClient, Inbox
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
@@ -113,8 +113,8 @@ class MqttLink:
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        address = self._address
-        async with aiomqtt.Client(
+        address, inbox = self._address, Inbox(_MAX_INCOMING)
+        async with GreedyClient(
             address.host,
             address.port,
             username=address.user,
@@ -124,7 +124,7 @@ class MqttLink:
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=_NODELAY,
             max_queued_incoming_messages=_MAX_INCOMING,
-            queue_type=Inbox,
+            queue_type=lambda maxsize: inbox,  # type: ignore[arg-type] # noqa: ARG005
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
@@ -140,12 +140,16 @@ class MqttLink:
             )
             try:
                 async for message in client.messages:
-                    if self._on_message is not None and isinstance(
-                        message.payload, bytes
-                    ):
-                        self._on_message(str(message.topic), message.payload)
+                    self._hand(message)
+                    # Waiting for each would cost more than most of them do.
+                    for _ in range(inbox.qsize()):
+                        self._hand(inbox.get_nowait())
             finally:
                 sender.cancel()
+
+    def _hand(self, message: aiomqtt.Message) -> None:
+        if self._on_message is not None and isinstance(message.payload, bytes):
+            self._on_message(message.topic.value, message.payload)
 
     async def _send_offered(self, client: aiomqtt.Client) -> None:
         while True:
@@ -186,33 +190,6 @@ class MqttLink:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
         _heed_cancellation()
-
-
-class Inbox(asyncio.Queue[aiomqtt.Message]):
-    """What waits to be read: of a topic's telemetry (QoS 0) only the newest.
-
-    A reader that falls behind must not read ever older news; what was sent at QoS 1
-    (orders, answers, safety reports) is kept, in order.
-    """
-
-    _queue: "deque[aiomqtt.Message | str]"
-
-    def _init(self, maxsize: int) -> None:
-        super()._init(maxsize)
-        self._newest: dict[str, aiomqtt.Message] = {}
-
-    def _put(self, item: aiomqtt.Message) -> None:
-        if item.qos > 0:
-            self._queue.append(item)
-            return
-        topic = item.topic.value
-        if topic not in self._newest:
-            self._queue.append(topic)
-        self._newest[topic] = item
-
-    def _get(self) -> aiomqtt.Message:
-        waiting = self._queue.popleft()
-        return self._newest.pop(waiting) if isinstance(waiting, str) else waiting
 
 
 def _heed_cancellation() -> None:

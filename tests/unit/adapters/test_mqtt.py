@@ -5,11 +5,10 @@ import contextlib
 import logging
 from collections.abc import AsyncIterator, Callable
 
-import aiomqtt
 import orjson
 import pytest
 
-from iveg.adapters.mqtt import BrokerAddress, Inbox, MqttLink
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.roads import MqttRoad
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
@@ -236,52 +235,3 @@ async def test_a_release_without_a_broker_fails_and_is_kept_for_nobody() -> None
             await until(lambda: heard.messages)
 
     assert [payload for _, payload in heard.messages] == [b"last"]
-
-
-# --- what waits to be read ----------------------------------------------------------
-
-
-def letter(topic: str, payload: str, qos: int = 0) -> aiomqtt.Message:
-    return aiomqtt.Message(
-        aiomqtt.Topic(topic),
-        payload.encode(),
-        qos,
-        retain=False,
-        mid=1,
-        properties=None,
-    )
-
-
-def emptied(inbox: Inbox) -> list[tuple[str, bytes]]:
-    read = [inbox.get_nowait() for _ in range(inbox.qsize())]
-    return [(one.topic.value, bytes(one.payload)) for one in read]
-
-
-def test_of_telemetry_that_waits_the_newest_of_each_topic_is_read() -> None:
-    inbox = Inbox()
-
-    for number in range(3000):
-        inbox.put_nowait(letter(f"t/{number % 2}", str(number)))
-
-    assert emptied(inbox) == [("t/0", b"2998"), ("t/1", b"2999")]
-
-
-def test_what_was_sent_with_a_receipt_is_all_read_in_its_order() -> None:
-    inbox = Inbox()
-
-    for number in range(3):
-        inbox.put_nowait(letter("t", f"look {number}"))
-        inbox.put_nowait(letter("t", f"answer {number}", qos=1))
-
-    read = [payload for _, payload in emptied(inbox)]
-    assert read == [b"look 2", b"answer 0", b"answer 1", b"answer 2"]
-
-
-def test_an_inbox_that_was_emptied_takes_the_same_topic_again() -> None:
-    inbox = Inbox()
-    inbox.put_nowait(letter("t", "first"))
-    inbox.get_nowait()
-
-    inbox.put_nowait(letter("t", "second"))
-
-    assert emptied(inbox) == [("t", b"second")]
