@@ -202,7 +202,7 @@ class Stage:
     # --- what iVeg says ---------------------------------------------------------------
 
     def robot(self, robot_id: str) -> Json:
-        return dict(self._views.robot(robot_id, self.now))
+        return self._views.robot(robot_id, self.now).model_dump()
 
     def speed(self, robot_id: str) -> float:
         """What its odometry says (m/s), whichever way it drives; 0 before the first."""
@@ -210,12 +210,13 @@ class Stage:
         return abs(float(twist["linear"])) if twist else 0.0
 
     def people(self) -> list[Json]:
-        return [dict(one) for one in self._views.people(self.now)]
+        return [one.model_dump() for one in self._views.people(self.now)]
 
     def look(self, robot_id: str) -> dict[str, Json]:
         """What a robot sees now, by class."""
         frame = self._views.frame(robot_id, self.now)
-        return {one["class_id"]: dict(one) for one in frame["items"]} if frame else {}
+        items = [] if frame is None else frame.items
+        return {one.class_id: one.model_dump() for one in items}
 
     def decisions(self, robot_id: str, reason: str) -> list[DecisionRecord]:
         """What slowed a robot, oldest first, each as it stands now."""
@@ -231,16 +232,16 @@ class Stage:
         ]
 
     def alerts(self) -> list[Json]:
-        return [dict(one) for one in self._views.alerts()]
+        return [one.model_dump() for one in self._views.alerts()]
 
     def safety(self) -> Json:
         """How soon robots obeyed, as the Fleet page tells it."""
-        return dict(self._views.safety(self.now))
+        return self._views.safety(self.now).model_dump()
 
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
         told = self._views.log(list(self._desk.minutes.lines))
-        lines: list[Json] = [dict(one) for one in told]
+        lines: list[Json] = [one.model_dump() for one in told]
         return [
             line
             for line in lines

@@ -8,12 +8,12 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from iveg.domain.observations import Instant
+from iveg.models.alert import Alert
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.assess import Assessor
-from iveg.web import schemas, shapes
+from iveg.web.answers import Json
 from iveg.web.auth import Principal, require
 from iveg.web.problems import Problem
-from iveg.web.robots import Json
 
 
 class Acknowledgement(BaseModel):
@@ -28,7 +28,7 @@ def router(assessor: Assessor, clock: Callable[[], Instant]) -> APIRouter:
     """Alerts as people handle them."""
     routes = APIRouter(prefix="/api/v1", tags=["alerts"])
 
-    @routes.post("/alerts/{alert_id}/acknowledge", response_model=schemas.AlertJson)
+    @routes.post("/alerts/{alert_id}/acknowledge", response_model=Alert)
     async def acknowledge(
         alert_id: str,
         body: Acknowledgement,
@@ -39,6 +39,6 @@ def router(assessor: Assessor, clock: Callable[[], Instant]) -> APIRouter:
         found = assessor.alarms.acknowledge(alert_id, who.name, note, clock())
         if found is None:
             return Problem(404, "There is no such alert.").response()
-        return Json(shapes.alert(found))
+        return Json(Alert.of(found))
 
     return routes

@@ -13,12 +13,11 @@ from starlette.requests import Request
 from starlette.responses import Response
 
 from iveg.domain.observations import Instant
-from iveg.domain.stop import Command
+from iveg.models.command import FleetPressed, Pressed
 from iveg.pipeline.command import Commander
-from iveg.web import schemas
+from iveg.web.answers import Json
 from iveg.web.auth import Principal, require
 from iveg.web.presses import DESCRIBED, press_of
-from iveg.web.robots import Json
 
 Pressing = Annotated[Principal, Depends(require("stop"))]
 Releasing = Annotated[Principal, Depends(require("release"))]
@@ -40,65 +39,57 @@ def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
     @routes.post(
         "/robots/{robot_id}/stop",
         status_code=202,
-        response_model=schemas.PressedJson,
+        response_model=Pressed,
         openapi_extra=DESCRIBED,
     )
     async def stop(request: Request, robot_id: str, who: Pressing) -> Response:
         """STOP one robot, on both roads at once."""
         press = await press_of(request)
         pressed = await commander.stop([robot_id], who.name, clock(), press)
-        return Json(_pressed(pressed[0]), 202)
+        return Json(Pressed.of(pressed[0]), 202)
 
     @routes.post(
         "/fleet/stop",
         status_code=202,
-        response_model=schemas.FleetPressedJson,
+        response_model=FleetPressed,
         openapi_extra=DESCRIBED,
     )
     async def stop_fleet(request: Request, who: Pressing) -> Response:
         """STOP every robot, in parallel."""
         press = await press_of(request)
         pressed = await commander.stop(commander.machines, who.name, clock(), press)
-        return Json({"commands": [_pressed(command) for command in pressed]}, 202)
+        return Json(FleetPressed(commands=[Pressed.of(one) for one in pressed]), 202)
 
     @routes.post(
         "/robots/{robot_id}/drill",
         status_code=202,
-        response_model=schemas.PressedJson,
+        response_model=Pressed,
         openapi_extra=DESCRIBED,
     )
     async def drill(request: Request, robot_id: str, who: Releasing) -> Response:
         """STOP a robot that stands or crawls, to prove that STOP works; 409 else."""
         press = await press_of(request)
         command = await commander.drill(robot_id, who.name, clock(), press)
-        return Json(_pressed(command), 202)
+        return Json(Pressed.of(command), 202)
 
     @routes.post(
         "/robots/{robot_id}/release",
         status_code=202,
-        response_model=schemas.PressedJson,
+        response_model=Pressed,
     )
     async def release(robot_id: str, body: Release, who: Releasing) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
-        return Json(_pressed(command), 202)
+        return Json(Pressed.of(command), 202)
 
     @routes.post(
         "/robots/{robot_id}/resume",
         status_code=202,
-        response_model=schemas.PressedJson,
+        response_model=Pressed,
     )
     async def resume(robot_id: str, who: Releasing) -> Response:
         """Let a released robot drive again."""
         command = await commander.resume(robot_id, who.name, clock())
-        return Json(_pressed(command), 202)
+        return Json(Pressed.of(command), 202)
 
     return routes
-
-
-def _pressed(command: Command) -> schemas.PressedJson:
-    return {
-        "robot_id": command.robot_id,
-        "command_id": command.command_id,
-        "state": command.state,
-    }

@@ -19,20 +19,18 @@ from starlette.responses import Response
 from iveg.domain.costmap import UNKNOWN, Costmap
 from iveg.domain.hazards import hazards_of
 from iveg.domain.observations import Instant
+from iveg.models.base import write_json
+from iveg.models.places import Costmap as CostmapModel
+from iveg.models.places import Point
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.mapping import Mapper
-from iveg.web import schemas
 from iveg.web.auth import require
 
 _PNG = "image/png"
 _UNKNOWN_GREY = 205
-_NOTHING: schemas.CostmapJson = {
-    "resolution": 0.1,
-    "width": 0,
-    "height": 0,
-    "origin": {"x": 0.0, "y": 0.0},
-    "data": [],
-}
+_NOTHING = CostmapModel(
+    resolution=0.1, width=0, height=0, origin=Point(x=0.0, y=0.0), data=[]
+)
 
 
 def router(
@@ -45,7 +43,7 @@ def router(
 
     @routes.get(
         "/costmap",
-        response_model=schemas.CostmapJson,
+        response_model=CostmapModel,
         responses={200: {"content": {_PNG: {}}}},
     )
     async def costmap(
@@ -74,8 +72,9 @@ def router(
 
 def _json(costmap: Costmap | None) -> bytes:
     if costmap is None:
-        return orjson.dumps(_NOTHING)
+        return write_json(_NOTHING)
     grid = costmap.grid
+    # Cells by the hundred thousand go as they are: the model names them, no more.
     told = {
         "resolution": round(grid.resolution, 6),
         "width": grid.width,

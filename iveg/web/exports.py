@@ -13,8 +13,8 @@ from typing import Literal, TypeVar
 from starlette.datastructures import Headers
 
 from iveg.domain.records import Record
-from iveg.ngsi.codec import format_stamp
-from iveg.web.history_views import View
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import Model, write_json
 
 Form = Literal["json", "csv", "ndjson"]
 MEDIA_TYPES: dict[Form, str] = {
@@ -55,14 +55,13 @@ async def write_csv(
 
 
 async def write_ndjson(
-    view: Callable[[Sequence[R]], Awaitable[Sequence[View]]],
+    view: Callable[[Sequence[R]], Awaitable[Sequence[Model]]],
     pages: AsyncIterator[Sequence[R]],
 ) -> AsyncIterator[bytes]:
     """Rows as one JSON value a line, each as the list has it."""
     async for records in pages:
-        views = await view(records)
-        lines = (one.model_dump_json(by_alias=True) for one in views)
-        yield "".join(f"{line}\n" for line in lines).encode()
+        models = await view(records)
+        yield b"".join(write_json(one) + b"\n" for one in models)
 
 
 def _csv_lines(rows: list[list[str]]) -> bytes:

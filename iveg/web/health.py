@@ -7,43 +7,44 @@ from fastapi import APIRouter, Depends
 from starlette.responses import PlainTextResponse, Response
 
 from iveg.domain.observations import Instant
+from iveg.models.base import rounded
+from iveg.models.health import Health, Hop, Safety
 from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.web import schemas
+from iveg.web.answers import Json
 from iveg.web.auth import require
-from iveg.web.robots import Json
 
 
 def health_of(
     chain: HealthMonitor,
     counters: Callable[[], Counter[str]],
-    safety: Callable[[Instant], schemas.SafetyJson],
+    safety: Callable[[Instant], Safety],
     now: Instant,
-) -> schemas.HealthJson:
+) -> Health:
     """Every hop with its state and age, all counters, and how the fleet is told."""
-    hops: list[schemas.HopJson] = [
-        {
-            "hop": hop.name,
-            "state": hop.state,
-            "age_s": None if hop.age_s is None else round(hop.age_s, 1),
-            "key": f"health.hop.{hop.name}.{hop.state}",
-            "detail": hop.detail,
-            "lag_s": None if hop.lag_s is None else round(hop.lag_s, 1),
-            "growing": hop.growing,
-        }
+    hops = [
+        Hop(
+            hop=hop.name,
+            state=hop.state,
+            age_s=rounded(hop.age_s, 1),
+            key=f"health.hop.{hop.name}.{hop.state}",
+            detail=hop.detail,
+            lag_s=rounded(hop.lag_s, 1),
+            growing=hop.growing,
+        )
         for hop in chain.hops(now)
     ]
-    return {
-        "ok": all(hop["state"] == "ok" for hop in hops),
-        "hops": hops,
-        "counters": dict(sorted(counters().items())),
-        "safety": safety(now),
-        "earlier": chain.earlier(now),
-    }
+    return Health(
+        ok=all(hop.state == "ok" for hop in hops),
+        hops=hops,
+        counters=dict(sorted(counters().items())),
+        safety=safety(now),
+        earlier=chain.earlier(now),
+    )
 
 
 def router(
     clock: Callable[[], Instant],
-    health: Callable[[Instant], schemas.HealthJson],
+    health: Callable[[Instant], Health],
 ) -> APIRouter:
     """The endpoints that machines ask."""
     routes = APIRouter(tags=["health"])
@@ -57,7 +58,7 @@ def router(
     async def ready() -> Response:
         """200 when every hop is well, else 503."""
         state = health(clock())
-        return Json({"ok": state["ok"]}, 200 if state["ok"] else 503)
+        return Json({"ok": state.ok}, 200 if state.ok else 503)
 
     @routes.get("/metrics", dependencies=[Depends(require("read"))])
     async def metrics() -> Response:
@@ -66,28 +67,25 @@ def router(
         lines = ["# TYPE iveg_events_total counter"]
         lines += [
             f'iveg_events_total{{name="{name}"}} {count}'
-            for name, count in state["counters"].items()
+            for name, count in state.counters.items()
         ]
         lines.append("# TYPE iveg_hop_up gauge")
         lines += [
-            f'iveg_hop_up{{hop="{hop["hop"]}"}} {int(hop["state"] == "ok")}'
-            for hop in state["hops"]
+            f'iveg_hop_up{{hop="{hop.hop}"}} {int(hop.state == "ok")}'
+            for hop in state.hops
         ]
-        lines += _lag_lines(state["hops"])
+        lines += _lag_lines(state.hops)
         return PlainTextResponse("\n".join(lines) + "\n")
 
     return routes
 
 
-def _lag_lines(hops: list[schemas.HopJson]) -> list[str]:
+def _lag_lines(hops: list[Hop]) -> list[str]:
     """How late measures pass each hop that a probe tells of."""
-    known = [hop for hop in hops if hop["lag_s"] is not None]
+    known = [hop for hop in hops if hop.lag_s is not None]
     return [
         "# TYPE iveg_lag_seconds gauge",
-        *(f'iveg_lag_seconds{{hop="{hop["hop"]}"}} {hop["lag_s"]}' for hop in known),
+        *(f'iveg_lag_seconds{{hop="{hop.hop}"}} {hop.lag_s}' for hop in known),
         "# TYPE iveg_lag_growing gauge",
-        *(
-            f'iveg_lag_growing{{hop="{hop["hop"]}"}} {int(hop["growing"])}'
-            for hop in known
-        ),
+        *(f'iveg_lag_growing{{hop="{hop.hop}"}} {int(hop.growing)}' for hop in known),
     ]

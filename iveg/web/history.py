@@ -17,29 +17,22 @@ from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import ClimateSeries
 from iveg.domain.fleet import NOBODY, FleetDescription
-from iveg.domain.flood import Flood
+from iveg.domain.flood import Flood as NoFlood
 from iveg.domain.observations import Instant
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
-from iveg.ngsi.codec import format_stamp
-from iveg.web import charts, exports, schemas, shapes
+from iveg.domain.stamps import format_stamp
+from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
+from iveg.models.base import Listing, Model, write_json
+from iveg.models.climate import ClimateReading
+from iveg.models.command import Command
+from iveg.models.decision import Decision
+from iveg.models.people import Detection
+from iveg.web import charts, exports
+from iveg.web.answers import Json
 from iveg.web.exports import MEDIA_TYPES, Form
 from iveg.web.history_filters import Filters, Range, Span, filter_of, range_of
-from iveg.web.history_views import (
-    AlertListing,
-    CommandView,
-    DecisionView,
-    DetectionView,
-    EntryView,
-    Listing,
-    View,
-    view_alert,
-    view_climate,
-    view_command,
-    view_decision,
-    view_detection,
-    view_entry,
-)
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
@@ -56,7 +49,7 @@ class _List(Generic[R]):
     path: str
     of: ListOf[R]
     ask: Callable[[Filter], Awaitable[Page[R]]]
-    view: Callable[[Sequence[R]], Awaitable[list[View]]]
+    view: Callable[[Sequence[R]], Awaitable[list[Model]]]
     listing: type[Listing[Any]]
     says: str
     more: Callable[[], dict[str, Any]] = dict
@@ -68,7 +61,7 @@ def router(
     reader: Callable[..., Any],
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
-    flood: Callable[[], schemas.FloodJson] = lambda: shapes.flood(Flood()),
+    flood: Callable[[], Flood] = lambda: Flood.of(NoFlood()),
     fleet: FleetDescription = NOBODY,
     read_clock: Callable[[], Instant] = clock.now,
 ) -> APIRouter:
@@ -87,14 +80,18 @@ def router(
     for one in _lists(queries, flood):
         _add_list(routes, one)
 
-    @routes.get("/api/v1/decisions/{decision_id}", summary="One decision")
+    @routes.get(
+        "/api/v1/decisions/{decision_id}",
+        summary="One decision",
+        response_model=Decision,
+    )
     async def decision(
         decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
-    ) -> DecisionView:
+    ) -> Response:
         found = present(decision_id) or await queries.decision(decision_id)
         if found is None:
             raise HTTPException(404, "There is no such decision.")
-        return view_decision(found)
+        return Json(Decision.of_record(found))
 
     @routes.get(
         "/api/v1/history/charts",
@@ -131,28 +128,28 @@ def router(
     return routes
 
 
-def _lists(
-    queries: Queries, flood: Callable[[], schemas.FloodJson]
-) -> tuple[_List[Any], ...]:
-    async def audited(records: Sequence[CommandRecord]) -> list[View]:
+def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ...]:
+    async def audited(records: Sequence[CommandRecord]) -> list[Model]:
         steps = await queries.steps_of([one.command_id for one in records])
-        return [view_command(one, steps.get(one.command_id, ())) for one in records]
+        return [
+            Command.of_record(one, steps.get(one.command_id, ())) for one in records
+        ]
 
     return (
         _List(
             "decisions",
             lists.DECISIONS,
             queries.decisions,
-            _each(view_decision),
-            Listing[DecisionView],
+            _each(Decision.of_record),
+            Listing[Decision],
             "Why robots were slowed, by when it began",
         ),
         _List(
             "detections",
             lists.DETECTIONS,
             queries.detections,
-            _each(view_detection),
-            Listing[DetectionView],
+            _each(Detection.of_record),
+            Listing[Detection],
             "What robots saw, by when it reached iVeg",
         ),
         _List(
@@ -160,14 +157,14 @@ def _lists(
             lists.COMMANDS,
             queries.commands,
             audited,
-            Listing[CommandView],
+            Listing[Command],
             "Every STOP, release and resume, by when it was asked",
         ),
         _List(
             "alerts",
             lists.ALERTS,
             queries.alerts,
-            _each(view_alert),
+            _each(Alert.of_record),
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
             lambda: {"flood": flood()},
@@ -176,8 +173,8 @@ def _lists(
             "log",
             lists.LOG,
             queries.log,
-            _each(view_entry),
-            Listing[EntryView],
+            _each(LogEntry.of_record),
+            Listing[LogEntry],
             "The action and inference log",
         ),
     )
@@ -201,10 +198,12 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
         return await _file(one, filters, asked, form)
 
 
-def _each(view: Callable[[R], View]) -> Callable[[Sequence[R]], Awaitable[list[View]]]:
+def _each(
+    view: Callable[[R], Model],
+) -> Callable[[Sequence[R]], Awaitable[list[Model]]]:
     """Rows of which each says all that is told of it."""
 
-    async def views(records: Sequence[R]) -> list[View]:
+    async def views(records: Sequence[R]) -> list[Model]:
         return [view(record) for record in records]
 
     return views
@@ -213,9 +212,7 @@ def _each(view: Callable[[R], View]) -> Callable[[Sequence[R]], Awaitable[list[V
 async def _listing(page: Page[R], one: _List[R]) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
     items = await one.view(page.items)
-    listing = one.listing(items=items, next=after, **one.more())
-    text = listing.model_dump_json(by_alias=True, serialize_as_any=True)
-    return Response(text, media_type=MEDIA_TYPES["json"])
+    return Json(one.listing(items=items, next=after, **one.more()))
 
 
 async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> Response:
@@ -274,12 +271,12 @@ async def _climate(queries: Queries, since: float, until: float) -> Response:
     series = await queries.climate_series(since, until)
 
     def draw() -> bytes:
-        head = orjson.dumps(
+        head = write_json(
             {
                 "since": format_stamp(since),
                 "until": format_stamp(until),
                 "slice_s": round(series.slice_s, 3),
-                "items": view_climate(series),
+                "items": _readings(series),
                 **_library(),
             }
         )
@@ -289,6 +286,12 @@ async def _climate(queries: Queries, since: float, until: float) -> Response:
 
     body = await asyncio.to_thread(draw)
     return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+def _readings(series: ClimateSeries) -> list[ClimateReading]:
+    """Oldest first."""
+    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
+    return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
 
 
 def _library() -> dict[str, object]:

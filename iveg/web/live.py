@@ -19,13 +19,14 @@ from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.stop import Command, Press
+from iveg.models.alert import LogEntry
+from iveg.models.base import write_json
 from iveg.ngsi.codec import load_json
 from iveg.pipeline.publish import Hub, Subscriber, is_telemetry
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
 from iveg.web.feed import TelemetryFeed
 from iveg.web.pacing import SUBPROTOCOL
 from iveg.web.presses import read_press
-from iveg.web.shapes import log_line
 from iveg.web.telemetry import TelemetryEncoder
 from iveg.web.views import Views
 
@@ -115,9 +116,9 @@ class Encoder:
         data: Any = item
         now = self._clock()
         if isinstance(item, LogRecord):
-            data = log_line(item)
+            data = LogEntry.of_record(item)
         elif topic == "log/earlier" and isinstance(item, list):
-            data = [log_line(line) for line in item]
+            data = [LogEntry.of_record(line) for line in item]
         elif isinstance(item, Command):
             data = self._views.command(item, now)
         return text(topic, data, now)
@@ -125,7 +126,7 @@ class Encoder:
 
 def text(topic: str, data: Any, now: Instant) -> bytes:
     """A JSON frame; ``at`` is when it was true, on the server's monotonic clock."""
-    return orjson.dumps({"topic": topic, "data": data, "at": now.mono})
+    return write_json({"topic": topic, "data": data, "at": now.mono})
 
 
 def router(

@@ -2,94 +2,68 @@
 
 from collections.abc import Callable
 
-import orjson
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
-from typing_extensions import TypedDict
 
 from iveg.domain.observations import Instant
-from iveg.web import schemas
+from iveg.models.base import Listing
+from iveg.models.climate import Climate
+from iveg.models.health import Health
+from iveg.models.people import Person
+from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.robot import Robot
+from iveg.web.answers import Json
 from iveg.web.auth import require
 from iveg.web.views import Views
-
-
-class Json(Response):
-    """A JSON answer that is written once, by orjson."""
-
-    media_type = "application/json"
-
-    def render(self, content: object) -> bytes:
-        """The bytes of the answer."""
-        return orjson.dumps(content)
-
-
-class RobotList(TypedDict):
-    """A page of robots."""
-
-    items: list[schemas.RobotJson]
-    next: str | None
-
-
-class PersonList(TypedDict):
-    """A page of people."""
-
-    items: list[schemas.PersonJson]
-    next: str | None
 
 
 def router(
     views: Views,
     clock: Callable[[], Instant],
-    health: Callable[[Instant], schemas.HealthJson],
+    health: Callable[[Instant], Health],
 ) -> APIRouter:
     """What is known now."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
     )
 
-    @routes.get("/robots", response_model=RobotList)
+    @routes.get("/robots", response_model=Listing[Robot])
     async def robots() -> Response:
         """The whole fleet, each robot with the age of what is said of it."""
-        return Json({"items": views.robots(clock()), "next": None})
+        return Json(Listing(items=views.robots(clock())))
 
-    @routes.get("/robots/{robot_id}", response_model=schemas.RobotJson)
+    @routes.get("/robots/{robot_id}", response_model=Robot)
     async def robot(robot_id: str) -> Response:
         """One robot."""
         return Json(views.robot(robot_id, clock()))
 
-    @routes.get("/robots/{robot_id}/scan", response_model=schemas.ScanJson)
+    @routes.get("/robots/{robot_id}/scan", response_model=Scan)
     async def scan(robot_id: str) -> Response:
         """The newest sweep of one robot, as points in `map`."""
         swept = views.scan(robot_id)
-        points: list[list[float]] = []
+        points: list[tuple[float, float]] = []
         stamp = None
         if swept is not None:
             stamp = swept[0].origin.stamp
-            points = [[round(x, 3), round(y, 3)] for x, y in swept[1].tolist()]
-        body: schemas.ScanJson = {
-            "robot_id": robot_id,
-            "stamp": stamp,
-            "frame_id": "map",
-            "points": points,
-        }
-        return Json(body)
+            points = [(round(x, 3), round(y, 3)) for x, y in swept[1].tolist()]
+        return Json(Scan(robot_id=robot_id, stamp=stamp, points=points))
 
-    @routes.get("/people", response_model=PersonList)
+    @routes.get("/people", response_model=Listing[Person])
     async def people() -> Response:
         """Everyone who is known, in their three stages."""
-        return Json({"items": views.people(clock()), "next": None})
+        return Json(Listing(items=views.people(clock())))
 
-    @routes.get("/map")
+    @routes.get("/map", response_model=GreenhouseMap)
     async def greenhouse() -> Response:
         """The greenhouse: lanes, crop rows, posts, obstacles (m)."""
         return Json(views.map())
 
-    @routes.get("/climate", response_model=schemas.ClimateJson | None)
+    @routes.get("/climate", response_model=Climate | None)
     async def climate() -> Response:
         """The newest reading of the air; null before the first."""
         return Json(views.climate(clock()))
 
-    @routes.get("/health", response_model=schemas.HealthJson)
+    @routes.get("/health", response_model=Health)
     async def chain() -> Response:
         """The chain from robot to screen, hop by hop, and what was counted."""
         return Json(health(clock()))

@@ -6,16 +6,16 @@ from typing import Annotated, Literal, TypeVar
 from fastapi import APIRouter, Depends
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 from starlette.responses import Response
-from typing_extensions import TypedDict
 
 from iveg.domain.alerts import Class, Rule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.models.base import Listing
+from iveg.models.rule import Rule as RuleModel
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.rules import Rules
-from iveg.web import schemas, shapes
+from iveg.web.answers import Json
 from iveg.web.auth import Principal, require
-from iveg.web.robots import Json
 
 T = TypeVar("T")
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
@@ -73,37 +73,32 @@ def _new(wanted: T | None, old: T) -> T:
     return old if wanted is None else wanted
 
 
-class RuleList(TypedDict):
-    """Every version, newest first."""
-
-    items: list[schemas.RuleJson]
-    next: str | None
-
-
 def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
     """Read by all, changed by operators; every version keeps its author and time."""
     routes = APIRouter(prefix="/api/v1", tags=["rule"])
     reader = [Depends(require("read"))]
 
-    @routes.get("/rule", response_model=schemas.RuleJson, dependencies=reader)
+    @routes.get("/rule", response_model=RuleModel, dependencies=reader)
     async def rule() -> Response:
         """The version in force."""
-        return Json(shapes.rule(rules.current))
+        return Json(RuleModel.of(rules.current))
 
-    @routes.get("/rule/versions", response_model=RuleList, dependencies=reader)
+    @routes.get(
+        "/rule/versions", response_model=Listing[RuleModel], dependencies=reader
+    )
     async def versions() -> Response:
         """Every version with its author and time, newest first."""
-        items = [shapes.rule(one) for one in reversed(rules.versions)]
-        return Json({"items": items, "next": None})
+        items = [RuleModel.of(one) for one in reversed(rules.versions)]
+        return Json(Listing(items=items))
 
-    @routes.put("/rule", response_model=schemas.RuleJson)
+    @routes.put("/rule", response_model=RuleModel)
     async def change(
         body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
     ) -> Response:
         """Put a new version in force at once; what is not named stays as it is."""
         wanted = body.applied_to(rules.current)
         return Json(
-            shapes.rule(await rules.change(wanted, who.name, clock(), body.version))
+            RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))
         )
 
     return routes

@@ -5,7 +5,7 @@ A part is JSON, and for a scan the integers that it counts; docs/interfaces.md, 
 says itself when it was true (``at``, the server's monotonic clock).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -13,8 +13,10 @@ import orjson
 
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant, LaserScan
+from iveg.models.base import write_json
+from iveg.models.people import Person
+from iveg.models.robot import Robot
 from iveg.pipeline.publish import Hub
-from iveg.web import schemas
 from iveg.web.views import Views
 
 UNIT_M: Final = 0.005
@@ -117,7 +119,7 @@ class TelemetryEncoder:
         if data is None:
             return None
         told = {"topic": topic, "at": now.mono, "data": data}
-        return Part(version, orjson.dumps(told))
+        return Part(version, write_json(told))
 
     def _scan(self, topic: str, version: int, now: Instant) -> Part | None:
         robot_id = topic.split("/")[1]
@@ -151,14 +153,14 @@ class _RobotState:
         self._values: dict[str, Any] = {}
         self._members: dict[str, tuple[int, bytes]] = {}
 
-    def update(self, told: Mapping[str, Any], version: int, at: float) -> None:
+    def update(self, told: Robot, version: int, at: float) -> None:
         """Compare with what was told before."""
         self.version, self._at = version, at
-        for name, value in told.items():
+        for name, value in told.__dict__.items():
             if name in _MOVES or self._values.get(name, self) == value:
                 continue
             self._values[name] = value
-            member = b'"%b":%b' % (name.encode(), orjson.dumps(value))
+            member = b'"%b":%b' % (name.encode(), write_json(value))
             self._members[name] = version, member
 
     def changes(self, topic: str, since: int) -> Part | None:
@@ -185,24 +187,22 @@ class _People:
         self._values: dict[str, Any] = {}
         self._texts: dict[str, tuple[int, bytes]] = {}
 
-    def update(
-        self, told: Sequence[schemas.PersonJson], version: int, at: float
-    ) -> None:
+    def update(self, told: Sequence[Person], version: int, at: float) -> None:
         """Compare with who was told of before."""
         self.version, self._at = version, at
-        ids = [person["person_id"] for person in told]
+        ids = [person.person_id for person in told]
         if ids != self._ids:
             self._ids, self._changed = ids, version
         self._values = {name: self._values.get(name) for name in ids}
         self._texts = {name: self._texts[name] for name in ids if name in self._texts}
         for person in told:
             value = _without_ages(person)
-            if self._values[person["person_id"]] == value:
+            if self._values[person.person_id] == value:
                 continue
-            self._values[person["person_id"]] = value
+            self._values[person.person_id] = value
             # Its age counts from here, whoever takes it later.
-            text = orjson.dumps({**person, "at": at})
-            self._texts[person["person_id"]] = version, text
+            text = orjson.dumps({**person.model_dump(), "at": at})
+            self._texts[person.person_id] = version, text
             self._changed = version
 
     def changes(self, since: int) -> Part | None:
@@ -218,11 +218,11 @@ class _People:
         return Part(self.version, head)
 
 
-def _without_ages(person: schemas.PersonJson) -> dict[str, Any]:
-    margin = person["margin"]
-    told = {name: value for name, value in person.items() if name != "age_s"}
+def _without_ages(person: Person) -> dict[str, Any]:
+    told, margin = dict(person.__dict__), person.margin
+    del told["age_s"]
     if margin is not None:
-        told["margin"] = {**margin, "age_s": None}
+        told["margin"] = {**margin.__dict__, "age_s": None}
     return told
 
 

@@ -1,24 +1,44 @@
-"""What is known, in the shapes of ``schemas``: built when somebody asks, never kept."""
-
-from typing import Any, Literal
+"""What is known, as models: built when somebody asks, never kept."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain import margins as margins_
 from iveg.domain.echoes import echoes_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
+from iveg.domain.mandates import Crossing
 from iveg.domain.margins import LeastMargins, least, margins_of
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
+from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
 from iveg.domain.world import RobotState, World
-from iveg.ngsi.codec import format_stamp
+from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.base import moment, rounded
+from iveg.models.climate import Climate
+from iveg.models.command import Command as CommandModel
+from iveg.models.health import Safety
+from iveg.models.margin import Margin
+from iveg.models.people import Acting, Detection, DetectionFrame
+from iveg.models.people import Person as PersonModel
+from iveg.models.places import GreenhouseMap, Position
+from iveg.models.robot import (
+    Applied,
+    Hold,
+    Mode,
+    Navigation,
+    Pose,
+    Profile,
+    Robot,
+    SpeedLimit,
+    Twist,
+)
+from iveg.models.rule import Rule
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
-from iveg.web import schemas, shapes
 
 
 class Views:
@@ -39,7 +59,7 @@ class Views:
 
     # --- robots -------------------------------------------------------------------
 
-    def robots(self, now: Instant) -> list[schemas.RobotJson]:
+    def robots(self, now: Instant) -> list[Robot]:
         """The whole fleet."""
         return [self.robot(robot_id, now) for robot_id in self._world.robots]
 
@@ -49,69 +69,45 @@ class Views:
 
     def robot(
         self, robot_id: str, now: Instant, margins: LeastMargins | None = None
-    ) -> schemas.RobotJson:
+    ) -> Robot:
         """One robot. Raises UnknownRobotError."""
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
-        odometry, safety = robot.odometry, robot.safety
-        mandate = self._assessor.mandates[robot_id]
-        age = robot.age_s(now)
-        received = robot.odometry_received
-        return {
-            "robot_id": robot_id,
-            "link": robot.link(now),
-            "mode": self._mode(robot, machine, now),
-            "pose": None
-            if odometry is None
-            else {
-                "x": odometry.pose.x,
-                "y": odometry.pose.y,
-                "yaw": odometry.pose.yaw,
-            },
-            "twist": None
-            if odometry is None
-            else {
-                "linear": odometry.twist.linear_x,
-                "angular": odometry.twist.angular_z,
-            },
-            "stamp": None if odometry is None else odometry.origin.stamp,
-            "received_at": shapes.moment(received),
-            "age_s": None if age is None else round(age, 3),
-            "age_estimated": robot.estimated_since is not None,
-            "speed_factor": None if safety is None else safety.speed_factor,
-            "applied": self._applied(robot, now),
-            "mandate": {
-                "speed_factor": mandate.speed_factor,
-                "reason": mandate.reason,
-                "cause": mandate.cause,
-                "distance_m": shapes.rounded(mandate.distance_m),
-                "decision_id": mandate.decision_id,
-            },
-            "holds": []
-            if safety is None
-            else [
-                {"id": hold.id, "source": hold.source, "ack": hold.ack}
-                for hold in safety.holds
-            ],
-            "stop": None if machine.stop is None else self.command(machine.stop, now),
-            "stop_state": machine.state,
-            "navigation": shapes.navigation(robot),
-            "replay": robot.is_replay,
-            "clock_offset_s": shapes.rounded(robot.clock.offset_s(now)),
-            "road": robot.frame_road,
-            "transport": self._world.feeds.of(robot_id).transport(now.mono),
-            "profile": shapes.profile(robot.profile),
-            "margin": shapes.margin(
-                margins.of_robot(robot_id)
-                if margins is not None and not robot.is_replay
-                else least(margins_of([robot], self._people(), now))
-            ),
-            "cmd_status": robot.command_status,
-        }
+        odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
+        return Robot(
+            robot_id=robot_id,
+            link=robot.link(now),
+            mode=self._mode(robot, machine, now),
+            pose=None if odometry is None else Pose.of(odometry.pose),
+            twist=None if odometry is None else Twist.of(odometry.twist),
+            stamp=None if odometry is None else odometry.origin.stamp,
+            received_at=moment(robot.odometry_received),
+            age_s=rounded(age),
+            age_estimated=robot.estimated_since is not None,
+            speed_factor=None if safety is None else safety.speed_factor,
+            applied=Applied.of(robot, now),
+            mandate=SpeedLimit.of(self._assessor.mandates[robot_id]),
+            holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
+            stop=None if machine.stop is None else self.command(machine.stop, now),
+            stop_state=machine.state,
+            navigation=Navigation.of(robot),
+            replay=robot.is_replay,
+            clock_offset_s=rounded(robot.clock.offset_s(now)),
+            road=robot.frame_road,
+            transport=self._world.feeds.of(robot_id).transport(now.mono),
+            profile=Profile.of(robot.profile),
+            margin=Margin.of(self._margin(robot, margins, now)),
+            cmd_status=robot.command_status,
+        )
 
-    def _mode(
-        self, robot: RobotState, machine: StopMachine, now: Instant
-    ) -> Literal["RUNNING", "SLOW", "STOPPED"]:
+    def _margin(
+        self, robot: RobotState, margins: LeastMargins | None, now: Instant
+    ) -> margins_.Margin | None:
+        if margins is not None and not robot.is_replay:
+            return margins.of_robot(robot.robot_id)
+        return least(margins_of([robot], self._people(), now))
+
+    def _mode(self, robot: RobotState, machine: StopMachine, now: Instant) -> Mode:
         """What the robot has just said; while it says nothing, what it was told.
 
         That a STOP is wanted is in ``stop_state``: here a robot stands by its own word
@@ -127,20 +123,6 @@ class Views:
         if factor <= 0.0 or machine.state == "STANDING":
             return "STOPPED"
         return "SLOW" if factor < 1.0 else "RUNNING"
-
-    def _applied(self, robot: RobotState, now: Instant) -> schemas.AppliedJson | None:
-        if robot.safety is None or robot.safety_received is None:
-            return None
-        return {
-            "reason": robot.safety.reason,
-            "cause": robot.safety.cause,
-            "age_s": round(now.mono - robot.safety_received.mono, 3),
-            "feedback_age_s": robot.safety.feedback_age_s,
-            "faults": [
-                {"code": one.code, "about": one.about, "for_s": one.for_s}
-                for one in robot.safety.faults
-            ],
-        }
 
     def motion(
         self, robot_id: str, now: Instant
@@ -172,7 +154,7 @@ class Views:
 
     def people(
         self, now: Instant, margins: LeastMargins | None = None
-    ) -> list[schemas.PersonJson]:
+    ) -> list[PersonModel]:
         """Everyone who is known."""
         margins = margins or self.margins(now)
         return [
@@ -182,42 +164,33 @@ class Views:
 
     def _person(
         self, person: Person, margins: LeastMargins, now: Instant
-    ) -> schemas.PersonJson:
-        newest, age = person.newest, person.age_s(now)
+    ) -> PersonModel:
+        newest, rule = person.newest, self._assessor.rule
         crossings = [
             one
             for one in self._assessor.crossings
             if one.hazard.cause == person.person_id
         ]
-        rule = self._assessor.rule
-        return {
-            "person_id": person.person_id,
-            "class": person.class_,
-            "class_id": newest.class_id,
-            "stage": person.stage(now),
-            "position": {"x": newest.x, "y": newest.y, "z": newest.z},
-            "radius_m": max(
-                (radius for _, radius in person.rings(rule, now)), default=None
-            ),
-            "confidence": newest.confidence,
-            "first_seen": format_stamp(person.first_seen.wall),
-            "last_seen": format_stamp(newest.at.wall),
-            "age_s": round(age, 3),
-            "observers": person.observers(now),
-            "possible": newest.possible,
-            "doubtful": newest.reach_m > 0.0,
-            "decision_id": max((one.decision_id for one in crossings), default=None),
-            "lane": self.greenhouse.lane_at(newest.x, newest.y),
-            "acting": [
-                {
-                    "robot_id": one.robot_id,
-                    "distance_m": round(one.distance_m, 3),
-                    "in_sight": one.in_sight,
-                }
-                for one in crossings
-            ],
-            "margin": shapes.margin(margins.of_person(person.person_id)),
-        }
+        rings = person.rings(rule, now)
+        return PersonModel(
+            person_id=person.person_id,
+            class_=person.class_,
+            class_id=newest.class_id,
+            stage=person.stage(now),
+            position=Position(x=newest.x, y=newest.y, z=newest.z),
+            radius_m=max((radius for _, radius in rings), default=None),
+            confidence=newest.confidence,
+            first_seen=format_stamp(person.first_seen.wall),
+            last_seen=format_stamp(newest.at.wall),
+            age_s=round(person.age_s(now), 3),
+            observers=person.observers(now),
+            possible=newest.possible,
+            doubtful=newest.reach_m > 0.0,
+            decision_id=max((one.decision_id for one in crossings), default=None),
+            lane=self.greenhouse.lane_at(newest.x, newest.y),
+            acting=[_acting(one) for one in crossings],
+            margin=Margin.of(margins.of_person(person.person_id)),
+        )
 
     def _people(self) -> list[Person]:
         return list(self._assessor.people.known.values())
@@ -225,35 +198,35 @@ class Views:
     def _fleet(self) -> list[RobotState]:
         return list(self._world.live_robots())
 
-    def frame(self, robot_id: str, now: Instant) -> schemas.FrameJson | None:
+    def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
         """One robot's newest look, faint detections included."""
         robot = self._world.robot(robot_id)
         if robot.frame is None or robot.detections_at is None:
             return None
         stamp, road = robot.frame.origin.stamp, robot.frame_road
-        return {
-            "robot_id": robot_id,
-            "stamp": stamp,
-            "road": road,
-            "age_s": round(now.mono - robot.detections_at, 3),
-            "items": [
-                shapes.detection(one, robot_id, stamp, road)
+        return DetectionFrame(
+            robot_id=robot_id,
+            stamp=stamp,
+            road=road,
+            age_s=round(now.mono - robot.detections_at, 3),
+            items=[
+                Detection.of(one, robot_id, stamp, road)
                 for one in self._assessor.placed.get(robot_id, [])
             ],
-        }
+        )
 
     # --- commands, alerts, log ----------------------------------------------------
 
-    def command(self, command: Command, now: Instant) -> schemas.CommandJson:
+    def command(self, command: Command, now: Instant) -> CommandModel:
         """One command with the robot's last word."""
-        return shapes.command(command, self._commander.machine(command.robot_id), now)
+        return CommandModel.of(command, self._commander.machine(command.robot_id), now)
 
-    def find_command(self, command_id: str, now: Instant) -> schemas.CommandJson | None:
+    def find_command(self, command_id: str, now: Instant) -> CommandModel | None:
         """A command of this run; older ones are in the history."""
         command = self._commander.commands.get(command_id)
         return None if command is None else self.command(command, now)
 
-    def open_commands(self, now: Instant) -> list[schemas.CommandJson]:
+    def open_commands(self, now: Instant) -> list[CommandModel]:
         """Every command that still goes on."""
         return [
             self.command(command, now)
@@ -262,42 +235,44 @@ class Views:
             if command is not None
         ]
 
-    def alerts(self) -> list[schemas.AlertJson]:
+    def alerts(self) -> list[Alert]:
         """All that is for people to see now, gravest first."""
         waiting = self._assessor.alarms.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
-        return [shapes.alert(one) for one in waiting]
+        return [Alert.of(one) for one in waiting]
 
-    def flood(self) -> schemas.FloodJson:
+    def flood(self) -> Flood:
         """How fast alarms come."""
-        return shapes.flood(self._assessor.alarms.flood)
+        return Flood.of(self._assessor.alarms.flood)
 
-    def log(self, lines: list[LogRecord]) -> list[schemas.LogJson]:
+    def log(self, lines: list[LogRecord]) -> list[LogEntry]:
         """Log lines."""
-        return [shapes.log_line(line) for line in lines]
+        return [LogEntry.of_record(line) for line in lines]
 
-    def safety(self, now: Instant) -> schemas.SafetyJson:
+    def safety(self, now: Instant) -> Safety:
         """How soon the fleet obeys, and how close it comes to people."""
         echoes = echoes_of(self._assessor.live_decisions(), now)
-        return shapes.safety(echoes, self._assessor.exposure, now)
+        return Safety.of(echoes, self._assessor.exposure, now)
 
-    def climate(self, now: Instant) -> schemas.ClimateJson | None:
+    def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""
         climate, received = self._world.climate, self._world.climate_received
         if climate is None or received is None:
             return None
-        return {
-            "temperature": climate.temperature,
-            "relative_humidity": climate.relative_humidity,
-            "co2": climate.co2,
-            "received_at": format_stamp(received.wall),
-            "age_s": round(now.mono - received.mono, 3),
-        }
+        return Climate.of(climate, received, now)
 
-    def map(self) -> dict[str, Any]:
+    def map(self) -> GreenhouseMap:
         """The greenhouse as the page draws it."""
-        return shapes.house(self.greenhouse)
+        return GreenhouseMap.of(self.greenhouse)
 
-    def rule(self) -> schemas.RuleJson:
+    def rule(self) -> Rule:
         """The version of the rule that is in force."""
-        return shapes.rule(self._assessor.rule)
+        return Rule.of(self._assessor.rule)
+
+
+def _acting(crossing: Crossing) -> Acting:
+    return Acting(
+        robot_id=crossing.robot_id,
+        distance_m=round(crossing.distance_m, 3),
+        in_sight=crossing.in_sight,
+    )

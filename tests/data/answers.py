@@ -162,7 +162,7 @@ async def _over_http(page: httpx.AsyncClient) -> dict[str, Any]:
 
 
 async def _acknowledge(desk: WebDesk) -> Any:
-    alert_id = desk.views.alerts()[0]["alert_id"]
+    alert_id = desk.views.alerts()[0].alert_id
     async with desk.browser("operator") as page:
         answer = await page.post(
             f"/api/v1/alerts/{alert_id}/acknowledge", json={"note": "seen"}

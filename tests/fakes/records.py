@@ -56,7 +56,8 @@ def detection_record(**fields: Any) -> DetectionRecord:
         "z": 0.9,
         "confident": True,
         "road": "mqtt",
-        "box": '{"xmin":-4.0,"frame_id":"map"}',
+        "box": '{"xmin":-4.0,"xmax":-3.0,"ymin":1.5,"ymax":2.5,"zmin":0.0,"zmax":1.8,'
+        '"frame_id":"map"}',
     }
     return DetectionRecord(**(defaults | fields))
 

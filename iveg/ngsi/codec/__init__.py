@@ -3,6 +3,7 @@
 ``read_…`` takes bytes to observations; ``write_…`` is its inverse.
 """
 
+from iveg.domain.stamps import format_stamp, parse_stamp
 from iveg.ngsi.codec.attributes import read_attributes
 from iveg.ngsi.codec.commands import (
     write_command,
@@ -13,7 +14,6 @@ from iveg.ngsi.codec.commands import (
 )
 from iveg.ngsi.codec.door import MAX_DEPTH, Problem, Reading, load_json
 from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
-from iveg.ngsi.codec.fields import format_stamp, parse_stamp
 from iveg.ngsi.codec.incoming import (
     read_answer,
     read_entity,

@@ -1,31 +1,14 @@
 """Fields that several messages share: who said it and when, holds, round numbers."""
 
 from collections.abc import Iterable
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.observations import FeedbackRef, Hold, Origin
+from iveg.domain.stamps import parse_stamp
 from iveg.ngsi import payloads
-
-
-def format_stamp(wall: float) -> str:
-    """Unix seconds as the contract's ISO-8601 UTC with milliseconds."""
-    stamp = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds")
-    return stamp.removesuffix("+00:00") + "Z"
-
-
-def parse_stamp(text: str) -> float | None:
-    """Unix seconds of an ISO-8601 text; None where it is none."""
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=UTC)
-    return moment.timestamp()
 
 
 def read_origin(value: payloads.OriginFields) -> Origin:

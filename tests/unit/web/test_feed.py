@@ -241,8 +241,8 @@ def test_a_move_says_when_it_was_true_and_its_stamp_as_the_robot_sent_it(
 
     (move,) = page.told("moves")
     robot = desk.views.robot("AGI", desk.clock())
-    assert move[:4] == ["AGI", now, robot["age_s"], 1.235]
-    assert move[-1] == robot["stamp"]
+    assert move[:4] == ["AGI", now, robot.age_s, 1.235]
+    assert move[-1] == robot.stamp
 
 
 def test_a_version_is_encoded_once_for_all_browsers(desk: WebDesk) -> None:

@@ -56,8 +56,8 @@ async def test_one_press_over_http_and_over_the_socket_is_one_command() -> None:
 
     assert first.json()["command_id"] == again.json()["command_id"]
     (command,) = desk.views.open_commands(desk.clock())
-    assert command["requesters"] == ["ana"]
-    assert command["times"]["pressed"] == "2023-11-14T22:13:19.750Z"
+    assert command.requesters == ["ana"]
+    assert command.times.pressed == "2023-11-14T22:13:19.750Z"
 
 
 async def test_a_drill_wants_somebody_who_may_release() -> None:
@@ -70,7 +70,7 @@ async def test_a_drill_wants_somebody_who_may_release() -> None:
 
     assert (refused.status_code, taken.status_code) == (403, 202)
     (command,) = desk.views.open_commands(desk.clock())
-    assert (command["kind"], command["drill"]) == ("stop", True)
+    assert (command.kind, command.drill) == ("stop", True)
 
 
 async def test_a_drill_of_a_driving_robot_is_409() -> None:

@@ -140,24 +140,24 @@ async def test_an_order_says_what_a_late_agent_means_for_it(
     await desk.commander.stop(["AGI"], "ana", desk.clock())
     await settle()
 
-    told = desk.views.robot("AGI", desk.clock())["stop"]
+    told = desk.views.robot("AGI", desk.clock()).stop
 
     assert told is not None
-    note = told["note"]
-    assert (None if note is None else note["key"]) == key
-    assert note is None or note["slots"] == {"lag": 12.3}
+    note = told.note
+    assert (None if note is None else note.key) == key
+    assert note is None or note.slots == {"lag": 12.3}
 
 
 async def test_a_robot_is_stopped_when_it_says_so_and_not_when_it_was_asked() -> None:
     desk = WebDesk()
     await desk.commander.stop(["AGI"], "ana", desk.clock())
-    asked = desk.views.robot("AGI", desk.clock())["mode"]
+    asked = desk.views.robot("AGI", desk.clock()).mode
     hold_id = desk.commander.machine("AGI").hold_id or ""
 
     desk.report("AGI", Hold(hold_id, "iveg", "remote"))
 
     assert asked == "RUNNING"
-    assert desk.views.robot("AGI", desk.clock())["mode"] == "STOPPED"
+    assert desk.views.robot("AGI", desk.clock()).mode == "STOPPED"
 
 
 async def test_a_hold_that_was_last_reported_long_ago_stops_nothing_now() -> None:
@@ -166,7 +166,7 @@ async def test_a_hold_that_was_last_reported_long_ago_stops_nothing_now() -> Non
     modes = []
     for age in (0.0, 1.5, 1.6, 60.0):
         desk.clock.now = age
-        modes.append(desk.views.robot("AGI", desk.clock())["mode"] == "STOPPED")
+        modes.append(desk.views.robot("AGI", desk.clock()).mode == "STOPPED")
 
     assert modes == [True, True, False, False]
 
@@ -248,8 +248,8 @@ async def test_a_look_is_told_with_faint_ones_and_peers() -> None:
     frame = desk.views.frame("AGI", desk.clock())
 
     assert frame is not None
-    assert [one["confident"] for one in frame["items"]] == [False, True]
-    assert [one["peer"] for one in frame["items"]] == [None, "AGII"]
+    assert [one.confident for one in frame.items] == [False, True]
+    assert [one.peer for one in frame.items] == [None, "AGII"]
     assert desk.views.frame("AGII", desk.clock()) is None
 
 
@@ -284,7 +284,7 @@ async def test_alerts_are_told_gravest_first() -> None:
     desk.drive("AGII", 50.0, linear=0.5)
     await desk.wait(3.2)
 
-    assert [one["priority"] for one in desk.views.alerts()] == ["P1", "P2"]
+    assert [one.priority for one in desk.views.alerts()] == ["P1", "P2"]
 
 
 @pytest.mark.parametrize(

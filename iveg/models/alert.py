@@ -1,0 +1,156 @@
+"""Alerts (ISA-18.2) and lines of the log: sentences that people are told."""
+
+from pydantic import Field, JsonValue
+
+from iveg.domain import alarms, flood
+from iveg.domain.records import AlertRecord, LogRecord
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import Listing, Model, Slots, moment, stamp
+from iveg.models.remembered import read_objects, read_slots, read_stamp
+
+
+class Occurrence(Model):
+    """One time that an alert was raised."""
+
+    priority: str
+    raised_at: str
+    cleared_at: str | None
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str | None
+
+    @classmethod
+    def of(cls, one: alarms.Occurrence) -> "Occurrence":
+        """One that is in memory."""
+        return cls(
+            priority=one.priority,
+            raised_at=format_stamp(one.raised.wall),
+            cleared_at=moment(one.cleared),
+            acknowledged_at=moment(one.acknowledged),
+            acknowledged_by=one.acknowledged_by,
+            note=one.note or None,
+        )
+
+    @classmethod
+    def of_object(cls, one: dict[str, JsonValue]) -> "Occurrence":
+        """One that is remembered."""
+        by, note = one.get("acknowledged_by"), one.get("note")
+        return cls(
+            priority=str(one.get("priority")),
+            raised_at=read_stamp(one.get("raised_at")) or "",
+            cleared_at=read_stamp(one.get("cleared_at")),
+            acknowledged_at=read_stamp(one.get("acknowledged_at")),
+            acknowledged_by=None if by is None else str(by),
+            note=None if note is None else str(note),
+        )
+
+
+class Alert(Model):
+    """A notice to people: all occurrences of one kind and subject as one."""
+
+    alert_id: str
+    priority: str
+    key: str
+    slots: Slots
+    robot_id: str | None
+    raised_at: str
+    """The first time; ``last_raised_at`` the newest."""
+    last_raised_at: str
+    cleared_at: str | None
+    acknowledged_at: str | None
+    acknowledged_by: str | None
+    note: str | None
+    count: int
+    members: list[Occurrence]
+    """The newest occurrences, oldest first."""
+
+    @classmethod
+    def of(cls, alarm: alarms.Alarm) -> "Alert":
+        """One alert with its newest occurrences."""
+        condition, last = alarm.condition, alarm.last
+        return cls(
+            alert_id=alarm.alert_id,
+            priority=alarm.priority,
+            key=condition.key,
+            slots=dict(condition.slots),
+            robot_id=condition.robot_id,
+            raised_at=format_stamp(alarm.raised.wall),
+            last_raised_at=format_stamp(last.raised.wall),
+            cleared_at=moment(last.cleared),
+            acknowledged_at=moment(last.acknowledged),
+            acknowledged_by=last.acknowledged_by,
+            note=last.note or None,
+            count=alarm.count,
+            members=[Occurrence.of(one) for one in alarm.members],
+        )
+
+    @classmethod
+    def of_record(cls, record: AlertRecord) -> "Alert":
+        """One alert as it is remembered."""
+        return cls(
+            alert_id=record.alert_id,
+            priority=record.priority,
+            key=record.key,
+            slots=read_slots(record.slots),
+            robot_id=record.robot_id,
+            raised_at=format_stamp(record.raised_at),
+            last_raised_at=format_stamp(record.last_raised_at),
+            cleared_at=stamp(record.cleared_at),
+            acknowledged_at=stamp(record.acknowledged_at),
+            acknowledged_by=record.acknowledged_by,
+            note=record.note,
+            count=record.count,
+            members=[Occurrence.of_object(one) for one in read_objects(record.members)],
+        )
+
+
+class Flood(Model):
+    """How many alerts sounded within the window; ``since`` null: no flood."""
+
+    count: int
+    limit: int
+    window_s: float
+    since: str | None
+
+    @classmethod
+    def of(cls, of: flood.Flood) -> "Flood":
+        """How fast alerts come."""
+        return cls(
+            count=of.count,
+            limit=flood.FLOOD_LIMIT,
+            window_s=flood.FLOOD_WINDOW_S,
+            since=moment(of.since),
+        )
+
+
+class AlertListing(Listing[Alert]):
+    """One page of alerts, and how fast they come now."""
+
+    flood: Flood
+
+
+class LogEntry(Model):
+    """One line of the action and inference log."""
+
+    id: int
+    at: str
+    kind: str
+    robot_id: str | None
+    key: str
+    slots: Slots
+    class_: str | None = Field(validation_alias="class", serialization_alias="class")
+    decision_id: str | None
+
+    @classmethod
+    def of_record(cls, record: LogRecord) -> "LogEntry":
+        """One line, live and remembered."""
+        return cls(
+            id=record.id,
+            at=format_stamp(record.at),
+            kind=record.kind,
+            robot_id=record.robot_id,
+            key=record.key,
+            slots=read_slots(record.slots),
+            class_=record.class_,
+            decision_id=record.decision_id,
+        )

@@ -1,0 +1,259 @@
+"""STOP, release and resume as people follow them, live and remembered."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Literal
+
+from iveg.domain import stop
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.records import CommandEventRecord, CommandRecord
+from iveg.domain.stamps import format_stamp
+from iveg.domain.stop import StopMachine
+from iveg.domain.stop.commands import Times
+from iveg.domain.stop.latency import Spread
+from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
+from iveg.models.base import Model, Slots, moment, rounded, stamp
+
+AGENT_LATE_S = 1.0
+"""An agent that is less behind than this is not worth a sentence."""
+
+
+class CommandTimes(Model):
+    """When each step came to be known; null where it has not yet."""
+
+    pressed: str | None
+    """By the browser's corrected clock; null where no page told, or it cannot be."""
+    requested: str
+    sent_fiware: str | None
+    sent_direct: str | None
+    answer_fiware: str | None
+    answer_direct: str | None
+    standing: str | None
+    """The first standing sample."""
+
+
+class CommandRobot(Model):
+    """The robot's last word, while a command is open."""
+
+    v: float
+    report_age_s: float | None
+    moved_m: float
+
+
+class CommandStep(Model):
+    """One line of the audit trail of a command."""
+
+    at: str
+    state: str
+    why: str
+
+
+class Sentence(Model):
+    """The name of a template and what fills its holes."""
+
+    key: str
+    slots: Slots
+
+
+class Command(Model):
+    """One STOP, release or resume.
+
+    What only a command that goes on has is null, empty or false in the history.
+    """
+
+    command_id: str
+    robot_id: str
+    kind: Literal["stop", "release", "resume"]
+    drill: bool
+    state: str
+    requested_by: str
+    times: CommandTimes
+    standstill_ms: float | None
+    tries: int
+    reason: str | None
+    requesters: list[str]
+    hold_id: str | None = None
+    pressed_doubted: bool = False
+    age_s: float | None = None
+    transports: dict[str, str]
+    roads: dict[str, str]
+    """``transports`` for one version more."""
+    agent_lag_s: float | None = None
+    note: Sentence | None = None
+    robot: CommandRobot | None = None
+    challenge_fresh: bool = False
+    outcome: Outcome | None = None
+    """How it ended; null on ``/live``, where ``state`` says how it stands."""
+    was_loud: bool = False
+    steps: list[CommandStep]
+    """Of the audit trail; empty on ``/live``, where each step is told."""
+
+    @classmethod
+    def of(cls, of: stop.Command, machine: StopMachine, now: Instant) -> "Command":
+        """One command with the robot's last word."""
+        return cls(
+            command_id=of.command_id,
+            robot_id=of.robot_id,
+            kind=of.kind,
+            drill=of.drill,
+            state=of.state,
+            requested_by=of.requesters[0],
+            times=_times(of.times),
+            standstill_ms=rounded(of.standstill_ms),
+            tries=of.tries,
+            reason=of.reason,
+            hold_id=of.hold_id,
+            requesters=list(of.requesters),
+            pressed_doubted=of.times.pressed_doubted,
+            age_s=round(now.mono - of.times.requested.mono, 3),
+            transports=dict(of.roads.items()),
+            roads=dict(of.roads.items()),
+            agent_lag_s=rounded(of.agent_lag_s, 1),
+            note=_note(of),
+            robot=_robot(machine, now),
+            challenge_fresh=machine.report_age(now) <= LIMITS.report_fresh_s,
+            steps=[],
+        )
+
+    @classmethod
+    def of_record(
+        cls, record: CommandRecord, steps: Sequence[CommandEventRecord] = ()
+    ) -> "Command":
+        """One command as it is remembered, with each of its steps."""
+        return cls(
+            command_id=record.command_id,
+            robot_id=record.robot_id,
+            kind=record.kind,
+            drill=record.drill,
+            state=record.state,
+            requested_by=record.requested_by,
+            times=CommandTimes(
+                pressed=stamp(record.pressed_at),
+                requested=format_stamp(record.requested_at),
+                sent_fiware=stamp(record.sent_fiware_at),
+                sent_direct=stamp(record.sent_direct_at),
+                answer_fiware=stamp(record.answer_fiware_at),
+                answer_direct=stamp(record.answer_direct_at),
+                standing=stamp(record.standing_at),
+            ),
+            standstill_ms=record.standstill_ms,
+            tries=record.tries,
+            reason=record.reason,
+            requesters=[record.requested_by],
+            transports={},
+            roads={},
+            outcome=outcome_of(record),
+            was_loud=was_loud((record.state, *(one.state for one in steps))),
+            steps=[
+                CommandStep(at=format_stamp(one.at), state=one.state, why=one.why)
+                for one in steps
+            ],
+        )
+
+
+def _times(of: Times) -> CommandTimes:
+    return CommandTimes(
+        pressed=stamp(of.pressed),
+        requested=format_stamp(of.requested.wall),
+        sent_fiware=moment(of.sent_fiware),
+        sent_direct=moment(of.sent_direct),
+        answer_fiware=moment(of.answer_fiware),
+        answer_direct=moment(of.answer_direct),
+        standing=moment(of.standing),
+    )
+
+
+def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
+    report, age = machine.report, machine.evidence_age(now)
+    return CommandRobot(
+        v=0.0 if report is None else report.linear,
+        report_age_s=rounded(age) if isfinite(age) else None,
+        moved_m=round(machine.moved_m(now), 2),
+    )
+
+
+def _note(of: stop.Command) -> Sentence | None:
+    """What a late agent means for an order that went through it."""
+    lag = of.agent_lag_s
+    if lag is None or lag <= AGENT_LATE_S:
+        return None
+    direct = of.roads["direct"] not in ("off", "failed")
+    key = "stop.note.direct" if direct else "stop.note.fiware"
+    return Sentence(key=key, slots={"lag": round(lag, 1)})
+
+
+class Pressed(Model):
+    """A STOP, release or resume that was accepted."""
+
+    robot_id: str
+    command_id: str
+    state: str
+
+    @classmethod
+    def of(cls, command: stop.Command) -> "Pressed":
+        """As it stands just after the press."""
+        return cls(
+            robot_id=command.robot_id,
+            command_id=command.command_id,
+            state=command.state,
+        )
+
+
+class FleetPressed(Model):
+    """A fleet STOP: one command a robot."""
+
+    commands: list[Pressed]
+
+
+class LatencySpread(Model):
+    """Times of one step (ms); null where nothing was measured."""
+
+    count: int
+    p50_ms: float | None
+    p95_ms: float | None
+    max_ms: float | None
+
+    @classmethod
+    def of(cls, of: Spread) -> "LatencySpread":
+        """Rounded to a tenth of a millisecond."""
+        return cls(
+            count=of.count,
+            p50_ms=rounded(of.p50, 1),
+            p95_ms=rounded(of.p95, 1),
+            max_ms=rounded(of.longest, 1),
+        )
+
+
+class RobotLatency(Model):
+    """One robot's STOPs: how many, and each step from the press on."""
+
+    robot_id: str
+    stops: int
+    accepted: LatencySpread
+    sent_direct: LatencySpread
+    sent_fiware: LatencySpread
+    answer_direct: LatencySpread
+    answer_fiware: LatencySpread
+    standing: LatencySpread
+
+
+class Latency(Model):
+    """How long the newest STOPs of a range took."""
+
+    since: str
+    until: str
+    robots: list[RobotLatency]
+
+
+class Drill(Model):
+    """One drill and its verdict."""
+
+    robot_id: str
+    command_id: str
+    drilled_at: str
+    by: str
+    passed: bool | None
+    """Standing in time; null while it may still come true."""
+    standstill_ms: float | None
+    command: Command

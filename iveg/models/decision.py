@@ -1,0 +1,132 @@
+"""Why one robot was slowed: each link from the detection to the robot's own report."""
+
+from typing import Literal
+
+from pydantic import Field, JsonValue
+
+from iveg.domain.records import DecisionRecord
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import Model, stamp
+from iveg.models.command import Sentence
+from iveg.models.places import Position
+from iveg.models.remembered import read_json, read_objects, read_stamp
+
+
+class DecisionRule(Model):
+    """The rule that fired, as it was at that moment."""
+
+    id: str | None
+    version: str | None
+    parameters: JsonValue
+
+
+class DecisionLink(Model):
+    """One link of the chain of evidence."""
+
+    link: str
+    at: str | None
+    value: JsonValue
+    verdict: str
+
+
+class Decision(Model):
+    """Who was seen by whom, which rule fired, and when the robot obeyed."""
+
+    decision_id: str
+    kind: Literal["alert", "mandate"]
+    robot_id: str
+    person_id: str | None
+    observer: str | None
+    class_: str | None = Field(validation_alias="class", serialization_alias="class")
+    class_id: str | None
+    confidence: float | None
+    position: Position | None
+    distance_m: float | None
+    """From the robot to the centre of the ring."""
+    speed_factor: float | None
+    reason: str | None
+    rule: DecisionRule
+    in_sight: bool | None
+    started_at: str
+    feedback_at: str | None
+    applied_at: str | None
+    observed_at: str | None
+    ended_at: str | None
+    speed_before: float | None
+    """m/s; ``speed_after`` at ``observed_at``."""
+    speed_after: float | None
+    links: list[DecisionLink]
+    sentence: Sentence
+
+    @classmethod
+    def of_record(cls, record: DecisionRecord) -> "Decision":
+        """One decision, from memory or from the history."""
+        return cls(
+            decision_id=record.decision_id,
+            kind=record.kind,
+            robot_id=record.robot_id,
+            person_id=record.person_id,
+            observer=record.observer,
+            class_=record.class_,
+            class_id=record.class_id,
+            confidence=record.confidence,
+            position=_position(record),
+            distance_m=record.distance_m,
+            speed_factor=record.speed_factor,
+            reason=record.reason,
+            rule=DecisionRule(
+                id=record.rule_id,
+                version=record.rule_version,
+                parameters=read_json(record.rule_parameters),
+            ),
+            in_sight=record.in_sight,
+            started_at=format_stamp(record.started_at),
+            feedback_at=stamp(record.feedback_at),
+            applied_at=stamp(record.applied_at),
+            observed_at=stamp(record.observed_at),
+            ended_at=stamp(record.ended_at),
+            speed_before=record.speed_before,
+            speed_after=record.speed_after,
+            links=[_link(one) for one in read_objects(record.links)],
+            sentence=_sentence(record),
+        )
+
+
+def _position(record: DecisionRecord) -> Position | None:
+    if record.x is None or record.y is None:
+        return None
+    return Position(x=record.x, y=record.y, z=record.z or 0.0)
+
+
+def _sentence(record: DecisionRecord) -> Sentence:
+    """The same sentence that the log used when it happened."""
+    if record.kind == "alert":
+        key = "log.person_seen"
+    elif record.in_sight is False:
+        key = f"log.speed_down.{record.reason}_nlos"
+    else:
+        key = f"log.speed_down.{record.reason or 'default'}"
+    return Sentence(
+        key=key,
+        slots={
+            "robot": record.robot_id,
+            "person": record.person_id,
+            "observer": record.observer,
+            "class": record.class_,
+            "class_id": record.class_id,
+            "confidence": record.confidence,
+            "factor": record.speed_factor,
+            "reason": record.reason,
+            "distance": record.distance_m,
+            "in_sight": record.in_sight,
+        },
+    )
+
+
+def _link(link: dict[str, JsonValue]) -> DecisionLink:
+    return DecisionLink(
+        link=str(link.get("link")),
+        at=read_stamp(link.get("at")),
+        value=link.get("value"),
+        verdict=str(link.get("verdict")),
+    )

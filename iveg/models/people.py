@@ -1,0 +1,147 @@
+"""People, and what detectors saw of them."""
+
+from pydantic import Field, ValidationError
+
+from iveg.domain.alerts import Class
+from iveg.domain.geometry import Box3D
+from iveg.domain.people import Placed
+from iveg.domain.records import DetectionRecord
+from iveg.domain.stamps import format_stamp
+from iveg.domain.tracking.person import Stage
+from iveg.models.base import Model
+from iveg.models.margin import Margin
+from iveg.models.places import Position
+
+
+class Acting(Model):
+    """A robot that is slowed for somebody."""
+
+    robot_id: str
+    distance_m: float
+    in_sight: bool
+
+
+class Person(Model):
+    """A person, or a robot that is none of the fleet."""
+
+    person_id: str
+    class_: Class = Field(validation_alias="class", serialization_alias="class")
+    class_id: str
+    """As the detector said."""
+    stage: Stage
+    position: Position
+    radius_m: float | None
+    """Of the widest ring."""
+    confidence: float
+    first_seen: str
+    last_seen: str
+    age_s: float
+    observers: list[str]
+    possible: bool
+    """Below the threshold but seen again and again."""
+    doubtful: bool
+    """Seen beyond the walls: the position is its observer's."""
+    decision_id: str | None
+    """Of the newest slow-down for it that goes on."""
+    lane: str | None
+    acting: list[Acting]
+    margin: Margin | None
+
+
+class DetectionBox(Model):
+    """A 3D box (m) in ``frame_id``."""
+
+    xmin: float
+    xmax: float
+    ymin: float
+    ymax: float
+    zmin: float
+    zmax: float
+    frame_id: str
+
+    @classmethod
+    def of(cls, box: Box3D, frame_id: str) -> "DetectionBox":
+        """As the detector reported it."""
+        return cls(
+            xmin=box.xmin,
+            xmax=box.xmax,
+            ymin=box.ymin,
+            ymax=box.ymax,
+            zmin=box.zmin,
+            zmax=box.zmax,
+            frame_id=frame_id,
+        )
+
+
+class Detection(Model):
+    """One box of one detection frame, placed in ``map``."""
+
+    robot_id: str
+    stamp: str | None
+    received_at: str | None = None
+    """When it reached iVeg; null on ``/live``, where its frame has an age."""
+    class_: str | None = Field(validation_alias="class", serialization_alias="class")
+    class_id: str
+    probability: float
+    position: Position
+    box: DetectionBox | None
+    confident: bool
+    person_id: str | None
+    peer: str | None = None
+    """The robot of the fleet that was seen."""
+    road: str
+
+    @classmethod
+    def of(
+        cls, one: Placed, robot_id: str, stamp: str | None, road: str
+    ) -> "Detection":
+        """One detection of a robot's newest frame."""
+        x, y, z = one.position
+        return cls(
+            robot_id=robot_id,
+            stamp=stamp,
+            class_=one.class_,
+            class_id=one.detection.class_id,
+            probability=one.detection.probability,
+            position=Position(x=x, y=y, z=z),
+            box=DetectionBox.of(one.detection.box, one.detection.frame_id),
+            confident=one.kind != "faint",
+            person_id=None if one.person is None else one.person.person_id,
+            peer=one.peer,
+            road=road,
+        )
+
+    @classmethod
+    def of_record(cls, record: DetectionRecord) -> "Detection":
+        """One detection as it is remembered."""
+        return cls(
+            robot_id=record.robot_id,
+            stamp=record.stamp,
+            received_at=format_stamp(record.at),
+            class_=record.class_,
+            class_id=record.class_id,
+            probability=record.probability,
+            position=Position(x=record.x, y=record.y, z=record.z),
+            box=_box(record.box),
+            confident=record.confident,
+            person_id=record.person_id,
+            road=record.road,
+        )
+
+
+def _box(text: str | None) -> DetectionBox | None:
+    """A remembered box; None where a row holds none that is whole."""
+    try:
+        return None if text is None else DetectionBox.model_validate_json(text)
+    except ValidationError:
+        return None
+
+
+class DetectionFrame(Model):
+    """Everything that one robot saw at one moment, faint detections included."""
+
+    robot_id: str
+    stamp: str | None
+    road: str
+    age_s: float
+    items: list[Detection]

@@ -1,0 +1,103 @@
+"""Places in ``map``: points, boxes, the greenhouse and the costmap (m)."""
+
+from dataclasses import asdict
+
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.models.base import Model
+
+
+class Point(Model):
+    """A place in ``map`` (m)."""
+
+    x: float
+    y: float
+
+
+class Position(Model):
+    """A place in ``map`` with its height (m)."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Area(Model):
+    """A rectangle along the axes of ``map`` (m)."""
+
+    xmin: float
+    ymin: float
+    xmax: float
+    ymax: float
+
+
+class Lane(Area):
+    """Where robots drive."""
+
+    label: str
+
+
+class Obstacle(Area):
+    """What stands in the way."""
+
+    kind: str
+
+
+class Post(Model):
+    """A round thing (m)."""
+
+    x: float
+    y: float
+    radius: float
+
+
+class GreenhouseMap(Model):
+    """The greenhouse as the page draws it."""
+
+    name: str
+    bounds: Area
+    lanes: list[Lane]
+    rows: list[Area]
+    posts: list[Post]
+    obstacles: list[Obstacle]
+
+    @classmethod
+    def of(cls, greenhouse: Greenhouse) -> "GreenhouseMap":
+        """The greenhouse that is supervised."""
+        return cls(
+            name=greenhouse.name,
+            bounds=_area(greenhouse.bounds),
+            lanes=[
+                Lane(label=lane.label, **asdict(lane.area)) for lane in greenhouse.lanes
+            ],
+            rows=[_area(row) for row in greenhouse.rows],
+            posts=[Post(**asdict(post)) for post in greenhouse.posts],
+            obstacles=[
+                Obstacle(kind=one.kind, **asdict(one.area))
+                for one in greenhouse.obstacles
+            ],
+        )
+
+
+class Scan(Model):
+    """One sweep: points in ``map`` (m)."""
+
+    robot_id: str
+    stamp: str | None
+    frame_id: str = "map"
+    points: list[tuple[float, float]]
+
+
+class Costmap(Model):
+    """Cells from the south-western corner, row by row: 0-100, -1 unknown."""
+
+    resolution: float
+    """Metres a cell."""
+    width: int
+    height: int
+    origin: Point
+    data: list[int]
+
+
+def _area(of: Rectangle) -> Area:
+    return Area(xmin=of.xmin, ymin=of.ymin, xmax=of.xmax, ymax=of.ymax)

@@ -1,0 +1,188 @@
+"""A robot of the fleet, with the age of everything that is said of it."""
+
+from typing import Literal
+
+from iveg.domain.feedback import Mandate
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Hold as DomainHold
+from iveg.domain.observations import Instant
+from iveg.domain.transports import Transport
+from iveg.domain.world import Link, RobotState
+from iveg.models.base import Model, rounded
+from iveg.models.command import Command
+from iveg.models.margin import Margin
+from iveg.models.places import Point
+
+Mode = Literal["RUNNING", "SLOW", "STOPPED"]
+
+
+class Pose(Model):
+    """Pose of ``base_link`` in ``map``."""
+
+    x: float
+    y: float
+    yaw: float
+
+    @classmethod
+    def of(cls, pose: Pose2D) -> "Pose":
+        """As the robot measured it."""
+        return cls(x=pose.x, y=pose.y, yaw=pose.yaw)
+
+
+class Twist(Model):
+    """Speed (m/s) and turn rate (rad/s)."""
+
+    linear: float
+    angular: float
+
+    @classmethod
+    def of(cls, twist: Twist2D) -> "Twist":
+        """As the robot measured it."""
+        return cls(linear=twist.linear_x, angular=twist.angular_z)
+
+
+class Hold(Model):
+    """A reason why a robot may not move."""
+
+    id: str
+    source: str
+    ack: str
+
+    @classmethod
+    def of(cls, hold: DomainHold) -> "Hold":
+        """As the robot reported it."""
+        return cls(id=hold.id, source=hold.source, ack=hold.ack)
+
+
+class Fault(Model):
+    """What a robot finds wrong with its own data."""
+
+    code: str
+    about: str
+    for_s: float | None
+
+
+class Applied(Model):
+    """What the robot itself says it applies."""
+
+    reason: str
+    cause: str | None
+    age_s: float
+    feedback_age_s: float | None
+    faults: list[Fault]
+
+    @classmethod
+    def of(cls, robot: RobotState, now: Instant) -> "Applied | None":
+        """From its newest report; None before the first."""
+        report, received = robot.safety, robot.safety_received
+        if report is None or received is None:
+            return None
+        return cls(
+            reason=report.reason,
+            cause=report.cause,
+            age_s=round(now.mono - received.mono, 3),
+            feedback_age_s=report.feedback_age_s,
+            faults=[
+                Fault(code=one.code, about=one.about, for_s=one.for_s)
+                for one in report.faults
+            ],
+        )
+
+
+class SpeedLimit(Model):
+    """What iVeg tells the robot; the key is ``mandate``."""
+
+    speed_factor: float
+    reason: str
+    cause: str | None
+    distance_m: float | None
+    decision_id: str | None
+
+    @classmethod
+    def of(cls, mandate: Mandate) -> "SpeedLimit":
+        """What is in force."""
+        return cls(
+            speed_factor=mandate.speed_factor,
+            reason=mandate.reason,
+            cause=mandate.cause,
+            distance_m=rounded(mandate.distance_m),
+            decision_id=mandate.decision_id,
+        )
+
+
+class Navigation(Model):
+    """The robot's intent, in ``map`` (m)."""
+
+    task: str
+    goal: Point | None
+    path: list[tuple[float, float]]
+
+    @classmethod
+    def of(cls, robot: RobotState) -> "Navigation | None":
+        """What a robot says it is about to do; None while it says nothing."""
+        intent = robot.navigation
+        if intent is None:
+            return None
+        goal = intent.goal
+        return cls(
+            task=intent.task,
+            goal=None if goal is None else Point(x=goal[0], y=goal[1]),
+            path=list(intent.path),
+        )
+
+
+class Profile(Model):
+    """What is known of this kind of robot (m, m/s)."""
+
+    drive: str
+    length: float
+    width: float
+    max_speed: float
+    turning_radius: float
+
+    @classmethod
+    def of(cls, body: RobotProfile) -> "Profile":
+        """The body of a robot."""
+        return cls(
+            drive=body.drive,
+            length=body.length,
+            width=body.width,
+            max_speed=body.max_speed,
+            turning_radius=body.turning_radius,
+        )
+
+
+class Robot(Model):
+    """One robot with the age of what is said of it."""
+
+    robot_id: str
+    link: Link
+    mode: Mode
+    """What the robot has just said; while it says nothing, what it was told."""
+    pose: Pose | None
+    twist: Twist | None
+    stamp: str | None
+    """As the robot sent it."""
+    received_at: str | None
+    age_s: float | None
+    """At most; null while nobody knows."""
+    age_estimated: bool
+    speed_factor: float | None
+    """What the robot says it applies."""
+    applied: Applied | None
+    mandate: SpeedLimit
+    holds: list[Hold]
+    stop: Command | None
+    stop_state: str
+    navigation: Navigation | None
+    replay: bool
+    clock_offset_s: float | None
+    road: str
+    """Of the newest detections."""
+    transport: Transport
+    """That feeds the pose."""
+    profile: Profile
+    margin: Margin | None
+    cmd_status: str | None
+    """The agent's opinion, never believed."""

@@ -1,0 +1,39 @@
+"""The detection rule: when somebody counts, and how wide the ring is."""
+
+from iveg.domain import alerts
+from iveg.domain.alerts import Class
+from iveg.domain.feedback import HALF_SPEED
+from iveg.models.base import Model, stamp
+
+
+class Rule(Model):
+    """One version of the detection rule."""
+
+    id: str
+    version: int
+    confidence_threshold: float
+    """0 to 1, inclusive; ``class_thresholds`` by class."""
+    class_thresholds: dict[Class, float]
+    radius_m: float
+    factor: float
+    aliases: dict[str, Class]
+    """A detector's word → the class that it stands for."""
+    possible_people: bool
+    author: str
+    since: str | None
+
+    @classmethod
+    def of(cls, rule: alerts.Rule) -> "Rule":
+        """One version."""
+        return cls(
+            id=rule.id,
+            version=rule.version,
+            confidence_threshold=rule.threshold,
+            class_thresholds=dict(rule.class_thresholds),
+            radius_m=rule.radius_m,
+            factor=HALF_SPEED,
+            aliases=dict(rule.aliases),
+            possible_people=rule.possible_people,
+            author=rule.author,
+            since=stamp(rule.since),
+        )

@@ -1,0 +1,50 @@
+"""Everything that is known, for a browser that has just come."""
+
+from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.base import Model
+from iveg.models.climate import Climate
+from iveg.models.command import Command
+from iveg.models.health import Health
+from iveg.models.people import DetectionFrame, Person
+from iveg.models.places import GreenhouseMap
+from iveg.models.robot import Robot
+from iveg.models.rule import Rule
+
+
+class Server(Model):
+    """Which iVeg speaks."""
+
+    boot: str
+    """Random, new at each start."""
+    version: str
+    demo: bool
+    wall: float
+    """Its clock (Unix s)."""
+
+
+class User(Model):
+    """Who is signed in."""
+
+    name: str
+    role: str
+
+
+class Snapshot(Model):
+    """The first frame of ``/live``."""
+
+    t: str
+    server: Server
+    user: User
+    rule: Rule
+    map: GreenhouseMap
+    robots: list[Robot]
+    people: list[Person]
+    detections: dict[str, DetectionFrame]
+    commands: list[Command]
+    """Those that go on."""
+    alerts: list[Alert]
+    flood: Flood
+    log: list[LogEntry]
+    """The newest 200, oldest first."""
+    health: Health
+    climate: Climate | None

@@ -1,0 +1,50 @@
+"""What iVeg makes of its models is what they promise, also where nobody validates."""
+
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from iveg.models.alert import Alert, AlertListing, LogEntry
+from iveg.models.base import Listing
+from iveg.models.climate import Climate
+from iveg.models.command import Command, Drill, Latency
+from iveg.models.decision import Decision
+from iveg.models.health import Health
+from iveg.models.people import Detection, Person
+from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.robot import Robot
+from iveg.models.rule import Rule
+from tests.data.answers import answers
+
+PROMISED: dict[str, Any] = {
+    "REST robots": Listing[Robot],
+    "REST robots/AGI": Robot,
+    "REST robots/AGI/scan": Scan,
+    "REST people": Listing[Person],
+    "REST map": GreenhouseMap,
+    "REST climate": Climate,
+    "REST health": Health,
+    "REST rule": Rule,
+    "REST rule/versions": Listing[Rule],
+    "REST decisions": Listing[Decision],
+    "REST decisions/D1": Decision,
+    "REST detections": Listing[Detection],
+    "REST commands": Listing[Command],
+    "REST commands/C1": Command,
+    "REST commands/latency": Latency,
+    "REST drills": Listing[Drill],
+    "REST alerts": AlertListing,
+    "REST log": Listing[LogEntry],
+    "NDJSON decisions": list[Decision],
+    "NDJSON detections": list[Detection],
+    "NDJSON commands": list[Command],
+    "NDJSON alerts": list[Alert],
+    "NDJSON log": list[LogEntry],
+}
+
+
+async def test_every_answer_is_what_its_model_says() -> None:
+    told = await answers()
+
+    for name, promised in PROMISED.items():
+        TypeAdapter(promised).validate_python(told[name])
