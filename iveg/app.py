@@ -37,7 +37,9 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.domain.stop.drills import Drills
 from iveg.domain.world import World
+from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
+from iveg.pipeline import topics
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.pipeline.earlier import remember
@@ -204,7 +206,9 @@ class Dss:
             read_clock=clock.now,
         )
         self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
-        self.views = Views(self.assessor, self.commander)
+        self.views = Views(
+            self.assessor, self.commander, self.minutes, self.chain, self.counters
+        )
         self.sessions = FileSessions(directory / "sessions.jsonl")
         self.door = Door(
             sign_in_token=self.sign_in_token,
@@ -287,35 +291,16 @@ class Dss:
         total["nlos.protected"] = self.assessor.protected_unseen
         return total
 
-    def health(self, now: Instant) -> Any:
-        """The chain from robot to screen."""
-        return health.health_of(self.chain, self.counters, self.views.safety, now)
-
-    def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
+    def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
-        views, ids = self.views, self.fleet.ids
-        frames = {robot_id: views.frame(robot_id, now) for robot_id in ids}
-        return {
-            "t": format_stamp(now.wall),
-            "server": {
-                "boot": self._boot,
-                "version": __version__,
-                "demo": self._demo,
-                "wall": now.wall,
-            },
-            "user": {"name": principal.name, "role": principal.role},
-            "rule": views.rule(),
-            "map": views.map(),
-            "robots": views.robots(now),
-            "people": views.people(now),
-            "detections": {name: frame for name, frame in frames.items() if frame},
-            "commands": views.open_commands(now),
-            "alerts": views.alerts(),
-            "flood": views.flood(),
-            "log": views.log(list(self.minutes.lines)[-200:]),
-            "health": self.health(now),
-            "climate": views.climate(now),
-        }
+        return Snapshot(
+            t=format_stamp(now.wall),
+            server=Server(
+                boot=self._boot, version=__version__, demo=self._demo, wall=now.wall
+            ),
+            user=User(name=principal.name, role=principal.role),
+            **topics.read_all(self.views, now),
+        )
 
     async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
         """STOP one robot, or all."""
@@ -357,7 +342,7 @@ def create_app(dss: Dss) -> FastAPI:
     )
     app.state.door = dss.door
     drawn = pages.Pages(dss.site())
-    encoder = live.Encoder(dss.views, dss.hub, clock.now, dss.health)
+    encoder = live.Encoder(dss.views, dss.hub, clock.now)
     settings = dss.settings
     tenant = settings.fiware_service, settings.fiware_servicepath
     orion = notifications.NotificationEndpoint(
@@ -375,7 +360,7 @@ def create_app(dss: Dss) -> FastAPI:
     app.include_router(
         stop_records.router(dss.queries, clock.now, dss.views.find_command)
     )
-    app.include_router(robots.router(dss.views, clock.now, dss.health))
+    app.include_router(robots.router(dss.views, clock.now))
     app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.assessor, clock.now))
@@ -390,7 +375,7 @@ def create_app(dss: Dss) -> FastAPI:
             fleet=dss.fleet,
         )
     )
-    app.include_router(health.router(clock.now, dss.health))
+    app.include_router(health.router(clock.now, dss.views.health))
     app.include_router(
         pages.router(
             drawn,

@@ -4,6 +4,7 @@ safety machines and all of iVeg between its doors, without a socket or a process
 What goes from one to the other is written and read by the codec, as on the wire.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -135,7 +136,13 @@ class Stage:
         self._world = World(house, layout, DETECTORS[layout.detector or profile], seed)
         self._incidents = [(one.at_s, one.order) for one in layout.incidents]
         self._desk = Desk(robots, house)
-        self._views = Views(self._desk.assessor, self._desk.commander)
+        self._views = Views(
+            self._desk.assessor,
+            self._desk.commander,
+            self._desk.minutes,
+            self._desk.chain,
+            Counter,
+        )
         self._robots = {
             robot_id: Robot(rig, self.now, self._hear)
             for robot_id, rig in self._world.rigs.items()

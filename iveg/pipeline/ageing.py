@@ -7,6 +7,7 @@ from iveg.domain.people import People
 from iveg.domain.sight import AllClear
 from iveg.domain.tracking.person import Person
 from iveg.domain.world import Link, RobotState, World
+from iveg.pipeline import topics
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
 
@@ -49,7 +50,7 @@ class Ageing:
             self._log_clear(person, now)
         for person in people.forget(now):
             self._stages.pop(person.person_id, None)
-            self._hub.changed("people")
+            self._hub.changed(topics.PEOPLE.name)
 
     def _watch_link(self, robot: RobotState, now: Instant) -> None:
         link = robot.link(now)
@@ -57,7 +58,7 @@ class Ageing:
         if link == before:
             return
         self._links[robot.robot_id] = link
-        self._hub.changed(f"robots/{robot.robot_id}")
+        self._hub.changed(topics.ROBOT.of(robot.robot_id))
         if link == "UNKNOWN":
             # For as long as it takes to prove an age; if that fails, it is LOST.
             return
@@ -73,7 +74,7 @@ class Ageing:
         if stage == before:
             return
         self._stages[person.person_id] = stage
-        self._hub.changed("people")
+        self._hub.changed(topics.PEOPLE.name)
         key = _STAGE_KEYS.get(stage)
         # The first sighting has a line of its own.
         if key is None or before is None:
@@ -90,7 +91,7 @@ class Ageing:
         )
 
     def _log_clear(self, person: Person, now: Instant) -> None:
-        self._hub.changed("people")
+        self._hub.changed(topics.PEOPLE.name)
         newest = person.newest
         if person.sightings or person.stage(now) != "remembered":
             return

@@ -7,6 +7,7 @@ from iveg.domain.conditions import EXPECTED
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.flood import Flood, FloodGauge
 from iveg.domain.observations import Instant
+from iveg.pipeline import topics
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Ids
 from iveg.pipeline.publish import Hub
@@ -40,7 +41,7 @@ class Alarming:
     def remember(self, earlier: Iterable[Alarm]) -> None:
         """Take up what nobody saw in an earlier run."""
         self._book.remember(one for one in earlier if not self.knows(one.alert_id))
-        self._hub.changed("alerts")
+        self._hub.changed(topics.ALERTS.name)
 
     def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
         """Take what is wrong now."""
@@ -75,7 +76,7 @@ class Alarming:
         after = self._gauge.take(raised, now)
         if after == before:
             return
-        self._hub.changed("flood")
+        self._hub.changed(topics.FLOOD.name)
         line = flood_line(before, after)
         if line is not None:
             self._minutes.log(line, now)

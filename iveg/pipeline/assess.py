@@ -31,6 +31,7 @@ from iveg.domain.observations import (
 from iveg.domain.people import People, Placed
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.world import World
+from iveg.pipeline import topics
 from iveg.pipeline.ageing import Ageing
 from iveg.pipeline.alarming import Alarming
 from iveg.pipeline.evidence import record_of
@@ -152,7 +153,7 @@ class Assessor:
             case Climate():
                 self._minutes.climate(observation, received.at)
             case LaserScan():
-                self._hub.changed(f"robots/{observation.robot_id}/scan")
+                self._hub.changed(topics.SCAN.of(observation.robot_id))
             case SafetyReport():
                 self._reported(observation, received.at)
             case DetectionFrame():
@@ -180,7 +181,7 @@ class Assessor:
             self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
         self._unjudged = _later(self._unjudged, at)
         self._moved.add(odometry.robot_id)
-        self._hub.changed(f"robots/{odometry.robot_id}")
+        self._hub.changed(topics.ROBOT.of(odometry.robot_id))
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):
@@ -192,7 +193,7 @@ class Assessor:
             self._applied[report.robot_id] = applied
             if before is None or before[0] != applied[0]:
                 self._log_speed(report, at)
-        self._hub.changed(f"robots/{report.robot_id}")
+        self._hub.changed(topics.ROBOT.of(report.robot_id))
 
     def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
         if after is not before:
@@ -215,7 +216,7 @@ class Assessor:
             or mandate.reason != before[robot_id].reason
         ]
         for robot_id in changed:
-            self._hub.changed(f"robots/{robot_id}")
+            self._hub.changed(topics.ROBOT.of(robot_id))
             if self.world.robots[robot_id].safety is None:
                 self._log_mandate(robot_id, before[robot_id], mandates[robot_id], now)
         slower = any(

@@ -33,6 +33,7 @@ from iveg.domain.stop import (
     Wanted,
 )
 from iveg.domain.stop.drills import Drills
+from iveg.pipeline import topics
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Ids, Journal
 from iveg.pipeline.presses import Presses
@@ -320,7 +321,7 @@ class Commander:
         self._show(machine)
 
     def _show(self, machine: StopMachine) -> None:
-        self._hub.changed(f"robots/{machine.robot_id}")
+        self._hub.changed(topics.ROBOT.of(machine.robot_id))
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         command = self._command_of(machine, changed)

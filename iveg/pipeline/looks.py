@@ -15,6 +15,7 @@ from iveg.domain.order import Verdict
 from iveg.domain.overload import Overload
 from iveg.domain.people import People, Placed
 from iveg.domain.world import World
+from iveg.pipeline import topics
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Ids
 from iveg.pipeline.publish import Hub
@@ -87,7 +88,7 @@ class Looks:
             self._overload.judged(robot_id, received.at, whole=not turned_away)
         if verdict == "new":
             self.placed[robot_id] = placed
-            self._hub.changed(f"detections/{robot_id}")
+            self._hub.changed(topics.DETECTIONS.of(robot_id))
 
     def _age_s(self, frame: DetectionFrame, received: Received) -> float:
         """How old the look that has just come is (s)."""
@@ -102,7 +103,7 @@ class Looks:
         for one in placed:
             self._describe(one, frame, received)
         if any(one.person is not None for one in placed):
-            self._hub.changed("people")
+            self._hub.changed(topics.PEOPLE.name)
         return placed
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:

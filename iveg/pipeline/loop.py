@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import Canary, CommandAnswer, Instant, Received
+from iveg.pipeline import topics
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.pipeline.health_monitor import HealthMonitor, Hop, HopState
@@ -93,7 +94,7 @@ class RuleLoop:
             self._tell(hop, now)
         if changed or now.mono - self._health_at >= _HEALTH_PERIOD_S:
             self._health_at = now.mono
-            self._hub.changed("health")
+            self._hub.changed(topics.HEALTH.name)
 
     def _tell(self, hop: Hop, now: Instant) -> None:
         """A loss once, and its end once; what is merely late or unknown is neither."""

@@ -26,6 +26,7 @@ from iveg.domain.records import (
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
+from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
@@ -66,7 +67,7 @@ class Minutes:
         )
         self.lines.append(record)
         self._sink.offer(record)
-        self._hub.append("log", record)
+        self._hub.append(topics.LOG.name, record)
 
     def recall(self, earlier: Iterable[LogRecord]) -> None:
         """Put lines of an earlier run before those of this one; any order."""
@@ -75,7 +76,7 @@ class Minutes:
         before = before[-(_KEPT_LINES - len(self.lines)) :]
         if before and len(self.lines) < _KEPT_LINES:
             self.lines.extendleft(reversed(before))
-            self._hub.append("log/earlier", before)
+            self._hub.append(topics.EARLIER_LOG.name, before)
 
     def decision(self, decision: Decision, now: Instant) -> None:
         """A decision is new or has grown a link."""
@@ -179,7 +180,7 @@ class Minutes:
             roads=dict(command.roads),
             requesters=list(command.requesters),
         )
-        self._hub.append(f"commands/{command.command_id}", step)
+        self._hub.append(topics.COMMAND.of(command.command_id), step)
 
     def closed(self, closed: Closed, at: Instant) -> None:
         """A command is followed no more."""
@@ -207,8 +208,8 @@ class Minutes:
     def rule(self, event: LogEvent, at: Instant) -> None:
         """Another version of the rule is in force: its rings are others, too."""
         self.log(event, at)
-        for topic in ("rule", "people"):
-            self._hub.changed(topic)
+        for topic in (topics.RULE, topics.PEOPLE):
+            self._hub.changed(topic.name)
 
     def _audit(
         self, command: Command | CommandRecord, state: str, why: str, at: Instant
@@ -225,7 +226,7 @@ class Minutes:
 
     def climate(self, read: Climate, at: Instant) -> None:
         """The air was measured: pages are told each time, history once a minute."""
-        self._hub.changed("climate")
+        self._hub.changed(topics.CLIMATE.name)
         # Devices that send every minute are late as often as early.
         kept = self._climate_kept
         if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:
@@ -261,7 +262,7 @@ class Minutes:
                 members=json.dumps(members, ensure_ascii=False),
             )
         )
-        self._hub.changed("alerts")
+        self._hub.changed(topics.ALERTS.name)
 
 
 def _number(line: LogRecord) -> int:

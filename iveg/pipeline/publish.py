@@ -9,16 +9,11 @@ import asyncio
 import contextlib
 from collections import Counter, deque
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
+
+from iveg.pipeline.topics import is_telemetry
 
 MAX_PENDING = 1000
-
-_TELEMETRY: Final = ("robots/", "detections/", "people")
-
-
-def is_telemetry(topic: str) -> bool:
-    """Whether a topic changes with each measure, so that its sending is paced."""
-    return topic.startswith(_TELEMETRY)
 
 
 class Subscriber:

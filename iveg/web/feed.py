@@ -9,7 +9,9 @@ import math
 from typing import Final
 
 from iveg.domain.observations import Instant
-from iveg.pipeline.publish import Subscriber, is_telemetry
+from iveg.pipeline import topics
+from iveg.pipeline.publish import Subscriber
+from iveg.pipeline.topics import is_telemetry
 from iveg.web.pacing import BYTES, CreditWindow
 from iveg.web.telemetry import Part, TelemetryEncoder
 
@@ -69,8 +71,9 @@ class TelemetryFeed:
     def _absorb(self) -> None:
         for topic in self._subscriber.take_topics(is_telemetry):
             self._waiting[topic] = None
-            if _is_robot(topic):
-                self._waiting[f"{topic}/state"] = None
+            row, robot_id = topics.find(topic)
+            if row is topics.ROBOT:
+                self._waiting[topics.ROBOT_STATE.of(robot_id)] = None
 
     def _due_at(self) -> float:
         """When the first of what waits may go; what has no room waits for credit."""
@@ -93,13 +96,16 @@ class TelemetryFeed:
             self._told[topic] = part.version, now.mono
 
     def _part(self, topic: str, since: int, now: Instant) -> Part | None:
-        if _is_robot(topic):
-            return self._encoder.move(topic.split("/")[1], now)
-        if topic.endswith("/state"):
-            return self._encoder.state(topic.split("/")[1], since, now)
-        if topic == "people":
-            return self._encoder.people(since, now)
-        return self._encoder.part(topic, now)
+        row, key = topics.find(topic)
+        match row.pace:
+            case "frame":
+                return self._encoder.move(key, now)
+            case "read-out" if row is topics.PEOPLE:
+                return self._encoder.people(since, now)
+            case "read-out":
+                return self._encoder.state(key, since, now)
+            case _:
+                return self._encoder.part(topic, now)
 
 
 class _Frame:
@@ -149,7 +155,7 @@ class _Frame:
 
 
 def _is_robot(topic: str) -> bool:
-    return topic.startswith("robots/") and topic.count("/") == 1
+    return topics.find(topic)[0] is topics.ROBOT
 
 
 def _next_after(topic: str, told_at: float) -> float:
@@ -167,4 +173,4 @@ def _next_after(topic: str, told_at: float) -> float:
 
 def _rank(topic: str) -> int:
     """People and states before pictures, where there is no room for all."""
-    return 1 if topic.endswith("/scan") or topic.startswith("detections/") else 0
+    return 1 if topics.find(topic)[0].pace == "picture" else 0

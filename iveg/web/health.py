@@ -1,45 +1,14 @@
 """Whether the chain is whole: for people, for supervisors, for Prometheus."""
 
-from collections import Counter
 from collections.abc import Callable
 
 from fastapi import APIRouter, Depends
 from starlette.responses import PlainTextResponse, Response
 
 from iveg.domain.observations import Instant
-from iveg.models.base import rounded
-from iveg.models.health import Health, Hop, Safety
-from iveg.pipeline.health_monitor import HealthMonitor
+from iveg.models.health import Health, Hop
 from iveg.web.answers import Json
 from iveg.web.auth import require
-
-
-def health_of(
-    chain: HealthMonitor,
-    counters: Callable[[], Counter[str]],
-    safety: Callable[[Instant], Safety],
-    now: Instant,
-) -> Health:
-    """Every hop with its state and age, all counters, and how the fleet is told."""
-    hops = [
-        Hop(
-            hop=hop.name,
-            state=hop.state,
-            age_s=rounded(hop.age_s, 1),
-            key=f"health.hop.{hop.name}.{hop.state}",
-            detail=hop.detail,
-            lag_s=rounded(hop.lag_s, 1),
-            growing=hop.growing,
-        )
-        for hop in chain.hops(now)
-    ]
-    return Health(
-        ok=all(hop.state == "ok" for hop in hops),
-        hops=hops,
-        counters=dict(sorted(counters().items())),
-        safety=safety(now),
-        earlier=chain.earlier(now),
-    )
 
 
 def router(

@@ -17,12 +17,13 @@ from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 
 from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.observations import Instant
-from iveg.domain.records import LogRecord
-from iveg.domain.stop import Command, Press
-from iveg.models.alert import LogEntry
+from iveg.domain.stop import Press
 from iveg.models.base import write_json
+from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
-from iveg.pipeline.publish import Hub, Subscriber, is_telemetry
+from iveg.pipeline import topics
+from iveg.pipeline.publish import Hub, Subscriber
+from iveg.pipeline.topics import is_telemetry
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
 from iveg.web.feed import TelemetryFeed
 from iveg.web.pacing import SUBPROTOCOL
@@ -49,12 +50,10 @@ class Encoder:
         views: Views,
         hub: Hub,
         clock: Callable[[], Instant],
-        health: Callable[[Instant], Any],
     ) -> None:
         self._views = views
         self._hub = hub
         self._clock = clock
-        self._health = health
         self.telemetry = TelemetryEncoder(views, hub)
         self._frames: dict[str, tuple[int, bytes]] = {}
 
@@ -72,27 +71,10 @@ class Encoder:
         return frame
 
     def _encode(self, topic: str) -> bytes | None:
-        now = self._clock()
-        kind, _, rest = topic.partition("/")
-        if kind == "robots" and rest.endswith("/scan"):
-            return self._scan(topic, rest.removesuffix("/scan"), now)
-        data: Any = None
-        if kind == "robots":
-            data = self._views.robot(rest, now)
-        elif kind == "detections":
-            data = self._views.frame(rest, now)
-        elif kind == "people":
-            data = self._views.people(now)
-        elif kind == "alerts":
-            data = self._views.alerts()
-        elif kind == "flood":
-            data = self._views.flood()
-        elif kind == "rule":
-            data = self._views.rule()
-        elif kind == "health":
-            data = self._health(now)
-        elif kind == "climate":
-            data = self._views.climate(now)
+        now, (row, key) = self._clock(), topics.find(topic)
+        if row is topics.SCAN:
+            return self._scan(topic, key, now)
+        data = None if row.read is None else row.read(self._views, key, now)
         return None if data is None else text(topic, data, now)
 
     def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
@@ -113,15 +95,8 @@ class Encoder:
 
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event that nobody may miss."""
-        data: Any = item
         now = self._clock()
-        if isinstance(item, LogRecord):
-            data = LogEntry.of_record(item)
-        elif topic == "log/earlier" and isinstance(item, list):
-            data = [LogEntry.of_record(line) for line in item]
-        elif isinstance(item, Command):
-            data = self._views.command(item, now)
-        return text(topic, data, now)
+        return text(topic, topics.find(topic)[0].tell(self._views, item, now), now)
 
 
 def text(topic: str, data: Any, now: Instant) -> bytes:
@@ -132,7 +107,7 @@ def text(topic: str, data: Any, now: Instant) -> bytes:
 def router(
     hub: Hub,
     encoder: Encoder,
-    snapshot: Callable[[Principal, Instant], dict[str, Any]],
+    snapshot: Callable[[Principal, Instant], Snapshot],
     clock: Callable[[], Instant],
     stop: Stop,
 ) -> APIRouter:
@@ -156,7 +131,7 @@ def router(
         feed = TelemetryFeed(encoder.telemetry, subscriber) if is_paced else None
         try:
             now = clock()
-            await line.say(text("snapshot", snapshot(principal, now), now))
+            await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
             async with asyncio.TaskGroup() as tasks:
                 sender = tasks.create_task(
                     line.send_all() if feed is None else line.send_paced(feed),
@@ -234,7 +209,7 @@ class Line:
             frame = self._encoder.frame(topic)
             if frame is None:
                 continue
-            if topic.endswith("/scan"):
+            if topics.find(topic)[0] is topics.SCAN:
                 await self._websocket.send_bytes(frame)
             else:
                 await self.say(frame)
@@ -293,7 +268,7 @@ class Ear:
         try:
             message = load_json(raw[:_MAX_MESSAGE])
         except UnreadableError as error:
-            self._subscriber.append("problem", {"reason": error.reason})
+            self._subscriber.append(topics.PROBLEM.name, {"reason": error.reason})
             return
         if not isinstance(message, dict):
             return
@@ -303,7 +278,7 @@ class Ear:
                     self._feed.painted(message.get("frame"), self._clock().mono)
             case "ping":
                 t, server = message.get("t"), self._clock().wall
-                self._subscriber.append("pong", {"t": t, "server": server})
+                self._subscriber.append(topics.PONG.name, {"t": t, "server": server})
             case "stop":
                 await self._press(message)
 
@@ -314,4 +289,4 @@ class Ear:
             try:
                 await self._stop(robot_id, self._principal.name, read_press(message))
             except UnknownRobotError as error:
-                self._subscriber.append("problem", {"reason": str(error)})
+                self._subscriber.append(topics.PROBLEM.name, {"reason": str(error)})

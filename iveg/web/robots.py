@@ -17,11 +17,7 @@ from iveg.web.auth import require
 from iveg.web.views import Views
 
 
-def router(
-    views: Views,
-    clock: Callable[[], Instant],
-    health: Callable[[Instant], Health],
-) -> APIRouter:
+def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
     """What is known now."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
@@ -66,6 +62,6 @@ def router(
     @routes.get("/health", response_model=Health)
     async def chain() -> Response:
         """The chain from robot to screen, hop by hop, and what was counted."""
-        return Json(health(clock()))
+        return Json(views.health(clock()))
 
     return routes

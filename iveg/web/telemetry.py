@@ -16,6 +16,7 @@ from iveg.domain.observations import Instant, LaserScan
 from iveg.models.base import write_json
 from iveg.models.people import Person
 from iveg.models.robot import Robot
+from iveg.pipeline import topics
 from iveg.pipeline.publish import Hub
 from iveg.web.views import Views
 
@@ -67,7 +68,7 @@ class TelemetryEncoder:
         odometry, age_s = self._views.motion(robot_id, now)
         if odometry is None:
             return None
-        topic = f"robots/{robot_id}"
+        topic = topics.ROBOT.of(robot_id)
         if self._moved.get(robot_id) is not odometry:
             self._moved[robot_id] = odometry
             pose, twist = odometry.pose, odometry.twist
@@ -81,7 +82,7 @@ class TelemetryEncoder:
 
     def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
         """What else of a robot has changed since a version; None: nothing."""
-        topic = f"robots/{robot_id}"
+        topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
         if state.version != self._hub.versions[topic]:
             told = self._views.robot(robot_id, now, self._margins_at(now))
@@ -90,7 +91,7 @@ class TelemetryEncoder:
 
     def people(self, since: int, now: Instant) -> Part | None:
         """Who there is, and whoever has changed since a version; None: nothing has."""
-        version = self._hub.versions["people"]
+        version = self._hub.versions[topics.PEOPLE.name]
         if self._people.version != version:
             told = self._views.people(now, self._margins_at(now))
             self._people.update(told, version, now.mono)
@@ -113,16 +114,18 @@ class TelemetryEncoder:
         return self._margins
 
     def _encode(self, topic: str, version: int, now: Instant) -> Part | None:
-        if topic.endswith("/scan"):
-            return self._scan(topic, version, now)
-        data = self._views.frame(topic.partition("/")[2], now)
+        row, robot_id = topics.find(topic)
+        if row is topics.SCAN:
+            return self._scan(topic, robot_id, version, now)
+        data = self._views.frame(robot_id, now)
         if data is None:
             return None
         told = {"topic": topic, "at": now.mono, "data": data}
         return Part(version, write_json(told))
 
-    def _scan(self, topic: str, version: int, now: Instant) -> Part | None:
-        robot_id = topic.split("/")[1]
+    def _scan(
+        self, topic: str, robot_id: str, version: int, now: Instant
+    ) -> Part | None:
         swept = self._views.sweep(robot_id)
         if swept is None:
             return None

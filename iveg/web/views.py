@@ -1,5 +1,8 @@
 """What is known, as models: built when somebody asks, never kept."""
 
+from collections import Counter
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +23,7 @@ from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
-from iveg.models.health import Safety
+from iveg.models.health import Health, Hop, Safety
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame
 from iveg.models.people import Person as PersonModel
@@ -39,14 +42,29 @@ from iveg.models.robot import (
 from iveg.models.rule import Rule
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
+from iveg.pipeline.health_monitor import HealthMonitor
+from iveg.pipeline.health_monitor import Hop as ChainHop
+from iveg.pipeline.minutes import Minutes
+
+_FIRST_LINES = 200
 
 
 class Views:
     """Reads the pipeline's state for browsers and integrators."""
 
-    def __init__(self, assessor: Assessor, commander: Commander) -> None:
+    def __init__(
+        self,
+        assessor: Assessor,
+        commander: Commander,
+        minutes: Minutes,
+        chain: HealthMonitor,
+        counters: Callable[[], Counter[str]],
+    ) -> None:
         self._assessor = assessor
         self._commander = commander
+        self._minutes = minutes
+        self._chain = chain
+        self._counters = counters
 
     @property
     def _world(self) -> World:
@@ -215,6 +233,11 @@ class Views:
             ],
         )
 
+    def frames(self, now: Instant) -> dict[str, DetectionFrame]:
+        """The newest detection frame of each robot that has one."""
+        frames = ((name, self.frame(name, now)) for name in self._world.robots)
+        return {name: frame for name, frame in frames if frame is not None}
+
     # --- commands, alerts, log ----------------------------------------------------
 
     def command(self, command: Command, now: Instant) -> CommandModel:
@@ -245,9 +268,24 @@ class Views:
         """How fast alarms come."""
         return Flood.of(self._assessor.alarms.flood)
 
-    def log(self, lines: list[LogRecord]) -> list[LogEntry]:
-        """Log lines."""
+    def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
+        """Lines of the log."""
         return [LogEntry.of_record(line) for line in lines]
+
+    def newest_log(self) -> list[LogEntry]:
+        """The lines that a page begins with, oldest first."""
+        return self.log(list(self._minutes.lines)[-_FIRST_LINES:])
+
+    def health(self, now: Instant) -> Health:
+        """Every hop with its state and age, all counters, and how the fleet is told."""
+        hops = [_hop(one) for one in self._chain.hops(now)]
+        return Health(
+            ok=all(hop.state == "ok" for hop in hops),
+            hops=hops,
+            counters=dict(sorted(self._counters().items())),
+            safety=self.safety(now),
+            earlier=self._chain.earlier(now),
+        )
 
     def safety(self, now: Instant) -> Safety:
         """How soon the fleet obeys, and how close it comes to people."""
@@ -268,6 +306,18 @@ class Views:
     def rule(self) -> Rule:
         """The version of the rule that is in force."""
         return Rule.of(self._assessor.rule)
+
+
+def _hop(hop: ChainHop) -> Hop:
+    return Hop(
+        hop=hop.name,
+        state=hop.state,
+        age_s=rounded(hop.age_s, 1),
+        key=f"health.hop.{hop.name}.{hop.state}",
+        detail=hop.detail,
+        lag_s=rounded(hop.lag_s, 1),
+        growing=hop.growing,
+    )
 
 
 def _acting(crossing: Crossing) -> Acting:

@@ -21,10 +21,11 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
+from iveg.models.base import write_json
 from iveg.pipeline.publish import Subscriber
 from iveg.pipeline.record import Waiting
 from iveg.web import history, stop_records
-from iveg.web.auth import require
+from iveg.web.auth import Principal, require
 from iveg.web.feed import TelemetryFeed
 from tests.builders import detection, detection_frame, hold, safety_report, scan
 from tests.fakes.records import (
@@ -174,6 +175,9 @@ def _live(desk: WebDesk) -> dict[str, Any]:
     """The frames of a browser without a subprotocol."""
     told = {f"live {topic}": _read(desk.encoder.frame(topic)) for topic in _TOPICS}
     told["live log"] = _read(desk.encoder.event("log", log_record()))
+    ana, now = Principal("ana", "operator"), desk.clock()
+    told["live snapshot"] = orjson.loads(write_json(desk.snapshot(ana, now)))
+    del told["live snapshot"]["log"]  # how many lines there are is nobody's business
     stop = desk.commander.machine("AGII").stop
     told["live commands/{id}"] = _read(desk.encoder.event("commands/x", stop))
     return told

@@ -12,7 +12,9 @@ from fastapi import FastAPI
 
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
+from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
+from iveg.pipeline import topics
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.rules import Rules
 from iveg.web import (
@@ -53,8 +55,14 @@ class WebDesk(Desk):
         self.mapper = Mapper(self.world, self.assessor.greenhouse.bounds)
         self.rule_store = FakeRuleStore()
         self.rules = Rules(self.assessor, self.rule_store, self.minutes, [])
-        self.views = Views(self.assessor, self.commander)
-        self.encoder = live.Encoder(self.views, self.hub, self.clock, self.health)
+        self.views = Views(
+            self.assessor,
+            self.commander,
+            self.minutes,
+            self.chain,
+            lambda: Counter({"some": 1}),
+        )
+        self.encoder = live.Encoder(self.views, self.hub, self.clock)
         self.app = FastAPI()
         self.app.state.door = self.door
         for router in self._routers():
@@ -76,27 +84,23 @@ class WebDesk(Desk):
     def _routers(self) -> list[Any]:
         return [
             live.router(self.hub, self.encoder, self.snapshot, self.clock, self.stop),
-            robots.router(self.views, self.clock, self.health),
+            robots.router(self.views, self.clock),
             costmap.router(self.mapper, self.assessor, self.clock),
             commands.router(self.commander, self.clock),
             alerts.router(self.assessor, self.clock),
             rule.router(self.rules, self.clock),
-            health.router(self.clock, self.health),
+            health.router(self.clock, self.views.health),
         ]
 
     # --- what the web asks --------------------------------------------------------
 
-    def health(self, now: Instant) -> Any:
-        counted = Counter({"some": 1})
-        return health.health_of(self.chain, lambda: counted, self.views.safety, now)
-
-    def snapshot(self, principal: Principal, now: Instant) -> dict[str, Any]:
-        return {
-            "t": format_stamp(now.wall),
-            "user": {"name": principal.name, "role": principal.role},
-            "robots": self.views.robots(now),
-            "commands": self.views.open_commands(now),
-        }
+    def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
+        return Snapshot(
+            t=format_stamp(now.wall),
+            server=Server(boot="iveg-boot", version="1", demo=True, wall=now.wall),
+            user=User(name=principal.name, role=principal.role),
+            **topics.read_all(self.views, now),
+        )
 
     async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
         targets = self.commander.machines if robot_id is None else [robot_id]

@@ -104,8 +104,8 @@ async def test_a_page_that_never_answers_gets_one_window_and_everything_else() -
         (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
         await settle()
         desk.answer("LATCHED")
-        desk.hub.append("end", None)
-        await page.read_until("end")
+        desk.hub.append("problem", None)
+        await page.read_until("problem")
 
     lines = [line.id for line in list(desk.minutes.lines)[before:]]
     steps = page.told(f"commands/{command.command_id}")

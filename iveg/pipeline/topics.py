@@ -1,0 +1,238 @@
+"""The live topics: what each is called, what its data are, where they are read.
+
+This table is the only place that spells a topic.  The pipeline names what has changed
+by it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the
+table read once.  A topic without ``read`` is an event: each is told, none is a state.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal, Protocol
+
+from iveg.domain.observations import Instant
+from iveg.domain.records import LogRecord
+from iveg.domain.stop import Command as StopCommand
+from iveg.models.alert import Alert, Flood, LogEntry
+from iveg.models.climate import Climate
+from iveg.models.command import Command
+from iveg.models.health import Health
+from iveg.models.people import DetectionFrame, Person
+from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.robot import Robot
+from iveg.models.rule import Rule
+
+Pace = Literal["at once", "frame", "read-out", "picture"]
+"""At once, past all telemetry; in each frame; as digits are read; as pictures are."""
+
+
+class Reader(Protocol):
+    """Who knows the newest value of everything (``web.views``)."""
+
+    def robot(self, robot_id: str, now: Instant) -> Robot:
+        """One robot."""
+
+    def robots(self, now: Instant) -> list[Robot]:
+        """The fleet."""
+
+    def people(self, now: Instant) -> list[Person]:
+        """Everyone who is known."""
+
+    def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
+        """A robot's newest detection frame."""
+
+    def frames(self, now: Instant) -> dict[str, DetectionFrame]:
+        """Those of all robots that have one."""
+
+    def command(self, command: StopCommand, now: Instant) -> Command:
+        """A command at one of its steps."""
+
+    def open_commands(self, now: Instant) -> list[Command]:
+        """Commands that go on."""
+
+    def alerts(self) -> list[Alert]:
+        """All that is for people to see now."""
+
+    def flood(self) -> Flood:
+        """How fast alerts come."""
+
+    def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
+        """Lines of the log."""
+
+    def newest_log(self) -> list[LogEntry]:
+        """The lines that a page begins with, oldest first."""
+
+    def rule(self) -> Rule:
+        """The version in force."""
+
+    def map(self) -> GreenhouseMap:
+        """The greenhouse."""
+
+    def health(self, now: Instant) -> Health:
+        """The data path, hop by hop."""
+
+    def climate(self, now: Instant) -> Climate | None:
+        """The newest reading of the air."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Topic:
+    """One row.
+
+    Attributes:
+        name: As docs/interfaces.md writes it; ``{id}`` is the key.
+        model: What its data are; None for what concerns one connection alone.
+        read: The newest value of one key; None for an event.
+        tell: The data of an event.
+        member: Its place in the snapshot; ``every`` reads what stands there.
+        pace: How often a browser that speaks ``iveg.2`` is told of it.
+    """
+
+    name: str
+    model: Any = None
+    read: Callable[[Reader, str, Instant], Any] | None = None
+    tell: Callable[[Reader, Any, Instant], Any] = lambda _, item, __: item
+    member: str = ""
+    every: Callable[[Reader, Instant], Any] | None = None
+    pace: Pace = "at once"
+
+    def of(self, key: str) -> str:
+        """The topic of one robot or command."""
+        return self.name.replace("{id}", key)
+
+    def __str__(self) -> str:
+        return self.name
+
+
+ROBOT = Topic(
+    "robots/{id}",
+    Robot,
+    lambda reader, robot_id, now: reader.robot(robot_id, now),
+    member="robots",
+    every=lambda reader, now: reader.robots(now),
+    pace="frame",
+)
+ROBOT_STATE = Topic("robots/{id}/state", Robot, pace="read-out")
+"""Within frames alone: what of a robot is not its motion."""
+SCAN = Topic("robots/{id}/scan", Scan, pace="picture")
+"""Binary, so that ``web`` writes it (docs/interfaces.md §8)."""
+PEOPLE = Topic(
+    "people",
+    list[Person],
+    lambda reader, _, now: reader.people(now),
+    member="people",
+    every=lambda reader, now: reader.people(now),
+    pace="read-out",
+)
+DETECTIONS = Topic(
+    "detections/{id}",
+    DetectionFrame,
+    lambda reader, robot_id, now: reader.frame(robot_id, now),
+    member="detections",
+    every=lambda reader, now: reader.frames(now),
+    pace="picture",
+)
+COMMAND = Topic(
+    "commands/{id}",
+    Command,
+    tell=lambda reader, command, now: reader.command(command, now),
+    member="commands",
+    every=lambda reader, now: reader.open_commands(now),
+)
+ALERTS = Topic(
+    "alerts",
+    list[Alert],
+    lambda reader, _, __: reader.alerts(),
+    member="alerts",
+    every=lambda reader, _: reader.alerts(),
+)
+FLOOD = Topic(
+    "flood",
+    Flood,
+    lambda reader, _, __: reader.flood(),
+    member="flood",
+    every=lambda reader, _: reader.flood(),
+)
+RULE = Topic(
+    "rule",
+    Rule,
+    lambda reader, _, __: reader.rule(),
+    member="rule",
+    every=lambda reader, _: reader.rule(),
+)
+MAP = Topic("map", GreenhouseMap, member="map", every=lambda reader, _: reader.map())
+"""In the snapshot alone: it stays as it is while iVeg runs."""
+LOG = Topic(
+    "log",
+    LogEntry,
+    tell=lambda reader, line, _: reader.log([line])[0],
+    member="log",
+    every=lambda reader, _: reader.newest_log(),
+)
+EARLIER_LOG = Topic(
+    "log/earlier", list[LogEntry], tell=lambda reader, lines, _: reader.log(lines)
+)
+HEALTH = Topic(
+    "health",
+    Health,
+    lambda reader, _, now: reader.health(now),
+    member="health",
+    every=lambda reader, now: reader.health(now),
+)
+CLIMATE = Topic(
+    "climate",
+    Climate | None,
+    lambda reader, _, now: reader.climate(now),
+    member="climate",
+    every=lambda reader, now: reader.climate(now),
+)
+SNAPSHOT = Topic("snapshot")
+PONG = Topic("pong")
+PROBLEM = Topic("problem")
+
+TOPICS = (
+    ROBOT,
+    ROBOT_STATE,
+    SCAN,
+    PEOPLE,
+    DETECTIONS,
+    COMMAND,
+    ALERTS,
+    FLOOD,
+    RULE,
+    MAP,
+    LOG,
+    EARLIER_LOG,
+    HEALTH,
+    CLIMATE,
+    SNAPSHOT,
+    PONG,
+    PROBLEM,
+)
+
+
+@lru_cache(maxsize=4096)
+def find(topic: str) -> tuple[Topic, str]:
+    """The row of a topic and its key; empty where the topic has none.
+
+    Raises:
+        KeyError: no such topic.
+    """
+    for row in TOPICS:
+        head, hole, tail = row.name.partition("{id}")
+        if not hole and topic == row.name:
+            return row, ""
+        key = topic.removeprefix(head).removesuffix(tail)
+        if hole and topic == row.of(key) and key and "/" not in key:
+            return row, key
+    raise KeyError(topic)
+
+
+def is_telemetry(topic: str) -> bool:
+    """Whether a topic changes with each measure, so that its sending is paced."""
+    return find(topic)[0].pace != "at once"
+
+
+def read_all(reader: Reader, now: Instant) -> dict[str, Any]:
+    """The members of the snapshot that topics have, by name."""
+    return {row.member: row.every(reader, now) for row in TOPICS if row.every}
