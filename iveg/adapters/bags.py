@@ -61,12 +61,20 @@ class Bag:
         path: A file ``.db3``, ``.mcap`` or ``.bag``, or a directory of ROS 2.
         topics: Which to read.
         mount: The laser's pose in ``base_link``.
+        needs_odometry: Whether a bag without it is refused.
 
     Raises:
         DataFileError: it cannot be read, or its topics leave open which is meant.
     """
 
-    def __init__(self, path: Path, topics: BagTopics, mount: Pose2D) -> None:
+    def __init__(
+        self,
+        path: Path,
+        topics: BagTopics,
+        mount: Pose2D,
+        *,
+        needs_odometry: bool = True,
+    ) -> None:
         self._path = path
         self._mount = mount
         self._is_ros1 = path.suffix == ".bag" and not path.is_dir()
@@ -78,9 +86,10 @@ class Bag:
             found = reader.connections
             odometry = self._choose(found, ODOMETRY, topics.odometry, "--odom-topic")
             scan = self._choose(found, SCAN, topics.scan, "--scan-topic")
-        if odometry is None:
+        if odometry is None and (needs_odometry or scan is None):
             raise self._unusable(f"holds no topic of type {ODOMETRY}")
-        self._topics = {odometry: ODOMETRY} | ({scan: SCAN} if scan else {})
+        self._topics = {odometry: ODOMETRY} if odometry else {}
+        self._topics |= {scan: SCAN} if scan else {}
 
     def messages(self) -> Iterator[BagMessage]:
         """All messages of both topics, in the order in which they were recorded.

@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -11,10 +12,12 @@ from iveg import __version__
 from iveg.cli.words import add_network_words, add_robot_words
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
 from iveg.domain.fleet import is_robot_id
+from iveg.domain.geometry import Pose2D
 from iveg.settings import Settings, default_data_directory, describe
 
 UNUSABLE = 2
 """Exit code for a setting or a file that cannot be used."""
+_FARTHEST_M = 1e6
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -147,6 +150,15 @@ def _parser() -> argparse.ArgumentParser:
         help="a ROS bag plays by when it was recorded, not by its stamps",
     )
     replay.add_argument(
+        "--pose",
+        type=_pose,
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="ROBOT:X,Y,YAW",
+        help="where a recording without odometry stands (m, m, rad)",
+    )
+    replay.add_argument(
         "--frame",
         type=_frame,
         metavar="NAME",
@@ -180,6 +192,17 @@ def _rate(text: str) -> float:
     if not 1.0 <= rate <= 60.0:
         raise argparse.ArgumentTypeError("a rate from 1 to 60 (Hz)")
     return rate
+
+
+def _pose(text: str) -> tuple[str, Pose2D]:
+    robot_id, _, place = text.partition(":")
+    try:
+        x, y, yaw = (float(part) for part in place.split(","))
+    except ValueError:
+        x = y = yaw = math.nan
+    if not all(abs(one) <= _FARTHEST_M for one in (x, y, yaw)):
+        raise argparse.ArgumentTypeError("ROBOT:X,Y,YAW in m, m, rad")
+    return robot_id, Pose2D(x, y, yaw)
 
 
 def _frame(text: str) -> str:

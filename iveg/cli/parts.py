@@ -217,6 +217,7 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
             topics=BagTopics(options.odom_topic, options.scan_topic),
             bag_time=options.bag_time,
             frame=options.frame,
+            poses=dict(options.pose),
         )
 
 
@@ -224,6 +225,9 @@ async def _refuse_replay(
     options: argparse.Namespace, settings: Settings, fleet: FleetDescription
 ) -> None:
     """A recording must never be taken for a robot that is really there."""
+    for name, _ in options.pose:
+        if name not in options.robot:
+            raise DataFileError("--pose", name, "is none of the robots to be played")
     for name in options.robot:
         if name not in fleet.members:
             known = ", ".join(fleet.ids)

@@ -55,14 +55,12 @@ class LogReader:
         file: ``.jsonl`` or ``.jsonl.gz``.
 
     Raises:
-        DataFileError: the file cannot be read or holds no odometry.
+        DataFileError: the file cannot be read.
     """
 
     def __init__(self, file: Path) -> None:
         self._file = file
         self._reported: set[int] = set()
-        if not any(isinstance(entry.observation, Odometry) for entry in self.entries()):
-            raise DataFileError(str(file), "", "holds no line of odometry.")
 
     def entries(self) -> Iterator[Entry]:
         """All entries from the start, in the order of the file.

@@ -11,7 +11,9 @@ _READ_AHEAD = 256
 """Lines looked ahead for the next pose; beyond, the robot is shown where it was."""
 
 _SEEN_FOR_S = 0.4
-"""How long (s of the recording) a recorded detection counts as seen."""
+"""How long (s of the recording) a recorded picture counts, unless another follows."""
+_ONE_PICTURE_S = 0.02
+"""Detections so close together are of one picture; 30 a second are usual at most."""
 
 
 class Playback:
@@ -37,7 +39,8 @@ class Playback:
         self._source = self._open()
         self._ahead: deque[Entry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
-        self._seen: list[tuple[float, Detection]] = []
+        self._picture: tuple[Detection, ...] = ()
+        self._taken_at = 0.0
         self._scan: LaserScan | None = None
         self._read_ahead()
         self._at = self._ahead[0].at if self._ahead else 0.0
@@ -52,7 +55,8 @@ class Playback:
         while self._ahead and self._ahead[0].at <= self._at:
             self._take(self._ahead.popleft())
             self._read_ahead()
-        self._seen = [seen for seen in self._seen if seen[0] > self._at - _SEEN_FOR_S]
+        if self._at - self._taken_at >= _SEEN_FOR_S:
+            self._picture = ()
         if not self._ahead and self._loop:
             self._start_over()
         self.ended = not self._ahead and not self._loop
@@ -74,7 +78,13 @@ class Playback:
                 self._scan = scan
             case Detection() as detection:
                 self.has_detector = True
-                self._seen.append((entry.at, detection))
+                self._see(detection, entry.at)
+
+    def _see(self, detection: Detection, at: float) -> None:
+        """The newest picture takes the place of the one before: who walks is one."""
+        if not self._picture or abs(at - self._taken_at) > _ONE_PICTURE_S:
+            self._picture, self._taken_at = (), at
+        self._picture = (*self._picture, detection)
 
     # --- what the robot senses at this moment -------------------------------------
 
@@ -101,5 +111,5 @@ class Playback:
 
     @property
     def detections(self) -> tuple[Detection, ...]:
-        """What was detected just now."""
-        return tuple(detection for _, detection in self._seen)
+        """What the newest picture shows; nothing when that is too long ago."""
+        return self._picture

@@ -6,8 +6,8 @@ from typing import Protocol
 
 from iveg.adapters.bags import Bag, BagMessage, BagTopics
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import Pose2D
-from iveg.domain.observations import Odometry
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Odometry, Origin
 from iveg.emulator.logs import Entry, LogReader
 
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap", ".bag")
@@ -31,6 +31,7 @@ def open_recording(
     topics: BagTopics | None = None,
     *,
     bag_time: bool = False,
+    pose: Pose2D | None = None,
 ) -> Recording:
     """Open a recording by its name.
 
@@ -39,13 +40,34 @@ def open_recording(
         mount: Where the laser of a bag sits in ``base_link``; logs say it themselves.
         topics: Which of a bag are read.
         bag_time: A bag plays by when it was recorded, not by the stamps of its sensors.
+        pose: Where a recording without odometry stands, such as a fixed camera's.
 
     Raises:
-        DataFileError: it is of no known kind, cannot be read or holds no odometry.
+        DataFileError: it is of no known kind, cannot be read, or neither holds odometry
+            nor was said where it stands.
     """
+    recording = _opened(path, mount, topics, bag_time=bag_time, fixed=pose is not None)
+    if any(isinstance(one.observation, Odometry) for one in recording.entries()):
+        return recording
+    if pose is None:
+        reason = "holds no odometry that can be used; --pose says where it stands."
+        raise DataFileError(str(path), "", reason)
+    if next(recording.entries(), None) is None:
+        raise DataFileError(str(path), "", "holds nothing that can be used.")
+    return FixedRecording(recording, pose)
+
+
+def _opened(
+    path: Path,
+    mount: Pose2D,
+    topics: BagTopics | None,
+    *,
+    bag_time: bool,
+    fixed: bool,
+) -> Recording:
     if path.is_dir() or path.suffix in _BAGS:
-        bag = Bag(path, topics or BagTopics(), mount)
-        return BagRecording(str(path), bag, bag_time=bag_time)
+        bag = Bag(path, topics or BagTopics(), mount, needs_odometry=not fixed)
+        return BagRecording(bag, bag_time=bag_time)
     if path.suffix in _LOGS:
         return LogReader(path)
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
@@ -53,23 +75,39 @@ def open_recording(
     raise DataFileError(str(path), "", reason)
 
 
+class FixedRecording:
+    """A recording of something that never moves: its pose comes before all else.
+
+    Args:
+        recording: Without odometry, and not empty.
+        pose: Where it stands in the frame of the recording.
+    """
+
+    def __init__(self, recording: Recording, pose: Pose2D) -> None:
+        self._recording = recording
+        self._stands = Odometry("", Origin(), pose, Twist2D(0.0, 0.0))
+
+    def entries(self) -> Iterator[Entry]:
+        """All entries, the pose first."""
+        entries = self._recording.entries()
+        first = next(entries)
+        yield Entry(first.at, self._stands)
+        yield first
+        yield from entries
+
+
 class BagRecording:
     """A bag whose messages come by the stamps of their sensors, or by bag time.
 
     Stamps count unless the first message has none: a bag without them, or one that is
     asked to, plays by bag time throughout, since the two clocks may differ by years.
-
-    Raises:
-        DataFileError: the bag holds no odometry that can be used.
     """
 
-    def __init__(self, name: str, bag: Bag, *, bag_time: bool) -> None:
+    def __init__(self, bag: Bag, *, bag_time: bool) -> None:
         self._bag = bag
         first = next(bag.messages(), None)
         self._by_bag = bag_time or (first is not None and first.stamp_s <= 0.0)
         self._start = 0.0 if first is None else self._time_of(first)
-        if not any(isinstance(one.observation, Odometry) for one in self.entries()):
-            raise DataFileError(name, "", "holds no odometry that can be used.")
 
     def entries(self) -> Iterator[Entry]:
         """All entries from the start; one whose stamp is absurd is left out."""

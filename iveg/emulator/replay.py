@@ -8,7 +8,7 @@ detections are told again, as a robot that stands goes on seeing what it saw.
 """
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from iveg.adapters.bags import BagTopics
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
-from iveg.domain.geometry import Twist2D
+from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
@@ -75,6 +75,7 @@ async def run_replay(
     bag_time: bool = False,
     fleet: FleetDescription | None = None,
     frame: str | None = None,
+    poses: Mapping[str, Pose2D] | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
 
@@ -94,16 +95,19 @@ async def run_replay(
         fleet: What each robot is; None: nobody described them.
         frame: The map that all recordings are in; None: each is in one of its own, and
             nobody in it slows another robot.
+        poses: By robot, where a recording without odometry stands.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
     """
     _check(files, robots, speed)
-    known = fleet or NOBODY
+    known, stands = fleet or NOBODY, poses or {}
     profiles = [known.of_robot(robot_id).profile for robot_id in robots]
     recordings = [
-        open_recording(file, profile.laser, topics, bag_time=bag_time)
-        for file, profile in zip(files, profiles, strict=True)
+        open_recording(
+            file, profile.laser, topics, bag_time=bag_time, pose=stands.get(robot_id)
+        )
+        for file, robot_id, profile in zip(files, robots, profiles, strict=True)
     ]
     playbacks = [Playback(one.entries, loop=loop) for one in recordings]
     settings = ReplaySettings(

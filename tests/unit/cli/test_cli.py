@@ -67,6 +67,9 @@ def test_a_bad_setting_stops_the_start_with_one_sentence(
         ["emulator", "--profile", "dream"],
         ["replay", "log.jsonl"],
         ["replay", "log.jsonl", "--robot", "AGI", "--speed", "0"],
+        ["replay", "log.jsonl", "--robot", "AGI", "--pose", "AGI:1,2"],
+        ["replay", "log.jsonl", "--robot", "AGI", "--pose", "AGI:1,nan,0"],
+        ["replay", "log.jsonl", "--robot", "AGI", "--frame", "our map"],
         ["db", "downgrade"],
     ],
 )
@@ -82,6 +85,15 @@ def test_a_recording_of_a_robot_outside_the_fleet_is_refused(
 ) -> None:
     assert run(["replay", "log.jsonl", "--robot", "AGX"]) == UNUSABLE
     assert "AGX" in capsys.readouterr().err
+
+
+def test_a_pose_of_a_robot_that_is_not_played_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ["replay", "log.jsonl", "--robot", "D1", "--pose", "D2:1,2,0.5"]
+
+    assert run(words) == UNUSABLE
+    assert "--pose, D2: is none of the robots" in capsys.readouterr().err
 
 
 def test_nothing_is_played_as_a_live_robot_even_by_force(

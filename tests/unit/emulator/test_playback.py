@@ -9,6 +9,7 @@ from iveg.emulator.logs import Entry, LogReader
 from iveg.emulator.playback import Playback
 from tests import data
 from tests.builders import scan
+from tests.unit.domain.scene import Scene
 
 DATA = Path(data.__file__).parent
 
@@ -22,8 +23,8 @@ def swept(at: float) -> Entry:
     return Entry(at, scan())
 
 
-def saw(at: float) -> Entry:
-    box = Box3D(0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
+def saw(at: float, x: float = 0.5) -> Entry:
+    box = Box3D(x - 0.5, x + 0.5, 0.0, 1.0, 0.0, 1.0)
     return Entry(at, Detection("farmer", 0.9, box, "map"))
 
 
@@ -86,6 +87,40 @@ def test_a_detection_is_seen_for_a_moment_of_the_recording() -> None:
     assert (at_first, later) == (False, True)
     assert paused == seen
     assert playback.detections == ()
+
+
+def test_of_pictures_that_follow_each_other_the_newest_is_seen_alone() -> None:
+    walk = [saw(0.1 * step, 0.15 * step) for step in range(1, 5)]
+    playback = Playback(log(moved(0.0, 0.0), *walk, moved(9.0, 1.0)), loop=False)
+
+    playback.advance(0.45)
+
+    assert playback.detections == (walk[-1].observation,)
+
+
+def test_people_of_one_picture_are_all_seen_whatever_milliseconds_it_took() -> None:
+    two = saw(0.30, 1.0), saw(0.31, 5.0)
+    entries = moved(0.0, 0.0), saw(0.2, 9.0), *two, moved(9.0, 1.0)
+    playback = Playback(log(*entries), loop=False)
+
+    playback.advance(0.4)
+
+    assert playback.detections == tuple(one.observation for one in two)
+
+
+def test_one_person_who_walks_through_a_log_is_one_person_on_the_map() -> None:
+    walk = [saw(0.1 * step, 0.15 * step) for step in range(60)]
+    playback = Playback(log(moved(0.0, 0.0), *walk, moved(9.0, 1.0)), loop=False)
+    scene = Scene(robots=("D1:recording",))
+    most = 0
+
+    for _ in range(30):
+        playback.advance(0.2)
+        scene.now += 0.2
+        scene.look("D1", *playback.detections)
+        most = max(most, len(scene.everyone))
+
+    assert most == 1
 
 
 def test_a_recording_ends_after_its_last_entry() -> None:

@@ -145,6 +145,57 @@ def test_a_bag_without_odometry_is_refused(tmp_path: Path) -> None:
         entries(bag)
 
 
+SAW = '{"t":1,"kind":"detection","class":"farmer","probability":0.9,"x":5,"y":1}\n'
+
+
+def test_a_log_without_odometry_is_refused_unless_it_is_said_where_it_stands(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "camera.jsonl"
+    file.write_text(SAW)
+
+    with pytest.raises(DataFileError, match=r"holds no odometry .*--pose says where"):
+        open_recording(file, MOUNT)
+
+
+def test_a_log_of_a_fixed_camera_stands_where_it_was_said(tmp_path: Path) -> None:
+    file = tmp_path / "camera.jsonl"
+    file.write_text(SAW)
+
+    pose, saw = open_recording(file, MOUNT, pose=Pose2D(3.0, 4.0, 0.5)).entries()
+
+    assert isinstance(pose.observation, Odometry)
+    assert pose.observation.pose == Pose2D(3.0, 4.0, 0.5)
+    assert pose.observation.twist == Twist2D(0.0, 0.0)
+    assert (pose.at, saw.at) == (1.0, 1.0)
+
+
+def test_a_bag_of_scans_alone_stands_where_it_was_said(tmp_path: Path) -> None:
+    said = [one for one in drive(1.0) if one.kind == SCAN]
+    bag = db3_bag(tmp_path / "run", said)
+
+    found = list(open_recording(bag, MOUNT, pose=Pose2D(3.0, 4.0, 0.5)).entries())
+
+    assert poses(found) == [Pose2D(3.0, 4.0, 0.5)]
+    assert len(found) == len(said) + 1
+
+
+def test_what_moves_by_its_own_odometry_is_not_nailed_down(tmp_path: Path) -> None:
+    bag = db3_bag(tmp_path / "run", drive(1.0))
+
+    found = open_recording(bag, MOUNT, pose=Pose2D(30.0, 4.0, 0.5)).entries()
+
+    assert max(one.x for one in poses(list(found))) < 3.0
+
+
+def test_an_empty_log_is_refused_wherever_it_stands(tmp_path: Path) -> None:
+    file = tmp_path / "camera.jsonl"
+    file.write_text("\n")
+
+    with pytest.raises(DataFileError, match="holds nothing that can be used"):
+        open_recording(file, MOUNT, pose=Pose2D(0.0, 0.0, 0.0))
+
+
 def test_a_message_that_cannot_be_used_is_reported_once_and_skipped(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
