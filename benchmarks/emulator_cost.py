@@ -9,19 +9,22 @@ import time
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import Instant
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import World
+from iveg.emulator.world import Camera, World
 from iveg.robot.uplink import Uplink
 
 RATE_HZ = 30.0
 SECONDS = 20
-CASES = (
-    ("mvsim-20x20", "demo", ("AGI", "AGII")),
-    ("mvsim-20x20", "demo", tuple(f"R{n}" for n in range(10))),
-    ("agroconnect", "demo", ("AGI", "AGII")),
-    ("none", "demo", tuple(f"R{n}" for n in range(20))),
+CASES: tuple[tuple[str, tuple[str, ...], Camera], ...] = (
+    ("mvsim-20x20", ("AGI", "AGII"), "boxes"),
+    ("mvsim-20x20", ("AGI", "AGII"), "grounding"),
+    ("mvsim-20x20", tuple(f"R{n}" for n in range(10)), "boxes"),
+    ("agroconnect", ("AGI", "AGII"), "boxes"),
+    ("agroconnect", ("AGI", "AGII"), "grounding"),
+    ("none", tuple(f"R{n}" for n in range(20)), "boxes"),
 )
 
 
@@ -48,25 +51,26 @@ def spent(world: World) -> dict[str, float]:
             wish = rig.wish(now, world)
             rig.drive(wish if tick > RATE_HZ else Twist2D(0.0, 0.0))
             rig.move(1.0 / RATE_HZ)
-            uplink.send(rig.odometry(), now)
+            uplink.send(rig.odometry(), Instant(now, now))
             at = timed("drive", at)
-            uplink.send(rig.scan(world), now)
+            uplink.send(rig.scan(world), Instant(now, now))
             at = timed("laser", at)
-            uplink.send(rig.look(now, world), now)
+            uplink.send(rig.look(now, world), Instant(now, now))
             at = timed("camera", at)
     return parts
 
 
 def main() -> None:
-    print("greenhouse    robots   people    drive    laser   camera   core per robot")
-    for name, scenario, robots in CASES:
+    parts_named = "people    drive    laser   camera   core per robot"
+    print(f"greenhouse   boxes by   robots   {parts_named}")
+    for name, robots, camera in CASES:
         house = load_greenhouse(name)
-        layout = lay_out(scenario_named(scenario), robots, house)
-        world = World(house, layout, DETECTORS["simulation"], seed=1)
+        layout = lay_out(scenario_named("demo"), robots, house)
+        world = World(house, layout, DETECTORS["simulation"], 1, camera)
         parts = spent(world)
         each = [one / SECONDS / len(robots) for one in parts.values()]
         shares = "".join(f"{share:9.2%}" for share in each)
-        print(f"{name:12} {len(robots):7} {shares} {sum(each):14.2%}")
+        print(f"{name:12} {camera:9} {len(robots):7} {shares} {sum(each):14.2%}")
 
 
 if __name__ == "__main__":

@@ -107,6 +107,12 @@ def _parser() -> argparse.ArgumentParser:
         "--profile", default="simulation", choices=("simulation", "field", "perfect")
     )
     emulator.add_argument(
+        "--camera",
+        default="boxes",
+        choices=("boxes", "grounding"),
+        help="draw boxes about the truth, or ground masks in depth pictures",
+    )
+    emulator.add_argument(
         "--held", action="store_true", help="robots stay held after they boot"
     )
     emulator.add_argument(

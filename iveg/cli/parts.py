@@ -165,6 +165,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 fault_port=options.fault_port,
                 network=network,
                 description=fleet,
+                camera=options.camera,
             ),
             name="emulator",
         )

@@ -1,9 +1,10 @@
 """Camera and detector: who is in view, and what a detector of the paper's makes of it.
 
-Nothing is rendered.  A target in the field of view, in range and not hidden by crop or
-crates opens an *encounter* of 0.5 to 2 s; whether it is missed, how sure the detector
-is and whether a false box comes with it is drawn once for the encounter, so that
-mistakes last as long as real ones and do not flicker away between two frames.
+Unless ``grounded`` places what is found, nothing is rendered.  A target in the field of
+view, in range and not hidden by crop or crates opens an *encounter* of 0.5 to 2 s;
+whether it is missed, how sure the detector is and whether a false box comes with it is
+drawn once for the encounter, so that mistakes last as long as real ones and do not
+flicker away between two frames.
 
 Source of the rates: the seed paper's field table (true positives, false positives,
 false negatives per class).  Assumed: the spread of confidence, the length of an
@@ -11,7 +12,7 @@ encounter, that false boxes are less sure than true ones.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -145,6 +146,21 @@ class _Encounter:
     ghost: _Ghost | None
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A target that the network has found, and how sure it is (0 to 1)."""
+
+    target: Target
+    probability: float
+
+
+Place = Callable[
+    [Pose2D, Sequence[Found], Sequence[Target], Scenery],
+    tuple[tuple[Detection, ...], int],
+]
+"""Places what was found: boxes, and how many are there without a place."""
+
+
 class Detector:
     """One robot's camera and the network behind it.
 
@@ -152,11 +168,21 @@ class Detector:
         profile: Where the camera sits and what it sees.
         model: How good the network is.
         rng: Where its mistakes come from.
+        place: Makes boxes of what was found; None draws them about the truth.
+
+    Attributes:
+        lost: How many of the last look are there without a place.
     """
 
     def __init__(
-        self, profile: RobotProfile, model: DetectorModel, rng: np.random.Generator
+        self,
+        profile: RobotProfile,
+        model: DetectorModel,
+        rng: np.random.Generator,
+        place: Place | None = None,
     ) -> None:
+        self.lost = 0
+        self._place = place
         self._profile = profile
         self._model = model
         self._rng = rng
@@ -177,17 +203,25 @@ class Detector:
             Boxes in ``base_link``.
         """
         camera = pose.compose(self._profile.camera)
-        found: list[Detection] = []
+        drawn: list[Detection] = []
+        found: list[Found] = []
         for target in targets:
             seen = self.part_seen(camera, target.body, scenery)
             encounter = self._encounter(now, camera, target, seen > 0.0)
             if encounter is None:
                 continue
             if seen > 0.0 and not encounter.missed:
-                found.append(self._box(pose, target, encounter, seen))
+                if self._place is None:
+                    drawn.append(self._box(pose, target, encounter, seen))
+                else:
+                    found.append(Found(target, self._certainty(encounter, seen)))
             if encounter.ghost is not None:
-                found.append(self._ghost_box(pose, encounter.ghost))
-        return tuple(found)
+                drawn.append(self._ghost_box(pose, encounter.ghost))
+        if self._place is None or not found:
+            self.lost = 0
+            return tuple(drawn)
+        placed, self.lost = self._place(pose, found, targets, scenery)
+        return (*placed, *drawn)
 
     # --- what is in view ----------------------------------------------------------
 
@@ -256,8 +290,10 @@ class Detector:
         corners = [_into(pose, float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
-        confidence = encounter.confidence - _HIDDEN_LOSS * (1.0 - seen)
-        return Detection(target.class_id, self._probability(confidence), box)
+        return Detection(target.class_id, self._certainty(encounter, seen), box)
+
+    def _certainty(self, encounter: _Encounter, seen: float) -> float:
+        return self._probability(encounter.confidence - _HIDDEN_LOSS * (1.0 - seen))
 
     def _ghost_box(self, pose: Pose2D, ghost: _Ghost) -> Detection:
         probability = self._probability(ghost.confidence)

@@ -33,7 +33,7 @@ from iveg.emulator.relay import Relay
 from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import Rig, World, climate_at
+from iveg.emulator.world import Camera, Rig, World, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
 from iveg.robot.ros2.config import RobotConfig
@@ -66,6 +66,7 @@ async def run_emulator(
     network: Network | None = None,
     ros2: Mapping[str, RobotConfig] | None = None,
     description: FleetDescription | None = None,
+    camera: Camera = "boxes",
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -90,6 +91,7 @@ async def run_emulator(
         ros2: What each one's topics are called; below ``/`` and its id in small letters
             where nothing is said.
         description: What each robot is; None: iVeg's own.
+        camera: Where boxes come from: drawn about the truth, or by grounding.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the house.
@@ -100,7 +102,7 @@ async def run_emulator(
         raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
     layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
-    world = World(greenhouse, layout, detector, seed)
+    world = World(greenhouse, layout, detector, seed, camera)
     settings = FleetSettings(
         address, apikey, uplink, slow_s, stand_s, state_directory, held, rate_hz
     )

@@ -6,6 +6,7 @@ Pure but for its seeds: time is an argument, so an hour is a loop of steps.
 
 import math
 from collections.abc import Mapping
+from typing import Literal
 
 import numpy as np
 
@@ -31,12 +32,14 @@ from iveg.emulator.camera import (
 )
 from iveg.emulator.following import Follower
 from iveg.emulator.greenhouse import Body, Disc, Scenery
+from iveg.emulator.grounded import GroundedCamera
 from iveg.emulator.kinematics import Odometer, Vehicle
 from iveg.emulator.layout import Layout
 from iveg.emulator.lidar import LaserModel, sweep
 from iveg.emulator.people import Person
 from iveg.emulator.scripts import RobotScript
 
+Camera = Literal["boxes", "grounding"]
 REST = Twist2D(0.0, 0.0)
 _LASER = LaserModel()
 _FALSE_PERSON_CONFIDENCE = 0.95
@@ -58,6 +61,7 @@ class Rig:
         script: RobotScript,
         detector: DetectorModel,
         rng: np.random.Generator,
+        camera: Camera = "boxes",
     ) -> None:
         self.robot_id = robot_id
         self.profile = profile
@@ -67,7 +71,10 @@ class Rig:
         self._script = script
         self._rng = rng
         self._odometer = Odometer(rng)
-        self._detector = Detector(self.profile, detector, rng)
+        place = None
+        if camera == "grounding":
+            place = GroundedCamera(profile, rng.spawn(1)[0]).place
+        self._detector = Detector(profile, detector, rng, place)
         self.vehicle = Vehicle(self.profile, script.start)
         self._believed = script.start
         self._follower = Follower(
@@ -128,7 +135,7 @@ class Rig:
             x, y = self.false_person
             ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
             found = (*found, ghost)
-        return DetectionFrame(self.robot_id, Origin(), found)
+        return DetectionFrame(self.robot_id, Origin(), found, self._detector.lost)
 
     def part_seen(self, target: Target, around: "World") -> float:
         """How much of a target its camera has in view, whatever the detector says."""
@@ -150,10 +157,16 @@ class World:
         layout: Who, and on which ways.
         detector: How good the robots' detectors are.
         seed: The same seed gives the same people and the same noise.
+        camera: Where boxes come from: drawn about the truth, or by grounding.
     """
 
     def __init__(
-        self, house: Greenhouse, layout: Layout, detector: DetectorModel, seed: int
+        self,
+        house: Greenhouse,
+        layout: Layout,
+        detector: DetectorModel,
+        seed: int,
+        camera: Camera = "boxes",
     ) -> None:
         streams = np.random.SeedSequence(seed).spawn(
             len(layout.robots) + len(layout.people)
@@ -161,7 +174,9 @@ class World:
         generators = [np.random.default_rng(stream) for stream in streams]
         self.scenery = Scenery.of(house)
         self.rigs: Mapping[str, Rig] = {
-            robot_id: Rig(robot_id, layout.profiles[robot_id], script, detector, rng)
+            robot_id: Rig(
+                robot_id, layout.profiles[robot_id], script, detector, rng, camera
+            )
             for (robot_id, script), rng in zip(
                 layout.robots.items(), generators, strict=False
             )

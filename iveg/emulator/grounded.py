@@ -1,0 +1,128 @@
+"""Boxes the long way round: a mask and a depth picture, and the grounding of a robot.
+
+What the network finds, and how sure it is, is drawn as ever (``camera``); where it is
+comes out of the picture, by the very code that rides on a robot (``robot/grounding``).
+Only the part of the picture about a target is taken: the rest is looked at by nobody.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import Detection, Origin
+from iveg.emulator.camera import PERSON, Found, Target
+from iveg.emulator.depth import (
+    DepthCamera,
+    Foliage,
+    Upright,
+    person_shape,
+    robot_shape,
+    take,
+)
+from iveg.emulator.greenhouse import Disc, Scenery
+from iveg.robot.grounding.cloud import Pinhole
+from iveg.robot.grounding.locate import Grounding, Mount, look
+
+_WIDTH, _HEIGHT = 320, 240
+"""As a D435 sends depth; a quarter of its pixels, and enough of them at 8 m."""
+_BESIDE_M = 0.2
+"""So far beside a target its leaves and its fringe may hang."""
+_NEAREST_M = 0.3
+_SETTINGS = Grounding(p_min=0.0, hidden={PERSON: 0.36})
+"""A robot tells faint ones, too: what iVeg does with them is iVeg's to say."""
+
+
+class GroundedCamera:
+    """One robot's depth camera and the software that places what it shows.
+
+    Args:
+        profile: Where the camera sits and what it sees.
+        rng: Where noise and leaves come from.
+    """
+
+    def __init__(self, profile: RobotProfile, rng: np.random.Generator) -> None:
+        lens = Pinhole.across(profile.camera_fov, _WIDTH, _HEIGHT)
+        self._camera = replace(DepthCamera.of(profile), lens=lens)
+        self._mount = Mount.of(profile)
+        self._rng = rng
+
+    def place(
+        self,
+        pose: Pose2D,
+        found: Sequence[Found],
+        targets: Sequence[Target],
+        scenery: Scenery,
+    ) -> tuple[tuple[Detection, ...], int]:
+        """Place what was found.
+
+        Args:
+            pose: The robot's true pose in ``map``.
+            found: Of these, in the order that they are told in.
+            targets: All that may hide one another.
+            scenery: What hides them, too.
+
+        Returns:
+            Boxes in ``base_link``, and how many are there without a place.
+        """
+        placed: list[Detection] = []
+        lost = 0
+        for one in found:
+            others = [each for each in targets if each.key != one.target.key]
+            boxes, unplaced = self._one(pose, one, others, scenery)
+            placed += boxes
+            lost += unplaced
+        return tuple(placed), lost
+
+    def _one(
+        self, pose: Pose2D, one: Found, others: Sequence[Target], scenery: Scenery
+    ) -> tuple[tuple[Detection, ...], int]:
+        sensor = pose.compose(self._mount.pose)
+        lens = _about(self._camera, sensor, one.target)
+        if lens is None:
+            return (), 0
+        shapes = [_shape(one.target), *(_shape(other) for other in others)]
+        foliage = Foliage() if scenery.rectangles.size else None
+        camera = replace(self._camera, lens=lens)
+        view = take(camera, sensor, shapes, scenery, foliage, self._rng)
+        segment = view.segment(1, one.target.class_id, one.probability)
+        if segment is None:
+            return (), 0
+        frame = look("", Origin(), [segment], view.depth, self._mount, _SETTINGS)
+        return frame.detections, frame.unreadable
+
+
+def _shape(target: Target) -> tuple[Upright, ...]:
+    body = target.body
+    if target.class_id != PERSON:
+        return robot_shape(body)
+    return person_shape(Disc(body.pose.x, body.pose.y, body.width / 2))
+
+
+def _about(camera: DepthCamera, sensor: Pose2D, target: Target) -> Pinhole | None:
+    """The part of the lens in which a target can be; None where it is out of view."""
+    lens, body = camera.lens, target.body
+    dx, dy = body.pose.x - sensor.x, body.pose.y - sensor.y
+    c, s = math.cos(sensor.yaw), math.sin(sensor.yaw)
+    ahead, left = c * dx + s * dy, c * dy - s * dx
+    reach = math.hypot(body.length, body.width) / 2 + _BESIDE_M
+    scale = lens.focal / max(ahead - reach, _NEAREST_M)
+    columns = _within(
+        lens.cx - scale * (left + reach), lens.cx - scale * (left - reach), lens.width
+    )
+    over = scale * (target.height + _BESIDE_M - camera.height)
+    rows = _within(lens.cy - over, lens.cy + scale * camera.height, lens.height)
+    if ahead <= 0.0 or columns is None or rows is None:
+        return None
+    (first, last), (top, bottom) = columns, rows
+    cx, cy = lens.cx - first, lens.cy - top
+    return Pinhole(last - first, bottom - top, lens.focal, cx, cy)
+
+
+def _within(low: float, high: float, size: int) -> tuple[int, int] | None:
+    """Whole pixels from ``low`` to ``high`` of a picture; None where there is none."""
+    first, last = max(0, math.floor(low)), min(size, math.ceil(high) + 1)
+    return (first, last) if first < last else None
