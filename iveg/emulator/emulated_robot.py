@@ -10,6 +10,8 @@ from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import Instant
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import every
 from iveg.emulator.relay import Relay
@@ -27,6 +29,7 @@ LINK_FIELDS = {
     "reorder_percent",
     "delay_ms",
     "jitter_ms",
+    "mute",
 }
 """Fields of a fault order that its radio obeys."""
 
@@ -81,6 +84,9 @@ class EmulatedRobot:
         self._run_began = 0.0
         self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
         self._is_odometry_frozen = False
+        self._is_deaf = False
+        self._wish = REST
+        self._clock_offset_s = 0.0
 
     def _new_node(self, *, held: bool) -> RobotNode:
         settings = self._settings
@@ -90,11 +96,12 @@ class EmulatedRobot:
             apikey=settings.apikey,
             profile=self._rig.profile,
             hold_file=settings.state_directory / f"{self.robot_id}.holds.json",
-            drive=self._rig.drive,
+            drive=self._obey_gate,
             slow_s=settings.slow_s,
             stand_s=settings.stand_s,
             uplink=settings.uplink,
             held=held,
+            read_clock=self._read_clock,
         )
 
     async def run(self, began: float, phase: float) -> None:
@@ -131,7 +138,8 @@ class EmulatedRobot:
             # While wishes do not count navigation asks for rest: the gate wants to see
             # that before it lets the robot move again.
             wish = self._rig.wish(now, self._world)
-            node.wish(wish if node.may_drive else REST)
+            self._wish = wish if node.may_drive else REST
+            node.wish(self._wish)
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if self._node_task is None:
             return
@@ -151,15 +159,25 @@ class EmulatedRobot:
         if self._node_task is not None:
             self._node.sense(self._rig.look(self._now(), self._world))
 
+    def _obey_gate(self, command: Twist2D) -> None:
+        """The base takes what the gate lets through; a deaf one only when to halt."""
+        ignores = self._is_deaf and command != REST
+        self._rig.drive(self._wish if ignores else command)
+
+    def _read_clock(self) -> Instant:
+        """The robot's own clocks, of which the one on the wall may be wrong."""
+        now = clock.now()
+        return Instant(now.mono, now.wall + self._clock_offset_s)
+
     # --- faults -------------------------------------------------------------------
 
     def obey(self, order: FaultOrder) -> None:
         """Do what a fault order says, in the order of its fields."""
         node = self._node
-        node.mute = node.mute if order.mute is None else order.mute
-        node.deaf = node.deaf if order.deaf is None else order.deaf
+        if order.deaf is not None:
+            self._is_deaf = order.deaf
         if order.clock_offset_s is not None:
-            node.clock_offset_s = order.clock_offset_s
+            self._clock_offset_s = order.clock_offset_s
         self._freeze(order)
         self._disturb(order)
         self._blind(order)

@@ -107,7 +107,7 @@ async def run_emulator(
         address, apikey, uplink, slow_s, stand_s, state_directory, held, rate_hz
     )
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
-    is_radio_bad = bool(faults) or fault_port is not None
+    is_radio_bad = bool(incidents) or fault_port is not None
     bases = None
     if network is not None:
         bases = partial(_base, world, network, ros2 or {}, rate_hz)

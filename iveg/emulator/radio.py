@@ -20,6 +20,7 @@ class LinkFaults:
         reorder_percent: Delivered after the next of the same topic.
         delay_ms: Added to all; ``jitter_ms`` at most more, order kept.
         repeats_odometry: In place of odometry its last message goes out again.
+        mute: Nothing that the robot publishes arrives; it learns nothing of that.
     """
 
     drop_percent: float = 0.0
@@ -28,6 +29,7 @@ class LinkFaults:
     delay_ms: float = 0.0
     jitter_ms: float = 0.0
     repeats_odometry: bool = False
+    mute: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +40,13 @@ class Packet:
         topic: Where it is published to; None for a packet of another kind.
         qos: 0 to 2.
         raw: All its bytes.
+        receipt: What a broker answers to one of QoS 1 (PUBACK); else empty.
     """
 
     topic: str | None
     qos: int
     raw: bytes
+    receipt: bytes = b""
 
     @property
     def is_telemetry(self) -> bool:
@@ -59,7 +63,7 @@ class Radio:
 
     Attributes:
         faults: How bad the radio is now.
-        counters: What was dropped, duplicated, reordered, repeated.
+        counters: What was dropped, duplicated, reordered, repeated, muted.
     """
 
     def __init__(self, odometry: frozenset[str], rng: np.random.Generator) -> None:
@@ -75,6 +79,9 @@ class Radio:
         """What goes out for a packet, and when (same clock as ``now``, s)."""
         if packet.topic is None:
             return [(now, packet.raw)]
+        if self.faults.mute:
+            self.counters["muted"] += 1
+            return []
         if not packet.is_telemetry:
             return [(self._due(now), packet.raw)]
         out = self._disturbed(self._repeated(packet, packet.topic), packet.topic)

@@ -96,7 +96,7 @@ class Relay:
             asyncio.create_task(way, name=f"relay-{name}")
             for name, way in (
                 ("down", _copy(down, writer)),
-                ("up", self._take(reader, up, waiting)),
+                ("up", self._take(reader, writer, up, waiting)),
                 ("late", _send_when_due(waiting, up)),
             )
         ]
@@ -110,12 +110,17 @@ class Relay:
     async def _take(
         self,
         reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
         up: asyncio.StreamWriter,
         waiting: asyncio.Queue[tuple[float, bytes]],
     ) -> None:
         while True:
             packet = await read_packet(reader)
-            for due, raw in self.radio.pass_on(packet, clock.now().mono):
+            passed = self.radio.pass_on(packet, clock.now().mono)
+            if packet.receipt and not passed:
+                # Swallowed: without it the robot's software would wait for the broker.
+                writer.write(packet.receipt)
+            for due, raw in passed:
                 if packet.topic is None:
                     up.write(raw)
                 elif waiting.full():
@@ -163,4 +168,6 @@ async def read_packet(reader: asyncio.StreamReader) -> Packet:
         return Packet(None, 0, head + rest)
     size = int.from_bytes(rest[:2], "big")
     topic = rest[2 : 2 + size].decode("utf-8", "replace")
-    return Packet(topic, head[0] >> 1 & 3, head + rest)
+    qos = head[0] >> 1 & 3
+    receipt = b"\x40\x02" + rest[2 + size : 4 + size] if qos == 1 else b""
+    return Packet(topic, qos, head + rest, receipt)

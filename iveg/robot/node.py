@@ -65,6 +65,7 @@ class RobotNode:
         replay: It plays a recording, which is in this map frame: its messages are
             marked, and echo nothing, since what they say was measured long ago.
         on_feedback: Told each feedback that could be read, and its topic's robot.
+        read_clock: The robot's own clocks.
     """
 
     def __init__(
@@ -83,16 +84,14 @@ class RobotNode:
         on_link_loss: Literal["stop", "slow"] = "stop",
         replay: str | None = None,
         on_feedback: Callable[[str, Feedback], None] | None = None,
+        read_clock: Callable[[], Instant] = clock.now,
     ) -> None:
+        self._read_clock = read_clock
         self.boot = secrets.token_hex(4)
-        self.clock_offset_s = 0.0
-        """Fault injection: the robot's wall clock is this far ahead; display only."""
-        self.mute = False
-        """Fault injection: publishes nothing."""
         self.counters: Counter[str] = Counter()
         self._id = robot_id
         self._drive = drive
-        self._started = clock.now().mono
+        self._started = self._read_clock().mono
         self._echo = Echo()
         self._on_feedback_read = on_feedback
         self._faults: tuple[RobotFault, ...] = ()
@@ -127,7 +126,7 @@ class RobotNode:
         self._machine = SafetyMachine(
             robot_id,
             self.boot,
-            clock.now().mono,
+            self._read_clock().mono,
             stored=stored,
             fresh=partial(secrets.token_hex, 8),
             limits=limits,
@@ -138,7 +137,7 @@ class RobotNode:
     @property
     def state(self) -> State:
         """Where the safety machine stands."""
-        return self._machine.state(clock.now().mono)
+        return self._machine.state(self._read_clock().mono)
 
     @property
     def holds(self) -> tuple[Hold, ...]:
@@ -164,15 +163,6 @@ class RobotNode:
         """Whether the broker hears us."""
         return self._link.connected
 
-    @property
-    def deaf(self) -> bool:
-        """Fault injection: the gate ignores factors and mandates; holds still bite."""
-        return self._machine.deaf
-
-    @deaf.setter
-    def deaf(self, deaf: bool) -> None:
-        self._machine.deaf = deaf
-
     # --- what happens to the robot ------------------------------------------------
 
     async def run(self) -> None:
@@ -192,19 +182,19 @@ class RobotNode:
 
     def sense(self, observation: Sensed) -> None:
         """Take what the robot's own sensors say; the origin is filled in here."""
-        now = clock.now()
+        now = self._read_clock()
         if isinstance(observation, Odometry):
             self._perform(
                 self._machine.odometry(observation.pose, observation.twist, now.mono)
             )
         elif isinstance(observation, Unplaced) and observation.twist is not None:
             self._perform(self._machine.odometry(None, observation.twist, now.mono))
-        if self._link.connected and not self.mute:
+        if self._link.connected:
             self._uplink.send(observation, self._own(now))
 
     def wish(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
-        self._perform(self._machine.wish(twist, clock.now().mono))
+        self._perform(self._machine.wish(twist, self._read_clock().mono))
 
     def limit(self, factor: float, cause: str | None = None) -> None:
         """Drive no faster than this from here on (0, 0.5 or 1), because of ``cause``.
@@ -219,20 +209,20 @@ class RobotNode:
 
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
         """The red button or the bumper at the robot was pressed."""
-        self._perform(self._machine.local_hold(source, clock.now().mono))
+        self._perform(self._machine.local_hold(source, self._read_clock().mono))
 
     def release_locally(self) -> None:
         """A crew at the robot lifts boot, button and bumper holds and resumes."""
         if not self._nobody_there:
-            self._perform(self._machine.release_locally(clock.now().mono))
+            self._perform(self._machine.release_locally(self._read_clock().mono))
 
     async def _tick_forever(self) -> None:
         while True:
-            self._perform(self._machine.tick(clock.now().mono))
+            self._perform(self._machine.tick(self._read_clock().mono))
             await asyncio.sleep(_GATE_EVERY_S)
 
     def _on_message(self, topic: str, payload: bytes) -> None:
-        now = clock.now().mono
+        now = self._read_clock().mono
         if topic == self._command_topic:
             self._perform(self._machine.command(payload, now))
         elif topic == self._desired_topic:
@@ -273,19 +263,17 @@ class RobotNode:
         _log.info(
             "%s: %s %s %s", self._id, answer.result, answer.id or "", answer.why or ""
         )
-        if not self.mute:
-            self._lane.answer(self._uplink.answer(answer, self._own(clock.now())))
+        self._lane.answer(self._uplink.answer(answer, self._own(self._read_clock())))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
-        if not self.mute:
-            told = replace(report, faults=self._faults)
-            seq, messages = self._uplink.report(
-                told, self._own(clock.now()), is_measure=is_measure
-            )
-            self._machine.reported(seq, clock.now().mono)
-            for message in messages:
-                self._lane.report(message)
+        told = replace(report, faults=self._faults)
+        seq, messages = self._uplink.report(
+            told, self._own(self._read_clock()), is_measure=is_measure
+        )
+        self._machine.reported(seq, self._read_clock().mono)
+        for message in messages:
+            self._lane.report(message)
 
     def _own(self, now: Instant) -> Instant:
         """The moment on the robot's own clocks: since its boot, and its wall clock."""
-        return Instant(now.mono - self._started, now.wall + self.clock_offset_s)
+        return Instant(now.mono - self._started, now.wall)

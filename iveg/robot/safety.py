@@ -24,7 +24,7 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
 from iveg.robot.attempts import Attempts, Verdict
-from iveg.robot.caps import FREE, Cap
+from iveg.robot.caps import Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
 from iveg.robot.holds import HoldSet
@@ -80,8 +80,6 @@ class SafetyMachine:
         if stored is None:
             self._latch(self._nameless_stop(), now)
         self._latch(Hold(f"boot-{boot}", "boot", "remote"), now)
-        self.deaf = False
-        """Fault injection: drive as wished whatever feedback says; holds still bite."""
 
     # --- what can be asked --------------------------------------------------------
 
@@ -111,7 +109,7 @@ class SafetyMachine:
     @property
     def cap(self) -> Cap:
         """The cap that the gate applies."""
-        return FREE if self.deaf else self._judgement.cap
+        return self._judgement.cap
 
     # --- what happens -------------------------------------------------------------
 

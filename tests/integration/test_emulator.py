@@ -212,6 +212,25 @@ async def test_a_mute_robot_says_nothing_and_a_frozen_one_no_odometry(
         assert len(cloud.of("AGI", LaserScan)) <= reports + 3
         assert len(cloud.of("AGII", Odometry)) <= frozen + 3
 
+        silent = len(cloud.of("AGI", SafetyReport))
+        await port.post({"robot": "AGI", "mute": False})
+        await until(lambda: len(cloud.of("AGI", SafetyReport)) > silent)
+
+
+async def test_a_deaf_robot_drives_on_whatever_its_gate_says_and_holds_still_bite(
+    address: BrokerAddress, cloud: Cloud, tmp_path: Path
+) -> None:
+    port = FaultPort()
+    cloud.mandates["AGII"] = Mandate(0.5, "person", "someone", 1.0)
+    async with running(emulator(address, tmp_path, port=port)):
+        await until(lambda: cloud.speed("AGII") > 0.3)
+        await port.post({"robot": "AGII", "deaf": True})
+        await until(lambda: cloud.speed("AGII") > 0.6)
+        assert cloud.report("AGII").speed_factor == 0.5
+
+        await cloud.command("AGII", {"stop": {"id": "01STOP", "by": "anna"}})
+        await until(lambda: cloud.speed("AGII") == 0.0)
+
 
 async def test_a_person_who_was_placed_is_seen_there_and_hidden_on_demand(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
@@ -381,7 +400,7 @@ async def test_an_incident_of_a_scenario_happens_when_it_is_due(
         Incident(1.0, FaultOrder(robot="AGII", mute=True)),
         Incident(0.1, FaultOrder(robot="AGV", mute=True)),
     )
-    fleet = Fleet(world, settings)
+    fleet = Fleet(world, settings, radio_seed=1)
 
     def silent_for(scans: int) -> bool:
         said = cloud.heard["AGII"]

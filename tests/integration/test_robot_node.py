@@ -19,7 +19,6 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     CommandAnswer,
-    DetectionFrame,
     Odometry,
     Origin,
     SafetyReport,
@@ -289,24 +288,3 @@ async def test_a_retained_level_holds_a_robot_that_comes_later(
     async with running(robot, Cloud(broker)):
         await until(lambda: robot.node.holds)
     assert [hold.id for hold in robot.node.holds] == ["01STOP"]
-
-
-async def test_a_mute_robot_publishes_nothing_and_a_deaf_one_ignores_mandates(
-    broker: BrokerAddress, tmp_path: Path
-) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
-    robot.node.release_locally()
-    async with running(robot, cloud):
-        robot.node.deaf = True
-        cloud.mandate = Mandate(0.5, "person")
-        await until(lambda: robot.speed > 0.9)
-        robot.node.mute = True
-        await asyncio.sleep(0.1)
-        before = len(cloud.reports)
-        robot.node.sense(DetectionFrame("", Origin(), ()))
-        await cloud.command(b"STOP")
-        await until(lambda: robot.speed == 0.0)
-        await asyncio.sleep(0.3)
-    assert len(cloud.reports) == before
-    assert cloud.answers == []
-    assert "/iveg/AGI_yolox_bounding_boxes/attrs" not in cloud.topics

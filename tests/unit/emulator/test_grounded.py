@@ -87,9 +87,7 @@ def test_whom_depth_cannot_reach_counts_as_there_without_a_place() -> None:
     assert camera().place(HERE, [Found(far, 0.9)], [far], CROP) == ((), 1)
 
 
-def test_the_detector_tells_who_has_no_place_until_the_next_look() -> (
-    None
-):
+def test_the_detector_tells_who_has_no_place_until_the_next_look() -> None:
     detector = Detector(
         AGI, DETECTORS["perfect"], np.random.default_rng(1), lambda *_: ((), 1)
     )

@@ -1,3 +1,4 @@
+import asyncio
 import itertools
 from collections import Counter
 
@@ -5,6 +6,7 @@ import numpy as np
 import pytest
 
 from iveg.emulator.radio import LinkFaults, Packet, Radio
+from iveg.emulator.relay import read_packet
 
 ODOMETRY, SCAN = "/iveg/AGI_odom/attrs", "/iveg/AGI_lidar2D/attrs"
 EVERY_S = 1 / 30
@@ -123,3 +125,25 @@ def test_the_same_seed_makes_the_same_mistakes() -> None:
 
     assert runs[0] == runs[1]
     assert runs[0] != runs[2]
+
+
+def test_of_a_mute_robot_nothing_arrives_and_its_connection_lives() -> None:
+    silent = radio()
+    silent.faults = LinkFaults(mute=True)
+
+    assert sent(silent, 10) == []
+    assert silent.pass_on(Packet(SCAN, 1, b"report", b"ack"), 0.0) == []
+    assert silent.pass_on(Packet(None, 0, b"ping"), 0.0) == [(0.0, b"ping")]
+    assert silent.counters["muted"] == 11
+
+
+async def test_a_message_that_asks_for_a_receipt_brings_the_one_of_its_broker() -> None:
+    topic, number = b"/AGI/iveg/safety", b"\x12\x34"
+    body = len(topic).to_bytes(2, "big") + topic + number + b"{}"
+    sender = asyncio.StreamReader()
+    sender.feed_data(bytes((0x32, len(body))) + body)
+
+    packet = await read_packet(sender)
+
+    assert (packet.topic, packet.qos) == (topic.decode(), 1)
+    assert packet.receipt == b"\x40\x02" + number

@@ -787,18 +787,6 @@ def test_a_robot_that_was_slowed_goes_on_slowly_until_it_is_well_outside() -> No
     assert rig.factor == 1.0
 
 
-def test_a_deaf_robot_drives_on_and_says_so_but_holds_still_bite() -> None:
-    rig = moving()
-    rig.machine.deaf = True
-    rig.mandates = {"AGI": Mandate(0.5, "person")}
-    rig.alerts = (person(0.5),)
-    rig.run(1.0)
-    assert rig.twist == AHEAD
-    assert rig.reports[-1].speed_factor == 1.0
-    rig.stop()
-    assert rig.twist == REST
-
-
 def test_a_held_robot_reports_ten_times_a_second_and_twice_through_the_agent() -> None:
     rig = moving()
     rig.stop("01STOP")
