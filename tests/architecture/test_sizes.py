@@ -32,7 +32,6 @@ LARGE_FILES = {
     "iveg/embedded/context_broker.py": "to be divided: entities and subscriptions",
     "iveg/robot/ros2/senses.py": TABLE,
     "iveg/ros2/messages.py": TABLE,
-    "iveg/web/schemas.py": TABLE,
 }
 LARGE_FUNCTIONS = {
     "iveg/app.py Dss.__init__": LIST,
