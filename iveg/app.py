@@ -1,6 +1,7 @@
 """Composition root of the DSS: settings → parts → FastAPI.  Wires, decides nothing."""
 
 import asyncio
+import contextlib
 import logging
 import secrets
 from collections import Counter
@@ -32,7 +33,10 @@ from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.domain.alerts import Rule
+from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
+from iveg.domain.latency.hops import WINDOW_S
+from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.domain.stop.drills import Drills
@@ -45,6 +49,7 @@ from iveg.pipeline.command import Commander
 from iveg.pipeline.earlier import remember
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.latency import LatencyMonitor, hours_of
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.minutes import Minutes
@@ -120,7 +125,17 @@ class Dss:
         self.minutes = Minutes(self.hub, self.recorder, start)
         self.chain = HealthMonitor(start)
         world = World(self.fleet, self.chain.probe)
-        self.ingest = Ingest(world.robots.__contains__, self._rejected, world.is_past)
+        self.latency = LatencyMonitor(
+            LatencyWatch(world.robots, world.ledger.composed_at),
+            self.recorder,
+            self.minutes,
+        )
+        self.ingest = Ingest(
+            world.robots.__contains__,
+            self._rejected,
+            world.is_past,
+            self.latency.watch.arrived,
+        )
         self.journal = FileJournal(directory / "commands.jsonl")
         self._direct = DirectReader(
             settings.apikey,
@@ -189,6 +204,7 @@ class Dss:
             self.hub,
             clock.now,
             lambda: self.recorder.health(clock.now()).state,
+            self.latency,
         )
         self.provisioner = Provisioner(
             self.orion,
@@ -260,6 +276,11 @@ class Dss:
             self.chain,
             clock.now,
         )
+        with contextlib.suppress(HopError):
+            day = clock.now().wall - WINDOW_S["24h"]
+            measured = await self.queries.latency_minutes(day)
+            # A day of twenty robots is half a million rows: not in the loop's thread.
+            self.latency.remember(await asyncio.to_thread(hours_of, measured))
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A part that must live has died: say so and stop; the robots slow down."""
@@ -355,7 +376,10 @@ def create_app(dss: Dss) -> FastAPI:
         dss.is_thinned,
     )
     app.router.routes.append(orion.route())
-    app.include_router(live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop))
+    watch = dss.latency.watch
+    app.include_router(
+        live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop, watch)
+    )
     # Before the routes that would take ``latency`` for the name of a command.
     app.include_router(
         stop_records.router(dss.queries, clock.now, dss.views.find_command)

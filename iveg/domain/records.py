@@ -210,6 +210,29 @@ class ClimateRecord:
     co2: float | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatencyRecord:
+    """A minute of one hop, for one kind of data of one robot; kept for a day.
+
+    Attributes:
+        at: When the minute began.
+        data: ``odometry``, ``detections`` or ``lidar``; ``hop`` of ``latency.hops``.
+        count: Messages that were measured.
+        total_s: Sum of their durations; ``least_s`` and ``most_s`` their extremes.
+        bins: Text of ``latency.sketch.write_bins``.
+    """
+
+    at: float
+    robot_id: str
+    data: str
+    hop: str
+    count: int
+    total_s: float
+    least_s: float
+    most_s: float
+    bins: str
+
+
 Record = (
     DecisionRecord
     | DetectionRecord
@@ -219,6 +242,7 @@ Record = (
     | LogRecord
     | OdometryRecord
     | ClimateRecord
+    | LatencyRecord
 )
 RECORD_TYPES: tuple[type[Record], ...] = (
     DecisionRecord,
@@ -229,9 +253,12 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     LogRecord,
     OdometryRecord,
     ClimateRecord,
+    LatencyRecord,
 )
 
 
 def is_telemetry(record: Record) -> bool:
     """Whether a record may be dropped under pressure; the others never are."""
-    return isinstance(record, OdometryRecord | DetectionRecord | ClimateRecord)
+    return isinstance(
+        record, OdometryRecord | DetectionRecord | ClimateRecord | LatencyRecord
+    )

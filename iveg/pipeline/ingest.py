@@ -33,6 +33,7 @@ class Ingest:
         known: Whether a robot id belongs to the fleet.
         rejected: Called once for each new kind of rejection, with source and reason.
         is_past: What need not be read; whoever reads messages asks it.
+        passed: Told of each copy of a message of the fleet, before it waits.
     """
 
     def __init__(
@@ -40,8 +41,10 @@ class Ingest:
         known: Callable[[str], bool],
         rejected: Callable[[str, str], None] | None = None,
         is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
+        passed: Callable[[Received], None] = lambda _: None,
     ) -> None:
         self._known = known
+        self._passed = passed
         self.is_past = is_past
         self._rejected = rejected
         self._queue: deque[Received] = deque()
@@ -59,6 +62,7 @@ class Ingest:
         # What we asked for is no message: it would hide that one was lost.
         way = "asked" if received.asked else received.road
         self.counters[f"{way}.{kind}"] += 1
+        self._passed(received)
         if len(self._queue) >= MAX_QUEUED:
             self._make_room()
         self._queue.append(received)

@@ -13,6 +13,7 @@ from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.pipeline.health_monitor import HealthMonitor, Hop, HopState
 from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub
@@ -36,6 +37,7 @@ class RuleLoop:
         hub: Hub,
         clock: Clock,
         database_state: Callable[[], HopState],
+        latency: LatencyMonitor,
     ) -> None:
         self._ingest = ingest
         self._assessor = assessor
@@ -45,6 +47,7 @@ class RuleLoop:
         self._hub = hub
         self._clock = clock
         self._database_state = database_state
+        self._latency = latency
         self._apart_s = APART_S * len(assessor.world.robots)
         self._ticked = float("-inf")
         self._health_at = float("-inf")
@@ -66,8 +69,11 @@ class RuleLoop:
 
     def step(self, arrived: Iterable[Received], now: Instant) -> None:
         """Take everything that arrived, then let time pass if it is due."""
+        taken = []
         for received in arrived:
             fresh = self._assessor.take(received)
+            if fresh:
+                taken.append(received)
             if isinstance(received.observation, Canary):
                 self._chain.received(received.observation.origin, received.at)
             if received.asked or self._assessor.world.refuses(received):
@@ -76,11 +82,14 @@ class RuleLoop:
             if fresh or isinstance(received.observation, CommandAnswer):
                 self._commander.take(received, self._assessor.world.age_then(received))
         self._assessor.settle()
+        if taken:
+            self._latency.decided(taken, self._clock())
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)
             self._assessor.tick(now, self._commander.conditions(now))
             self._watch_chain(now)
+            self._latency.tick(now)
 
     def _watch_chain(self, now: Instant) -> None:
         self._chain.received_at = self._assessor.world.canary_at

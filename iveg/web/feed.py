@@ -13,6 +13,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.publish import Subscriber
 from iveg.pipeline.topics import is_telemetry
 from iveg.web.pacing import BYTES, CreditWindow
+from iveg.web.painting import Painting
 from iveg.web.telemetry import Part, TelemetryEncoder
 
 PICTURE_S: Final = 1 / 15
@@ -27,17 +28,26 @@ _INF: Final = float("inf")
 class TelemetryFeed:
     """Makes the frames of one browser from what has changed for it."""
 
-    def __init__(self, encoder: TelemetryEncoder, subscriber: Subscriber) -> None:
+    def __init__(
+        self, encoder: TelemetryEncoder, subscriber: Subscriber, painting: Painting
+    ) -> None:
         self.window = CreditWindow()
+        self._painting = painting
         self._encoder = encoder
         self._subscriber = subscriber
         self._waiting: dict[str, None] = {}
         self._told: dict[str, tuple[int, float]] = {}
         self._is_full = False
 
-    def painted(self, number: object, now: float) -> None:
-        """The page has painted a frame: there may be credit for another."""
-        if self.window.painted(number, now):
+    def painted(
+        self, number: object, now: float, at: object = None, within: object = None
+    ) -> None:
+        """The page has painted a frame: there may be credit for another.
+
+        ``at`` and ``within`` (s) are when, in its own words; None: it drew nothing.
+        """
+        if type(number) is int and self.window.painted(number, now):
+            self._painting.painted(number, at, within, now)
             self._is_full = False
             self._subscriber.wake()
 
@@ -65,6 +75,7 @@ class TelemetryFeed:
         if frame.is_empty:
             return None
         told = frame.write(self.window.next_number)
+        self._painting.sent(self.window.next_number, now.mono)
         self.window.sent(frame.heavy, now.mono)
         return told
 
@@ -94,6 +105,7 @@ class TelemetryFeed:
         elif frame.take(topic, part):
             del self._waiting[topic]
             self._told[topic] = part.version, now.mono
+            self._painting.adds(topic, now.mono)
 
     def _part(self, topic: str, since: int, now: Instant) -> Part | None:
         row, key = topics.find(topic)

@@ -16,6 +16,7 @@ import orjson
 from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
 
 from iveg.domain.errors import UnknownRobotError, UnreadableError
+from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.models.base import write_json
@@ -27,6 +28,7 @@ from iveg.pipeline.topics import is_telemetry
 from iveg.web.auth import NO_SESSION, Action, Door, Principal, require
 from iveg.web.feed import TelemetryFeed
 from iveg.web.pacing import SUBPROTOCOL
+from iveg.web.painting import Painting
 from iveg.web.presses import read_press
 from iveg.web.telemetry import TelemetryEncoder
 from iveg.web.views import Views
@@ -110,11 +112,13 @@ def router(
     snapshot: Callable[[Principal, Instant], Snapshot],
     clock: Callable[[], Instant],
     stop: Stop,
+    latency: LatencyWatch,
 ) -> APIRouter:
     """The live endpoint.
 
     ``snapshot`` says everything that is known to one who has just come; ``stop``
-    presses STOP for one robot, or for all, by somebody.
+    presses STOP for one robot, or for all, by somebody; ``latency`` is told when pages
+    have drawn what was decided.
     """
     routes = APIRouter()
 
@@ -128,7 +132,11 @@ def router(
         await websocket.accept(SUBPROTOCOL if is_paced else None)
         subscriber = hub.join()
         line = Line(websocket, subscriber, encoder, clock)
-        feed = TelemetryFeed(encoder.telemetry, subscriber) if is_paced else None
+        feed = (
+            TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
+            if is_paced
+            else None
+        )
         try:
             now = clock()
             await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
@@ -275,7 +283,12 @@ class Ear:
         match message.get("type"):
             case "painted":
                 if self._feed is not None:
-                    self._feed.painted(message.get("frame"), self._clock().mono)
+                    self._feed.painted(
+                        message.get("frame"),
+                        self._clock().mono,
+                        message.get("at"),
+                        message.get("within"),
+                    )
             case "ping":
                 t, server = message.get("t"), self._clock().wall
                 self._subscriber.append(topics.PONG.name, {"t": t, "server": server})

@@ -27,6 +27,7 @@ from iveg.pipeline.record import Waiting
 from iveg.web import history, stop_records
 from iveg.web.auth import Principal, require
 from iveg.web.feed import TelemetryFeed
+from iveg.web.painting import Painting
 from tests.builders import detection, detection_frame, hold, safety_report, scan
 from tests.fakes.records import (
     NOON,
@@ -188,9 +189,9 @@ def _paced(desk: WebDesk) -> Any:
     subscriber = Subscriber()
     for topic in _PACED:
         subscriber.changed(topic)
-    return _read(
-        TelemetryFeed(desk.encoder.telemetry, subscriber).next_frame(desk.clock())
-    )
+    painting = Painting(desk.latency.watch)
+    feed = TelemetryFeed(desk.encoder.telemetry, subscriber, painting)
+    return _read(feed.next_frame(desk.clock()))
 
 
 def _read(frame: bytes | None) -> Any:

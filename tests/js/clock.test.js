@@ -45,3 +45,13 @@ test("a quick answer of long ago is forgotten", () => {
   for (let n = 1; n <= 8; n += 1) clock.note(1000 * n, 1000 * n + 20, 100 + n + 0.01);
   near(clock.serverNow(9000), 109, 1e-6);
 });
+
+test("a moment here is told on the server's clock, with how wrong that may be", () => {
+  const clock = createServerClock(0);
+  equal(clock.serverOf(1000), null);
+  clock.note(1000, 1040, 1_700_000_000, 500);
+  clock.note(2000, 2010, 1_700_000_001, 501);
+  const { at, within } = clock.serverOf(2505) ?? { at: 0, within: 0 };
+  near(at, 501.5);
+  near(within, 0.005);
+});

@@ -83,4 +83,8 @@ test("half a scan is refused", () => {
 
 test("what was painted is said as the server counts it", () => {
   equal(writePainted(12), '{"type":"painted","frame":12}');
+  equal(
+    writePainted(12, { at: 3.5, within: 0.002 }),
+    '{"type":"painted","frame":12,"at":3.5,"within":0.002}',
+  );
 });

@@ -21,6 +21,7 @@ from iveg.adapters.history.tables import (
     command_events,
     commands,
     decisions,
+    latency,
     log,
 )
 from iveg.domain.errors import HopError
@@ -30,6 +31,7 @@ from iveg.domain.records import (
     CommandRecord,
     DecisionRecord,
     DetectionRecord,
+    LatencyRecord,
     LogRecord,
 )
 
@@ -242,6 +244,17 @@ class Queries:
         return await self._ask(
             lambda c: series.command_latencies(c, since, until, robot)
         )
+
+    async def latency_minutes(self, since: float) -> tuple[LatencyRecord, ...]:
+        """Every minute of every hop from then on (Unix s), oldest first."""
+        c = latency.c
+        wanted = select(latency).where(c.at >= since).order_by(c.at, c.row_id)
+
+        def read(connection: Connection) -> tuple[LatencyRecord, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(LatencyRecord, row) for row in rows)
+
+        return await self._ask(read)
 
     def close(self) -> None:
         """Let go of threads and connections."""

@@ -8,7 +8,7 @@ import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 
-from sqlalchemy import Connection, Engine, Insert
+from sqlalchemy import Connection, Engine, Insert, Table, delete
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import (
     DataError,
@@ -123,6 +123,16 @@ def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
         values = _values([row for row in rows if type(row.record) is kind], shelf)
         if values:
             connection.execute(_statement(shelf, connection.dialect.name), values)
+            if shelf.keep_s is not None:
+                _forget(connection, shelf.table, values, shelf.keep_s)
+
+
+def _forget(
+    connection: Connection, table: Table, values: list[_Row], keep_s: float
+) -> None:
+    """Delete what is older than the newest of these by more than its time."""
+    newest = max(float(str(one["at"])) for one in values)
+    connection.execute(delete(table).where(table.c.at < newest - keep_s))
 
 
 def _values(rows: Iterable[Waiting], shelf: Shelf) -> list[_Row]:

@@ -30,6 +30,7 @@ from iveg.domain.records import (
     CommandRecord,
     DecisionRecord,
     DetectionRecord,
+    LatencyRecord,
     LogRecord,
     OdometryRecord,
 )
@@ -226,6 +227,24 @@ climate = Table(
 )
 
 
+latency = Table(
+    "latency",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _text("robot_id", null=False),
+    _text("data", null=False),
+    _text("hop", null=False),
+    Column("count", BigInteger, nullable=False),
+    _number("total_s", null=False),
+    _number("least_s", null=False),
+    _number("most_s", null=False),
+    _text("bins", null=False),
+    Index(None, "at"),
+    sqlite_autoincrement=True,
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Shelf:
     """Where one kind of record is kept.
@@ -233,11 +252,13 @@ class Shelf:
     Attributes:
         identity: Columns that name the thing or fact; empty where every row is new.
         changes: Whether a later record takes the place of an earlier one.
+        keep_s: How long before the newest a row is kept (s, by ``at``); None: for good.
     """
 
     table: Table
     identity: tuple[str, ...] = ()
     changes: bool = False
+    keep_s: float | None = None
 
 
 SHELVES: dict[type, Shelf] = {
@@ -249,4 +270,5 @@ SHELVES: dict[type, Shelf] = {
     DetectionRecord: Shelf(detections),
     OdometryRecord: Shelf(odometry),
     ClimateRecord: Shelf(climate),
+    LatencyRecord: Shelf(latency, keep_s=86400.0),
 }

@@ -71,12 +71,14 @@ export function aboutAge(robot, said, words) {
  * waiting somewhere, so half of it is the best guess of the way back (Cristian 1989).
  *
  * `at` is the server's monotonic clock (s), which no correction of the date moves:
- * `localOf(at)` is that moment by `performance.now()` (ms), null before an answer told.
+ * `localOf(at)` is that moment by `performance.now()` (ms), null before an answer told;
+ * `serverOf(nowMs)` the other way, with how wrong it may be (s).
  *
  * @typedef {{
  *   note: (sentMs: number, receivedMs: number, serverS: number, at?: number) => void,
  *   serverNow: (nowMs: number) => number,
  *   localOf: (at: number) => number | null,
+ *   serverOf: (nowMs: number) => {at: number, within: number} | null,
  *   roundTripMs: () => number | null,
  *   reset: () => void,
  * }} ServerClock
@@ -104,6 +106,11 @@ export function createServerClock(fallbackOriginS = performance.timeOrigin / 100
     localOf(at) {
       const zeroMs = samples.length ? best().zeroMs : null;
       return zeroMs === null ? null : zeroMs + 1000 * at;
+    },
+    serverOf(nowMs) {
+      const told = samples.length ? best() : null;
+      if (told === null || told.zeroMs === null) return null;
+      return { at: (nowMs - told.zeroMs) / 1000, within: told.roundTrip / 2000 };
     },
     roundTripMs: () => (samples.length ? samples[samples.length - 1].roundTrip : null),
     reset() {

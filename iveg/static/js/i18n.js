@@ -117,6 +117,7 @@ export function createWords(load) {
     a: (value) => find(`class.a.${value}`) ?? String(value),
     why: (value) => named("why", value),
     hop: (value) => named("hop", value),
+    data: (value) => named("stream", value),
     drive: (value) => named("drive", value),
     lane: (value) => laneName(String(value), say),
     person: trackOf,

@@ -33,7 +33,8 @@ async function start() {
   const words = await loadWords();
   if (!document.querySelector("#stops")) return;
   const store = createStore();
-  const line = connect({ url: liveUrl(), store });
+  const draws = document.querySelector("#map") !== null;
+  const line = connect({ url: liveUrl(), store, draws });
   const app = /** @type {App} */ ({ store, words, line, dialogs });
   app.stops = createStopPanel(app);
   createBanner(app);

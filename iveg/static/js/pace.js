@@ -9,7 +9,7 @@ import { onNextFrame } from "./hub.js";
 const HIDDEN_MS = 1000;
 
 /**
- * @param {(frame: number) => void} say
+ * @param {(frame: number, isDrawn: boolean) => void} say
  * @param {(fn: () => void) => void} [whenPainted] after the map has drawn what has come
  */
 export function createPace(
@@ -21,7 +21,8 @@ export function createPace(
 
   function tell() {
     told = newest;
-    say(newest);
+    // Where nobody looks nothing is drawn, and the moment says nothing of the screen.
+    say(newest, !document.hidden);
   }
 
   return {

@@ -64,11 +64,14 @@ export function retryDelay(tries, luck) {
  *   onCommandFallback?: (press: Press) => void,
  *   probe?: () => Promise<boolean>,
  *   page?: PageSight,
- * }} options `onCommandFallback` is told of a STOP that could not be sent at once: the
+ *   draws?: boolean,
+ * }} options `draws`: this page shows telemetry, so when it paints is worth telling;
+ *   `onCommandFallback` is told of a STOP that could not be sent at once: the
  *   page tries its other transport, this one keeps the press and sends it when it can.
  */
 export function connect(options) {
   const { url, store, onState, onCommandFallback, page = document } = options;
+  const { draws = true } = options;
   const isServerThere = options.probe ?? (() => probeHealth(url));
   const clock = createServerClock();
   const presses = createPresses();
@@ -100,8 +103,10 @@ export function connect(options) {
     isFirstPong = true;
     const opened = new WebSocket(url, [SUBPROTOCOL]);
     opened.binaryType = "arraybuffer";
-    pace = createPace((frame) => {
-      if (opened.readyState === WebSocket.OPEN) opened.send(writePainted(frame));
+    pace = createPace((frame, isDrawn) => {
+      if (opened.readyState !== WebSocket.OPEN) return;
+      const drawn = draws && isDrawn ? clock.serverOf(performance.now()) : null;
+      opened.send(writePainted(frame, drawn));
     });
     opened.addEventListener("open", ping);
     opened.addEventListener("message", (event) => hear(opened, event.data));

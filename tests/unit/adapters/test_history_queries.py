@@ -18,6 +18,7 @@ from tests.fakes.records import (
     command_record,
     decision_record,
     detection_record,
+    latency_record,
     log_record,
     odometry_record,
 )
@@ -370,3 +371,16 @@ async def test_a_database_that_does_not_answer_is_a_hop() -> None:
 
     queries.close()
     assert "secret" not in str(caught.value)
+
+
+async def test_a_day_of_latency_is_kept_and_no_more(
+    queries: Queries, database_url: str
+) -> None:
+    remember(database_url, *(latency_record(at=NOON + 3600.0 * n) for n in range(30)))
+    remember(database_url, latency_record(at=NOON + 3600.0 * 30))
+
+    found = await queries.latency_minutes(0.0)
+
+    assert [one.at for one in found] == [NOON + 3600.0 * n for n in range(6, 31)]
+    assert found[0] == latency_record(at=NOON + 3600.0 * 6)
+    assert await queries.latency_minutes(NOON + 3600.0 * 31) == ()

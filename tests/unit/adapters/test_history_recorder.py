@@ -25,6 +25,7 @@ from tests.fakes.records import (
     command_record,
     decision_record,
     detection_record,
+    latency_record,
     log_record,
     odometry_record,
 )
@@ -35,6 +36,7 @@ EVERYTHING = (
     command_record(),
     decision_record(),
     detection_record(),
+    latency_record(),
     log_record(),
     odometry_record(),
 )
@@ -200,7 +202,7 @@ async def test_while_the_database_is_locked_nothing_that_matters_is_lost(
     assert stored.pop("odometry") == 5
     assert stored.pop("detections") == 0
     assert set(stored.values()) == {1}
-    assert recorder.counters["history_dropped"] == 97
+    assert recorder.counters["history_dropped"] == 98
     assert [record.levelname for record in caplog.records] == ["WARNING", "INFO"]
 
 

@@ -8,6 +8,7 @@ from typing import TypeVar
 from iveg.domain.alerts import Rule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import (
     CommandAnswer,
     Detection,
@@ -23,6 +24,7 @@ from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
@@ -68,9 +70,12 @@ class Desk:
         self.description = fleet_of(*robots)
         self.world = World(self.description)
         self.rejected: list[tuple[str, str]] = []
+        watch = LatencyWatch(robots, self.world.ledger.composed_at)
+        self.latency = LatencyMonitor(watch, self.sink, self.minutes)
         self.ingest = Ingest(
             self.world.robots.__contains__,
             lambda source, reason: self.rejected.append((source, reason)),
+            passed=watch.arrived,
         )
         self.chain = HealthMonitor(START)
         self.assessor = Assessor(
@@ -107,6 +112,7 @@ class Desk:
             self.hub,
             self.clock,
             lambda: "ok",
+            self.latency,
         )
         self.seq = 0
 

@@ -10,6 +10,7 @@ from tests.fakes.records import (
     command_record,
     decision_record,
     detection_record,
+    latency_record,
     log_record,
     odometry_record,
 )
@@ -43,7 +44,8 @@ def test_only_telemetry_may_be_dropped() -> None:
     assert is_telemetry(detection_record())
     assert is_telemetry(climate_record())
     assert not any(is_telemetry(record) for record in KEPT)
-    assert len(RECORD_TYPES) == len(KEPT) + 3
+    assert is_telemetry(latency_record())
+    assert len(RECORD_TYPES) == len(KEPT) + 4
 
 
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:

@@ -83,7 +83,14 @@ class WebDesk(Desk):
 
     def _routers(self) -> list[Any]:
         return [
-            live.router(self.hub, self.encoder, self.snapshot, self.clock, self.stop),
+            live.router(
+                self.hub,
+                self.encoder,
+                self.snapshot,
+                self.clock,
+                self.stop,
+                self.latency.watch,
+            ),
             robots.router(self.views, self.clock),
             costmap.router(self.mapper, self.assessor, self.clock),
             commands.router(self.commander, self.clock),

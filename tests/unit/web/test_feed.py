@@ -10,6 +10,7 @@ import pytest
 
 from iveg.web.feed import PICTURE_S, READ_OUT_S, TelemetryFeed
 from iveg.web.pacing import BYTES, FRAMES, GAP_S
+from iveg.web.painting import Painting
 from iveg.web.telemetry import NO_RETURN, UNIT_M
 from tests.builders import detection, scan
 from tests.unit.web.desk import WebDesk
@@ -27,7 +28,11 @@ class Page:
 
     def __post_init__(self) -> None:
         self.subscriber = self.desk.hub.join()
-        self.feed = TelemetryFeed(self.desk.encoder.telemetry, self.subscriber)
+        self.feed = TelemetryFeed(
+            self.desk.encoder.telemetry,
+            self.subscriber,
+            Painting(self.desk.latency.watch),
+        )
 
     def read(self) -> dict[str, Any] | None:
         """The next frame, if there may be one now."""

@@ -1,0 +1,104 @@
+"""The latency watch in the loop: taps, minutes for the history, lines for the log."""
+
+from collections.abc import Iterable, Sequence
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.events import LogEvent
+from iveg.domain.latency.behind import Remark
+from iveg.domain.latency.hops import DATA, HOPS, Data, Hop
+from iveg.domain.latency.sketch import Sketch, merged, read_bins, write_bins
+from iveg.domain.latency.watch import LatencyWatch, Measured
+from iveg.domain.observations import Instant, Received
+from iveg.domain.records import LatencyRecord
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.record import RecordSink
+
+_QUIET_S = 10.0
+"""A hop that falls behind again within this is the same story."""
+
+
+class LatencyMonitor:
+    """Hands messages to the watch, and what it found to the history and the log."""
+
+    def __init__(self, watch: LatencyWatch, sink: RecordSink, minutes: Minutes) -> None:
+        self.watch = watch
+        self._sink = sink
+        self._minutes = minutes
+        self._told: dict[str, float] = {}
+
+    def decided(self, taken: Iterable[Received], now: Instant) -> None:
+        """These became part of the state, and the fleet has been judged with them."""
+        self.watch.decided(taken, now)
+
+    def tick(self, now: Instant) -> None:
+        """Let time pass."""
+        self.watch.tick(now)
+        for began_at, minute in self.watch.ended:
+            self._sink.offer(_record(began_at, minute))
+        self.watch.ended.clear()
+        for remark in self.watch.overloads.remarks:
+            self._tell(remark, now)
+
+    def remember(self, hours: Iterable[Measured]) -> None:
+        """What ``hours_of`` made of the history."""
+        self.watch.remember(hours)
+
+    def _tell(self, remark: Remark, now: Instant) -> None:
+        """Once, for as long as it goes on."""
+        what = "behind" if remark.what == "growing" else remark.what
+        about = f"{what}/{remark.hop}/{remark.slots.get('robot', '')}"
+        last = self._told.get(about, float("-inf"))
+        self._told[about] = now.mono
+        if now.mono - last > _QUIET_S:
+            robot = remark.slots.get("robot")
+            event = LogEvent(
+                "system",
+                f"log.{what}.{remark.hop}",
+                remark.slots,
+                None if robot is None else str(robot),
+            )
+            self._minutes.log(event, now)
+
+
+def hours_of(kept: Sequence[LatencyRecord]) -> list[Measured]:
+    """Minutes of the history, oldest first, as hours; pure, so any thread may do it."""
+    hours: dict[tuple[int, str, Data, Hop], list[Sketch]] = {}
+    for record in kept:
+        for robot_id, data, hop, sketch in _minute(record):
+            place = int(record.at // 3600.0), robot_id, data, hop
+            hours.setdefault(place, []).append(sketch)
+    return [
+        (robot_id, data, hop, merged(minutes))
+        for (_, robot_id, data, hop), minutes in hours.items()
+    ]
+
+
+def _record(began_at: float, minute: Measured) -> LatencyRecord:
+    robot_id, data, hop, sketch = minute
+    return LatencyRecord(
+        at=began_at,
+        robot_id=robot_id,
+        data=data,
+        hop=hop,
+        count=sketch.count,
+        total_s=sketch.total,
+        least_s=sketch.least,
+        most_s=sketch.most,
+        bins=write_bins(sketch),
+    )
+
+
+def _minute(record: LatencyRecord) -> Iterable[Measured]:
+    """The minute of a row; none where a later version named what this one lacks."""
+    data = next((one for one in DATA if one == record.data), None)
+    hop = next((one for one in HOPS if one == record.hop), None)
+    if data is None or hop is None:
+        return
+    try:
+        keys, counts = read_bins(record.bins)
+    except UnreadableError:
+        return
+    sketch = Sketch(
+        record.count, record.total_s, record.least_s, record.most_s, keys, counts
+    )
+    yield record.robot_id, data, hop, sketch

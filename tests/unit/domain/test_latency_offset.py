@@ -1,0 +1,163 @@
+"""A robot's clock against ours: proven bounds, jumps, and no number below zero."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from iveg.domain.latency.offset import AGREE, ClockOffset
+from tests.builders import START, at
+
+STAMP_ROUNDING_S = 0.001
+
+
+@dataclass
+class Talker:
+    """A robot that sends thirty messages a second and may echo ten feedbacks.
+
+    Attributes:
+        ahead_s: Its clock less ours.
+        up_s: What a message takes to us; ``down_s`` what feedback takes to it.
+    """
+
+    ahead_s: float = 0.0
+    up_s: float = 0.002
+    down_s: float = 0.002
+    echoes: bool = True
+    now: float = 0.0
+
+    def talk(self, clock: ClockOffset, seconds: float) -> Iterator[float | str]:
+        """What the clock says of each message."""
+        for _ in range(round(30 * seconds)):
+            self.now += 1 / 30
+            stamp = round(START.wall + self.now + self.ahead_s, 3)
+            heard = (self.now - self.down_s) // 0.1 * 0.1
+            composed = START.mono + heard if self.echoes else None
+            yield clock.take(stamp, at(self.now + self.up_s), composed)
+
+
+def said(talker: Talker, clock: ClockOffset, seconds: float) -> list[float | str]:
+    return list(talker.talk(clock, seconds))
+
+
+def numbers(found: list[float | str]) -> list[float]:
+    return [one for one in found if isinstance(one, float)]
+
+
+def test_a_clock_in_step_gives_what_the_way_took() -> None:
+    clock = ClockOffset()
+
+    found = said(Talker(up_s=0.050), clock, 5.0)
+
+    assert found[-1] == pytest.approx(0.050, abs=STAMP_ROUNDING_S)
+    assert clock.state == "in_step"
+    assert clock.uncertainty_s is not None
+    assert clock.uncertainty_s < 0.120
+
+
+@pytest.mark.parametrize("ahead_s", [-3600.0, -0.4, 0.4, 3600.0])
+def test_a_clock_that_is_off_is_corrected_within_its_uncertainty(
+    ahead_s: float,
+) -> None:
+    clock = ClockOffset()
+
+    found = said(Talker(ahead_s=ahead_s, up_s=0.012), clock, 20.0)
+
+    assert clock.state == "corrected"
+    assert clock.offset_s is not None
+    assert clock.uncertainty_s is not None
+    assert abs(clock.offset_s - ahead_s) <= clock.uncertainty_s + STAMP_ROUNDING_S
+    assert min(numbers(found)) >= 0.0
+
+
+@pytest.mark.parametrize("jump_s", [-3600.0, -0.6, 0.6, 3600.0])
+def test_messages_of_a_clock_that_jumps_are_excluded_until_it_is_known_again(
+    jump_s: float,
+) -> None:
+    clock, talker = ClockOffset(), Talker()
+    said(talker, clock, 5.0)
+
+    talker.ahead_s = jump_s
+    found = said(talker, clock, 20.0)
+
+    assert found[:AGREE] == ["clock_jump"] * AGREE
+    assert clock.jumps == 1
+    assert max(numbers(found)) < 0.11
+    assert clock.state == "corrected"
+
+
+def test_one_stamp_that_is_wrong_is_no_jump() -> None:
+    clock, talker = ClockOffset(), Talker()
+    said(talker, clock, 5.0)
+
+    wrong = clock.take(START.wall + 999.0, at(5.0), START.mono + 4.95)
+    right = said(talker, clock, 1.0)
+
+    assert wrong == "clock_jump"
+    assert all(isinstance(one, float) for one in right)
+    assert clock.jumps == 0
+
+
+def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
+    clock = ClockOffset()
+
+    found = said(Talker(echoes=False, up_s=0.030), clock, 2.0)
+
+    assert found[-1] == pytest.approx(0.030, abs=STAMP_ROUNDING_S)
+    assert clock.state == "assumed"
+    assert clock.uncertainty_s is None
+
+
+def test_a_future_that_nothing_explains_gives_no_number() -> None:
+    clock = ClockOffset()
+
+    found = said(Talker(echoes=False, ahead_s=0.3), clock, 2.0)
+
+    assert numbers(found) == []
+    assert clock.state == "untrusted"
+
+
+def test_an_hour_in_the_past_that_nothing_explains_gives_no_number() -> None:
+    clock = ClockOffset()
+
+    found = said(Talker(echoes=False, ahead_s=-3600.0), clock, 2.0)
+
+    assert set(found) == {"stale_stamp"}
+    assert clock.state == "untrusted"
+
+
+def test_a_slow_way_up_is_not_taken_for_a_clock() -> None:
+    clock, talker = ClockOffset(), Talker()
+    said(talker, clock, 5.0)
+
+    talker.up_s = 0.450
+    found = said(talker, clock, 130.0)
+
+    assert {round(one, 2) for one in numbers(found)} == {0.45}
+    assert len(numbers(found)) == len(found)
+
+
+def test_a_clock_that_drifts_is_followed_and_nothing_falls_below_zero() -> None:
+    clock, talker = ClockOffset(), Talker()
+    found: list[float | str] = []
+    for second in range(200):
+        talker.ahead_s = 3e-4 * second
+        found += said(talker, clock, 1.0)
+
+    assert clock.jumps == 0
+    assert min(numbers(found)) >= 0.0
+    assert clock.offset_s == pytest.approx(0.060, abs=0.06)
+
+
+def test_no_stamp_whatever_it_says_gives_a_number_below_zero() -> None:
+    clock, chance = ClockOffset(), random.Random(7)  # noqa: S311 - a fault
+    now = 0.0
+    found: list[float | str] = []
+    for _ in range(5_000):
+        now += 0.03
+        stamp = START.wall + now + chance.choice([0, 0, 0, chance.gauss(0, 1), 3600])
+        composed = chance.choice([None, START.mono + now - chance.random()])
+        found.append(clock.take(stamp, at(now), composed))
+
+    assert min(numbers(found)) >= 0.0

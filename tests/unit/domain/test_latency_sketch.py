@@ -1,0 +1,134 @@
+"""Sketches: quantiles within 1 % of exact, bounded, mergeable, and back from a text."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.latency.series import SLICES_A_MINUTE, Series
+from iveg.domain.latency.sketch import (
+    NOTHING,
+    Sketch,
+    merged,
+    read_bins,
+    sketch_of,
+    write_bins,
+)
+from tests.data import latencies
+
+SHARES = (0.5, 0.9, 0.95, 0.99)
+
+
+def exact(values: NDArray[np.float64], share: float) -> float:
+    return float(np.quantile(values, share, method="lower"))
+
+
+@pytest.mark.parametrize("hop", latencies.HOPS)
+@pytest.mark.parametrize("share", SHARES)
+def test_quantiles_of_recorded_samples_are_within_one_percent(
+    hop: str, share: float
+) -> None:
+    values = latencies.recorded(hop)
+
+    told = sketch_of(values.tolist()).quantile(share)
+
+    assert told == pytest.approx(exact(values, share), rel=0.01)
+
+
+def test_mean_count_and_extremes_are_exact() -> None:
+    sketch = sketch_of([0.010, 0.020, 0.060])
+
+    assert (sketch.count, sketch.least, sketch.most) == (3, 0.010, 0.060)
+    assert sketch.mean == pytest.approx(0.030)
+
+
+def test_many_sketches_together_are_as_one_of_all_their_samples() -> None:
+    values = latencies.recorded("robot_orion")
+
+    whole = sketch_of(values.tolist())
+    parts = merged(sketch_of(part.tolist()) for part in np.array_split(values, 37))
+
+    assert [parts.quantile(share) for share in SHARES] == [
+        whole.quantile(share) for share in SHARES
+    ]
+    assert parts.count == whole.count
+    assert parts.mean == pytest.approx(whole.mean)
+
+
+def test_a_sketch_stays_small_whatever_comes() -> None:
+    sketch = sketch_of(np.geomspace(1e-9, 1e6, 100_000).tolist())
+
+    assert sketch.keys.size <= 1_013
+
+
+def test_nothing_has_no_quantile_and_no_mean() -> None:
+    assert merged([]) is NOTHING
+    assert sketch_of([]).quantile(0.5) is None
+    assert NOTHING.mean is None
+
+
+def test_the_distribution_rises_to_one() -> None:
+    edges, shares = sketch_of([0.01, 0.02, 0.02, 0.5]).distribution()
+
+    assert edges == sorted(edges)
+    assert shares == [0.25, 0.75, 1.0]
+    assert edges[-1] == pytest.approx(0.5)
+
+
+def test_bins_come_back_from_their_text() -> None:
+    sketch = sketch_of(latencies.recorded("uplink").tolist())
+
+    keys, counts = read_bins(write_bins(sketch))
+
+    back = Sketch(sketch.count, sketch.total, sketch.least, sketch.most, keys, counts)
+    assert back.quantile(0.95) == sketch.quantile(0.95)
+
+
+@pytest.mark.parametrize("text", ["", "*", "AAAA", "eJwzNDI2MQUAAvgBAA=="])
+def test_what_is_no_text_of_bins_is_refused(text: str) -> None:
+    with pytest.raises(UnreadableError, match="not_bins"):
+        read_bins(text)
+
+
+def filled(minutes: int, each: float = 0.010) -> Series:
+    """A series of one sample a slice; of minute m they are m + 1 times ``each``."""
+    series = Series()
+    for slice_ in range(minutes * SLICES_A_MINUTE):
+        series.add(each * (slice_ // SLICES_A_MINUTE + 1), 10.0 * slice_)
+        series.end_slice(slice_ + 1)
+    return series
+
+
+def test_a_window_holds_its_own_time_and_no_more() -> None:
+    series = filled(minutes=130)
+
+    counts = {
+        window: merged(series.parts(window)).count
+        for window in ("1min", "15min", "24h")
+    }
+
+    assert counts == {"1min": 6, "15min": 90, "24h": 780}
+    assert merged(series.parts("1min")).least == pytest.approx(1.30)
+
+
+def test_what_is_older_than_a_day_is_forgotten() -> None:
+    series = filled(minutes=25 * 60, each=0.001)
+
+    assert merged(series.parts("24h")).count == 24 * 360
+    assert merged(series.parts("24h")).least == pytest.approx(0.061)
+
+
+def test_what_was_measured_just_now_counts_before_its_slice_is_over() -> None:
+    series = filled(minutes=1)
+
+    series.add(0.9, 61.0)
+
+    assert merged(series.parts("1min")).most == 0.9
+
+
+def test_a_burst_between_two_slices_keeps_the_buffer_short() -> None:
+    series = Series()
+    for _ in range(10_000):
+        series.add(0.01, 0.0)
+
+    assert merged(series.parts("1min")).count == 10_000
