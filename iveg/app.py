@@ -62,6 +62,7 @@ from iveg.web import (
     costmap,
     health,
     history,
+    latency,
     limits,
     live,
     notifications,
@@ -399,6 +400,7 @@ def create_app(dss: Dss) -> FastAPI:
             fleet=dss.fleet,
         )
     )
+    app.include_router(latency.router(watch, clock.now))
     app.include_router(health.router(clock.now, dss.views.health))
     app.include_router(
         pages.router(

@@ -39,7 +39,7 @@ def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> byte
     nothing was heard for 5 s: a line through silence would be invented.
     """
     traces = [trace for one in series for trace in _speed_traces(one, fleet)]
-    return _figure(traces, ("time", "speed"), {"yaxis": {"rangemode": "tozero"}})
+    return figure_of(traces, ("time", "speed"), {"yaxis": {"rangemode": "tozero"}})
 
 
 def confidence_figure(
@@ -62,7 +62,7 @@ def confidence_figure(
     layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
     if threshold is not None:
         layout["shapes"] = [_line_at(threshold)]
-    return _figure(traces, ("confidence", "count"), layout)
+    return figure_of(traces, ("confidence", "count"), layout)
 
 
 def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
@@ -81,7 +81,7 @@ def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
         for kind in kinds
         if any(getattr(one, kind) is not None for one in latencies)
     ]
-    return _figure(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
+    return figure_of(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
 
 
 def climate_figures(series: ClimateSeries) -> dict[str, bytes]:
@@ -170,7 +170,7 @@ def _climate_figure(
     }
     heard = [value for value in values if value is not None]
     layout = {"showlegend": False, "yaxis": {"range": _room(heard, _LEAST_ROOM[kind])}}
-    return _figure([trace] if heard else [], ("time", kind), layout)
+    return figure_of([trace] if heard else [], ("time", kind), layout)
 
 
 def _room(values: Sequence[float], least: float) -> list[float] | None:
@@ -216,10 +216,13 @@ def _line_at(x: float) -> _Trace:
     }
 
 
-def _figure(
+def figure_of(
     traces: Sequence[_Trace], axes: tuple[str, str], layout: Mapping[str, object]
 ) -> bytes:
-    """Checked by the package: a wrong name or value raises here, not in a browser."""
+    """A figure as JSON; ``axes`` say what they show.
+
+    Checked by the package: a wrong name or value raises here, not in a browser.
+    """
     # Half of its users never open a chart, and the package is slow to load.
     from plotly.graph_objects import Figure
 

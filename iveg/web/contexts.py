@@ -111,6 +111,14 @@ class ClimatePage:
 
 
 @dataclass(frozen=True, slots=True)
+class LatencyPage:
+    """``latency.html``: where the milliseconds go, hop by hop."""
+
+    template: ClassVar[str] = "latency.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsPage:
     """``settings.html``: the rule in force, and what this device remembers."""
 
@@ -188,6 +196,7 @@ Page = (
     | CommandsPage
     | FleetPage
     | ClimatePage
+    | LatencyPage
     | SettingsPage
     | DecisionPage
     | DocsPage

@@ -30,6 +30,7 @@ from iveg.web.contexts import (
     FleetPage,
     Frame,
     HistoryPage,
+    LatencyPage,
     LivePage,
     Look,
     Page,
@@ -189,6 +190,10 @@ def _add_supervision(routes: APIRouter, pages: Pages, who: Any) -> None:
     @routes.get("/climate", response_model=None)
     async def climate(request: Request, visitor: Annotated[Any, who]) -> Response:
         return pages.draw(ClimatePage(pages.frame(request, "climate", visitor)))
+
+    @routes.get("/latency", response_model=None)
+    async def latency(request: Request, visitor: Annotated[Any, who]) -> Response:
+        return pages.draw(LatencyPage(pages.frame(request, "latency", visitor)))
 
     @routes.get("/settings", response_model=None)
     async def settings(request: Request, visitor: Annotated[Any, who]) -> Response:

@@ -19,7 +19,7 @@ from tests.processes import Site, until
 
 pytestmark = pytest.mark.e2e
 
-ROUTES = ("/alerts", "/commands", "/fleet", "/climate", "/settings")
+ROUTES = ("/alerts", "/commands", "/fleet", "/climate", "/latency", "/settings")
 THEMES = ("dark", "sunlight")
 STANDING = re.compile(r"PARADO")
 
@@ -168,6 +168,35 @@ def test_a_day_without_climate_says_so(open_page: OpenPage) -> None:
         "Aún no hay datos de las últimas 24 h."
     )
     expect(page.locator("#trends")).to_be_hidden()
+
+
+def test_the_latency_page_shows_the_papers_table_live_beside_what_it_printed(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(route="/latency")
+
+    row = page.locator("#hops-table tbody tr").first
+    expect(row).to_contain_text("odometría")
+    # Mean and P95 in ms with n, in Spanish numbers.
+    measured = re.compile(r"^\d+,\d · \d+,\d \(n \d+\)$")
+    expect(row.locator("td.number").nth(0)).to_have_text(measured)
+    expect(row.locator("td.number").nth(3)).to_have_text(measured)
+    printed = page.locator("#hops-table tbody tr").nth(2)
+    expect(printed).to_contain_text("16,9 · 103,9")
+    expect(page.locator("#hops-bars .main-svg").first).to_be_visible()
+    expect(page.locator("#hops-cdf .main-svg").first).to_be_visible()
+    expect(page.locator("#hops-clocks")).to_contain_text("AGI: reloj en hora")
+
+    page.click('[data-of="AGI"]')
+    page.click('[data-window="1min"]')
+    expect(row.locator("td.number").nth(0)).to_have_text(measured)
+    expect(page.locator("#hops-csv")).to_have_attribute(
+        "href", "/api/v1/latency?format=csv&window=1min&robot=AGI"
+    )
+    page.click('[data-language="en"]')
+    expect(printed).to_contain_text("16.9 · 103.9")
+    expect(page.locator("#hops-bars")).to_contain_text("Δt₁ robot → broker")
+    assert evaluate(page, OVERFLOW) <= 0
 
 
 def test_the_settings_page_shows_the_rule_in_force(

@@ -25,6 +25,7 @@ const ROUTES = {
   commands: () => import("./pages/commands.js"),
   fleet: () => import("./pages/fleet.js"),
   climate: () => import("./pages/climate.js"),
+  latency: () => import("./pages/hops.js"),
   settings: () => import("./pages/settings.js"),
   decision: () => import("./pages/decision.js"),
   about: () => import("./pages/about.js"),

@@ -22,6 +22,7 @@ from iveg.web import (
     commands,
     costmap,
     health,
+    latency,
     live,
     notifications,
     problems,
@@ -97,6 +98,7 @@ class WebDesk(Desk):
             alerts.router(self.assessor, self.clock),
             rule.router(self.rules, self.clock),
             health.router(self.clock, self.views.health),
+            latency.router(self.latency.watch, self.clock),
         ]
 
     # --- what the web asks --------------------------------------------------------

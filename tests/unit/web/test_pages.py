@@ -26,6 +26,7 @@ ROUTES = (
     "/history",
     "/fleet",
     "/climate",
+    "/latency",
     "/settings",
     "/decisions/d-1",
     "/docs",

@@ -67,13 +67,13 @@ export async function drawCharts(charts, asked, words) {
  * @throws {Error} the library could not be loaded
  */
 export async function drawFigure(place, { data, layout }, source, span, words) {
-  const plotly = await load(source);
+  const plotly = await loadPlotly(source);
   const traces = data.map((trace, index) => dressed(trace, index, words));
-  await plotly.react(place, traces, laidOut(layout, span, words), CONFIG);
+  await plotly.react(place, traces, styled(layout, span, words), CONFIG);
 }
 
 /** @param {Source} source */
-async function load(source) {
+export async function loadPlotly(source) {
   library ??= summon(source);
   try {
     return await library;
@@ -136,7 +136,7 @@ function colourOf(kind, who, index) {
  * @param {Span} asked
  * @param {import("../i18n.js").Words} words
  */
-function laidOut(layout, asked, words) {
+export function styled(layout, asked, words) {
   const axis = (/** @type {string} */ name) => ({
     ...layout[`${name}axis`],
     title: { text: words.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
@@ -201,5 +201,5 @@ function noteOf(name, data, words) {
 }
 
 /** @param {string} name */
-const token = (name) =>
+export const token = (name) =>
   getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -1,0 +1,67 @@
+/**
+ * Figures of latency in this page's words and colours: transport blue, FIWARE orange, as
+ * the paper has them; what comes after in two greys.
+ *
+ * @typedef {{type: string, name: string, x: (number | string)[], y: (number | string)[],
+ *   meta: {hop: string, data?: string}, error_y?: object, line?: object}} Trace
+ * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
+ */
+
+import { loadPlotly, styled, token } from "../history/charts.js";
+
+const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
+const COLOURS = /** @type {Record<string, string>} */ ({
+  uplink: "--robot-1",
+  fiware: "--robot-2",
+  iveg: "--text-2",
+  screen: "--line-strong",
+});
+const DASHES = /** @type {Record<string, string>} */ ({
+  odometry: "solid",
+  detections: "dash",
+  lidar: "dot",
+});
+
+/**
+ * @param {HTMLElement} place @param {Figure} figure
+ * @param {import("../history/charts.js").Source} source
+ * @param {import("../i18n.js").Words} words
+ * @throws {Error} the library could not be loaded
+ */
+export async function drawHopFigure(place, { data, layout }, source, words) {
+  const plotly = await loadPlotly(source);
+  const traces = data.map((trace) => dressed(trace, layout.meta, words));
+  const laid = styled(layout, { since: 0, until: 0 }, words);
+  if (layout.meta.y === "hop") {
+    // First hop on top, and room for its words.
+    laid.yaxis = { ...laid.yaxis, autorange: "reversed", title: { text: "" } };
+    laid.margin = { ...laid.margin, l: 150 };
+  }
+  await plotly.react(place, traces, laid, CONFIG);
+}
+
+/** @param {Trace} trace @param {{x: string, y: string}} axes @param {import("../i18n.js").Words} words */
+function dressed(trace, axes, words) {
+  const { hop, data } = trace.meta;
+  const color = token(COLOURS[hop]);
+  const named = words.t(`hops.step.${hop}`);
+  const say = (
+    /** @type {string} */ axis,
+    /** @type {(number | string)[]} */ values,
+  ) =>
+    axis === "data" || axis === "hop"
+      ? values.map((value) =>
+          words.t(axis === "data" ? `stream.${value}` : `hops.step.${value}`),
+        )
+      : values;
+  const error_y = trace.error_y && { ...trace.error_y, color: token("--text") };
+  return {
+    ...trace,
+    name: data ? `${words.t(`stream.${data}`)}, ${named}` : named,
+    x: say(axes.x, trace.x),
+    y: say(axes.y, trace.y),
+    marker: { color },
+    line: { ...trace.line, color, width: 2, dash: DASHES[data ?? ""] },
+    ...(error_y ? { error_y } : {}),
+  };
+}

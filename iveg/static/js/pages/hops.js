@@ -1,0 +1,281 @@
+/**
+ * The Latency page: the paper's table and figure as they are now, beside what it printed.
+ *
+ * @typedef {{count: number, mean_ms: number | null, p50_ms: number | null,
+ *   p95_ms: number | null, p99_ms: number | null}} Spread
+ * @typedef {{passed: number, missing: number, reordered: number, repeated: number}} Order
+ * @typedef {{
+ *   robot_id: string, data: string, heard_hz: number, agent_hz: number,
+ *   orion_hz: number, kept_back: number | null, throttled: boolean,
+ *   orion_first: number, uplink: Order, fiware: Order,
+ *   excluded: Record<string, Record<string, number>>,
+ * }} Stream
+ * @typedef {{robot_id: string, state: string, offset_ms: number | null,
+ *   uncertainty_ms: number | null, jumps: number}} Clock
+ * @typedef {import("../history/charts.js").Source & {
+ *   window: string, direct: boolean,
+ *   rows: {data: string, hops: Record<string, Spread>, sampled: string[]}[],
+ *   paper: Record<string, Record<string, Record<string, number>>>,
+ *   clocks: Clock[], pages_within_ms: number | null, streams: Stream[],
+ *   remarks: {key: string, hop: string, slots: Record<string, string | number>}[],
+ *   trace: {robot_id: string, data: string, stamp: string | null,
+ *     steps: {hop: string, from_ms: number, to_ms: number}[]} | null,
+ *   figures: Record<string, import("./hop_figures.js").Figure>,
+ * }} Latency
+ */
+
+import { readApi } from "../api.js";
+import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
+import { onThemeChange } from "../panels/theme.js";
+import { drawHopFigure } from "./hop_figures.js";
+
+const EVERY_MS = 2000;
+/** Figures cost the server more than numbers: every fifth time. */
+const DRAW_EVERY = 5;
+const HOPS = ["uplink", "fiware", "robot_orion", "iveg", "screen"];
+const FIGURES = ["bars", "cdf", "trace"];
+const NOTHING = "—";
+/** The paper's name of each of our hops; it has none for what comes after Orion. */
+const PRINTED = /** @type {Record<string, string>} */ ({
+  uplink: "uplink",
+  fiware: "fiware",
+  robot_orion: "total",
+});
+
+/** @param {import("../page.js").Page} page */
+export function start({ words }) {
+  let asked = { window: "15min", robot: "" };
+  /** @type {Latency | null} */
+  let told = null;
+  let status = 200;
+  let times = 0;
+
+  async function load() {
+    if (document.hidden) return;
+    const query = queryOf(asked);
+    const draws = times % DRAW_EVERY === 0;
+    times += 1;
+    const answer = await readApi(`latency?${query}&figures=${draws}`);
+    if (query !== queryOf(asked)) return;
+    status = answer.status;
+    if (status === 200) told = answer.body;
+    await draw();
+  }
+
+  async function draw() {
+    const failed = need("#hops-error");
+    setHidden(failed, status === 200);
+    setText(failed, words.t(status ? "rows.failed" : "rows.offline", { status }));
+    if (told === null) return;
+    drawRemarks(told, words);
+    drawTable(told, words);
+    drawClocks(told, words);
+    drawStreams(told, words);
+    await drawFigures(told, words);
+  }
+
+  function redraw() {
+    times = 0;
+    load();
+  }
+
+  /** @param {Partial<typeof asked>} change */
+  function ask(change) {
+    asked = { ...asked, ...change };
+    for (const chip of all("[data-window]")) {
+      setAttribute(chip, "aria-pressed", String(chip.dataset.window === asked.window));
+    }
+    for (const chip of all("[data-of]")) {
+      setAttribute(chip, "aria-pressed", String(chip.dataset.of === asked.robot));
+    }
+    const csv = /** @type {HTMLAnchorElement} */ (need("#hops-csv"));
+    csv.href = `/api/v1/latency?format=csv&${queryOf(asked)}`;
+    times = 0;
+    load();
+  }
+
+  for (const chip of all("[data-window]")) {
+    chip.addEventListener("click", () => ask({ window: chip.dataset.window }));
+  }
+  for (const chip of all("[data-of]")) {
+    chip.addEventListener("click", () => ask({ robot: chip.dataset.of }));
+  }
+  words.onChange(redraw);
+  onThemeChange(redraw);
+  document.addEventListener("visibilitychange", load);
+  setInterval(load, EVERY_MS);
+  load();
+}
+
+/** @param {{window: string, robot: string}} asked */
+function queryOf({ window, robot }) {
+  return robot ? `window=${window}&robot=${robot}` : `window=${window}`;
+}
+
+/** @param {Latency} told @param {import("../i18n.js").Words} words */
+function drawRemarks({ remarks }, words) {
+  const said = remarks.map(({ key, slots }) => words.t(key, slots));
+  if (!said.length) said.push(words.t("hops.well"));
+  fill(need("#hops-remarks"), said);
+}
+
+/**
+ * One line of what is measured and two of what was printed, for each kind of data.
+ *
+ * @param {Latency} told @param {import("../i18n.js").Words} words
+ */
+function drawTable(told, words) {
+  const lines = told.rows.flatMap(({ data, hops, sampled }) => [
+    line(
+      words.t(`stream.${data}`),
+      words.t("hops.source.here"),
+      HOPS.map((hop) => cellOf(hops[hop], sampled.includes(hop), words)),
+    ),
+    ...Object.entries(told.paper).map(([place, rows]) =>
+      line(
+        "",
+        words.t(`hops.source.${place}`),
+        HOPS.map((hop) => printedOf(rows[data], PRINTED[hop], words)),
+      ),
+    ),
+  ]);
+  need("#hops-table tbody").replaceChildren(...lines);
+  const first = told.streams.reduce((sum, one) => sum + one.orion_first, 0);
+  const passed = told.streams.reduce((sum, one) => sum + one.fiware.passed, 0);
+  const notes = told.direct ? [] : [words.t("hops.no_direct")];
+  if (first > 0) notes.push(words.t("hops.orion_first", { share: first / passed }));
+  setText(need("#hops-note"), notes.join(" "));
+}
+
+/** @param {string} data @param {string} source @param {string[]} cells */
+function line(data, source, cells) {
+  const row = make("tr");
+  const head = make("th", "", data);
+  head.setAttribute("scope", "row");
+  row.append(head, make("td", "", source));
+  row.append(...cells.map((text) => make("td", "number", text)));
+  return row;
+}
+
+/**
+ * @param {Spread} spread @param {boolean} isSampled
+ * @param {import("../i18n.js").Words} words
+ */
+function cellOf({ count, mean_ms, p95_ms }, isSampled, words) {
+  if (!count) return NOTHING;
+  const key = isSampled ? "hops.measured_sampled" : "hops.measured";
+  return words.t(key, { mean: mean_ms, p95: p95_ms, count });
+}
+
+/**
+ * @param {Record<string, number>} row @param {string | undefined} hop
+ * @param {import("../i18n.js").Words} words
+ */
+function printedOf(row, hop, words) {
+  if (!hop) return NOTHING;
+  const [mean, p95] = [row[`${hop}_mean`], row[`${hop}_p95`]];
+  return words.t("hops.printed", { mean, p95 });
+}
+
+/** @param {Latency} told @param {import("../i18n.js").Words} words */
+function drawClocks({ clocks, pages_within_ms }, words) {
+  const said = clocks.map((clock) =>
+    words.t(`hops.clock.${clock.state}`, {
+      robot: clock.robot_id,
+      offset: clock.offset_ms,
+      within: clock.uncertainty_ms,
+    }),
+  );
+  const page = pages_within_ms === null ? "unknown" : "known";
+  said.push(words.t(`hops.page_clock.${page}`, { within: pages_within_ms }));
+  fill(need("#hops-clocks"), said);
+}
+
+/** @param {Latency} told @param {import("../i18n.js").Words} words */
+function drawStreams({ streams }, words) {
+  const number = (/** @type {number} */ value, decimals = 0) =>
+    words.number(value, decimals);
+  const rows = streams.map((one) => {
+    const row = make("tr");
+    const kept = one.kept_back === null ? NOTHING : `${number(100 * one.kept_back)} %`;
+    const texts = [
+      number(one.heard_hz, 1),
+      number(one.agent_hz, 1),
+      one.throttled ? words.t("hops.throttled") : number(one.orion_hz, 1),
+      kept,
+      number(one.uplink.missing),
+      number(one.fiware.missing),
+      number(one.uplink.reordered + one.fiware.reordered),
+      number(excludedOf(one)),
+    ];
+    row.append(make("td", "", one.robot_id));
+    row.append(make("td", "", words.t(`stream.${one.data}`)));
+    row.append(...texts.map((text) => make("td", "number", text)));
+    return row;
+  });
+  need("#hops-streams tbody").replaceChildren(...rows);
+  fill(need("#hops-excluded"), reasonsOf(streams, words));
+}
+
+/** @param {Stream} stream */
+function excludedOf({ excluded }) {
+  const counts = Object.values(excluded).flatMap((of) => Object.values(of));
+  return counts.reduce((sum, count) => sum + count, 0);
+}
+
+/** @param {Stream[]} streams @param {import("../i18n.js").Words} words */
+function reasonsOf(streams, words) {
+  /** @type {Map<string, number>} */
+  const counts = new Map();
+  for (const { robot_id, excluded } of streams) {
+    for (const reasons of Object.values(excluded)) {
+      for (const [why, count] of Object.entries(reasons)) {
+        const name = `${why} ${robot_id}`;
+        counts.set(name, (counts.get(name) ?? 0) + count);
+      }
+    }
+  }
+  return [...counts].map(([name, count]) => {
+    const [why, robot] = name.split(" ");
+    return words.t(`hops.excluded.${why}`, { robot, count });
+  });
+}
+
+/** @param {Latency} told @param {import("../i18n.js").Words} words */
+async function drawFigures(told, words) {
+  for (const name of FIGURES) {
+    const place = need(`#hops-${name}`);
+    const figure = told.figures[name];
+    if (!figure) continue;
+    setHidden(place, figure.data.length === 0);
+    setText(need(`#hops-${name}-says`), noteOf(name, told, words));
+    if (figure.data.length === 0) continue;
+    try {
+      await drawHopFigure(place, figure, told, words);
+    } catch {
+      setHidden(need("#hops-error"), false);
+      setText(need("#hops-error"), words.t("history.error.library"));
+    }
+  }
+}
+
+/**
+ * What a figure shows, for who cannot see it.
+ *
+ * @param {string} name @param {Latency} told @param {import("../i18n.js").Words} words
+ */
+function noteOf(name, told, words) {
+  if (told.figures[name].data.length === 0) return words.t("hops.nothing");
+  if (name !== "trace" || told.trace === null) return words.t(`hops.note.${name}`);
+  const { robot_id, data, stamp, steps } = told.trace;
+  const total = Math.max(...steps.map(({ to_ms }) => to_ms));
+  return words.t("hops.note.trace", { robot: robot_id, data, stamp, total });
+}
+
+/** @param {HTMLElement} list @param {string[]} sentences */
+function fill(list, sentences) {
+  const said = [...list.children].map(({ textContent }) => textContent);
+  // A list that is read out aloud is left alone while it says the same.
+  if (said.join("\n") === sentences.join("\n")) return;
+  list.replaceChildren(...sentences.map((sentence) => make("li", "", sentence)));
+}
