@@ -65,6 +65,7 @@ from iveg.web import (
     latency,
     limits,
     live,
+    metrics,
     notifications,
     openapi,
     pages,
@@ -313,6 +314,30 @@ class Dss:
         total["nlos.protected"] = self.assessor.protected_unseen
         return total
 
+    def queues(self) -> metrics.Queues:
+        """How full the queues are, what gave way, what was done again."""
+        kept = self.recorder.counters
+        counted = self.ingest.counters
+        dropped = {
+            "ingest": sum(
+                n for name, n in counted.items() if name.startswith("dropped.")
+            ),
+            "history": kept["history_dropped"],
+            "mqtt_out": self.link.replaced,
+        }
+        stops = [machine.stop for machine in self.commander.machines.values()]
+        retries = {
+            "broker_connect": max(0, self.link.connects - 1),
+            "stop_send": sum(max(0, one.tries - 1) for one in stops if one is not None),
+            "history_replay": kept["history_replayed"],
+        }
+        depths = {
+            "ingest": self.ingest.waiting,
+            "history": kept["history_waiting"],
+            "mqtt_out": self.link.offered,
+        }
+        return metrics.Queues(depths, dropped, retries)
+
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
         return Snapshot(
@@ -402,6 +427,9 @@ def create_app(dss: Dss) -> FastAPI:
     )
     app.include_router(latency.router(watch, clock.now))
     app.include_router(health.router(clock.now, dss.views.health))
+    app.include_router(
+        metrics.router(clock.now, dss.views.health, watch, dss.queues)
+    )
     app.include_router(
         pages.router(
             drawn,

@@ -89,6 +89,11 @@ class MqttLink:
         self.connects = 0
 
     @property
+    def offered(self) -> int:
+        """How many topics wait to be sent."""
+        return len(self._offered)
+
+    @property
     def connected(self) -> bool:
         """Whether the broker has accepted us and has not gone since."""
         return self._client is not None

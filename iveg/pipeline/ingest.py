@@ -79,6 +79,11 @@ class Ingest:
         if self._rejected is not None:
             self._rejected(source, reason)
 
+    @property
+    def waiting(self) -> int:
+        """How much waits to be taken."""
+        return len(self._queue)
+
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
         while self._queue:

@@ -44,10 +44,16 @@ class Remark:
 
 
 class Overloads:
-    """What is wrong with the hops now; told once a second."""
+    """What is wrong with the hops now; told once a second.
+
+    Attributes:
+        remarks: In sentences.
+        lags: How far each is behind, by hop and robot (s); no robot where all share it.
+    """
 
     def __init__(self) -> None:
         self.remarks: Sequence[Remark] = ()
+        self.lags: dict[tuple[Hop, str], float] = {}
         self._lags: dict[tuple[Hop, str], deque[float]] = {}
         self._behind: set[tuple[Hop, str]] = set()
 
@@ -71,11 +77,13 @@ class Overloads:
         about = hop, robot_id
         if lag_s is None:
             self._lags.pop(about, None)
+            self.lags.pop(about, None)
             self._behind.discard(about)
             return
         past = self._lags.setdefault(about, deque(maxlen=_GROWS_WITHIN))
         grows = bool(past) and lag_s > past[0] + _GROWS_S
         past.append(lag_s)
+        self.lags[about] = lag_s
         limit = BEHIND_S / 2 if about in self._behind else BEHIND_S
         if lag_s < limit:
             self._behind.discard(about)

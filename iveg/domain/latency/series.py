@@ -32,8 +32,10 @@ class Series:
         "_minute",
         "_minutes",
         "_slices",
+        "count",
         "newest",
         "newest_at",
+        "total",
     )
 
     def __init__(self) -> None:
@@ -44,6 +46,9 @@ class Series:
         self._minutes: deque[Sketch] = deque(maxlen=15)
         self._hour: list[Sketch] = []
         self._hours: deque[Sketch] = deque(maxlen=24)
+        self.count = 0
+        """How many there were since the start; ``total`` their sum (s)."""
+        self.total = 0.0
         self.newest = 0.0
         """The last duration (s); ``newest_at`` when it was measured (monotonic, s)."""
         self.newest_at = float("-inf")
@@ -51,6 +56,8 @@ class Series:
     def add(self, duration_s: float, now: float) -> None:
         """One more message passed (``now`` monotonic, s)."""
         self.newest, self.newest_at = duration_s, now
+        self.count += 1
+        self.total += duration_s
         self._buffer.append(duration_s)
         if len(self._buffer) >= _BUFFER:
             self._fold()

@@ -24,6 +24,7 @@ from iveg.web import (
     health,
     latency,
     live,
+    metrics,
     notifications,
     problems,
     robots,
@@ -48,6 +49,7 @@ class WebDesk(Desk):
     def __init__(self, robots_: tuple[str, ...] = ("AGI", "AGII")) -> None:
         super().__init__(robots_)
         self.heard: list[Instant] = []
+        self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.door = Door(
             sign_in_token="cd" * 32,
             api_token=API_TOKEN,
@@ -99,6 +101,12 @@ class WebDesk(Desk):
             rule.router(self.rules, self.clock),
             health.router(self.clock, self.views.health),
             latency.router(self.latency.watch, self.clock),
+            metrics.router(
+                self.clock,
+                self.views.health,
+                self.latency.watch,
+                lambda: self.queues,
+            ),
         ]
 
     # --- what the web asks --------------------------------------------------------
