@@ -7,6 +7,7 @@ import runpy
 
 BENCHMARKS = (
     "decision_cost",
+    "latency_cost",
     "lidar_cost",
     "emulator_cost",
     "fiware_road",

@@ -15,9 +15,8 @@ from iveg.domain.latency.hops import HOPS, Data, Hop
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
-from iveg.models.health import Health
+from iveg.models.health import Health, Safety
 from iveg.models.health import Hop as HealthHop
-from iveg.models.health import Safety
 from iveg.web.auth import require
 
 _SHARES: Final = (0.5, 0.95, 0.99)
@@ -99,8 +98,7 @@ def _hops(hops: Iterable[HealthHop]) -> Iterator[str]:
     lag = ((labels, hop.lag_s) for labels, hop in known)
     yield from _family("lag_seconds", "gauge", "How late a probe passes it.", lag)
     growing = (
-        (labels, None if hop.lag_s is None else hop.growing)
-        for labels, hop in known
+        (labels, None if hop.lag_s is None else hop.growing) for labels, hop in known
     )
     yield from _family("lag_growing", "gauge", "Whether that grows.", growing)
 

@@ -54,6 +54,7 @@ _DATA: Final[dict[type, Data]] = {
 
 def data_of(observation: Observation) -> Data | None:
     """Which row of the table an observation belongs to; None: to none."""
-    if isinstance(observation, Overtaken):
+    data = _DATA.get(type(observation))
+    if data is None and isinstance(observation, Overtaken):
         return _DATA[observation.kind]
-    return _DATA.get(type(observation))
+    return data

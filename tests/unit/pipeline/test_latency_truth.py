@@ -1,0 +1,139 @@
+"""Delays that the emulator's radio and an agent put in are found in the right hop.
+
+Robots, their uplink, the codec and all of iVeg are real; time is moved by hand, so that
+what was put in is known to the microsecond.
+"""
+
+import heapq
+from itertools import count
+from statistics import mean, quantiles
+
+import numpy as np
+import pytest
+
+from iveg.domain.latency.hops import Hop
+from iveg.domain.latency.sketch import Sketch, merged
+from iveg.domain.observations import Instant, Received, Road
+from iveg.emulator.radio import LinkFaults, Packet, Radio
+from iveg.ngsi import codec
+from tests.builders import START
+from tests.stage import Stage
+
+CALM_AGENT_S = 0.015
+
+
+class Air(Stage):
+    """A stage whose messages take their time: radio to the broker, agent to Orion.
+
+    Attributes:
+        faults: Of AGI's radio; AGII's is well.
+        agent_s: From the broker to Orion.
+        put_in: What each of AGI's poses took to the broker, as the radio had it (s).
+    """
+
+    def __init__(self, faults: LinkFaults, agent_s: float = CALM_AGENT_S) -> None:
+        self.agent_s = agent_s
+        self.put_in: list[float] = []
+        self._radio = Radio(frozenset(), np.random.default_rng(3))
+        self._radio.faults = faults
+        self._on_way: list[tuple[float, int, Road, str, bytes]] = []
+        self._numbers = count()
+        # Robots speak as soon as they are made.
+        super().__init__("viewpoints")
+
+    async def step(self) -> None:
+        """What is due by the end of a step arrives in it, each at its own moment."""
+        end = self.now.mono + 0.05
+        while self._on_way and self._on_way[0][0] <= end:
+            due, _, road, device, payload = heapq.heappop(self._on_way)
+            at = Instant(due, START.wall + due - START.mono)
+            for observation in codec.read_measure(device, payload).observations:
+                self._desk.ingest.offer(Received(observation, at, road))
+        await super().step()
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        now, device = self.now.mono, topic.split("/")[2]
+        due = now
+        if device.startswith("AGI_"):
+            # What a radio does to telemetry: its order on one connection is kept.
+            [(due, _)] = self._radio.pass_on(Packet(topic, 1, payload), now)
+        if device == "AGI_odom":
+            self.put_in.append(due - now)
+        roads: tuple[tuple[Road, float], ...] = (
+            ("mqtt", due),
+            ("orion", due + self.agent_s),
+        )
+        for road, when in roads:
+            number = next(self._numbers)
+            heapq.heappush(self._on_way, (when, number, road, device, payload))
+
+    def took(self, robot_id: str, hop: Hop) -> Sketch:
+        """What a hop took for a robot's odometry in the last minute."""
+        streams = self._desk.latency.watch.streams
+        one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
+        return merged(one.hops[hop].parts("1min"))
+
+
+async def play(air: Air, seconds: float) -> None:
+    for _ in range(round(20 * seconds)):
+        await air.step()
+
+
+def close(seconds: float) -> object:
+    """Within 10 ms or 10 %, the larger."""
+    return pytest.approx(seconds, abs=0.010, rel=0.10)
+
+
+@pytest.mark.parametrize(
+    ("faults", "agent_s", "uplink_s"),
+    [
+        (LinkFaults(), CALM_AGENT_S, 0.0),
+        (LinkFaults(delay_ms=50.0), CALM_AGENT_S, 0.050),
+        (LinkFaults(), CALM_AGENT_S + 0.120, 0.0),
+        (LinkFaults(delay_ms=50.0), CALM_AGENT_S + 0.120, 0.050),
+    ],
+    ids=["calm", "radio", "agent", "both"],
+)
+async def test_a_delay_is_found_in_the_hop_that_has_it_and_in_no_other(
+    faults: LinkFaults, agent_s: float, uplink_s: float
+) -> None:
+    air = Air(faults, agent_s)
+
+    await play(air, 12.0)
+
+    found = {hop: air.took("AGI", hop) for hop in ("uplink", "fiware", "robot_orion")}
+    assert found["uplink"].count > 200
+    assert {hop: one.mean for hop, one in found.items()} == {
+        "uplink": close(uplink_s),
+        "fiware": close(agent_s),
+        "robot_orion": close(uplink_s + agent_s),
+    }
+    assert air.took("AGII", "uplink").mean == close(0.0)
+
+
+async def test_jitter_of_300_ms_is_found_as_the_radio_had_it() -> None:
+    air = Air(LinkFaults(jitter_ms=300.0))
+
+    await play(air, 20.0)
+
+    found = air.took("AGI", "uplink")
+    put_in = air.put_in[: found.count]
+    assert found.mean == close(mean(put_in))
+    assert found.quantile(0.95) == close(quantiles(put_in, n=20)[18])
+    assert found.least == close(min(put_in))
+    assert air.took("AGI", "fiware").mean == close(CALM_AGENT_S)
+    assert air.took("AGII", "uplink").most < 0.010
+
+
+async def test_a_delay_that_begins_later_is_not_taken_for_a_clock_that_was_set() -> (
+    None
+):
+    air = Air(LinkFaults())
+    await play(air, 5.0)
+
+    air._radio.faults = LinkFaults(delay_ms=400.0)
+    await play(air, 15.0)
+
+    clock = air._desk.latency.watch.clocks["AGI"]
+    assert (clock.state, clock.offset_s, clock.jumps) == ("in_step", 0.0, 0)
+    assert air.took("AGI", "uplink").quantile(0.95) == close(0.400)
