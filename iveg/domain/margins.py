@@ -7,12 +7,14 @@ and a constant deceleration (safety.md §6.1)::
           person walks     reaction   braking    uncertainty
 
 It is shown beside the paper's ring and decides nothing.  T grows with the age of the
-data: a distance is as old as the older of both positions.  Left out: the intrusion
-distance C, since nobody reaches through a light curtain here.
+data: a distance is as old as the older of both positions.  Somebody out of sight may
+have come nearer: of whom that could matter the margin is unknown, and of everybody else
+it is at least what is told.  Left out: the intrusion distance C, since nobody reaches
+through a light curtain here.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -26,7 +28,8 @@ from iveg.domain.world import RobotState
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
-_UNKNOWN_M = 1e6
+_UNKNOWN_M = 1e4
+_INSIDE_M = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,8 @@ class Margin:
         braking_m: How far it drives after.
         age_s: Of the older of both positions (s).
         speed: Of the robot (m/s); ``braking`` what the margin counts on (m/s²).
-        known: False where an age is above its limit.
+        known: False where the robot's pose is too old, or the look is and the person
+            could be near by now.
     """
 
     robot_id: str
@@ -99,8 +103,22 @@ def margins_of(
 
 
 def least(margins: Iterable[Margin]) -> Margin | None:
-    """The one to show: what is not known comes before what is small."""
-    return min(margins, key=lambda one: (one.known, one.margin_m), default=None)
+    """The one to show: who could not stop in time, then what is not known."""
+    return min(margins, key=_urgency, default=None)
+
+
+def _urgency(one: Margin) -> float:
+    """The less, the sooner it is shown (m)."""
+    if not one.known:
+        return one.margin_m - _UNKNOWN_M
+    return one.margin_m - _INSIDE_M if one.margin_m < 0.0 else one.margin_m
+
+
+def _is_known(pose_age_s: float, look_age_s: float, margin_m: float) -> bool:
+    """Whether a margin is one: the least that is left is told of who is far enough."""
+    if pose_age_s > LIMITS.pose_lost_s:
+        return False
+    return look_age_s <= LIMITS.pose_lost_s or margin_m >= LIMITS.margin_clear_m
 
 
 class LeastMargins:
@@ -157,10 +175,9 @@ class LeastMargins:
 def _all_pairs(
     facts: Sequence[tuple[float, ...]], looks: Sequence[Sighting], now: Instant
 ) -> NDArray[np.float64]:
-    """``margin_m`` of each robot with each look, as ``_to_look`` has it.
+    """``_urgency`` of each robot with each look, as ``_to_look`` has it.
 
-    Shape (robots, looks), (m).  What is not known lies below everything else: it comes
-    before what is small.
+    Shape (robots, looks), (m).
     """
     told = np.array(facts, float)
     x, y, speed, braking, half, age = told.reshape(-1, 6).T[:, :, np.newaxis]
@@ -174,8 +191,12 @@ def _all_pairs(
     needs = (
         walks + speed * reaction + speed * speed / (2 * braking) + LIMITS.uncertainty_m
     )
-    margins: NDArray[np.float64] = gap - needs - _UNKNOWN_M * (age > LIMITS.pose_lost_s)
-    return margins
+    margins = gap - needs
+    unseen = (look_age > LIMITS.pose_lost_s) & (margins < LIMITS.margin_clear_m)
+    is_lost = (age > LIMITS.pose_lost_s) | unseen
+    is_inside = ~is_lost & (margins < 0.0)
+    found: NDArray[np.float64] = margins - _UNKNOWN_M * is_lost - _INSIDE_M * is_inside
+    return found
 
 
 def _facts(
@@ -197,7 +218,7 @@ def _to_look(
     age = max(pose_age, look.age_s(now))
     reaction = max(LIMITS.reaction_s, age + LIMITS.onward_s)
     footprints = profile.length / 2 + LIMITS.person_radius_m
-    return Margin(
+    one = Margin(
         robot.robot_id,
         person.person_id,
         gap_m=odometry.pose.distance_to(look.x, look.y) - footprints,
@@ -207,5 +228,6 @@ def _to_look(
         age_s=age,
         speed=speed,
         braking=braking,
-        known=pose_age <= LIMITS.pose_lost_s,
     )
+    known = _is_known(pose_age, look.age_s(now), one.margin_m)
+    return one if known else replace(one, known=False)

@@ -9,6 +9,7 @@ from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.mandates import Crossing
 from iveg.domain.observations import SafetyReport
 from iveg.domain.people import People
@@ -22,6 +23,8 @@ class Evidence:
 
     Attributes:
         decision_id: The decision that opens; None where the robot was ahead of ours.
+        radius_m: Of the ring that it came into, where it had grown: nobody had looked
+            for ``unseen_s`` seconds.
     """
 
     cause: str
@@ -31,6 +34,8 @@ class Evidence:
     in_sight: bool
     confidence: float | None = None
     decision_id: str | None = None
+    radius_m: float | None = None
+    unseen_s: float | None = None
 
 
 def evidence_of(
@@ -78,8 +83,10 @@ def _without_decision(
 
 
 def _of_crossing(crossing: Crossing) -> Evidence:
-    hazard = crossing.hazard
-    confidence = None if hazard.sighting is None else hazard.sighting.confidence
+    hazard, look = crossing.hazard, crossing.hazard.sighting
+    confidence = None if look is None else look.confidence
+    unseen = None if look is None else look.age_s(crossing.entered)
+    grown = unseen is not None and unseen > LIMITS.growth_grace_s
     return Evidence(
         hazard.cause,
         hazard.reason,
@@ -88,6 +95,8 @@ def _of_crossing(crossing: Crossing) -> Evidence:
         crossing.in_sight,
         confidence,
         crossing.decision_id,
+        hazard.radius_m if grown else None,
+        unseen if grown else None,
     )
 
 
@@ -144,6 +153,9 @@ def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
                 "confidence": evidence.confidence,
                 "in_sight": evidence.in_sight,
             }
+            if evidence.radius_m is not None and evidence.unseen_s is not None:
+                slots["radius"] = round(evidence.radius_m, 2)
+                slots["unseen"] = round(evidence.unseen_s, 1)
     return LogEvent(
         "speed",
         key,

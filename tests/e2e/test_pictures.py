@@ -10,37 +10,21 @@ of another machine change stays within a square, what people call broken does no
 """
 
 import base64
-import json
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, WebSocketRoute
+from playwright.sync_api import Browser, Page
 
-from iveg.adapters.history.store import Store
-from iveg.domain.records import Record
-from iveg.emulator.world import climate_at
-from iveg.ngsi.codec import format_stamp
-from iveg.pipeline.record import Waiting
+from tests.e2e.frozen import frozen_page, past_site, settle
 from tests.e2e.reading import evaluate
-from tests.fakes.records import (
-    alert_record,
-    climate_record,
-    command_record,
-    decision_record,
-    detection_record,
-    odometry_record,
-)
-from tests.processes import Site, site
+from tests.processes import Site
 
 pytestmark = pytest.mark.e2e
 
 HERE = Path(__file__).parent
-NOW = 1_795_231_880.2
-"""When the snapshot was taken: 04:31:20 in Madrid on 21 November 2026."""
 SQUARE_PX = 20
 MOST_OF_A_SQUARE = 48.0
 """Of 255; measured: noise of one machine 0 to 4, the mildest defect below 85."""
@@ -78,38 +62,18 @@ CASES = (
 @pytest.fixture(scope="module")
 def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A server over a history that never changes; no robot is there."""
-    with site(tmp_path_factory.mktemp("pictures")) as place:
-        store = Store(place.settings["IVEG_DATABASE_URL"])
-        rows = enumerate(_history(), 1)
-        store.write([Waiting(record, n, 0.0) for n, record in rows])
-        store.close()
-        place.start("serve")
-        place.wait_until_served()
+    with past_site(tmp_path_factory.mktemp("pictures")) as place:
         yield place
 
 
 @pytest.fixture
 def picture(browser: Browser, past: Site, case: Case) -> Iterator[Page]:
     """The page of a case, as it stands at its moment."""
-    context = browser.new_context(
-        viewport={"width": case.width, "height": case.height},
-        locale="es-ES",
-        reduced_motion="reduce",
-    )
-    page = context.new_page()
-    page.goto(f"{past.sign_in_link}", wait_until="commit")
-    looks = {"iveg_theme": case.theme, "iveg_language": case.language}
-    context.add_cookies(
-        [{"name": name, "value": look, "url": past.url} for name, look in looks.items()]
-    )
-    page.clock.install(time=NOW - 1.0)
-    page.clock.pause_at(NOW)
-    page.route_web_socket("**/live", _answer)
-    page.route("**/api/v1/history/climate", _on_that_day)
-    page.goto(past.url + case.route)
-    _settle(page, case.ready)
-    yield page
-    context.close()
+    size = (case.width, case.height)
+    with frozen_page(browser, past, size, case.theme, case.language) as page:
+        page.goto(past.url + case.route)
+        settle(page, case.ready)
+        yield page
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -155,38 +119,6 @@ def judge(browser: Browser) -> Iterator[Page]:
     page.close()
 
 
-def _answer(line: WebSocketRoute) -> None:
-    """Plays the snapshot and its scans, and answers pings by the standing clock."""
-    frozen = json.loads((HERE / "frozen.json").read_text())
-    line.send(json.dumps({"topic": "snapshot", "data": frozen["snapshot"]}))
-    for scan in frozen["scans"]:
-        line.send(base64.b64decode(scan))
-
-    def reply(message: str | bytes) -> None:
-        data = {"t": json.loads(message).get("t"), "server": NOW}
-        line.send(json.dumps({"topic": "pong", "data": data}))
-
-    line.on_message(reply)
-
-
-def _on_that_day(route: Route) -> None:
-    """The last 24 hours as they were then: the server's own clock goes on."""
-    since, until = (format_stamp(NOW - ago) for ago in (86_400.0, 0.0))
-    route.continue_(url=f"{route.request.url}?since={since}&until={until}")
-
-
-def _settle(page: Page, ready: str) -> None:
-    """A little time of the page's own passes, until it shows what the case is about."""
-    for _ in range(100):
-        page.clock.run_for(5)
-        if page.locator(ready).first.is_visible():
-            break
-        page.evaluate("() => fetch('/healthz')")
-    for _ in range(10):
-        page.clock.run_for(20)
-        page.evaluate("() => fetch('/healthz')")
-
-
 def _keep(judge: Page, shot: bytes, file: Path) -> None:
     if WRITING:
         url = judge.evaluate(_HALF, base64.b64encode(shot).decode())
@@ -200,66 +132,6 @@ def _difference(judge: Page, one: bytes, other: bytes) -> tuple[float, float]:
     return found["worst"], found["mean"]
 
 
-def _history() -> Iterator[Record]:
-    """A day; nothing within a second of where the last 15 minutes begin or end.
-
-    They are asked for by the page's clock, and ``_settle`` lets it run a little.
-    """
-    for n in range(2, 900, 2):
-        slow = 0.5 if 300 <= n < 420 else 1.0
-        for robot, speed in (("AGI", 0.8), ("AGII", 0.6)):
-            yield odometry_record(
-                at=NOW - 900 + n,
-                robot_id=robot,
-                linear=speed * slow,
-                mandated_factor=slow,
-            )
-    for n in range(1440):
-        at = NOW - 60 * (1440 - n)
-        air: dict[str, Any] = {
-            name: getattr(climate_at(at), name)
-            for name in ("temperature", "relative_humidity", "co2")
-        }
-        yield climate_record(at=at, **air)
-    yield from (
-        detection_record(at=NOW - 60 * n - 30, probability=0.5 + n / 30)
-        for n in range(15)
-    )
-    yield decision_record(
-        started_at=NOW - 600, ended_at=NOW - 480, links=json.dumps(_CHAIN)
-    )
-    yield command_record(
-        state="RUNNING",
-        requested_at=NOW - 300,
-        sent_direct_at=NOW - 299.998,
-        sent_fiware_at=NOW - 299.99,
-        answer_direct_at=NOW - 299.95,
-        answer_fiware_at=NOW - 299.93,
-        standing_at=NOW - 299.588,
-        standstill_ms=412.0,
-        tries=1,
-    )
-    yield alert_record(
-        raised_at=NOW - 600,
-        cleared_at=NOW - 480,
-        slots='{"robot":"AGII","person":"P1","distance":1.4}',
-    )
-
-
-_CHAIN = [
-    {"link": link, "at": NOW - 600 + n / 50, "value": value, "verdict": verdict}
-    for n, (link, value, verdict) in enumerate(
-        (
-            ("detection", "farmer", "ok"),
-            ("filter", 0.94, "ok"),
-            ("geometry", 1.43, "ok"),
-            ("rule", "fleet-alert 1", "ok"),
-            ("feedback", "0.5", "ok"),
-            ("applied", 0.5, "late"),
-            ("observed", None, "missing"),
-        )
-    )
-]
 _BITMAP = """const bitmap = async (text) => createImageBitmap(
     await (await fetch('data:image/png;base64,' + text)).blob());"""
 _HALF = f"""async (text) => {{

@@ -125,3 +125,19 @@ test("a name that a grower gave stays as it is", () => {
     );
   }
 });
+
+test("13.9 a share below a threshold is never written as the threshold", async () => {
+  const loaded = createWords(async () => ({ share: "{value:percent}" }));
+  await loaded.use("en");
+  const said = [0.7953, 0.7999, 0.8, 0.29, 1].map((value) =>
+    loaded.t("share", { value }),
+  );
+  equal(said, ["79%", "79%", "80%", "29%", "100%"]);
+});
+
+test("13.20 a time is written in minutes as soon as it has any", async () => {
+  const loaded = createWords(async () => ({ age: "{value:span}" }));
+  await loaded.use("es");
+  const said = [42.4, 222, 7500].map((value) => loaded.t("age", { value }));
+  equal(said, ["42 s", "3 min 42 s", "2 h 5 min"]);
+});

@@ -1,3 +1,4 @@
+import { sentenceOf } from "../../iveg/static/js/panels/log.js";
 import { createChosen, facetsOf } from "../../iveg/static/js/panels/log_filter.js";
 import { equal, test } from "./harness.js";
 import { memory } from "./memory.js";
@@ -61,4 +62,16 @@ test("a memory that is no memory of ours filters nothing", () => {
     storage.setItem("iveg.log", text);
     equal(createChosen(storage).all(), []);
   }
+});
+
+test("13.9 a slow-down far from anybody says that the ring had grown", () => {
+  const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+    /** @type {unknown} */ ({ t: (/** @type {string} */ key) => key })
+  );
+  const slots = { reason: "person", distance: 5.2 };
+  equal(sentenceOf(entry({ slots }), words), "log.speed_down.person_nlos");
+  equal(
+    sentenceOf(entry({ slots: { ...slots, radius: 6, unseen: 2.5 } }), words),
+    "log.speed_down.person_nlos log.grown",
+  );
 });

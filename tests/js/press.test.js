@@ -1,6 +1,7 @@
 import { createPresser } from "../../iveg/static/js/panels/press.js";
 import { onPress } from "../../iveg/static/js/panels/stop.js";
 import { equal, test } from "./harness.js";
+import { memory } from "./memory.js";
 
 /** A line that notes what it was given. */
 function fakeLine() {
@@ -137,4 +138,41 @@ test("every new touch is a new press", () => {
     button.click();
   }
   equal(told.count, 3);
+});
+
+test("13.12 a press that nobody took survives a reload and is sent as the same STOP", async () => {
+  const kept = memory();
+  const cut = createPresser(fakeLine(), nothing, () => new Promise(nothing), kept);
+  cut.press("AGI");
+  cut.press(null);
+  /** @type {(string | null)[][]} */
+  const sent = [];
+  const again = createPresser(
+    fakeLine(),
+    nothing,
+    async ({ robotId, pressId }) => {
+      sent.push([robotId, pressId]);
+      return 202;
+    },
+    kept,
+  );
+  again.goOn();
+  await new Promise((resolve) => setTimeout(resolve, 20));
+  equal(sent, [
+    ["AGI", cut.pending("AGI")?.pressId ?? ""],
+    [null, cut.pending(null)?.pressId ?? ""],
+  ]);
+  const later = createPresser(fakeLine(), nothing, async () => 202, kept);
+  later.goOn();
+  equal(later.pending("AGI"), null);
+});
+
+test("13.12 what was kept and cannot be read as a press is none", () => {
+  for (const text of ["", "{", "{}", '[{"robotId":1}]', '[{"release":"AGI"}]']) {
+    const kept = memory();
+    kept.setItem("iveg_kept_stops", text);
+    const presser = createPresser(fakeLine(), nothing, async () => 202, kept);
+    presser.goOn();
+    equal(presser.pending("AGI"), null);
+  }
 });

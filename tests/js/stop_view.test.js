@@ -162,9 +162,28 @@ test("a press that the server did not take in half a second says so", () => {
   equal(stateOf({ press: pressed({ atMs: 9_000, accepted: true }) }), "asked");
 });
 
-test("a press on a dead line is seen, and then the dead line again", () => {
-  equal(stateOf({ connection: "lost", press: pressed() }), "asked");
-  equal(stateOf({ connection: "lost", press: pressed({ atMs: 1_000 }) }), "lost");
+test("13.12 a press on a dead line is kept, says since when, and looks like no STOP", () => {
+  for (const [atMs, seconds] of [
+    [9_900, 0.1],
+    [2_000, 8],
+  ]) {
+    const view = viewOfRobot(facts({ connection: "lost", press: pressed({ atMs }) }));
+    equal(view, { state: "lost", key: "stop.kept", slots: { seconds } });
+    const fleet = {
+      connection: /** @type {const} */ ("lost"),
+      nowMs: 10_000,
+      robots: [],
+    };
+    equal(viewOfFleet({ ...fleet, press: pressed({ atMs }) }).key, "stop.kept");
+  }
+  equal(viewOfRobot(facts({ connection: "lost" })).key, "stop.lost");
+});
+
+test("13.8 a resume is told as a resume, and no release", () => {
+  const releasing = command({ kind: "stop", state: "RELEASING", robot: RESTS });
+  equal(viewOfRobot(facts({ command: releasing })).key, "stop.releasing");
+  const resuming = viewOfRobot(facts({ command: releasing, isResuming: true }));
+  equal([resuming.state, resuming.key], ["releasing", "stop.resuming"]);
 });
 
 test("a new press never hides that the last STOP is unconfirmed", () => {

@@ -5,7 +5,7 @@ import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
-import { faultsSaid } from "../../iveg/static/js/panels/robots.js";
+import { faultsSaid } from "../../iveg/static/js/panels/robot_words.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
 import { createStore } from "../../iveg/static/js/store.js";
 import { createWakeLock } from "../../iveg/static/js/wakelock.js";

@@ -21,7 +21,7 @@ from tests.unit.pipeline.desk import Desk, settle
 
 pytestmark = pytest.mark.slow
 TOLD = (
-    *("reasserted", "adopted", "releasing", "ready", "refused", "running"),
+    *("reasserted", "adopted", "releasing", "resuming", "ready", "refused", "running"),
     *("unconfirmed", "still_moving", "stale", "moved", "release_unconfirmed"),
 )
 ENDED = ("RUNNING", "REPLACED", "EXPIRED")

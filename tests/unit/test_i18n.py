@@ -104,7 +104,15 @@ def test_every_sentence_that_the_server_names_exists() -> None:
     "state",
     [
         *("requested", "sent", "delivered", "standing", "unconfirmed", "stale"),
-        *("still_moving", "moved", "releasing", "ready", "refused", "running"),
+        *(
+            "still_moving",
+            "moved",
+            "releasing",
+            "resuming",
+            "ready",
+            "refused",
+            "running",
+        ),
         *("reasserted", "release_unconfirmed", "adopted"),
     ],
 )

@@ -161,4 +161,5 @@ def _send_once(
         ids,
         tuple(one for one in ours if one in ids),
     )
-    return [sending, episode.enter("RELEASING", "releasing")]
+    key = "releasing" if kind == "release" else "resuming"
+    return [sending, episode.enter("RELEASING", key)]

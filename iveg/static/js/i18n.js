@@ -110,8 +110,13 @@ export function createWords(load) {
 
   /** @type {Record<string, (value: any, slots: Slots) => string>} */
   const formats = {
+    // Down, so that what lies below a threshold is never written as the threshold.
     percent: (value) =>
-      formatted(value, { style: "percent", maximumFractionDigits: 0 }),
+      formatted(Math.floor(value * 100 + 1e-6) / 100, {
+        style: "percent",
+        maximumFractionDigits: 0,
+      }),
+    span: spanOf,
     time,
     class: (value) => named("class", value),
     a: (value) => find(`class.a.${value}`) ?? String(value),
@@ -123,6 +128,16 @@ export function createWords(load) {
     person: trackOf,
     sentence: (value, slots) => sentenceOf(value, slots),
   };
+
+  /** A time that people read: `42 s`, `3 min 42 s`. @param {number} seconds */
+  function spanOf(seconds) {
+    const whole = Math.round(seconds);
+    const [minutes, rest] = [Math.floor(whole / 60), whole % 60];
+    if (!minutes) return `${whole} s`;
+    return minutes < 60
+      ? `${minutes} min ${rest} s`
+      : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+  }
 
   /** `P3` is a person's number in the house; on a page it would read as a priority.
    * @param {unknown} value */

@@ -132,14 +132,35 @@ def test_of_two_looks_at_one_person_the_nearer_counts() -> None:
     assert margin(scene).gap_m == pytest.approx(9.5 - 0.99 / 2 - 0.30)
 
 
-def test_the_least_margin_is_shown_and_the_unknown_before_it() -> None:
+def test_the_least_margin_is_shown_and_before_it_the_unknown_and_the_negative() -> None:
     one = margin(met())
-    near, far = replace(one, gap_m=1.0), replace(one, gap_m=5.0)
+    inside = replace(one, gap_m=one.needs_m - 0.1)
+    near, far = (replace(one, gap_m=one.needs_m + left) for left in (0.5, 5.0))
     unknown = replace(one, gap_m=9.0, known=False)
 
     assert least([far, near]) is near
     assert least([far, near, unknown]) is unknown
+    assert least([far, near, unknown, inside]) is inside
     assert least([]) is None
+
+
+def test_13_8_who_was_out_of_sight_for_long_has_a_margin_only_from_afar() -> None:
+    bands = {}
+    for distance in (10.0, 60.0):
+        scene = met(distance, linear=0.5)
+        for looked_s in (1.4, 1.6, 9.0):
+            scene.now = looked_s
+            scene.drive("AGI", 0.0, linear=0.5)
+            bands[distance, looked_s] = margin(scene).band
+
+    assert bands == {
+        (10.0, 1.4): "clear",
+        (10.0, 1.6): "clear",
+        (10.0, 9.0): "unknown",
+        (60.0, 1.4): "clear",
+        (60.0, 1.6): "clear",
+        (60.0, 9.0): "clear",
+    }
 
 
 def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:

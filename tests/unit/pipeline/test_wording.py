@@ -80,6 +80,35 @@ def test_nobody_is_unseen_by_the_robot_that_saw_them() -> None:
     assert told(desk)[0] == "log.speed_down.person"
 
 
+def test_13_9_a_slow_down_far_from_anybody_says_how_the_ring_had_grown() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.look("AGII", detection("farmer", 5.0))
+    desk.clock.now += 2.5
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.assessor.tick(desk.clock())
+    (crossing,) = desk.assessor.crossings
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=crossing.decision_id)
+
+    _, slots = told(desk)
+    assert slots["distance"] == 5.0
+    assert slots["radius"] == 5.49
+    assert slots["unseen"] == 2.5
+
+
+def test_13_9_a_ring_that_has_not_grown_is_not_mentioned() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.look("AGII", detection("farmer", 1.0))
+    (crossing,) = desk.assessor.crossings
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=crossing.decision_id)
+
+    assert {"radius", "unseen"}.isdisjoint(told(desk)[1])
+
+
 def test_a_robot_that_means_a_peer_is_told_with_its_distance() -> None:
     desk = Desk()
     desk.drive("AGI", 0.0)

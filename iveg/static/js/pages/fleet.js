@@ -4,7 +4,7 @@
 
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
-import { modeSaid } from "../panels/robots.js";
+import { modeSaid } from "../panels/robot_words.js";
 import { judgeChain } from "./chain.js";
 import { createTiles } from "./tiles.js";
 

@@ -3,7 +3,7 @@
  * is the mandated limit, on the same scale (product section 1, widget 3).
  *
  * Fleets drive backwards, too; the needle shows how fast, the read-out beside it which
- * way.
+ * way.  A small card has the same on a straight line.
  */
 
 import { makeSvg, setAttribute, setText } from "./dom.js";
@@ -13,6 +13,8 @@ const HEIGHT = 112;
 const CENTRE = { x: WIDTH / 2, y: 94 };
 const RADIUS = 76;
 const HALF = 0.5;
+const BAR = { from: 2, long: 116, y: 9 };
+const DEFAULT_MAX = 1;
 
 /**
  * @typedef {{
@@ -22,12 +24,30 @@ const HALF = 0.5;
  *   rest is written already
  */
 
+/**
+ * What a gauge shows of a robot: the stricter of what it was told and what it says it
+ * applies; nothing of what nobody knows.
+ *
+ * @param {import("../protocol.js").Robot | undefined} robot
+ * @returns {{speed: number | null, max: number, factor: number | null}}
+ */
+export function readingOf(robot) {
+  const told = robot?.mandate?.speed_factor ?? null;
+  const applied = robot?.applied ? (robot.speed_factor ?? null) : null;
+  const known = [told, applied].filter((factor) => factor !== null);
+  const speed = robot?.twist?.linear ?? null;
+  const isHeard = speed !== null || applied !== null;
+  return {
+    speed,
+    max: robot?.profile?.max_speed ?? DEFAULT_MAX,
+    factor: isHeard && known.length ? Math.min(...known) : null,
+  };
+}
+
 export function createGauge() {
   const svg = makeSvg("svg", {
     class: "gauge",
     viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
-    role: "meter",
-    "aria-valuemin": 0,
   });
   const value = makeSvg("path", { class: "gauge__value" });
   const beyond = makeSvg("path", { class: "gauge__beyond" });
@@ -44,8 +64,9 @@ export function createGauge() {
   const maxText = makeSvg("text", { class: "gauge__small", x: 176, y: 108 });
   const zero = makeSvg("text", { class: "gauge__small", x: 24, y: 108 });
   zero.textContent = "0";
+  const track = makeSvg("path", { class: "gauge__track" });
   svg.append(
-    makeSvg("path", { class: "gauge__track", d: arc(0, 1) }),
+    track,
     beyond,
     value,
     makeSvg("path", { class: "gauge__half", d: tick(HALF) }),
@@ -56,8 +77,67 @@ export function createGauge() {
     maxText,
     limitText,
   );
-  const parts = { svg, value, beyond, needle, limit, text, limitText, maxText };
-  return { svg, draw: (/** @type {Reading} */ reading) => draw(parts, reading) };
+  const parts = { svg, track, value, beyond, needle, limit, text, limitText, maxText };
+  const bar = createBar();
+  return {
+    svg,
+    bar: bar.svg,
+    /** @param {Reading} reading */
+    draw(reading) {
+      draw(parts, reading);
+      bar.draw(reading);
+    },
+  };
+}
+
+/** The same on a straight line, with its words beside it. */
+function createBar() {
+  const svg = makeSvg("svg", { class: "gauge__bar", viewBox: "0 0 240 18" });
+  const track = makeSvg("path", { class: "gauge__track" });
+  const beyond = makeSvg("path", { class: "gauge__beyond" });
+  const value = makeSvg("path", { class: "gauge__value" });
+  const limit = makeSvg("path", { class: "gauge__limit", d: "M0 4l-4 -5h8z" });
+  const text = makeSvg("text", { class: "gauge__line", x: 128, y: 14 });
+  svg.append(track, beyond, value, limit, text);
+  return {
+    svg,
+    /** @param {Reading} reading */
+    draw(reading) {
+      const { share, allowed } = sharesOf(reading);
+      describe(svg, reading);
+      setAttribute(track, "d", line(0, allowed));
+      setAttribute(beyond, "d", line(allowed, 1));
+      setAttribute(value, "d", line(0, share));
+      setAttribute(limit, "transform", `translate(${along(allowed)} 1)`);
+      setAttribute(limit, "visibility", shown(reading.factor));
+      setText(text, `${reading.speedSaid} · ${reading.limitSaid}`);
+    },
+  };
+}
+
+/** @param {number} share */
+const along = (share) => (BAR.from + share * BAR.long).toFixed(1);
+
+/** @param {number} from @param {number} to shares of the scale */
+const line = (from, to) =>
+  to - from < 0.001 ? "" : `M${along(from)} ${BAR.y}H${along(to)}`;
+
+/** @param {number | null} value */
+const shown = (value) => (value === null ? "hidden" : "visible");
+
+/** @param {Reading} reading */
+function sharesOf({ speed, max, factor }) {
+  return { share: clamp(Math.abs(speed ?? 0) / max), allowed: clamp(factor ?? 1) };
+}
+
+/** For whoever hears it. @param {SVGElement} svg @param {Reading} reading */
+function describe(svg, { name, max, speed, said }) {
+  setAttribute(svg, "role", "meter");
+  setAttribute(svg, "aria-valuemin", "0");
+  setAttribute(svg, "aria-label", name);
+  setAttribute(svg, "aria-valuemax", String(max));
+  setAttribute(svg, "aria-valuenow", Math.abs(speed ?? 0).toFixed(2));
+  setAttribute(svg, "aria-valuetext", said);
 }
 
 /**
@@ -65,21 +145,18 @@ export function createGauge() {
  * @param {Reading} reading
  */
 function draw(parts, reading) {
-  const { speed, max, factor } = reading;
-  const share = clamp(Math.abs(speed ?? 0) / max);
-  const allowed = clamp(factor ?? 1);
+  const { share, allowed } = sharesOf(reading);
+  setAttribute(parts.track, "d", arc(0, allowed));
   setAttribute(parts.value, "d", arc(0, share));
   setAttribute(parts.beyond, "d", allowed < 1 ? arc(allowed, 1) : "");
   turn(parts.needle, share);
   turn(parts.limit, allowed);
-  setAttribute(parts.needle, "visibility", speed === null ? "hidden" : "visible");
+  setAttribute(parts.needle, "visibility", shown(reading.speed));
+  setAttribute(parts.limit, "visibility", shown(reading.factor));
   setText(parts.text, reading.speedSaid);
   setText(parts.limitText, reading.limitSaid);
-  setText(parts.maxText, String(max));
-  setAttribute(parts.svg, "aria-label", reading.name);
-  setAttribute(parts.svg, "aria-valuemax", String(max));
-  setAttribute(parts.svg, "aria-valuenow", Math.abs(speed ?? 0).toFixed(2));
-  setAttribute(parts.svg, "aria-valuetext", reading.said);
+  setText(parts.maxText, String(reading.max));
+  describe(parts.svg, reading);
 }
 
 /** @param {SVGElement} mark drawn pointing up @param {number} share 0–1 of the scale */

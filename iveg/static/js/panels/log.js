@@ -41,7 +41,7 @@ export function createLogPanel(app, decision) {
     const time = make("time", "", words.time(entry.at));
     time.dateTime = entry.at;
     const place = entry.decision_id ? makeOpener(entry) : text;
-    place.append(time, " ", words.t(keyOf(entry), entry.slots));
+    place.append(time, " ", sentenceOf(entry, words));
     if (place !== text) text.append(place);
     item.append(make("span", "log__mark"), text);
     return item;
@@ -57,14 +57,6 @@ export function createLogPanel(app, decision) {
       decision.open(String(entry.decision_id), opener);
     });
     return opener;
-  }
-
-  /** A robot may slow down for what iVeg does not know yet. @param {Entry} entry */
-  function keyOf({ key, slots }) {
-    const isBare = key.startsWith("log.speed_down.") && slots.distance === undefined;
-    return isBare && (slots.reason === "person" || slots.reason === "robot")
-      ? "log.speed_down"
-      : key;
   }
 
   /** @param {Entry} entry */
@@ -113,4 +105,25 @@ export function createLogPanel(app, decision) {
     rebuild();
   });
   rebuild();
+}
+
+/**
+ * What an entry says; of a slow-down far from anybody, why: the ring had grown.
+ *
+ * @param {Pick<Entry, "key" | "slots">} entry
+ * @param {import("../i18n.js").Words} words
+ */
+export function sentenceOf({ key, slots }, words) {
+  const said = words.t(keyOf({ key, slots }), slots);
+  const isGrown = slots.radius !== undefined && slots.unseen !== undefined;
+  return isGrown ? `${said} ${words.t("log.grown", slots)}` : said;
+}
+
+/** A robot may slow down for what iVeg does not know yet.
+ * @param {Pick<Entry, "key" | "slots">} entry */
+function keyOf({ key, slots }) {
+  const isBare = key.startsWith("log.speed_down.") && slots.distance === undefined;
+  return isBare && (slots.reason === "person" || slots.reason === "robot")
+    ? "log.speed_down"
+    : key;
 }

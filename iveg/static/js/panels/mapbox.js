@@ -77,7 +77,9 @@ export function createMapbox(app, decision) {
     const unseen = people.flatMap(({ acting }) => acting).filter((it) => !it.in_sight);
     const nlos = need("#nlos-count");
     setHidden(nlos, unseen.length === 0);
-    setText(nlos, words.t("map.nlos_count", { count: unseen.length }));
+    const slowed = new Set(unseen.map(({ robot_id }) => robot_id)).size;
+    const key = slowed === 1 ? "map.nlos_one" : "map.nlos_count";
+    setText(nlos, words.t(key, { count: slowed }));
   }
 
   /** @param {number} count */

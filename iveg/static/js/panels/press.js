@@ -3,7 +3,8 @@
  *
  * HTTP first; when it fails or is silent for half a second the live line sends the same
  * press too.  All repetitions carry one `press_id`, so the server makes one STOP of
- * them.  A STOP that comes late still stops, so nothing here gives up.
+ * them.  A STOP that comes late still stops, so nothing here gives up: what nobody has
+ * taken is kept in this tab, through a reload too, and is never sent as anything else.
  *
  * @typedef {{robotId: string | null, pressId: string, atMs: number, tries: number,
  *   accepted: boolean}} Pending `atMs` is `performance.now()` of the press
@@ -17,16 +18,48 @@ const RETRY_MS = 1000;
 const HTTP_LIMIT_MS = 3000;
 /** Answers that more HTTP will not change; the line goes on trying. */
 const HOPELESS = new Set([401, 403, 404]);
+const KEPT = "iveg_kept_stops";
 
 /**
  * @param {Line} line
  * @param {() => void} onChange
  * @param {(press: Pending, pressedAt: number) => Promise<number>} [send] HTTP; tests hand
  *   in their own
+ * @param {Storage | null} [kept] of this tab alone
  */
-export function createPresser(line, onChange, send = post) {
+export function createPresser(line, onChange, send = post, kept = tabStorage()) {
   /** @type {Map<string | null, Pending>} newest press by robot; null is the fleet */
   const pending = new Map();
+  /** @type {Map<string | null, number>} when that was, by the server's clock (s) */
+  const pressed = new Map();
+
+  /** Writes down what nobody has taken yet. */
+  function keep() {
+    const open = [...pending.values()].filter(({ accepted }) => !accepted);
+    const rows = open.map(({ robotId, pressId, atMs }) => ({
+      robotId,
+      pressId,
+      pressedAt: pressed.get(robotId),
+      wallMs: Date.now() - (performance.now() - atMs),
+    }));
+    kept?.setItem(KEPT, JSON.stringify(rows));
+  }
+
+  function goOn() {
+    for (const { robotId, pressId, pressedAt, wallMs } of readKept(kept)) {
+      const atMs = performance.now() - Math.max(0, Date.now() - wallMs);
+      begin({ robotId, pressId, atMs, tries: 0, accepted: false }, pressedAt);
+    }
+  }
+
+  /** @param {Pending} press @param {number} pressedAt */
+  function begin(press, pressedAt) {
+    pending.set(press.robotId, press);
+    pressed.set(press.robotId, pressedAt);
+    keep();
+    onChange();
+    return carry(press, pressedAt);
+  }
 
   /** @param {Pending} press @param {number} pressedAt */
   async function carry(press, pressedAt) {
@@ -52,6 +85,7 @@ export function createPresser(line, onChange, send = post) {
   function accept(press, fallback) {
     clearTimeout(fallback);
     press.accepted = true;
+    keep();
     onChange();
   }
 
@@ -63,10 +97,10 @@ export function createPresser(line, onChange, send = post) {
     press(robotId) {
       const atMs = performance.now();
       const press = { robotId, pressId: pressId(), atMs, tries: 0, accepted: false };
-      pending.set(robotId, press);
-      onChange();
-      return carry(press, line.serverNow());
+      return begin(press, line.serverNow());
     },
+    /** Goes on with what was kept when the page was left. */
+    goOn,
     /** The newest press that no command has answered. @param {string | null} robotId */
     pending: (robotId) => pending.get(robotId) ?? null,
     /**
@@ -78,6 +112,7 @@ export function createPresser(line, onChange, send = post) {
       const press = pending.get(robotId);
       if (press) press.accepted = true;
       pending.delete(robotId);
+      keep();
     },
   };
 }
@@ -104,6 +139,36 @@ async function post(press, pressedAt) {
     return answer.status;
   } catch {
     return 0;
+  }
+}
+
+/**
+ * What was kept; what cannot be read as a press of STOP is none.
+ *
+ * @param {Storage | null} kept
+ * @returns {{robotId: string | null, pressId: string, pressedAt: number, wallMs: number}[]}
+ */
+function readKept(kept) {
+  try {
+    const rows = JSON.parse(kept?.getItem(KEPT) ?? "[]");
+    return rows.filter(
+      (/** @type {any} */ row) =>
+        (row.robotId === null || typeof row.robotId === "string") &&
+        typeof row.pressId === "string" &&
+        Number.isFinite(row.pressedAt) &&
+        Number.isFinite(row.wallMs),
+    );
+  } catch {
+    return [];
+  }
+}
+
+/** A browser may forbid it; then a press lives as long as its page. */
+function tabStorage() {
+  try {
+    return sessionStorage;
+  } catch {
+    return null;
   }
 }
 

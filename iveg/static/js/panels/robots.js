@@ -5,11 +5,11 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
-import { LIMITS } from "../limits.js";
 import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
-import { createGauge } from "./gauge.js";
+import { createGauge, readingOf } from "./gauge.js";
 import { createRelease } from "./release.js";
+import { faultsSaid, marginSaid, modeSaid, taskSaid, whySaid } from "./robot_words.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Margin} Margin */
@@ -18,7 +18,8 @@ import { createRelease } from "./release.js";
 const TICK_MS = 200;
 /** Cards that nobody sees are drawn at every so many ticks: a second. */
 const UNSEEN_TICKS = 5;
-const DEFAULT_MAX = 1;
+/** More cards than this are small ones; the rest of each is in its menu. */
+const ROOMY = 2;
 const DEGREES = 180 / Math.PI;
 
 /** @param {App} app */
@@ -40,6 +41,7 @@ export function createRobotsPanel(app) {
     const card = createCard(app, element);
     sight.watch(robotId, element);
     cards.set(robotId, card);
+    place.toggleAttribute("data-many", cards.size > ROOMY);
     app.stops.place();
     return card;
   }
@@ -133,7 +135,7 @@ function createCard(app, card) {
   const parts = new Map();
   const robotId = String(card.dataset.robot);
   const gauge = createGauge();
-  needPart("gauge", card).append(gauge.svg);
+  needPart("gauge", card).append(gauge.svg, gauge.bar);
   const release = createRelease(app, card, robotId);
   const drill = createDrill(app, card, robotId);
   const menu = needPart("menu", card);
@@ -183,28 +185,11 @@ function createCard(app, card) {
 
   /** @param {Robot | undefined} robot */
   function drawMode(robot) {
-    setText(fields.mode, modeSaid(robot, words));
-    setText(
-      partOf("why"),
-      robot ? [whyOf(robot), ...faultsSaid(robot, words)].join(" · ") : "",
-    );
-  }
-
-  /** @param {Robot} robot */
-  function whyOf(robot) {
-    if (robot.holds.length) {
-      const names = robot.holds.map(({ source }) =>
-        words.t(`release.hold_source.${source}`),
-      );
-      return words.t("robot.why.held", { sources: [...new Set(names)].join(", ") });
-    }
-    const isMandated = (robot.mandate?.speed_factor ?? 1) < 1;
-    const reason = isMandated ? robot.mandate?.reason : robot.applied?.reason;
-    const distance = robot.mandate?.distance_m ?? null;
-    if (distance === null && (reason === "person" || reason === "robot")) {
-      return words.t(`why.${reason}`);
-    }
-    return words.t(`robot.why.${reason ?? "clear"}`, { distance });
+    setText(fields.mode, modeSaid(robot, words, app.stops.isResuming(robotId)));
+    setText(partOf("why"), whySaid(robot, words));
+    const faults = robot ? faultsSaid(robot, words).join(" · ") : "";
+    setHidden(partOf("faults"), !faults);
+    setText(partOf("faults"), faults);
   }
 
   /** @param {Robot | undefined} robot @param {number} ageS */
@@ -242,18 +227,19 @@ function createCard(app, card) {
 
   /** @param {Robot | undefined} robot */
   function drawGauge(robot) {
-    const speed = robot?.twist?.linear ?? null;
-    const max = robot?.profile?.max_speed ?? DEFAULT_MAX;
-    const factor = robot?.mandate?.speed_factor ?? null;
+    const { speed, max, factor } = readingOf(robot);
     const limit = (factor ?? 1) * max;
+    const isKnown = speed !== null;
     gauge.draw({
       speed,
       max,
       factor,
       name: words.t("robot.gauge", { robot: robotId }),
-      said: words.t("robot.gauge_value", { speed: speed ?? 0, max, limit }),
-      limitSaid: words.t("robot.limit", { limit }),
-      speedSaid: speed === null ? "—" : words.number(Math.abs(speed), 2),
+      said: isKnown
+        ? words.t("robot.gauge_value", { speed, max, limit })
+        : words.t("robot.speed_unknown"),
+      limitSaid: factor === null ? "" : words.t("robot.limit", { limit }),
+      speedSaid: isKnown ? words.number(Math.abs(speed), 2) : "—",
     });
   }
 
@@ -270,56 +256,19 @@ function createCard(app, card) {
 
   /** The least margin to a person, and what it is made of. @param {Margin | null} margin */
   function drawMargin(margin) {
-    const line = partOf("margin-line");
     const parts = partOf("margin-parts");
-    setHidden(line, margin === null);
     setHidden(parts, margin === null);
+    setAttribute(partOf("margin-line"), "data-band", margin?.band ?? "none");
+    setText(partOf("margin"), marginSaid(margin, words));
     if (!margin) return;
-    setAttribute(line, "data-band", margin.band);
-    const key = margin.band === "unknown" ? "margin_unknown" : "margin_value";
     const slots = { ...margin, ...margin.parts };
-    const band = words.t(`robot.margin_band.${margin.band}`);
-    setText(partOf("margin"), words.t(`robot.${key}`, { ...slots, band }));
     setText(parts, words.t("robot.margin_parts", slots));
   }
 
   /** @param {Robot | undefined} robot */
   function drawTask(robot) {
-    const task = robot?.navigation?.task;
-    setHidden(partOf("task-line"), !task);
-    const key = `task.${task}`;
-    setText(partOf("task"), words.has(key) ? words.t(key) : (task ?? ""));
+    setText(partOf("task"), taskSaid(robot?.navigation?.task, words));
   }
 
   return { draw };
-}
-
-/**
- * What a robot does, in words; that it was told to stop is not that it stands.
- *
- * @param {Robot | undefined} robot
- * @param {import("../i18n.js").Words} words
- */
-export function modeSaid(robot, words) {
-  const { mode = "UNKNOWN", stop } = robot ?? {};
-  if (stop && stop.state !== "STANDING") {
-    const state = words.t(`history.state.${stop.state}`);
-    return words.t("robot.mode_stopping", { state });
-  }
-  if (mode !== "SLOW") return words.t(`robot.mode.${mode}`);
-  return words.t("robot.mode_slow", { factor: LIMITS.slow_factor });
-}
-
-/**
- * What a robot finds wrong with its own data, a sentence each.
- *
- * @param {Robot} robot
- * @param {import("../i18n.js").Words} words
- */
-export function faultsSaid(robot, words) {
-  return (robot.applied?.faults ?? []).map(({ code, about, for_s }) => {
-    const known = words.has(`robot.fault.${code}`) ? code : "other";
-    const said = words.t(`robot.fault.${known}`, { code, about });
-    return for_s === null ? said : words.t("robot.fault_for", { said, seconds: for_s });
-  });
 }

@@ -18,10 +18,19 @@ import { since, viewOfFleet, viewOfRobot } from "./stop_view.js";
 /** @typedef {import("../protocol.js").Command} Command */
 /** @typedef {import("./stop_view.js").View} View */
 
-/** More robots than this have their controls on their cards on every screen. */
+/** More robots than this have their controls on their cards: what the strip has room for. */
 const STRIP_HOLDS = 4;
+const NARROW_STRIP_HOLDS = 3;
+const LOW_STRIP_HOLDS = 2;
 
-const PHONE = matchMedia("(max-width: 767px)");
+const PHONE = matchMedia(
+  "(max-width: 767px) and (min-height: 501px), (max-width: 567px)",
+);
+const NARROW = matchMedia("(min-width: 1200px) and (max-width: 1399px)");
+/** A phone lying down: the strip stands beside the map. */
+const LOW = matchMedia(
+  "(max-height: 500px) and (min-width: 568px) and (max-width: 1199px)",
+);
 const TICK_MS = 100;
 /** How long after `pointerup` a click still belongs to the same gesture (ms). */
 const GESTURE_MS = 400;
@@ -43,6 +52,8 @@ export function createStopPanel(app) {
   const commands = new Map();
   /** @type {Map<string, HTMLElement>} */
   const controls = new Map();
+  /** @type {Map<string, string>} kind of the newest release or resume by robot */
+  const orders = new Map();
   /** Whether the server knows this page well enough to stop, though not to watch. */
   let isBlind = false;
 
@@ -74,16 +85,30 @@ export function createStopPanel(app) {
 
   /** @param {Command} command */
   function take(command) {
-    if (command.kind !== "stop") return;
+    if (command.kind !== "stop") {
+      orders.set(command.robot_id, command.kind);
+      return;
+    }
     const known = commands.get(command.robot_id)?.command;
     if (known && isOlder(command, known)) return;
     if (command.state === "RUNNING") commands.delete(command.robot_id);
     else commands.set(command.robot_id, { command, heardMs: performance.now() });
-    for (const robotId of [command.robot_id, null]) settle(robotId, command);
+    settle(command.robot_id, command);
+    settleFleet();
     drawAll();
   }
 
-  /** @param {string | null} robotId @param {Command} command */
+  /** A press of the fleet is answered when each robot has answered, not the first. */
+  function settleFleet() {
+    const atMs = presser.pending(null)?.atMs;
+    if (atMs === undefined) return;
+    const ids = [...controls.keys()].filter((id) => id !== "fleet");
+    const isAnswered = (/** @type {string} */ id) =>
+      (commands.get(id)?.heardMs ?? Number.NEGATIVE_INFINITY) >= atMs;
+    if (ids.every(isAnswered)) presser.settle(null);
+  }
+
+  /** @param {string} robotId @param {Command} command */
   function settle(robotId, command) {
     const pending = presser.pending(robotId);
     if (!pending) return;
@@ -109,6 +134,7 @@ export function createStopPanel(app) {
   /** @param {import("../protocol.js").Snapshot} snapshot */
   function restart(snapshot) {
     commands.clear();
+    orders.clear();
     for (const command of snapshot.commands ?? []) take(command);
     for (const robot of snapshot.robots ?? []) takeRobot(robot);
     drawAll();
@@ -142,6 +168,7 @@ export function createStopPanel(app) {
       robotId,
       connection: store.connection.state,
       isBlind,
+      isResuming: isResuming(robotId),
       link: linkOfRobot(robot, nowMs),
       ageS: ageOf(robot, nowMs),
       command: commands.get(robotId)?.command ?? null,
@@ -150,6 +177,9 @@ export function createStopPanel(app) {
       serverNowS: line.serverNow(),
     };
   }
+
+  /** @param {string} robotId */
+  const isResuming = (robotId) => orders.get(robotId) === "resume";
 
   function drawAll() {
     const ids = [...controls.keys()].filter((id) => id !== "fleet");
@@ -161,7 +191,19 @@ export function createStopPanel(app) {
     const connection = store.connection.state;
     const fleet = { connection, press: pendingOf(null), nowMs: performance.now() };
     draw("fleet", viewOfFleet({ ...fleet, isBlind, robots }));
-    loud.draw(ids.map((id) => commands.get(id)?.command));
+    const kept = [null, ...ids].map(presser.pending).filter(isKept);
+    loud.draw(
+      ids.map((id) => commands.get(id)?.command),
+      kept,
+    );
+  }
+
+  /**
+   * @param {import("./press.js").Pending | null} press
+   * @returns {press is import("./press.js").Pending}
+   */
+  function isKept(press) {
+    return store.connection.state === "lost" && Boolean(press && !press.accepted);
   }
 
   /** @param {string} id @param {View} view */
@@ -177,7 +219,7 @@ export function createStopPanel(app) {
 
   /** Cards hold their robot's control on a phone and in a big fleet, else the strip. */
   function place() {
-    const isMany = controls.size - 1 > STRIP_HOLDS;
+    const isMany = controls.size - 1 > stripHolds();
     const isPanelOpen = document.body.hasAttribute("data-panel");
     const isOnCards = isMany || (PHONE.matches && !isPanelOpen);
     strip.toggleAttribute("data-many", isMany);
@@ -197,7 +239,7 @@ export function createStopPanel(app) {
 
   for (const control of all("[data-stop]")) adopt(control);
   place();
-  PHONE.addEventListener("change", place);
+  for (const screen of [PHONE, NARROW, LOW]) screen.addEventListener("change", place);
   document.addEventListener("iveg:panel", place);
   onFleetKeys(() => press(null));
   store.subscribe("snapshot", restart);
@@ -206,8 +248,18 @@ export function createStopPanel(app) {
   store.subscribe("connection", onConnection);
   words.onChange(drawAll);
   setInterval(drawAll, TICK_MS);
+  presser.goOn();
   drawAll();
-  return { place, commandOf: (/** @type {string} */ id) => commands.get(id)?.command };
+  return {
+    place,
+    commandOf: (/** @type {string} */ id) => commands.get(id)?.command,
+    isResuming,
+  };
+}
+
+function stripHolds() {
+  if (LOW.matches) return LOW_STRIP_HOLDS;
+  return NARROW.matches ? NARROW_STRIP_HOLDS : STRIP_HOLDS;
 }
 
 /** @param {string} robotId */

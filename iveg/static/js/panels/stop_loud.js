@@ -14,17 +14,31 @@ const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
 
 /** @param {import("../main.js").App} app */
 export function createLoudLines({ words, line }) {
-  /** @param {(Command | undefined)[]} commands the newest STOP of each robot */
-  function draw(commands) {
+  /**
+   * @param {(Command | undefined)[]} commands the newest STOP of each robot
+   * @param {import("./press.js").Pending[]} kept presses that wait for the link
+   */
+  function draw(commands, kept) {
     const place = need("#p1");
     const loud = commands.filter((command) =>
       LOUD.has(stateOfCommand(command ?? null) ?? ""),
     );
-    while (place.children.length > loud.length) place.lastElementChild?.remove();
-    while (place.children.length < loud.length) place.append(make("p", "p1__line"));
-    loud.forEach((command, i) => {
-      setText(place.children[i], sentenceOf(/** @type {Command} */ (command)));
+    const said = [
+      ...kept.map(keptSaid),
+      ...loud.map((command) => sentenceOf(/** @type {Command} */ (command))),
+    ];
+    while (place.children.length > said.length) place.lastElementChild?.remove();
+    while (place.children.length < said.length) place.append(make("p", "p1__line"));
+    said.forEach((sentence, i) => {
+      setText(place.children[i], sentence);
     });
+  }
+
+  /** @param {import("./press.js").Pending} press */
+  function keptSaid({ robotId, atMs }) {
+    const robot = robotId ?? words.t("stop.fleet_name");
+    const seconds = (performance.now() - atMs) / 1000;
+    return words.t("stop.p1.kept", { robot, seconds });
   }
 
   /** @param {Command} command */

@@ -17,13 +17,14 @@
  *   robotId: string,
  *   connection: ConnectionState,
  *   isBlind?: boolean,
+ *   isResuming?: boolean,
  *   link: Link,
  *   ageS: number,
  *   command: Command | null,
  *   press: Pending | null,
  *   nowMs: number,
  *   serverNowS: number,
- * }} RobotFacts `isBlind`: the session is over and may still stop; `nowMs` is `performance.now()`, `serverNowS` Unix time
+ * }} RobotFacts `isBlind`: the session is over and may still stop; `isResuming`: what is under way is a resume; `nowMs` is `performance.now()`, `serverNowS` Unix time
  */
 
 import { LIMITS } from "../limits.js";
@@ -171,6 +172,9 @@ function viewOfCommand(state, command, facts) {
       : since(command.times.requested, facts.serverNowS) * 1000;
     return { state, key, slots: { ms } };
   }
+  if (state === "releasing" && facts.isResuming) {
+    return { state, key: "stop.resuming", slots: {} };
+  }
   if (state === "standing") {
     if (command.standstill_ms === null) {
       return { state, key: "stop.standing_untimed", slots: {} };
@@ -203,8 +207,11 @@ function viewOfPress(press, nowMs) {
  * @returns {View}
  */
 function lost(press, nowMs) {
-  // A fresh press must be seen to have happened, even on a dead line.
-  if (press && nowMs - press.atMs < TAKEN_LIMIT_MS) return viewOfPress(press, nowMs);
+  // A press must be seen to have happened, and not to have arrived.
+  if (press && !press.accepted) {
+    const seconds = Math.max(0, (nowMs - press.atMs) / 1000);
+    return { state: "lost", key: "stop.kept", slots: { seconds } };
+  }
   return { state: "lost", key: "stop.lost", slots: {} };
 }
 

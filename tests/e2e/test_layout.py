@@ -1,0 +1,179 @@
+"""Where things stand on the live page, at every size, with two, three and six robots.
+
+The robots are those of a snapshot (``tests.e2e.frozen``): nothing moves while it is
+measured, and each fleet has one page for all sizes.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, WebSocketRoute, expect
+
+from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
+from tests.e2e.reading import COVERED_STOPS, OVERFLOW, SMALLEST_STOP, evaluate
+
+pytestmark = pytest.mark.e2e
+
+APART_PX = 24
+DESKTOPS = ((1200, 800), (1440, 900), (1500, 900), (1920, 1080))
+OTHERS = ((1024, 768), (844, 390), (667, 375), (768, 1024), (390, 844), (360, 740))
+SIZES = (*DESKTOPS, *OTHERS)
+SECTIONS = 9
+
+
+@dataclass
+class Fleet:
+    """The live page of so many robots."""
+
+    page: Page
+    lines: list[WebSocketRoute] = field(default_factory=list)
+
+    def at(self, size: tuple[int, int]) -> Page:
+        """The page in a window of this size."""
+        self.page.set_viewport_size({"width": size[0], "height": size[1]})
+        self.page.clock.run_for(250)
+        return self.page
+
+    def tell(self, robot: dict[str, Any]) -> None:
+        """A robot's state changes."""
+        topic = f"robots/{robot['robot_id']}"
+        self.lines[-1].send(json.dumps({"topic": topic, "data": robot}))
+        self.page.evaluate("() => fetch('/healthz')")
+        self.page.clock.run_for(500)
+
+
+def snapshot(count: int) -> Frozen:
+    """The snapshot with more robots like the first two."""
+    told = frozen()
+    robots = told["snapshot"]["robots"]
+    for n in range(count - len(robots)):
+        robots.append({**robots[n % 2], "robot_id": f"R{n + 3}"})
+    return told
+
+
+@pytest.fixture(scope="module", params=[2, 3, 6], ids="{} robots".format)
+def fleet(
+    request: pytest.FixtureRequest,
+    browser: Browser,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Fleet]:
+    """A page on a server that has no robots."""
+    told = snapshot(request.param)
+    lines: list[WebSocketRoute] = []
+    with (
+        past_site(tmp_path_factory.mktemp("layout")) as past,
+        frozen_page(browser, past, (1440, 900), tell=lambda: told, lines=lines) as page,
+    ):
+        page.goto(past.url)
+        settle(page, "#map-fit:enabled")
+        yield Fleet(page, lines)
+
+
+def test_13_19_nothing_overflows_or_covers_a_stop_and_stops_stand_apart(
+    fleet: Fleet,
+) -> None:
+    wanted = {"overflow": 0, "covered": [], "apart": True, "large": True, "header": []}
+    for size in SIZES:
+        page = fleet.at(size)
+        found = {
+            "overflow": evaluate(page, OVERFLOW),
+            "covered": evaluate(page, COVERED_STOPS),
+            "apart": evaluate(page, NEAREST_STOP) >= APART_PX,
+            "large": evaluate(page, SMALLEST_STOP) >= 64,
+            "header": evaluate(page, COLLISIONS),
+        }
+        assert found == wanted, size
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_13_4_the_navigation_has_every_entry_on_every_desktop(fleet: Fleet) -> None:
+    for size in DESKTOPS:
+        page = fleet.at(size)
+        entries = page.locator(".nav a").all()
+        assert len(entries) == SECTIONS
+        for entry in entries:
+            expect(entry).to_be_in_viewport(ratio=1)
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_13_4_the_user_opens_a_menu_with_a_way_out(fleet: Fleet) -> None:
+    for size in ((1920, 1080), (1024, 768), (844, 390)):
+        page = fleet.at(size)
+        page.locator(".user").click()
+
+        page.locator("#sign-out").scroll_into_view_if_needed()
+        expect(page.locator("#sign-out")).to_be_in_viewport(ratio=1)
+        assert evaluate(page, COVERED_STOPS) == []
+        page.keyboard.press("Escape")
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_13_19_a_low_screen_is_mostly_map(fleet: Fleet) -> None:
+    for size, high in (((1024, 768), 520), ((844, 390), 340), ((667, 375), 320)):
+        box = fleet.at(size).locator("#map").bounding_box()
+        assert box is not None
+        assert box["height"] >= high, size
+
+
+HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}
+SILENT = {"pose": None, "twist": None, "applied": None, "age_s": None}
+STATES: tuple[dict[str, Any], ...] = (
+    {},
+    {"margin": None, "navigation": None},
+    HELD,
+    {"mode": "SLOW", "twist": {"linear": 0.0, "angular": 0.0}},
+    SILENT,
+)
+
+
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    for size in ((1440, 900), (1024, 768), (768, 1024), (390, 844)):
+        heights = set()
+        for state in STATES:
+            fleet.tell({**first, **state})
+            heights.add(evaluate(fleet.at(size), CARD_HEIGHT))
+        assert len(heights) == 1, size
+
+
+@pytest.mark.parametrize("fleet", [6], indirect=True)
+def test_13_19_the_stop_of_each_of_six_robots_is_in_sight(fleet: Fleet) -> None:
+    for size in ((1200, 800), (1440, 900), (1024, 768), (768, 1024)):
+        stops = fleet.at(size).locator(".card .stop").all()
+
+        assert len(stops) == 6
+        for stop in stops:
+            expect(stop).to_be_in_viewport(ratio=1)
+
+
+CARD_HEIGHT = """() => {
+  const box = (part) => document.querySelector(`[data-robot="AGI"] ${part}`)
+    .getBoundingClientRect();
+  return Math.round(box('[data-part="task"]').bottom - box('.card__head').top);
+}"""
+"""From the head of a card to its last line (px); a phone has a STOP below."""
+NEAREST_STOP = """() => {
+  const boxes = [...document.querySelectorAll('[data-stop]')]
+    .filter((stop) => stop.checkVisibility({visibilityProperty: true}))
+    .map((stop) => [stop.dataset.stop, stop.getBoundingClientRect(),
+      Boolean(stop.closest('#stops'))]);
+  const [, all] = boxes.find(([id]) => id === 'fleet');
+  const gaps = boxes.filter(([id, , strip]) => id !== 'fleet' && strip)
+    .map(([, box]) => Math.max(
+      all.left - box.right, box.left - all.right,
+      all.top - box.bottom, box.top - all.bottom));
+  return gaps.length ? Math.min(...gaps) : 1000;
+}"""
+"""The gap (px) between the STOP of all and the nearest other of the strip."""
+COLLISIONS = """() => {
+  const parts = [...document.querySelectorAll('.header__bar > *')]
+    .filter((part) => !part.matches('.stops, .spring') && part.checkVisibility());
+  const boxes = parts.map((part) => [part.className, part.getBoundingClientRect()]);
+  return boxes.slice(1).filter(([, box], i) => box.left < boxes[i][1].right - 1)
+    .map(([name]) => name);
+}"""
+"""Parts of the header that lie on the one before."""

@@ -1,0 +1,92 @@
+import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
+import {
+  marginSaid,
+  modeSaid,
+  taskSaid,
+  whySaid,
+} from "../../iveg/static/js/panels/robot_words.js";
+import { equal, test } from "./harness.js";
+
+const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+  /** @type {unknown} */ ({
+    t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
+      [key, ...Object.values(slots)].join(" "),
+    has: (/** @type {string} */ key) => key === "task.hauling",
+  })
+);
+
+/** A robot that drives on a clear way. @param {object} [differs] */
+function robot(differs = {}) {
+  return /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+    /** @type {unknown} */ ({
+      robot_id: "AGI",
+      mode: "RUNNING",
+      pose: { x: 1, y: 1, yaw: 0 },
+      twist: { linear: 0.5, angular: 0 },
+      speed_factor: 1,
+      applied: { reason: "clear", faults: [] },
+      mandate: { speed_factor: 1, reason: "clear", distance_m: null },
+      holds: [],
+      stop: null,
+      profile: { max_speed: 2 },
+      ...differs,
+    })
+  );
+}
+
+test("13.8 the gauge draws the stricter of what was ordered and what is applied", () => {
+  const ordered = { mandate: { speed_factor: 0.5, reason: "person" } };
+  equal(readingOf(robot()).factor, 1);
+  equal(readingOf(robot(ordered)).factor, 0.5);
+  equal(readingOf(robot({ speed_factor: 0 })).factor, 0);
+  equal(readingOf(robot({ ...ordered, speed_factor: 0 })).factor, 0);
+});
+
+test("13.8 a robot at 0.00 m/s is waiting, and its way is not said to be clear", () => {
+  const waiting = robot({ twist: { linear: 0.002, angular: 0 } });
+  equal(modeSaid(waiting, words), "robot.mode.WAITING");
+  equal(whySaid(waiting, words), "");
+  equal(modeSaid(robot(), words), "robot.mode.RUNNING");
+  equal(whySaid(robot(), words), "robot.why.clear ");
+  const turning = robot({ twist: { linear: 0, angular: 0.3 } });
+  equal(modeSaid(turning, words), "robot.mode.RUNNING");
+});
+
+test("13.8 a margin that nobody knows has no number", () => {
+  const margin = /** @type {import("../../iveg/static/js/protocol.js").Margin} */ (
+    /** @type {unknown} */ ({ margin_m: -20.2, band: "unknown", person_id: "P1" })
+  );
+  equal(marginSaid(margin, words), "robot.margin_band.unknown");
+  equal(marginSaid(null, words), "robot.margin_nobody");
+  const known = { ...margin, margin_m: 1.2, band: /** @type {const} */ ("clear") };
+  equal(marginSaid(known, words), "robot.margin_value 1.2 robot.margin_band.clear");
+});
+
+test("13.5 a robot that was never heard has no speed, no limit and no reason", () => {
+  const silent = robot({ pose: null, twist: null, applied: null, speed_factor: null });
+  equal(readingOf(silent), { speed: null, max: 2, factor: null });
+  equal(readingOf(undefined), { speed: null, max: 1, factor: null });
+  equal(modeSaid(silent, words), "robot.mode.UNKNOWN");
+  equal(whySaid(silent, words), "");
+});
+
+test("13.16 no task is never the word none", () => {
+  equal(taskSaid("none", words), "task.unknown");
+  equal(taskSaid(null, words), "task.unknown");
+  equal(taskSaid("hauling", words), "task.hauling");
+  equal(taskSaid("mulching", words), "mulching");
+});
+
+test("13.19 what is forbidden ends where what is filled could be", () => {
+  const gauge = createGauge();
+  const said = { name: "AGI", said: "0.4", limitSaid: "limit", speedSaid: "0.4" };
+  gauge.draw({ speed: 0.4, max: 1, factor: 0.5, ...said });
+  for (const svg of [gauge.svg, gauge.bar]) {
+    const path = (/** @type {string} */ name) =>
+      svg.querySelector(`.gauge__${name}`)?.getAttribute("d");
+    equal(path("track") === path("beyond"), false);
+    equal(svg.getAttribute("aria-valuetext"), "0.4");
+  }
+  gauge.draw({ speed: null, max: 1, factor: null, ...said });
+  equal(gauge.svg.querySelector(".gauge__limit")?.getAttribute("visibility"), "hidden");
+});
