@@ -1,5 +1,6 @@
 import { coverOf } from "../../iveg/static/js/layers/scalebar.js";
 import { createMap } from "../../iveg/static/js/map.js";
+import { installPaintHook } from "../../iveg/static/js/painthook.js";
 import { createStore } from "../../iveg/static/js/store.js";
 import { screenX, screenY } from "../../iveg/static/js/viewport.js";
 import { detection, person, robot, STAMP, snapshot } from "./builders.js";
@@ -13,6 +14,7 @@ function mapOnPage(options = {}) {
   document.body.replaceChildren(canvas);
   const store = createStore();
   const map = createMap(canvas, store, { storage: null, ...options });
+  installPaintHook(store, map);
   /** @type {{robot: string, kind: string, stamp: string}[]} */
   const painted = [];
   /** @type {any} */ (globalThis).__onPaint = (/** @type {any} */ it) =>
@@ -116,6 +118,27 @@ test("what lies under a robot is not drawn again because it moves", async () => 
   }
   equal(rectangles < 300, true);
   map.destroy();
+});
+
+test("while no script listens for painting, nobody watches for it", () => {
+  let watching = 0;
+  const watch = () => {
+    watching += 1;
+    return () => {
+      watching -= 1;
+    };
+  };
+  const page = /** @type {any} */ (globalThis);
+  delete page.__onPaint;
+  const end = installPaintHook({ watch }, { onDrawn: watch });
+  const counts = [watching];
+  for (const listener of [() => {}, () => {}, undefined]) {
+    page.__onPaint = listener;
+    counts.push(watching);
+  }
+  end();
+  equal(counts, [0, 2, 2, 0]);
+  equal("__onPaint" in page, false);
 });
 
 test("a stamp that was painted is not told again", async () => {

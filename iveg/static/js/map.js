@@ -26,7 +26,6 @@ import { pick } from "./layers/pick.js";
 import { readTheme } from "./layers/theme.js";
 import { createTrails } from "./layers/trail.js";
 import { createWords } from "./layers/words.js";
-import { createPaintHook } from "./painthook.js";
 import { createPicture, LAYERS } from "./picture.js";
 import { readScene } from "./scene.js";
 import { followShortcuts } from "./shortcuts.js";
@@ -48,11 +47,12 @@ export function createMap(canvas, store, options = {}) {
   const { now = () => performance.now(), storage = browserStorage() } = options;
   const choices = createChoices(storage, invalidate);
   const trails = createTrails();
-  const hook = createPaintHook();
   const covers = createCovers(canvas, invalidate);
   const picture = createPicture(canvas, trails, choices.isOn, choices.trailSeconds);
   /** @type {Set<Picker>} */
   const pickers = new Set();
+  /** @type {Set<(hasScans: boolean) => void>} */
+  const drawn = new Set();
   let theme = readTheme(canvas);
   let words = createWords();
   let scene = readScene(store, now());
@@ -79,7 +79,7 @@ export function createMap(canvas, store, options = {}) {
     if (!view.width || !view.height) return;
     const followed = camera.followed();
     const missingMs = picture.draw({ view, theme, scene, words, followed, tape });
-    hook.painted(missingMs === 0);
+    for (const fn of drawn) fn(missingMs === 0);
     clearTimeout(later);
     if (missingMs) later = setTimeout(invalidate, missingMs);
   }
@@ -139,7 +139,6 @@ export function createMap(canvas, store, options = {}) {
       mark: () => mark(camera.view().width / 2, camera.view().height / 2),
     }),
     store.watch((data, topic) => {
-      hook.arrived(topic, data);
       leaveTrail(trails, store, topic, data);
       invalidate();
     }),
@@ -189,6 +188,16 @@ export function createMap(canvas, store, options = {}) {
       pickers.add(fn);
       return () => void pickers.delete(fn);
     },
+    /**
+     * Tells each frame that was drawn, and whether the newest scans are in it.
+     *
+     * @param {(hasScans: boolean) => void} fn
+     * @returns {() => void}
+     */
+    onDrawn(fn) {
+      drawn.add(fn);
+      return () => void drawn.delete(fn);
+    },
     /** Forgets trails: for a replay that jumps. */
     clearTrails() {
       trails.clear();
@@ -197,6 +206,7 @@ export function createMap(canvas, store, options = {}) {
     destroy() {
       for (const end of endings) end();
       pickers.clear();
+      drawn.clear();
     },
   };
 }

@@ -8,7 +8,49 @@
  * @typedef {{robot: string, kind: "odom" | "lidar" | "detection", stamp: string}} Painted
  */
 
-export function createPaintHook() {
+/**
+ * Listens for a script that defines `window.__onPaint`, now or later.  Until there is
+ * one nobody watches the store or the map for it.
+ *
+ * @param {Pick<import("./store.js").Store, "watch">} store
+ * @param {{onDrawn: (fn: (hasScans: boolean) => void) => () => void}} map
+ * @returns {() => void} ends it
+ */
+export function installPaintHook(store, map) {
+  const page = /** @type {any} */ (globalThis);
+  let listener = page.__onPaint;
+  /** @type {(() => void)[]} */
+  let endings = [];
+  /** @param {((painted: Painted) => void) | undefined} next */
+  function hear(next) {
+    listener = next;
+    for (const end of endings) end();
+    endings = listener ? attach(store, map, (painted) => listener(painted)) : [];
+  }
+  const get = () => listener;
+  Object.defineProperty(page, "__onPaint", { configurable: true, get, set: hear });
+  hear(listener);
+  return () => {
+    hear(undefined);
+    delete page.__onPaint;
+  };
+}
+
+/**
+ * @param {Pick<import("./store.js").Store, "watch">} store
+ * @param {{onDrawn: (fn: (hasScans: boolean) => void) => () => void}} map
+ * @param {(painted: Painted) => void} tell
+ */
+function attach(store, map, tell) {
+  const hook = createPaintHook(tell);
+  return [
+    store.watch((data, topic) => hook.arrived(topic, data)),
+    map.onDrawn(hook.painted),
+  ];
+}
+
+/** @param {(painted: Painted) => void} tell */
+function createPaintHook(tell) {
   /** @type {Map<string, Painted>} */
   const arrived = new Map();
   /** @type {Map<string, string>} */
@@ -25,12 +67,11 @@ export function createPaintHook() {
     },
     /** @param {boolean} hasScans whether the newest scans are in the picture, too */
     painted(hasScans) {
-      const listener = /** @type {any} */ (globalThis).__onPaint;
       for (const [name, painted] of arrived) {
         if (!hasScans && painted.kind === "lidar") continue;
         arrived.delete(name);
         told.set(name, painted.stamp);
-        listener?.(painted);
+        tell(painted);
       }
     },
   };

@@ -8,6 +8,7 @@ import { followCostmap } from "../costmap.js";
 import { hears } from "../layers/belief.js";
 import { TRAIL_SPANS_S } from "../layers/trail.js";
 import { createMap } from "../map.js";
+import { installPaintHook } from "../painthook.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { onThemeChange } from "./theme.js";
 
@@ -26,6 +27,7 @@ export function createMapbox(app, decision) {
     onFollow: showFollowed,
     onMeasure: showMeasure,
   });
+  installPaintHook(store, map);
 
   /** @param {string | null} robotId */
   function showFollowed(robotId) {
