@@ -8,7 +8,7 @@ import errno
 import logging
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -29,7 +29,6 @@ class Journal:
 
     Args:
         reserve_bytes: Given back to the disk when it is full.
-        write: As ``os.write``; a test's disk may be full.
 
     Attributes:
         unreadable: Lines that could not be read back, such as one torn by a power cut.
@@ -39,12 +38,10 @@ class Journal:
         self,
         file: Path,
         reserve_bytes: int = _RESERVE_BYTES,
-        write: Callable[[int, memoryview], int] = os.write,
     ) -> None:
         self._file = file
         self._reserve = file.with_name(file.name + "-reserve")
         self._reserve_bytes = reserve_bytes
-        self._write = write
         self._lock = threading.Lock()
         self.unreadable = 0
 
@@ -118,10 +115,18 @@ class Journal:
         try:
             rest = memoryview(lines)
             while rest:
-                rest = rest[self._write(descriptor, rest) :]
+                rest = rest[self.write(descriptor, rest) :]
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+
+    def write(self, descriptor: int, data: memoryview) -> int:
+        """Put bytes on the disk; returns how many it took.
+
+        Raises:
+            OSError: it takes none.
+        """
+        return os.write(descriptor, data)
 
     def _cut(self, end: int) -> None:
         # Half a line must not run into the next one.

@@ -30,11 +30,12 @@ def rows(*records: Record) -> list[Waiting]:
     return [Waiting(record, number, 5.0) for number, record in enumerate(records, 1)]
 
 
-class FullDisk:
-    """Has room for half a line only, until a file is gone."""
+class JournalOnFullDisk(Journal):
+    """There is room for half a line only, until the reserve is gone."""
 
-    def __init__(self, until_gone: Path) -> None:
-        self._until_gone = until_gone
+    def __init__(self, file: Path, reserve: Path) -> None:
+        super().__init__(file, 4096)
+        self._until_gone = reserve
         self._half_written = False
 
     def write(self, descriptor: int, data: memoryview) -> int:
@@ -131,7 +132,7 @@ def test_the_reserve_is_really_taken_from_the_disk(
 
 def test_a_full_disk_gets_the_reserve_back(tmp_path: Path) -> None:
     reserve = tmp_path / "journal-reserve"
-    journal = Journal(tmp_path / "journal", 4096, FullDisk(reserve).write)
+    journal = JournalOnFullDisk(tmp_path / "journal", reserve)
     journal.keep_reserve()
 
     journal.append(rows(command_record()))
