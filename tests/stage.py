@@ -45,10 +45,12 @@ class Faults:
     Attributes:
         mute: Nothing that it says arrives.
         deaf: It drives as it likes whatever iVeg mandates; holds still bite.
+        clock_offset_s: Its wall clock is this far ahead (s).
     """
 
     mute: bool = False
     deaf: bool = False
+    clock_offset_s: float = 0.0
 
 
 class Robot:
@@ -88,11 +90,16 @@ class Robot:
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
         self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
+        now = self._dated(now)
         self._uplink.send(moved, now)
         if number % _LOOK_EVERY == 1:
             self._uplink.send(self._rig.look(into_run, world), now)
         if number % _NAVIGATION_EVERY == 0:
             self._uplink.send(self._rig.navigation(), now)
+
+    def _dated(self, now: Instant) -> Instant:
+        """What its own clocks show."""
+        return Instant(now.mono, now.wall + self.faults.clock_offset_s)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Hear iVeg's feedback to a robot of the fleet."""
@@ -106,7 +113,7 @@ class Robot:
                 case Drive(twist):
                     self._rig.drive(twist)
                 case Report(report):
-                    seq, (_, message) = self._uplink.report(report, now)
+                    seq, (_, message) = self._uplink.report(report, self._dated(now))
                     self._machine.reported(seq, now.mono)
                     self._say(message.topic, message.payload)
 
@@ -178,7 +185,7 @@ class Stage:
         desk.clock.now = round(self._steps * STEP_S, 6)
         for at_s, order in self._incidents:
             if number == round(at_s / STEP_S):
-                self._happen(order)
+                self.happen(order)
         self._world.walk(STEP_S)
         for robot in self._robots.values():
             robot.step(number, self._world, self.now)
@@ -186,8 +193,10 @@ class Stage:
         self._deliver()
         await settle()
 
-    def _happen(self, order: FaultOrder) -> None:
+    def happen(self, order: FaultOrder) -> None:
+        """Something goes wrong with a robot, or is well again."""
         faults = self._robots[order.robot].faults
+        faults.clock_offset_s = order.clock_offset_s or faults.clock_offset_s
         faults.mute = faults.mute if order.mute is None else order.mute
         faults.deaf = faults.deaf if order.deaf is None else order.deaf
 

@@ -19,7 +19,7 @@ GROUPING_S = 600.0
 """The same condition back within this time is the same alarm, counted once more."""
 MOST_KEPT = 200
 """More alarms than this, and even a P1 that nobody saw is left to the history."""
-MEMBERS_KEPT = 20
+MEMBERS_KEPT = 100
 """Occurrences that an alarm can still tell one by one; the others are counted."""
 
 

@@ -11,8 +11,6 @@ from iveg.domain.observations import Instant
 from iveg.domain.overload import Overload
 from iveg.domain.world import RobotState
 
-EXPECTED = "alert.person_slowed"
-"""The rule at work: it clears by itself and asks nothing of anybody (product.md §3)."""
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """So long a robot may take to hear its first feedback."""
 UNREADABLE_SHOWN_S = 10.0
@@ -23,7 +21,10 @@ STORM_SHOWN_S = 10.0
 
 
 def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
-    """A slow-down is expected (P2); one that does not come is grave (P1)."""
+    """One that is not obeyed is grave; a slow-down is the rule at work and no alarm.
+
+    It is on the robot's card, on the map and in the log, and asks nothing of anybody.
+    """
     crossing = decision.crossing
     slots: dict[str, Slot] = {
         "robot": crossing.robot_id,
@@ -36,8 +37,6 @@ def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
     if decision.overdue(now):
         key = "alert.person_not_slowing" if person else "alert.no_slow_down"
         yield Condition("P1", key, subject, crossing.robot_id, slots)
-    elif person:
-        yield Condition("P2", EXPECTED, subject, crossing.robot_id, slots)
 
 
 def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:

@@ -87,6 +87,7 @@ class RobotState:
     safety_received: Instant | None = None
     safety_road: Road = "orion"
     navigation: Navigation | None = None
+    navigation_received: Instant | None = None
     command_status: str | None = None
     heard_at: float | None = None
     live_at: float | None = None
@@ -429,7 +430,7 @@ def _update(robot: RobotState, received: Received, moment: float | None) -> None
             robot.safety, robot.safety_received = observation, _dated(at, moment)
             robot.safety_road = received.road
         case Navigation():
-            robot.navigation = observation
+            robot.navigation, robot.navigation_received = observation, at
         case _:
             robot.command_status = getattr(observation, "status", robot.command_status)
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 
 from iveg.domain.alarms import Alarm, AlarmBook, Condition
-from iveg.domain.conditions import EXPECTED
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.flood import Flood, FloodGauge
 from iveg.domain.observations import Instant
@@ -48,12 +47,8 @@ class Alarming:
         changed = self._book.sync(wrong, now, self._new_id())
         for alarm in changed:
             self._minutes.alarm(alarm)
-            line = alarm_line(alarm)
-            if line is not None:
-                self._minutes.log(line, now)
-        raised = [one for one in changed if one.cleared is None]
-        asking = sum(one.condition.key != EXPECTED for one in raised)
-        self._watch_flood(asking, now)
+            self._minutes.log(alarm_line(alarm), now)
+        self._watch_flood(sum(one.cleared is None for one in changed), now)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 from iveg.domain.alarms import Alarm
-from iveg.domain.conditions import EXPECTED
 from iveg.domain.decisions import Decisions
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.feedback import FULL_SPEED
@@ -179,11 +178,9 @@ def flood_line(before: Flood, after: Flood) -> LogEvent | None:
     return LogEvent("alert", key, slots)
 
 
-def alarm_line(alarm: Alarm) -> LogEvent | None:
-    """An alarm came or went; None for a slow-down, which has a line of its own."""
+def alarm_line(alarm: Alarm) -> LogEvent:
+    """An alarm came or went."""
     condition = alarm.condition
-    if condition.key == EXPECTED:
-        return None
     key = "log.alert.raised" if alarm.cleared is None else "log.alert.cleared"
     slots: dict[str, Slot] = {
         **condition.slots,

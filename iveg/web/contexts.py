@@ -91,15 +91,10 @@ class CommandsPage:
 
 @dataclass(frozen=True, slots=True)
 class FleetPage:
-    """``fleet.html``: the chain from robot to screen, the robots, their devices.
-
-    Attributes:
-        devices: What follows the robot's id in the name of each of its devices.
-    """
+    """``fleet.html``: the chain from robot to screen, the robots, their devices."""
 
     template: ClassVar[str] = "fleet.html"
     frame: Frame
-    devices: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

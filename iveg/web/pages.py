@@ -17,7 +17,6 @@ from starlette.responses import HTMLResponse, Response
 
 from iveg.domain import limits
 from iveg.domain.alerts import Rule
-from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.contexts import (
     THEMES,
     AboutPage,
@@ -47,7 +46,6 @@ LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
 PALETTE_COOKIE = "iveg_palette"
 
-_DEVICES = tuple(device.suffix for device in ROBOT_DEVICES)
 _DECISION_ID = r"^[ -~]{1,64}$"
 _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
 
@@ -185,7 +183,7 @@ def _add_supervision(routes: APIRouter, pages: Pages, who: Any) -> None:
 
     @routes.get("/fleet", response_model=None)
     async def fleet(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(FleetPage(pages.frame(request, "fleet", visitor), _DEVICES))
+        return pages.draw(FleetPage(pages.frame(request, "fleet", visitor)))
 
     @routes.get("/climate", response_model=None)
     async def climate(request: Request, visitor: Annotated[Any, who]) -> Response:

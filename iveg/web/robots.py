@@ -8,6 +8,7 @@ from starlette.responses import Response
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.climate import Climate
+from iveg.models.device import Device
 from iveg.models.health import Health
 from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
@@ -48,6 +49,11 @@ def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
     async def people() -> Response:
         """Everyone who is known, in their three stages."""
         return Json(Listing(items=views.people(clock())))
+
+    @routes.get("/devices", response_model=Listing[Device])
+    async def devices() -> Response:
+        """Each robot's devices at the IoT Agent, and when each was last heard of."""
+        return Json(Listing(items=views.devices(clock())))
 
     @routes.get("/map", response_model=GreenhouseMap)
     async def greenhouse() -> Response:

@@ -23,6 +23,7 @@ from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
+from iveg.models.device import Device
 from iveg.models.health import Health, Hop, Safety
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame
@@ -40,6 +41,7 @@ from iveg.models.robot import (
     Twist,
 )
 from iveg.models.rule import Rule
+from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
 from iveg.pipeline.health_monitor import HealthMonitor
@@ -167,6 +169,14 @@ class Views:
         """Seconds since the newest sweep arrived."""
         received = self._world.robot(robot_id).scan_received
         return None if received is None else round(now.mono - received.mono, 3)
+
+    def devices(self, now: Instant) -> list[Device]:
+        """What each robot has at the IoT Agent, and what was last heard of it."""
+        return [
+            Device.of(robot, device.suffix, now)
+            for robot in self._world.robots.values()
+            for device in ROBOT_DEVICES
+        ]
 
     # --- people and looks ---------------------------------------------------------
 

@@ -19,6 +19,7 @@ import orjson
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
+from iveg.domain.alarms import Condition
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
 from iveg.models.base import write_json
@@ -120,6 +121,8 @@ async def _world() -> WebDesk:
         safety_report("AGII", held, speed_factor=0.0, reason="hold", origin=origin)
     )
     await desk.wait(0.1)
+    lost = Condition("P2", "alert.robot_lost", "AGIII", "AGIII", {"robot": "AGIII"})
+    desk.assessor.alarms.sync([lost], desk.clock())
     return desk
 
 

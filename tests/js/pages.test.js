@@ -116,7 +116,7 @@ test("13.7: a STOP pressed while the server was dead has one zero: the press", (
 
 test("13.7: a refused resume reads refused, with the reason", () => {
   const words = {
-    t: (/** @type {string} */ key, /** @type {any} */ slots) => `${key} ${slots.why}`,
+    t: (/** @type {string} */ key, /** @type {any} */ slots) => `${key} ${slots?.why}`,
   };
   const resume = order({ kind: "resume", state: "READY", reason: "held" });
   const said = endSaid({ ...resume, outcome: "refused" }, /** @type {any} */ (words));
@@ -126,4 +126,12 @@ test("13.7: a refused resume reads refused, with the reason", () => {
 test("the median is a number that was measured", () => {
   equal(statOf([30, 10, null, 20, 40]), { median: 30, worst: 40 });
   equal(statOf([null]), null);
+});
+
+test("13.5 a chain that nobody has heard of, or without robots, is not said to work", () => {
+  equal(judgeChain([], [], true).key, "fleet.unknown");
+  const silent = judgeChain(hops({}), ["AGI"], true, 3);
+  equal([silent.key, silent.slots.robots], ["fleet.silent_robots", "AGI"]);
+  const none = judgeChain(hops({}), [], true, 0);
+  equal([none.key, none.state], ["fleet.no_robots", "unknown"]);
 });

@@ -218,16 +218,37 @@ test("an acknowledgement that failed says so and can be tried again", async () =
   list.remove();
 });
 
-test("what is open and urgent stands first", () => {
-  document.body.dataset.role = "operator";
+test("13.10 the gravest stands first, of these the oldest", () => {
   const list = document.createElement("ul");
   createAlertList(list, words).draw([
-    alarm({ alert_id: "over", cleared_at: "2026-11-20T12:01:00Z" }),
-    alarm({ alert_id: "p2", priority: "P2" }),
-    alarm({ alert_id: "p1" }),
+    alarm({ alert_id: "p2", priority: "P2", key: "late" }),
+    alarm({ alert_id: "p1", key: "young", raised_at: "2026-11-20T12:05:00Z" }),
+    alarm({ alert_id: "over", key: "old", cleared_at: "2026-11-20T12:01:00Z" }),
   ]);
-  const shown = [...list.children].map((item) => item.getAttribute("data-priority"));
-  equal(shown, ["P1", "P2", "P1"]);
+  const shown = [...list.children].map((item) => item.getAttribute("data-alert"));
+  equal(shown, ["old", "young", "late"]);
+});
+
+test("13.10 after an acknowledgement nothing slides under the finger", async () => {
+  document.body.dataset.role = "operator";
+  const list = document.createElement("ul");
+  document.body.append(list);
+  const both = [alarm({ alert_id: "a" }), alarm({ alert_id: "b", priority: "P2" })];
+  const { draw } = createAlertList(list, words, async () => 200, 150);
+  draw(both);
+  list.querySelector("button")?.click();
+  draw([both[1], alarm({ alert_id: "c" })]);
+  const ids = () =>
+    [...list.children].map((item) => item.querySelector("b")?.textContent);
+  equal(ids().length, 2);
+  equal(list.children[1].getAttribute("data-priority"), "P2");
+  await until(
+    () =>
+      list.children[1].getAttribute("data-priority") === "P2" &&
+      !list.hasAttribute("data-still"),
+  );
+  equal(ids().length, 2);
+  list.remove();
 });
 
 /** @param {string} at @param {object} [differs] */
@@ -382,7 +403,17 @@ test("the age of a tile grows while the server is silent", () => {
     ...{ count: 8, window_s: 300, age_s: 3 },
   };
   const { of } = tilesOf(safety, 4, words).latency;
-  equal(of, "tiles.latency_of 120 240 310 8 300 3 5 7");
+  equal(of, "tiles.latency_of 120 240 310 8 300 3 5 7 20");
+});
+
+test("13.11 quantiles are told of twenty values or more", () => {
+  const safety = nothing();
+  const some = { p50_ms: 120, p95_ms: 240, p99_ms: 310, window_s: 300, age_s: 3 };
+  const said = [19, 20].map((count) => {
+    safety.alert_latency = { ...some, count };
+    return tilesOf(safety, 0, words).latency.value.split(" ")[0];
+  });
+  equal(said, ["tiles.too_few", "tiles.latency_value"]);
 });
 
 /** @param {() => boolean} isSo within two seconds */

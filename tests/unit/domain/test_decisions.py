@@ -164,15 +164,15 @@ def keys(one: Decision, after: float) -> list[tuple[str, str]]:
     return [(wrong.priority, wrong.key) for wrong in of_decision(one, at(after))]
 
 
-def test_a_slow_down_that_is_obeyed_is_expected() -> None:
-    assert keys(obeyed(decision()), 5.0) == [("P2", "alert.person_slowed")]
+def test_a_slow_down_that_is_obeyed_is_no_alarm() -> None:
+    assert keys(obeyed(decision()), 5.0) == []
 
 
-@pytest.mark.parametrize(("after", "priority"), [(1.99, "P2"), (2.0, "P1")])
+@pytest.mark.parametrize(("after", "priorities"), [(1.99, []), (2.0, ["P1"])])
 def test_a_robot_that_does_not_slow_down_in_two_seconds_is_grave(
-    after: float, priority: str
+    after: float, priorities: list[str]
 ) -> None:
-    assert keys(decision(), after)[0][0] == priority
+    assert [priority for priority, _ in keys(decision(), after)] == priorities
 
 
 def test_a_robot_that_says_so_and_drives_on_is_grave() -> None:
@@ -184,7 +184,7 @@ def test_a_robot_that_says_so_and_drives_on_is_grave() -> None:
 def test_a_robot_that_was_slow_already_only_has_to_say_so() -> None:
     said = decision(already_slow=True).reported(slow(), at(0.1))
 
-    assert keys(said, 5.0) == [("P2", "alert.person_slowed")]
+    assert keys(said, 5.0) == []
 
 
 def test_an_ended_decision_is_never_overdue() -> None:

@@ -10,7 +10,6 @@ from fastapi import FastAPI
 from starlette.responses import RedirectResponse, Response
 
 from iveg.domain.alerts import Rule
-from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.web.auth import Principal, require
 from iveg.web.contexts import Site
 from iveg.web.openapi import AnswerDoc, ApiDoc, CallDoc, FieldDoc, GroupDoc, ShapeDoc
@@ -283,11 +282,3 @@ async def test_a_stranger_has_nothing_to_sign_out_of(
     door.visitor = None
     assert (await browser.post("/signout")).status_code == 401
     assert door.left == 0
-
-
-async def test_every_device_of_a_robot_stands_on_the_fleet_page(
-    browser: httpx.AsyncClient,
-) -> None:
-    html = (await browser.get("/fleet")).text
-    wanted = " ".join(device.suffix for device in ROBOT_DEVICES)
-    assert f'data-suffixes="{wanted}"' in html

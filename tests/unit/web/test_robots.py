@@ -270,6 +270,29 @@ async def test_the_air_is_told_with_its_age_or_not_at_all() -> None:
     }
 
 
+async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> None:
+    desk = WebDesk()
+    desk.drive("AGI", 1.0)
+    desk.clock.now = 40.0
+    desk.look("AGI", detection("farmer", 1.0))
+    desk.clock.now = 42.0
+
+    told = await get(desk, "/devices")
+
+    assert isinstance(told, dict)
+    ages = {
+        one["device"]: one["age_s"] for one in told["items"] if one["robot_id"] == "AGI"
+    }
+    assert ages == {
+        "AGI": 2.0,
+        "AGI_odom": 42.0,
+        "AGI_lidar2D": None,
+        "AGI_yolox_bounding_boxes": 2.0,
+        "AGI_safety": None,
+        "AGI_nav": None,
+    }
+
+
 async def test_the_map_is_the_greenhouse() -> None:
     told = await get(WebDesk(), "/map")
 

@@ -5,7 +5,7 @@
 import { dayAndTime } from "../history/madrid.js";
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
 import { createMembers, floodSaid } from "../panels/alert_members.js";
-import { earlierUnknown } from "../panels/alerts.js";
+import { earlierUnknown, isKnown } from "../panels/alerts.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createChips, createRows, soon } from "./rows.js";
@@ -23,7 +23,7 @@ export function start({ store, words, tone }) {
     path: "alerts",
     words,
     cells: (alert) => cellsOf(alert, words, opened),
-    admits: ({ priority }) => isChosen(priority),
+    admits: ({ priority, cleared_at }) => cleared_at !== null && isChosen(priority),
   });
   const reload = soon(rows.load);
 
@@ -32,7 +32,7 @@ export function start({ store, words, tone }) {
     const alerts = store.get("alerts") ?? [];
     list.draw(alerts);
     const isUnknown = earlierUnknown(store);
-    setHidden(need("#active-empty"), alerts.length > 0 || isUnknown);
+    setHidden(need("#active-empty"), alerts.length > 0 || !isKnown(store));
     setHidden(need("#earlier-unknown"), !isUnknown);
   }
 

@@ -26,12 +26,14 @@ const WORST_FIRST = ["down", "late", "unknown"];
 
 /**
  * @param {readonly Hop[]} hops as the server tells them
- * @param {readonly string[]} lost ids of robots that are silent
+ * @param {readonly string[]} lost ids of robots that are silent, or never spoke
  * @param {boolean} isOpen whether this screen hears the server
+ * @param {number} [heard] how many robots anything is known of
  * @returns {Verdict}
  */
-export function judgeChain(hops, lost, isOpen) {
+export function judgeChain(hops, lost, isOpen, heard = 1) {
   if (!isOpen) return verdict("fleet.silent_server", "down", "server");
+  if (!hops.length) return verdict("fleet.unknown", "unknown", null);
   for (const state of WORST_FIRST) {
     const broken = hops
       .filter((hop) => hop.state === state)
@@ -40,6 +42,7 @@ export function judgeChain(hops, lost, isOpen) {
     if (state === "late" && lost.length) break;
     if (broken) return { ...sentenceOf(broken), state, hop: broken.hop };
   }
+  if (!lost.length && !heard) return verdict("fleet.no_robots", "unknown", "robots");
   if (!lost.length) return verdict("fleet.whole", "ok", null);
   const robots = lost.join(", ");
   return { ...verdict("fleet.silent_robots", "down", "robots"), slots: { robots } };

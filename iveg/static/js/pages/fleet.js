@@ -2,34 +2,50 @@
  * The Fleet page: the chain as a diagram, each robot, and each of its devices.
  */
 
+import { readApi } from "../api.js";
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
-import { modeSaid } from "../panels/robot_words.js";
+import { isHeard, modeSaid, taskSaid } from "../panels/robot_words.js";
 import { judgeChain } from "./chain.js";
 import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../protocol.js").Robot} Robot */
 /** @typedef {import("../i18n.js").Words} Words */
 
+/** @typedef {{device: string, robot_id: string, kind: string, age_s: number | null}} Device */
+
 const TICK_MS = 500;
+const READ_MS = 5000;
+const SILENT = new Set(["LOST", "UNKNOWN"]);
 
 /** @param {import("../page.js").Page} page */
 export function start(page) {
   const { store, words } = page;
-  const suffixes = (need("#devices").dataset.suffixes ?? "").split(" ");
+  /** @type {{items: Device[], readMs: number}} */
+  let devices = { items: [], readMs: 0 };
 
   function draw() {
     const robots = [...store.robots().values()];
     drawChain(robots);
     setHidden(need("#machines-empty"), robots.length > 0);
+    const isKnown = Boolean(store.get("snapshot"));
+    setText(need("#machines-empty"), words.t(isKnown ? "robot.none" : "rows.loading"));
     fill(
       "#machines tbody",
       robots.map((robot) => machineCells(robot, words)),
     );
-    const devices = robots.flatMap((robot) =>
-      suffixes.map((suffix) => deviceCells(robot, suffix)),
+    hideEmptyColumns(need("#machines"));
+    fill(
+      "#devices tbody",
+      devices.items.map((device) => deviceCells(device, devices.readMs, words)),
     );
-    fill("#devices tbody", devices);
+  }
+
+  /** What the server has heard of each device, since it knows longer than this page. */
+  async function load() {
+    const { status, body } = await readApi("devices");
+    if (status === 200) devices = { items: body.items, readMs: performance.now() };
+    draw();
   }
 
   /** @param {Robot[]} robots */
@@ -37,16 +53,16 @@ export function start(page) {
     const isOpen = store.connection.state === "open";
     /** @type {import("../protocol.js").Health | null} */
     const health = store.get("health") ?? null;
-    const silent = robots.filter((robot) => linkOfRobot(robot) === "LOST");
+    const silent = robots.filter((robot) => SILENT.has(linkOfRobot(robot)));
     const hops = health?.hops ?? [];
     const found = judgeChain(
       hops,
       silent.map(({ robot_id }) => robot_id),
       isOpen || store.connection.state === "connecting",
+      robots.length,
     );
-    const said = health || !isOpen ? words.t(found.key, found.slots) : "";
-    setAttribute(need("#chain-says"), "data-state", health ? found.state : "unknown");
-    if (said) setText(need("#chain-sentence"), said);
+    setAttribute(need("#chain-says"), "data-state", found.state);
+    setText(need("#chain-sentence"), words.t(found.key, found.slots));
     for (const box of all(".hop-box")) drawBox(box, hops, robots, silent.length);
   }
 
@@ -78,43 +94,42 @@ export function start(page) {
     setText(need("small", box), words.t(`health.state.${state}`));
   }
 
-  /** @param {Robot} robot @param {string} suffix */
-  function deviceCells(robot, suffix) {
-    const kind = suffix.slice(1) || "robot";
-    const id = robot.robot_id;
-    const age = ageOfDevice(kind, robot);
-    return [
-      make("code", "", `${id}${suffix}`),
-      words.has(`fleet.measures.${kind}`) ? words.t(`fleet.measures.${kind}`) : kind,
-      age === null ? "—" : ageSaid(age, words),
-    ];
-  }
-
-  /** Age (s) of what a device last brought; null where nobody keeps it.
-   * @param {string} kind @param {Robot} robot */
-  function ageOfDevice(kind, robot) {
-    if (kind === "odom") return ageOf(robot);
-    if (kind === "lidar2D") return ageOfKnown(store.scans().get(robot.robot_id));
-    if (kind === "yolox_bounding_boxes")
-      return ageOfKnown(store.looks().get(robot.robot_id));
-    if (kind !== "safety") return null;
-    const { applied, receivedAtMs } = robot;
-    return applied
-      ? ageOf({ age_s: applied.age_s, receivedAtMs })
-      : Number.POSITIVE_INFINITY;
-  }
-
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
   words.onChange(draw);
   setInterval(draw, TICK_MS);
+  setInterval(load, READ_MS);
+  store.subscribe("snapshot", load);
   draw();
+  load();
   createTiles(page);
 }
 
-/** @param {import("../clock.js").Aged | undefined} value */
-function ageOfKnown(value) {
-  return value ? ageOf(value) : Number.POSITIVE_INFINITY;
+/**
+ * @param {Device} device
+ * @param {number} readMs when the server said so
+ * @param {Words} words
+ * @returns {(string | Node)[]}
+ */
+function deviceCells({ device, kind, age_s }, readMs, words) {
+  const age = ageOf({ age_s, receivedAtMs: readMs });
+  return [
+    make("code", "", device),
+    words.has(`fleet.measures.${kind}`) ? words.t(`fleet.measures.${kind}`) : kind,
+    ageSaid(age, words),
+  ];
+}
+
+/** A column in which no robot has anything says nothing. @param {HTMLElement} table */
+function hideEmptyColumns(table) {
+  const rows = [...table.querySelectorAll("tbody tr")];
+  table.querySelectorAll("th").forEach((head, j) => {
+    const isEmpty =
+      rows.length > 0 && rows.every(({ children }) => children[j]?.textContent === "—");
+    for (const cell of [head, ...rows.map(({ children }) => children[j])]) {
+      setHidden(/** @type {HTMLElement} */ (cell), isEmpty);
+    }
+  });
 }
 
 /** @param {number} age (s) @param {Words} words */
@@ -127,24 +142,19 @@ function machineCells(robot, words) {
   const link = linkOfRobot(robot);
   const age = aboutAge(robot, ageSaid(ageOf(robot), words), words);
   const { profile, navigation, clock_offset_s, holds } = robot;
+  const isKnown = isHeard(robot);
   const sources = holds.map(({ source }) => words.t(`release.hold_source.${source}`));
   return [
     make("b", "", robot.robot_id),
     `${words.t(`robot.link.${link}`)} · ${age}`,
     link === "LOST" ? "—" : modeSaid(robot, words),
-    profile ? words.t("robot.profile", profile) : "—",
+    profile && isKnown ? words.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, words) : "—",
-    robot.transport ? words.t(`fleet.transport.${robot.transport}`) : "—",
+    robot.transport && isKnown ? words.t(`fleet.transport.${robot.transport}`) : "—",
     clock_offset_s === null ? "—" : words.t("fleet.clock", { offset: clock_offset_s }),
     robot.cmd_status ?? "—",
     sources.length ? [...new Set(sources)].join(", ") : "—",
   ];
-}
-
-/** A task in the reader's words; one of another fleet as it was sent.
- * @param {string} task @param {Words} words */
-export function taskSaid(task, words) {
-  return words.has(`task.${task}`) ? words.t(`task.${task}`) : task;
 }
 
 /**

@@ -21,7 +21,8 @@ export function createRuleForm(store, words) {
   );
   /** @type {Rule | null} the version that the person at the form has seen */
   let seen = null;
-  let note = "readonly";
+  /** @type {string | null} null while nobody knows */
+  let note = null;
 
   /** @param {Rule | null | undefined} rule */
   function take(rule) {
@@ -54,7 +55,8 @@ export function createRuleForm(store, words) {
   /** @param {Set<string>} verbs what the server knows: `get`, `put` */
   function open(verbs) {
     const may = WRITERS.has(document.body.dataset.role ?? "");
-    if (verbs.has("put")) note = may ? "editable" : "role";
+    const who = may ? "editable" : "role";
+    note = verbs.has("put") ? who : "readonly";
     setHidden(form, !verbs.has("put") || !may);
     draw();
   }
@@ -84,7 +86,8 @@ export function createRuleForm(store, words) {
       rule?.since && rule.author
         ? words.t("rule.since", { at: dayAndTime(rule.since), who: rule.author })
         : "";
-    setText(need("#rule-note"), `${words.t(`rule.${note}`)} ${since}`.trim());
+    const told = words.t(note ? `rule.${note}` : "rows.loading");
+    setText(need("#rule-note"), `${told} ${since}`.trim());
   }
 
   form.addEventListener("submit", (event) => {

@@ -13,6 +13,8 @@ import { need, setText } from "../panels/dom.js";
 /** @typedef {{value: string, of: string}} Tile */
 
 const TICK_MS = 1000;
+/** Of fewer values a quantile would be one of them by chance. */
+const FEWEST = 20;
 
 /** @param {import("../main.js").App} app */
 export function createTiles({ store, words }) {
@@ -55,9 +57,10 @@ export function tilesOf(safety, waitedS, words) {
 function latencyOf(it, aged, words) {
   const minutes = it.window_s / 60;
   if (!it.count) return { value: "—", of: words.t("tiles.no_answers", { minutes }) };
-  const slots = { ...it, minutes, age: aged(it.age_s) };
+  const slots = { ...it, minutes, age: aged(it.age_s), fewest: FEWEST };
+  const value = it.count < FEWEST ? "tiles.too_few" : "tiles.latency_value";
   return {
-    value: words.t("tiles.latency_value", slots),
+    value: words.t(value, slots),
     of: words.t("tiles.latency_of", slots),
   };
 }

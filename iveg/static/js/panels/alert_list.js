@@ -13,14 +13,17 @@ import { make, need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** Roles that may acknowledge (safety: the table of roles). */
 const ACKNOWLEDGERS = new Set(["operator", "admin"]);
+/** How long nothing moves under a finger that has acknowledged. */
+const STILL_MS = 3000;
 
 /**
  * @param {HTMLElement} list
  * @param {import("../i18n.js").Words} words
  * @param {(alertId: string, note: string) => Promise<number>} [send] tests hand in
  *   their own
+ * @param {number} [stillMs] how long nothing moves after somebody acknowledged
  */
-export function createAlertList(list, words, send = acknowledge) {
+export function createAlertList(list, words, send = acknowledge, stillMs = STILL_MS) {
   /** @type {Map<string, HTMLLIElement>} */
   const items = new Map();
   /** @type {Map<string, ReturnType<typeof createMembers>>} */
@@ -31,10 +34,15 @@ export function createAlertList(list, words, send = acknowledge) {
   const drawn = new Map();
   /** @type {Alert[]} */
   let shown = [];
+  /** Until then nothing moves: a finger has just been here (`performance.now()`). */
+  let stillUntilMs = 0;
 
   /** @param {Alert[]} alerts */
   function draw(alerts) {
     shown = [...alerts].sort(byUrgency);
+    const isStill = performance.now() < stillUntilMs;
+    list.toggleAttribute("data-still", isStill);
+    if (isStill) return drawStill();
     for (const id of items.keys()) {
       if (!shown.some(({ alert_id }) => alert_id === id)) drop(id);
     }
@@ -44,6 +52,20 @@ export function createAlertList(list, words, send = acknowledge) {
       if (list.children[i] !== item) list.insertBefore(item, list.children[i] ?? null);
       drawItem(item, alert);
     });
+  }
+
+  /** Writes what has changed; what is new or gone waits for the finger to leave. */
+  function drawStill() {
+    for (const alert of shown) {
+      const item = items.get(alert.alert_id);
+      if (item) drawItem(item, alert);
+    }
+  }
+
+  function keepStill() {
+    stillUntilMs = performance.now() + stillMs;
+    list.toggleAttribute("data-still", true);
+    setTimeout(() => draw(shown), stillMs + 20);
   }
 
   /** @param {string} id */
@@ -60,6 +82,7 @@ export function createAlertList(list, words, send = acknowledge) {
     const known = items.get(alert.alert_id);
     if (known) return known;
     const item = makeItem(async (note) => {
+      keepStill();
       const status = await send(alert.alert_id, note);
       if (status >= 200 && status < 300) failures.delete(alert.alert_id);
       else failures.set(alert.alert_id, status);
@@ -143,13 +166,14 @@ function makeItem(onAcknowledge) {
   return item;
 }
 
-/** Open before cleared, urgent before others, new before old. @param {Alert} a @param {Alert} b */
+/**
+ * The gravest first, of these the oldest: what comes later moves none of those above.
+ *
+ * @param {Alert} a
+ * @param {Alert} b
+ */
 export function byUrgency(a, b) {
-  return (
-    Number(Boolean(a.cleared_at)) - Number(Boolean(b.cleared_at)) ||
-    a.priority.localeCompare(b.priority) ||
-    b.last_raised_at.localeCompare(a.last_raised_at)
-  );
+  return a.priority.localeCompare(b.priority) || a.raised_at.localeCompare(b.raised_at);
 }
 
 /** @param {string} id @param {string} note @returns {Promise<number>} 0: no answer */

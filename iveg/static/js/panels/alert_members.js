@@ -17,7 +17,9 @@ export function createMembers(words) {
   /** @param {Alert} alert */
   function draw({ count, members = [] }) {
     setHidden(element, count < 2);
-    setText(summary, words.t("alert.members", { count }));
+    const kept = members.length;
+    const key = kept < count ? "alert.members_newest" : "alert.members";
+    setText(summary, words.t(key, { count, kept }));
     const newest = [...members].reverse();
     while (list.children.length > newest.length) list.lastElementChild?.remove();
     while (list.children.length < newest.length) list.append(make("li"));

@@ -28,7 +28,9 @@ export function createAlertsPanel({ store, words }, tone) {
     const isUnknown = earlierUnknown(store);
     setText(need("#alerts-count"), isUnknown ? `${open.length}?` : String(open.length));
     setHidden(need("#alerts-earlier"), !isUnknown);
-    setAttribute(button, "data-worst", open[0]?.priority ?? "none");
+    // What is over and unseen may be graver than what goes on.
+    const [worst] = alerts.map(({ priority }) => priority).sort();
+    setAttribute(button, "data-worst", worst ?? "none");
     /** @type {import("../protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");
     const rate = floodSaid(flood, words);
@@ -37,7 +39,7 @@ export function createAlertsPanel({ store, words }, tone) {
     button.toggleAttribute("data-flood", Boolean(flood?.since));
     setText(need("#alerts-flood"), rate);
     need("#alerts-flood").toggleAttribute("data-flood", Boolean(flood?.since));
-    setHidden(need("#alerts-empty"), alerts.length > 0 || isUnknown);
+    setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
     list.draw(alerts);
   }
 
@@ -70,6 +72,13 @@ export function createAlertsPanel({ store, words }, tone) {
  */
 export function earlierUnknown(store) {
   return store.get("health")?.earlier === "unknown";
+}
+
+/** That there is no alarm is known only from a server that is heard, and knows its past.
+ * @param {import("../store.js").Store} store */
+export function isKnown(store) {
+  const isHeard = store.connection.state === "open" && Boolean(store.get("snapshot"));
+  return isHeard && !earlierUnknown(store);
 }
 
 /** It sounds until somebody has seen it, also when it is over. @param {Alert} alert */

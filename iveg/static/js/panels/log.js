@@ -85,7 +85,8 @@ export function createLogPanel(app, decision) {
     setHidden(empty, shown.length > 0);
     const isHidden = entries.length > 0 && shown.length === 0;
     const filters = chips.said().join(" · ");
-    const key = isHidden ? "logpanel.hidden" : "logpanel.empty";
+    const none = store.get("snapshot") ? "logpanel.empty" : "rows.loading";
+    const key = isHidden ? "logpanel.hidden" : none;
     setText(empty, words.t(key, { count: entries.length, filters }));
     setHidden(clear, !isHidden);
   }

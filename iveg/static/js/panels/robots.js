@@ -69,6 +69,8 @@ export function createRobotsPanel(app) {
   function drawAll() {
     for (const robotId of store.robots().keys()) cardOf(robotId);
     setHidden(need("#robots-empty"), cards.size > 0);
+    const none = store.get("snapshot") ? "robot.none" : "rows.loading";
+    setText(need("#robots-empty"), words.t(none));
     for (const [robotId, card] of cards) card.draw(store.robots().get(robotId));
   }
 

@@ -12,25 +12,13 @@ import { ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createPresser } from "./press.js";
 import { createLoudLines } from "./stop_loud.js";
+import { createPlace } from "./stop_place.js";
 import { since, viewOfFleet, viewOfRobot } from "./stop_view.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Command} Command */
 /** @typedef {import("./stop_view.js").View} View */
 
-/** More robots than this have their controls on their cards: what the strip has room for. */
-const STRIP_HOLDS = 4;
-const NARROW_STRIP_HOLDS = 3;
-const LOW_STRIP_HOLDS = 2;
-
-const PHONE = matchMedia(
-  "(max-width: 767px) and (min-height: 501px), (max-width: 567px)",
-);
-const NARROW = matchMedia("(min-width: 1200px) and (max-width: 1399px)");
-/** A phone lying down: the strip stands beside the map. */
-const LOW = matchMedia(
-  "(max-height: 500px) and (min-width: 568px) and (max-width: 1199px)",
-);
 const TICK_MS = 100;
 /** How long after `pointerup` a click still belongs to the same gesture (ms). */
 const GESTURE_MS = 400;
@@ -52,8 +40,9 @@ export function createStopPanel(app) {
   const commands = new Map();
   /** @type {Map<string, HTMLElement>} */
   const controls = new Map();
-  /** @type {Map<string, string>} kind of the newest release or resume by robot */
-  const orders = new Map();
+  const isResuming = followOrders(store);
+  const place = createPlace(strip, controls);
+  const settle = createSettling(presser, line, controls, commands);
   /** Whether the server knows this page well enough to stop, though not to watch. */
   let isBlind = false;
 
@@ -85,36 +74,13 @@ export function createStopPanel(app) {
 
   /** @param {Command} command */
   function take(command) {
-    if (command.kind !== "stop") {
-      orders.set(command.robot_id, command.kind);
-      return;
-    }
+    if (command.kind !== "stop") return;
     const known = commands.get(command.robot_id)?.command;
     if (known && isOlder(command, known)) return;
     if (command.state === "RUNNING") commands.delete(command.robot_id);
     else commands.set(command.robot_id, { command, heardMs: performance.now() });
-    settle(command.robot_id, command);
-    settleFleet();
+    settle(command);
     drawAll();
-  }
-
-  /** A press of the fleet is answered when each robot has answered, not the first. */
-  function settleFleet() {
-    const atMs = presser.pending(null)?.atMs;
-    if (atMs === undefined) return;
-    const ids = [...controls.keys()].filter((id) => id !== "fleet");
-    const isAnswered = (/** @type {string} */ id) =>
-      (commands.get(id)?.heardMs ?? Number.NEGATIVE_INFINITY) >= atMs;
-    if (ids.every(isAnswered)) presser.settle(null);
-  }
-
-  /** @param {string} robotId @param {Command} command */
-  function settle(robotId, command) {
-    const pending = presser.pending(robotId);
-    if (!pending) return;
-    const ageS = (performance.now() - pending.atMs) / 1000;
-    const isNewer = since(command.times.requested, line.serverNow()) <= ageS + 1.5;
-    if (pending.accepted || isNewer) presser.settle(robotId);
   }
 
   /** @param {import("../protocol.js").Robot} robot */
@@ -134,7 +100,6 @@ export function createStopPanel(app) {
   /** @param {import("../protocol.js").Snapshot} snapshot */
   function restart(snapshot) {
     commands.clear();
-    orders.clear();
     for (const command of snapshot.commands ?? []) take(command);
     for (const robot of snapshot.robots ?? []) takeRobot(robot);
     drawAll();
@@ -178,9 +143,6 @@ export function createStopPanel(app) {
     };
   }
 
-  /** @param {string} robotId */
-  const isResuming = (robotId) => orders.get(robotId) === "resume";
-
   function drawAll() {
     const ids = [...controls.keys()].filter((id) => id !== "fleet");
     const robots = ids.map((id) => {
@@ -217,30 +179,8 @@ export function createStopPanel(app) {
     setHidden(who, view.state === "ready" || view.state === "late");
   }
 
-  /** Cards hold their robot's control on a phone and in a big fleet, else the strip. */
-  function place() {
-    const isMany = controls.size - 1 > stripHolds();
-    const isPanelOpen = document.body.hasAttribute("data-panel");
-    const isOnCards = isMany || (PHONE.matches && !isPanelOpen);
-    strip.toggleAttribute("data-many", isMany);
-    for (const [id, control] of controls) {
-      const slot = document.querySelector(
-        `[data-robot="${CSS.escape(id)}"] [data-part="stop"]`,
-      );
-      const home = isOnCards && slot ? slot : strip;
-      if (control.parentElement !== home) {
-        home.insertBefore(
-          control,
-          home === strip ? (controls.get("fleet") ?? null) : null,
-        );
-      }
-    }
-  }
-
   for (const control of all("[data-stop]")) adopt(control);
   place();
-  for (const screen of [PHONE, NARROW, LOW]) screen.addEventListener("change", place);
-  document.addEventListener("iveg:panel", place);
   onFleetKeys(() => press(null));
   store.subscribe("snapshot", restart);
   store.subscribe("commands/", take);
@@ -257,9 +197,55 @@ export function createStopPanel(app) {
   };
 }
 
-function stripHolds() {
-  if (LOW.matches) return LOW_STRIP_HOLDS;
-  return NARROW.matches ? NARROW_STRIP_HOLDS : STRIP_HOLDS;
+/**
+ * Whether what a robot does next was asked for by a resume, and no release.
+ *
+ * @param {import("../store.js").Store} store
+ * @returns {(robotId: string) => boolean}
+ */
+function followOrders(store) {
+  /** @type {Map<string, string>} kind of the newest release or resume by robot */
+  const kinds = new Map();
+  store.subscribe("snapshot", () => kinds.clear());
+  store.subscribe("commands/", ({ kind, robot_id }) => {
+    if (kind !== "stop") kinds.set(robot_id, kind);
+  });
+  return (robotId) => kinds.get(robotId) === "resume";
+}
+
+/**
+ * A command answers the press that asked for it; a press of the fleet is answered when
+ * each robot has answered, not the first.
+ *
+ * @param {ReturnType<typeof createPresser>} presser
+ * @param {App["line"]} line
+ * @param {ReadonlyMap<string, HTMLElement>} controls by robot, and `fleet`
+ * @param {ReadonlyMap<string, {heardMs: number}>} commands newest stop by robot
+ * @returns {(command: Command) => void}
+ */
+function createSettling(presser, line, controls, commands) {
+  /** @param {Command} command */
+  function settleRobot({ robot_id, times }) {
+    const pending = presser.pending(robot_id);
+    if (!pending) return;
+    const ageS = (performance.now() - pending.atMs) / 1000;
+    const isNewer = since(times.requested, line.serverNow()) <= ageS + 1.5;
+    if (pending.accepted || isNewer) presser.settle(robot_id);
+  }
+
+  function settleFleet() {
+    const atMs = presser.pending(null)?.atMs;
+    if (atMs === undefined) return;
+    const robots = [...controls.keys()].filter((id) => id !== "fleet");
+    const isAnswered = (/** @type {string} */ id) =>
+      (commands.get(id)?.heardMs ?? Number.NEGATIVE_INFINITY) >= atMs;
+    if (robots.every(isAnswered)) presser.settle(null);
+  }
+
+  return (command) => {
+    settleRobot(command);
+    settleFleet();
+  };
 }
 
 /** @param {string} robotId */
