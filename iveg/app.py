@@ -55,11 +55,13 @@ from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.rules import Rules
+from iveg.pipeline.watching import Watch
 from iveg.settings import Settings
 from iveg.web import (
     alerts,
     commands,
     costmap,
+    coverage,
     health,
     history,
     latency,
@@ -224,6 +226,7 @@ class Dss:
             read_clock=clock.now,
         )
         self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
+        self.watch = Watch(world, self.assessor.greenhouse)
         self.views = Views(
             self.assessor, self.commander, self.minutes, self.chain, self.counters
         )
@@ -262,6 +265,7 @@ class Dss:
             tasks.create_task(self.link.run(), name="mqtt")
             tasks.create_task(self.loop.run(), name="rule-loop")
             tasks.create_task(self.mapper.run(clock.now), name="costmap")
+            tasks.create_task(self.watch.run(clock.now), name="coverage")
             tasks.create_task(self.provisioner.run(), name="provisioner")
             tasks.create_task(self.recorder.run(), name="recorder")
             self.commander.restore(self.journal.read(), clock.now())
@@ -412,6 +416,7 @@ def create_app(dss: Dss) -> FastAPI:
     )
     app.include_router(robots.router(dss.views, clock.now))
     app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
+    app.include_router(coverage.router(dss.watch, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.assessor, clock.now))
     app.include_router(rule.router(dss.rules, clock.now))

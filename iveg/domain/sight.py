@@ -6,7 +6,10 @@ nobody, not even faintly; never for one missing frame (safety.md §3.4).
 
 import math
 
-from iveg.domain.geometry import wrap_angle
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D, wrap_angle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -21,6 +24,8 @@ _NEAR_M, _RANGE_SHARE = 1.0, 0.75
 _FRESH_LOOK_S = 0.5
 
 _Look = tuple[int, str]
+_Spots = NDArray[np.float64]
+_NONE = np.empty(0, np.intp)
 
 
 class AllClear:
@@ -79,16 +84,62 @@ def can_see(
     robot: RobotState, x: float, y: float, greenhouse: Greenhouse, now: Instant
 ) -> bool:
     """Whether a robot's camera looks at a spot now, nothing in between."""
-    age, looked = robot.age_s(now), robot.detections_at
-    if robot.odometry is None or age is None or age > LIMITS.live_s or looked is None:
-        return False
-    if now.mono - looked > _FRESH_LOOK_S:
+    camera = _camera_of(robot, now)
+    if camera is None:
         return False
     profile = robot.profile
-    camera = robot.odometry.pose.compose(profile.camera)
     distance = camera.distance_to(x, y)
     if not _NEAR_M <= distance <= _RANGE_SHARE * profile.camera_range:
         return False
     bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
     in_picture = abs(bearing) <= profile.camera_fov / 2 - _EDGE_RAD
     return in_picture and greenhouse.in_sight(camera.x, camera.y, x, y)
+
+
+def looks_from(
+    robot: RobotState, spots: _Spots, greenhouse: Greenhouse, now: Instant
+) -> NDArray[np.intp]:
+    """Which of many spots a robot's camera looks at now, nothing in between.
+
+    Args:
+        robot: One whose camera may be blind: then none.
+        spots: Shape (n, 2), in ``map`` (m).
+        greenhouse: What stands in between.
+        now: This moment.
+    """
+    camera = _camera_of(robot, now)
+    if camera is None:
+        return _NONE
+    profile = robot.profile
+    dx, dy = spots[:, 0] - camera.x, spots[:, 1] - camera.y
+    distance = np.hypot(dx, dy)
+    bearing = np.arctan2(dy, dx) - camera.yaw
+    off = np.abs((bearing + math.pi) % math.tau - math.pi)
+    in_picture = np.flatnonzero(
+        (distance >= _NEAR_M)
+        & (distance <= _RANGE_SHARE * profile.camera_range)
+        & (off <= profile.camera_fov / 2 - _EDGE_RAD)
+    )
+    clear = [
+        one
+        for one in in_picture.tolist()
+        if greenhouse.in_sight(camera.x, camera.y, spots[one, 0], spots[one, 1])
+    ]
+    return np.array(clear, np.intp)
+
+
+def is_looking(robot: RobotState, now: Instant) -> bool:
+    """Whether a robot's camera looks at all, and it is known where from."""
+    return _camera_of(robot, now) is not None
+
+
+def _camera_of(robot: RobotState, now: Instant) -> Pose2D | None:
+    """Where a robot's camera is, if it looks now and nobody doubts where that is."""
+    age, looked = robot.age_s(now), robot.detections_at
+    if robot.odometry is None or looked is None:
+        return None
+    if age is None or age > LIMITS.live_s:
+        return None
+    if now.mono - looked > _FRESH_LOOK_S:
+        return None
+    return robot.odometry.pose.compose(robot.profile.camera)

@@ -97,6 +97,30 @@ class Costmap(Model):
     height: int
     origin: Point
     data: list[int]
+    age_s: float | None = None
+    """Since the newest scan in it; null before the first."""
+
+
+class LaneCoverage(Area):
+    """One aisle in cells: rows from the south, each from west to east."""
+
+    label: str
+    columns: int
+    rows: int
+    ages_s: list[int | None]
+    """Whole seconds since a camera last looked at a cell; null: never."""
+
+
+class Coverage(Model):
+    """When a camera last looked at each cell of the aisles."""
+
+    at: str
+    cameras: int
+    """That look now."""
+    within_s: float
+    share: float | None
+    """Of the cells, looked at within that (0-1); null without aisles."""
+    lanes: list[LaneCoverage]
 
 
 def _area(of: Rectangle) -> Area:

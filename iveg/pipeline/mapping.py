@@ -62,6 +62,13 @@ class Mapper:
         """What the fleet knows together; None while nobody has swept."""
         return _costs(self._shared, hazards, now)
 
+    def age_s(self, robot_id: str | None, now: Instant) -> float | None:
+        """Since the newest scan of one robot, or of any, was drawn (s); None: never."""
+        times = self._read_at
+        found = times.values() if robot_id is None else [times.get(robot_id)]
+        drawn = [at for at in found if at is not None]
+        return now.mono - max(drawn) if drawn else None
+
     def of(
         self, robot_id: str, hazards: Iterable[Hazard], now: Instant
     ) -> Costmap | None:

@@ -65,12 +65,13 @@ def router(
         if _PNG in request.headers.get("accept", ""):
             body = await asyncio.to_thread(write_png, _shades(found))
             return Response(body, 200, headers, _PNG)
-        return Response(_json(found), 200, headers, "application/json")
+        age = mapper.age_s(robot, now)
+        return Response(_json(found, age), 200, headers, "application/json")
 
     return routes
 
 
-def _json(costmap: Costmap | None) -> bytes:
+def _json(costmap: Costmap | None, age_s: float | None) -> bytes:
     if costmap is None:
         return write_json(_NOTHING)
     grid = costmap.grid
@@ -81,6 +82,7 @@ def _json(costmap: Costmap | None) -> bytes:
         "height": grid.height,
         "origin": {"x": grid.xmin, "y": grid.ymin},
         "data": costmap.data.reshape(-1),
+        "age_s": None if age_s is None else round(age_s, 1),
     }
     return orjson.dumps(told, option=orjson.OPT_SERIALIZE_NUMPY)
 

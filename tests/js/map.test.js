@@ -212,6 +212,9 @@ test("every layer shows, and its switch takes it off the picture", async () => {
   const origin = { x: 12, y: 8 };
   const grid = { resolution: 0.5, width: 2, height: 1, origin, data: [100, 40] };
   store.apply("costmap", grid);
+  const aisle = { label: "", xmin: 1, ymin: 1, xmax: 3, ymax: 3, columns: 1, rows: 1 };
+  store.apply("coverage", { cameras: 1, lanes: [{ ...aisle, ages_s: [null] }] });
+  map.setLayer("costmap", true);
   for (const x of [0, 0.5, 1]) {
     store.apply("robots/AGI", robot({ navigation, pose: { x, y: 2, yaw: 0 } }));
   }
@@ -243,7 +246,10 @@ test("switches and trail length are remembered", () => {
   const second = createMap(canvas, store);
   equal(
     second.layers().filter(({ on }) => !on),
-    [{ name: "scan", on: false }],
+    [
+      { name: "costmap", on: false },
+      { name: "scan", on: false },
+    ],
   );
   equal(second.trailSeconds(), 600);
   second.destroy();

@@ -32,7 +32,3 @@ test("from near everybody has words", () => {
 test("who is seen now needs no age", () => {
   equal(worded(paint([who(0, 1, "seen")])), []);
 });
-
-test("after a minute somebody is a trace without words", () => {
-  equal(worded(paint([who(60, 1), who(61, 9)])).length, 1);
-});

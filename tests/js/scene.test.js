@@ -1,5 +1,5 @@
 import { isSeenHeld } from "../../iveg/static/js/layers/robot.js";
-import { readPerson, readScene } from "../../iveg/static/js/scene.js";
+import { marked, readPerson, readScene } from "../../iveg/static/js/scene.js";
 import { createStore } from "../../iveg/static/js/store.js";
 import { command, detection, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
@@ -125,4 +125,23 @@ test("the veil falls a second after the line was lost", () => {
   store.setConnection("lost", 10_000);
   equal(readScene(store, 10_900).isVeiled, false);
   equal(readScene(store, 11_100).isVeiled, true);
+});
+
+test("13.3: one mark a person, and none after a minute", () => {
+  const lost = { stage: "last_seen", peer: false, y: 0 };
+  const at = (/** @type {number} */ x, /** @type {number} */ ageS) =>
+    /** @type {any} */ ({ ...lost, x, ageS });
+  const shown = marked([at(1, 50), at(1.4, 20), at(9, 59), at(5, 61)]);
+  equal(
+    shown.map(({ x }) => x),
+    [1.4, 9],
+  );
+});
+
+test("13.3: nobody who has a ring gives way to a mark", () => {
+  const here = { peer: false, x: 0, y: 0 };
+  const seen = /** @type {any} */ ({ ...here, stage: "seen", ageS: 0 });
+  const other = /** @type {any} */ ({ ...here, x: 0.1, stage: "seen", ageS: 0 });
+  const lost = /** @type {any} */ ({ ...here, stage: "last_seen", ageS: 12 });
+  equal(marked([lost, seen, other]), [seen, other]);
 });

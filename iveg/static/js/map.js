@@ -11,7 +11,7 @@
  * @typedef {(picked: Picked) => void} Picker
  * @typedef {{
  *   now?: () => number, storage?: Storage | null,
- *   onFollow?: (robotId: string | null) => void,
+ *   onFollow?: (robotId: string | null) => void, onLegend?: () => void,
  *   onMeasure?: (measure: {on: boolean, points: number, metres: number | null}) => void,
  * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's
  */
@@ -137,6 +137,7 @@ export function createMap(canvas, store, options = {}) {
     wireKeys(canvas, camera, store, choices.hasShortcuts, {
       measure: () => setMeasuring(!isMeasuring),
       mark: () => mark(camera.view().width / 2, camera.view().height / 2),
+      legend: () => options.onLegend?.(),
     }),
     store.watch((data, topic) => {
       leaveTrail(trails, store, topic, data);
@@ -268,7 +269,7 @@ function wireGestures(canvas, camera, pickAt, tap, isMeasuring) {
  * @param {Camera} camera
  * @param {Store} store
  * @param {() => boolean} isEnabled
- * @param {Pick<import("./shortcuts.js").Actions, "measure" | "mark">} measuring
+ * @param {Pick<import("./shortcuts.js").Actions, "measure" | "mark" | "legend">} measuring
  */
 function wireKeys(canvas, camera, store, isEnabled, measuring) {
   return followShortcuts(canvas, isEnabled, {

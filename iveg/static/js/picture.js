@@ -9,6 +9,7 @@
  */
 
 import { createCostmapLayer } from "./layers/costmap.js";
+import * as coverage from "./layers/coverage.js";
 import * as detections from "./layers/detections.js";
 import * as greenhouse from "./layers/greenhouse.js";
 import * as grid from "./layers/grid.js";
@@ -28,6 +29,7 @@ import { drawVeil } from "./layers/veil.js";
 export const LAYERS = [
   "grid",
   "greenhouse",
+  "coverage",
   "costmap",
   "trail",
   "scan",
@@ -40,7 +42,7 @@ export const LAYERS = [
 ];
 
 /** Under the machines; the two below them never move. */
-const GROUND = ["costmap", "trail", "scan"];
+const GROUND = ["coverage", "costmap", "trail", "scan"];
 const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
 
 /** More than any layer nests its drawing states. */
@@ -63,6 +65,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
   /** @type {Record<string, (paint: Paint) => void>} */
   const layers = {
     measure: (paint) => measure.draw(paint, paint.tape),
+    coverage: coverage.draw,
     costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, trailSeconds()),
     scan: scan.draw,

@@ -131,9 +131,14 @@
  *
  * @typedef {Aged & {robot_id: string, stamp: string, points: Float32Array}} Scan
  *
- * @typedef {{resolution: number, width: number, height: number, origin: Point,
+ * @typedef {Aged & {resolution: number, width: number, height: number, origin: Point,
  *   data: number[]}} Costmap `resolution` (m/cell); `data` row by row from the origin
  *   (its south-western corner, m), 0 free … 100 taken, −1 unknown (GET /costmap)
+ *
+ * @typedef {Box2D & {label: string, columns: number, rows: number,
+ *   ages_s: (number | null)[]}} LaneCoverage rows from the south, each from west to east
+ * @typedef {Aged & {at: string, cameras: number, within_s: number, share: number | null,
+ *   lanes: LaneCoverage[]}} Coverage when a camera last looked where (GET /coverage)
  *
  * @typedef {Aged & {
  *   t: string, server: {boot: string, version: string, demo: boolean},

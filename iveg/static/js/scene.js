@@ -40,6 +40,7 @@
  *   nowMs: number, map: GreenhouseMap | null, isVeiled: boolean,
  *   robots: SceneRobot[], people: ScenePerson[], detections: SceneDetection[],
  *   scans: SceneScan[], costmap: import("./protocol.js").Costmap | null,
+ *   coverage: import("./protocol.js").Coverage | null,
  * }} Scene
  */
 
@@ -50,6 +51,10 @@ import { LIMITS, ringRadius } from "./limits.js";
 const VEIL_AFTER_MS = 1000;
 /** Commands whose robot may still be driving without anybody knowing. */
 const UNSURE_STATES = new Set(["UNCONFIRMED", "STILL_MOVING"]);
+/** A mark of somebody who was lost goes then (s): nobody knows where the person is. */
+export const MARK_LIMIT_S = 60;
+/** Marks nearer to each other than this are one (m). */
+const ONE_MARK_M = 1;
 /** A body for a robot that nobody described (m). */
 const PLAIN = { drive: "differential", length: 1, width: 0.6 };
 const BOX_WITHOUT_SIZE_M = 0.5;
@@ -67,10 +72,11 @@ export function readScene(store, nowMs) {
     map: store.map(),
     isVeiled: isGone && nowMs - since > VEIL_AFTER_MS,
     robots: readRobots(store, nowMs),
-    people: store.people().map((person) => readPerson(person, nowMs)),
+    people: marked(store.people().map((person) => readPerson(person, nowMs))),
     detections: readDetections(store, nowMs),
     scans: readScans(store, nowMs),
     costmap: store.get("costmap") ?? null,
+    coverage: store.get("coverage") ?? null,
   };
 }
 
@@ -153,6 +159,26 @@ export function readPerson(person, nowMs) {
     acting: person.acting,
     decisionId: person.decision_id,
   };
+}
+
+/**
+ * Whom the map shows: a mark of somebody who was lost goes after a minute, and of marks
+ * that lie on each other, or on somebody who has a ring, only the newest stays.
+ *
+ * @param {ScenePerson[]} people
+ */
+export function marked(people) {
+  /** @type {ScenePerson[]} */
+  const shown = people.filter(({ stage }) => stage !== "last_seen");
+  const lost = people.filter(
+    ({ stage, ageS }) => stage === "last_seen" && ageS <= MARK_LIMIT_S,
+  );
+  for (const one of lost.sort((a, b) => a.ageS - b.ageS)) {
+    const isSame = (/** @type {ScenePerson} */ it) =>
+      it.peer === one.peer && Math.hypot(it.x - one.x, it.y - one.y) < ONE_MARK_M;
+    if (!shown.some(isSame)) shown.push(one);
+  }
+  return shown;
 }
 
 /**

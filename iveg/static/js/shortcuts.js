@@ -1,5 +1,5 @@
 /**
- * The map's keys: F fits, 1…9 follow a robot, 0 shows the fleet, + and − zoom, M measures;
+ * The map's keys: F fits, 1…9 follow a robot, 0 shows the fleet, + and − zoom, M measures, ? explains;
  * while the map has the focus the arrows pan and Enter marks its centre.
  *
  * Single keys can be switched off (WCAG 2.1.4), and never fire while somebody types.
@@ -7,7 +7,7 @@
  * @typedef {{
  *   fit: () => void, fitFleet: () => void, robot: (n: number) => void,
  *   zoom: (steps: number) => void, pan: (x: number, y: number) => void,
- *   measure: () => void, mark: () => void,
+ *   measure: () => void, mark: () => void, legend: () => void,
  * }} Actions
  */
 
@@ -48,13 +48,14 @@ export function followShortcuts(element, isEnabled, actions) {
  * @returns {(() => void) | null}
  */
 function actionOf(key, isHere, actions) {
-  const { fit, fitFleet, robot, zoom, pan, measure, mark } = actions;
+  const { fit, fitFleet, robot, zoom, pan, measure, mark, legend } = actions;
   if (key === "f" || key === "F") return fit;
   if (key === "0") return fitFleet;
   if (/^[1-9]$/.test(key)) return () => robot(Number(key));
   if (key === "+" || key === "=") return () => zoom(1);
   if (key === "-") return () => zoom(-1);
   if (key === "m" || key === "M") return measure;
+  if (key === "?") return legend;
   if (key === "Enter" && isHere) return mark;
   const arrow = isHere && ARROWS[key];
   return arrow ? () => pan(...arrow) : null;

@@ -75,7 +75,8 @@ export function createGround(still, layers, look) {
 /** @param {Paint} paint @param {number} ratio */
 function placeOf({ view, theme, words, scene }, ratio) {
   const { width, height, scale, x, y } = view;
-  return [width, height, scale, x, y, ratio, theme, words, scene.map, scene.costmap];
+  const told = [scene.map, scene.coverage, scene.costmap];
+  return [width, height, scale, x, y, ratio, theme, words, ...told];
 }
 
 /** @param {Paint} paint */

@@ -10,7 +10,12 @@ import { TRAIL_SPANS_S } from "./trail.js";
 
 const KEY = "iveg.map";
 /** @type {Kept} */
-const FIRST = { off: [], trailS: TRAIL_SPANS_S[1], shortcuts: true, believer: null };
+const FIRST = {
+  off: ["costmap"],
+  trailS: TRAIL_SPANS_S[1],
+  shortcuts: true,
+  believer: null,
+};
 
 /**
  * @param {Storage | null} storage null where the browser keeps nothing

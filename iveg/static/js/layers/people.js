@@ -2,10 +2,11 @@
  * People, and peers seen by robots, with the ring that the rule keeps around them.
  *
  * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
- * marker alone: nobody knows where the person is now.  After a minute it is a trace
- * without words, so that the traces of a morning do not hide who is there.
+ * marker alone, which fades and is gone after a minute: nobody knows where the person is
+ * now, and the marks of a morning would hide who is there.
  */
 
+import { MARK_LIMIT_S } from "../scene.js";
 import { screenX, screenY } from "../viewport.js";
 import { circle, isolated, label } from "./paint.js";
 
@@ -16,9 +17,8 @@ import { circle, isolated, label } from "./paint.js";
 
 const WORDS_FROM_SCALE = 24;
 
-/** Somebody last seen longer ago than this is a trace (s). */
-const TRACE_AFTER_S = 60;
-const TRACE_PX = 4;
+/** A mark is never fainter than this: what can hardly be seen is dirt. */
+const FAINTEST = 0.3;
 
 /** Words nearer to each other than this would be read as one (px). */
 const WORDS_ACROSS_PX = 92;
@@ -40,9 +40,7 @@ export function draw(paint) {
  * @param {Paint} paint
  */
 export function worded({ scene, view }) {
-  const unseen = scene.people.filter(
-    (person) => person.stage !== "seen" && !isTrace(person),
-  );
+  const unseen = scene.people.filter(({ stage }) => stage !== "seen");
   /** @type {ScenePerson[]} */
   const chosen = [];
   for (const person of unseen.sort((a, b) => a.ageS - b.ageS)) {
@@ -61,21 +59,14 @@ function drawPerson(paint, person) {
   const { ctx, view } = paint;
   ctx.translate(screenX(view, person.x), screenY(view, person.y));
   if (person.stage !== "last_seen") drawRing(paint, person);
-  if (isTrace(person)) drawTrace(paint);
-  else if (person.peer) drawPeer(paint, person);
+  if (person.peer) drawPeer(paint, person);
   else drawFigure(paint, person);
 }
 
-/** @param {Pick<ScenePerson, "stage" | "ageS">} person */
-const isTrace = ({ stage, ageS }) => stage === "last_seen" && ageS > TRACE_AFTER_S;
-
-/** @param {Paint} paint */
-function drawTrace({ ctx, theme }) {
-  ctx.globalAlpha = 0.55;
-  ctx.fillStyle = theme.muted;
-  circle(ctx, 0, 0, TRACE_PX);
-  ctx.fill();
-  ctx.globalAlpha = 1;
+/** How much of a figure is left. @param {ScenePerson} person */
+function strengthOf({ stage, ageS }) {
+  if (stage !== "last_seen") return 1;
+  return Math.max(FAINTEST, 0.8 * (1 - ageS / MARK_LIMIT_S));
 }
 
 /** How long ago somebody was seen. @param {Paint} paint @param {ScenePerson} person */
@@ -107,7 +98,7 @@ function drawRing({ ctx, view, theme }, person) {
 
 /** Head and shoulders. @param {Paint} paint @param {ScenePerson} person */
 function drawFigure({ ctx, theme }, person) {
-  ctx.globalAlpha = person.stage === "last_seen" ? 0.55 : 1;
+  ctx.globalAlpha = strengthOf(person);
   ctx.strokeStyle = theme.bg;
   ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.person;
   ctx.lineWidth = 2;
@@ -125,7 +116,7 @@ function drawFigure({ ctx, theme }, person) {
 /** A diamond: a machine, but one that nobody steers from here. @param {Paint} paint
  * @param {ScenePerson} person */
 function drawPeer({ ctx, theme }, person) {
-  ctx.globalAlpha = person.stage === "last_seen" ? 0.55 : 1;
+  ctx.globalAlpha = strengthOf(person);
   ctx.strokeStyle = theme.bg;
   ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.peer;
   ctx.lineWidth = 2;

@@ -4,17 +4,23 @@
  * Picking a person opens the decision behind its ring; picking a robot goes to its card.
  */
 
-import { followCostmap } from "../costmap.js";
+import { ageOf } from "../clock.js";
+import { followCostmap, followCoverage } from "../costmap.js";
 import { hears } from "../layers/belief.js";
 import { TRAIL_SPANS_S } from "../layers/trail.js";
 import { createMap } from "../map.js";
 import { installPaintHook } from "../painthook.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { createLegend } from "./legend.js";
 import { onThemeChange } from "./theme.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../protocol.js").Person} Person */
 /** @typedef {ReturnType<typeof createMap>} LiveMap */
+
+const AGE_MS = 1000;
+/** An answer is asked for every two seconds. */
+const COVERAGE_OLD_S = 6;
 
 /**
  * @param {App} app
@@ -26,6 +32,8 @@ export function createMapbox(app, decision) {
   const map = createMap(canvas, store, {
     onFollow: showFollowed,
     onMeasure: showMeasure,
+    onLegend: () =>
+      app.dialogs.open(/** @type {HTMLDialogElement} */ (need("#legend-panel"))),
   });
   installPaintHook(store, map);
 
@@ -86,10 +94,24 @@ export function createMapbox(app, decision) {
 
   /** @param {number} count */
   function peopleSaid(count) {
-    if (count === 0) return words.t("map.people_none");
-    return count === 1
-      ? words.t("map.people_one")
-      : words.t("map.people_count", { count });
+    const said = coverageSaid(store.get("coverage"), words);
+    if (count === 0 && said.isBlind) return said.text;
+    const seen = count === 1 ? "map.people_one" : "map.people_count";
+    const people = count ? words.t(seen, { count }) : words.t("map.people_none");
+    return said.text ? `${people} · ${said.text}` : people;
+  }
+
+  function drawCostmapAge() {
+    /** @type {import("../protocol.js").Costmap | undefined} */
+    const costmap = store.get("costmap");
+    const isOn = map.layers().some(({ name, on }) => name === "costmap" && on);
+    const isKnown = typeof costmap?.age_s === "number";
+    const key = isKnown ? "map.costmap_age" : "map.costmap_none";
+    setHidden(need("#costmap-age"), !isOn);
+    setText(
+      need("#costmap-age"),
+      words.t(key, { age: costmap && isKnown ? ageOf(costmap) : 0 }),
+    );
   }
 
   function drawClimate() {
@@ -111,6 +133,7 @@ export function createMapbox(app, decision) {
     drawLayers(app, map, showBeliever);
     showBeliever();
     drawFacts();
+    drawCostmapAge();
     drawClimate();
     showFollowed(map.followed());
   }
@@ -133,14 +156,37 @@ export function createMapbox(app, decision) {
     () => map.layers().some(({ name, on }) => name === "costmap" && on),
     map.believer,
   );
+  followCoverage(store);
+  createLegend(app);
+  setInterval(drawCostmapAge, AGE_MS);
   onThemeChange(() => map.setTheme());
   store.subscribe("robots/", showBeliever);
   store.subscribe("snapshot", drawWords);
   store.subscribe("people", drawFacts);
+  store.subscribe("coverage", drawFacts);
+  store.subscribe("costmap", drawCostmapAge);
   store.subscribe("climate", drawClimate);
   words.onChange(drawWords);
   drawWords();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
+}
+
+/**
+ * How much of the aisles cameras see, in words; blind when none looks.
+ *
+ * @param {import("../protocol.js").Coverage | undefined} coverage
+ * @param {import("../i18n.js").Words} words
+ * @returns {{text: string, isBlind: boolean}}
+ */
+export function coverageSaid(coverage, words) {
+  if (!coverage) return { text: words.t("map.coverage_unknown"), isBlind: true };
+  const isOld =
+    ageOf({ age_s: 0, receivedAtMs: coverage.receivedAtMs }) > COVERAGE_OLD_S;
+  if (isOld) return { text: words.t("map.coverage_unknown"), isBlind: true };
+  if (!coverage.cameras) return { text: words.t("map.coverage_blind"), isBlind: true };
+  if (coverage.share === null) return { text: "", isBlind: false };
+  const share = Math.floor(coverage.share * 100) / 100;
+  return { text: words.t("map.coverage_share", { share }), isBlind: false };
 }
 
 /** @param {Person} person */

@@ -1,0 +1,108 @@
+"""What nobody sees: when a camera last looked at each spot of the aisles.
+
+That no person is on the map says something only of where somebody has looked.  Aisles
+are laid out in cells; a cell was looked at when a live robot's camera would have seen a
+person in its middle whole, nothing in between (``sight.looks_from``), the same look
+that may take a ring away.  Recorded robots do not look.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.observations import Instant
+from iveg.domain.sight import looks_from
+from iveg.domain.world import RobotState
+
+CELL_M = 1.0
+MOST_CELLS = 4000
+"""A larger house gets coarser cells, so that no house costs more than this."""
+RECENT_S = 10.0
+"""A look that is younger counts as seen now: a ring is remembered as long."""
+
+_Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LaneCells:
+    """One aisle in equal cells, rows from the south, each from west to east.
+
+    Attributes:
+        columns: Cells from west to east; ``rows`` from south to north.
+    """
+
+    lane: Lane
+    columns: int
+    rows: int
+
+    @property
+    def count(self) -> int:
+        """How many cells it has."""
+        return self.columns * self.rows
+
+    def centres(self) -> _Floats:
+        """Middles of the cells, shape (n, 2), in ``map`` (m)."""
+        area = self.lane.area
+        x = _middles(area.xmin, area.xmax, self.columns)
+        y = _middles(area.ymin, area.ymax, self.rows)
+        return np.column_stack((np.tile(x, self.rows), np.repeat(y, self.columns)))
+
+
+class Coverage:
+    """Remembers the newest look at each cell of a house."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._greenhouse = greenhouse
+        self.lanes = _laid_out(greenhouse.lanes)
+        parts = [one.centres() for one in self.lanes]
+        self._centres = np.concatenate(parts) if parts else np.empty((0, 2))
+        self._looked_at = np.full(len(self._centres), -np.inf)
+
+    def look(self, robots: Iterable[RobotState], now: Instant) -> None:
+        """Take in what the cameras of these robots look at now."""
+        if not len(self._centres):
+            return
+        for robot in robots:
+            seen = looks_from(robot, self._centres, self._greenhouse, now)
+            self._looked_at[seen] = now.mono
+
+    def ages(self, now: Instant) -> list[list[int | None]]:
+        """Whole seconds since each cell was looked at, per lane; None: never."""
+        told = [
+            None if math.isinf(age) else max(0, int(age))
+            for age in now.mono - self._looked_at
+        ]
+        lanes, start = [], 0
+        for one in self.lanes:
+            lanes.append(told[start : start + one.count])
+            start += one.count
+        return lanes
+
+    def share(self, now: Instant, within_s: float = RECENT_S) -> float | None:
+        """How much of the aisles was looked at lately (0-1); None without aisles."""
+        if not len(self._looked_at):
+            return None
+        return float(np.mean(now.mono - self._looked_at <= within_s))
+
+
+def _laid_out(lanes: tuple[Lane, ...]) -> tuple[LaneCells, ...]:
+    area = sum(_size(lane)[0] * _size(lane)[1] for lane in lanes)
+    side = max(CELL_M, math.sqrt(area / MOST_CELLS))
+    return tuple(
+        LaneCells(lane, *(max(1, math.ceil(size / side - 1e-9)) for size in sizes))
+        for lane, sizes in ((lane, _size(lane)) for lane in lanes)
+    )
+
+
+def _size(lane: Lane) -> tuple[float, float]:
+    area = lane.area
+    return area.xmax - area.xmin, area.ymax - area.ymin
+
+
+def _middles(low: float, high: float, count: int) -> _Floats:
+    step = (high - low) / count
+    return (low + step * (np.arange(count) + 0.5)).astype(np.float64)

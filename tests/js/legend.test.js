@@ -1,0 +1,60 @@
+import { hatchAt } from "../../iveg/static/js/layers/coverage.js";
+import { createChoices } from "../../iveg/static/js/layers/memory.js";
+import { createWords } from "../../iveg/static/js/layers/words.js";
+import { paintSign, SIGNS } from "../../iveg/static/js/panels/legend.js";
+import { coverageSaid } from "../../iveg/static/js/panels/mapbox.js";
+import { LAYERS } from "../../iveg/static/js/picture.js";
+import { equal, test } from "./harness.js";
+
+const words = /** @type {any} */ ({ t: (/** @type {string} */ key) => key });
+
+test("13.3: the legend explains a sign of every layer", () => {
+  const explained = new Set(SIGNS.map(({ layer }) => layer));
+  equal(
+    LAYERS.filter((layer) => !explained.has(layer)),
+    [],
+  );
+});
+
+test("13.3: each sign is drawn by its layer", () => {
+  const map = document.createElement("canvas");
+  map.id = "map";
+  document.body.replaceChildren(map);
+  const blank = SIGNS.filter((sign) => {
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [88, 56];
+    paintSign(canvas, sign, createWords(words.t, "en"));
+    const { data } = /** @type {CanvasRenderingContext2D} */ (
+      canvas.getContext("2d")
+    ).getImageData(0, 0, 88, 56);
+    return data.every((value, i) => value === data[i % 4]);
+  });
+  equal(
+    blank.map(({ name }) => name),
+    [],
+  );
+});
+
+test("13.17: the costmap is off until somebody switches it on", () => {
+  const choices = createChoices(null, () => {});
+  equal([choices.isOn("costmap"), choices.isOn("coverage")], [false, true]);
+});
+
+test("13.21: the longer nobody has looked, the denser; never is densest", () => {
+  equal([9, 10, 59, 60, 599, 600].map(hatchAt), [0, 0.2, 0.2, 0.38, 0.38, 0.6]);
+  equal(hatchAt(null), hatchAt(600));
+});
+
+test("13.21: that nobody is seen is never said when no camera looks", () => {
+  const now = performance.now();
+  const told = { at: "", within_s: 10, lanes: [], receivedAtMs: now };
+  const said = (/** @type {any} */ coverage) => coverageSaid(coverage, words);
+  equal(said(undefined), { text: "map.coverage_unknown", isBlind: true });
+  equal(said({ ...told, cameras: 0, share: 0.4 }).text, "map.coverage_blind");
+  equal(said({ ...told, cameras: 1, share: 0.4 }), {
+    text: "map.coverage_share",
+    isBlind: false,
+  });
+  const old = { ...told, receivedAtMs: now - 7000, cameras: 1, share: 1 };
+  equal(said(old).isBlind, true);
+});

@@ -1,0 +1,73 @@
+"""Issue 13.21: what nobody sees, and when somebody last looked there."""
+
+from iveg.domain.coverage import MOST_CELLS, Coverage
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse, Lane
+from tests.builders import at
+from tests.unit.domain.scene import Scene
+
+AISLES = (
+    Lane("1", Rectangle(0.0, -0.5, 12.0, 0.5)),
+    Lane("2", Rectangle(0.0, 1.5, 12.0, 2.5)),
+)
+HOUSE = Greenhouse(
+    "two aisles",
+    Rectangle(0.0, -3.0, 12.0, 3.0),
+    lanes=AISLES,
+    rows=(Rectangle(0.0, 0.9, 12.0, 1.1),),
+)
+
+
+def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
+    """AGI stands in the middle of aisle 1 and looks east."""
+    scene, coverage = Scene(house=HOUSE), Coverage(HOUSE)
+    scene.drive("AGI", 4.0, linear=0.0)
+    scene.look("AGI")
+    coverage.look(scene.world.live_robots(), at(seconds))
+    return scene, coverage
+
+
+def test_what_no_camera_ever_looked_at_is_never() -> None:
+    coverage = Coverage(HOUSE)
+
+    assert coverage.ages(at(5)) == [[None] * 12, [None] * 12]
+    assert coverage.share(at(5)) == 0.0
+
+
+def test_a_camera_sees_ahead_and_not_behind_or_through_the_crop() -> None:
+    _, coverage = looking()
+
+    first, second = coverage.ages(at(3))
+    assert first[:5] == [None] * 5
+    assert first[6] == 3
+    assert second == [None] * 12
+
+
+def test_ages_grow_and_what_was_looked_at_long_ago_is_not_seen_now() -> None:
+    _, coverage = looking()
+
+    assert (coverage.share(at(1)) or 0.0) > 0.0
+    assert coverage.share(at(11)) == 0.0
+    assert coverage.ages(at(11))[0][6] == 11
+
+
+def test_a_robot_that_is_silent_looks_at_nothing() -> None:
+    scene, coverage = looking()
+    coverage.look(scene.world.live_robots(), at(2.0))
+
+    assert coverage.ages(at(2.0))[0][6] == 2
+
+
+def test_an_open_field_has_no_aisles_to_look_at() -> None:
+    field = Greenhouse("field", Rectangle(-100, -100, 100, 100))
+
+    assert Coverage(field).share(at(0)) is None
+
+
+def test_no_house_costs_more_than_a_bound() -> None:
+    vast = Lane("1", Rectangle(0, 0, 500, 500))
+    house = Greenhouse("vast", vast.area, lanes=(vast,))
+
+    (cells,) = Coverage(house).lanes
+
+    assert cells.count <= 1.1 * MOST_CELLS
