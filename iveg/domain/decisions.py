@@ -49,6 +49,16 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where a robot was when a decision began, in ``map`` (m, rad)."""
+
+    robot_id: str
+    x: float
+    y: float
+    yaw: float
+
+
+@dataclass(frozen=True, slots=True)
 class Decision:
     """Why one robot was slowed once.
 
@@ -61,6 +71,7 @@ class Decision:
         noticed: Arrival of the look that it rests on (monotonic, s); None for a ring
             that was known before.
         answered: When a robot that was ahead said that it slows (monotonic, s).
+        places: Where the robot that is slowed and the observer were.
     """
 
     crossing: Crossing
@@ -74,6 +85,7 @@ class Decision:
     interrupted: bool = False
     noticed: float | None = None
     answered: float | None = None
+    places: tuple[Place, ...] = ()
 
     @property
     def took_s(self) -> float | None:

@@ -29,6 +29,15 @@ class DecisionLink(Model):
     verdict: str
 
 
+class DecisionPlace(Model):
+    """Where a robot was when a decision began, in ``map`` (m, rad)."""
+
+    robot_id: str
+    x: float
+    y: float
+    yaw: float
+
+
 class Decision(Model):
     """Who was seen by whom, which rule fired, and when the robot obeyed."""
 
@@ -57,10 +66,14 @@ class Decision(Model):
     speed_after: float | None
     links: list[DecisionLink]
     sentence: Sentence
+    places: list[DecisionPlace]
+    """Of the robot and its observer; empty for those of the earlier version."""
 
     @classmethod
     def of_record(cls, record: DecisionRecord) -> "Decision":
         """One decision, from memory or from the history."""
+        parameters = read_json(record.rule_parameters)
+        places = parameters.pop("places", []) if isinstance(parameters, dict) else []
         return cls(
             decision_id=record.decision_id,
             kind=record.kind,
@@ -77,7 +90,7 @@ class Decision(Model):
             rule=DecisionRule(
                 id=record.rule_id,
                 version=record.rule_version,
-                parameters=read_json(record.rule_parameters),
+                parameters=parameters,
             ),
             in_sight=record.in_sight,
             started_at=format_stamp(record.started_at),
@@ -88,7 +101,11 @@ class Decision(Model):
             speed_before=record.speed_before,
             speed_after=record.speed_after,
             links=[_link(one) for one in read_objects(record.links)],
-            sentence=_sentence(record),
+            sentence=sentence_of(record),
+            places=[
+                DecisionPlace.model_validate(one)
+                for one in (places if isinstance(places, list) else [])
+            ],
         )
 
 
@@ -98,7 +115,7 @@ def _position(record: DecisionRecord) -> Position | None:
     return Position(x=record.x, y=record.y, z=record.z or 0.0)
 
 
-def _sentence(record: DecisionRecord) -> Sentence:
+def sentence_of(record: DecisionRecord) -> Sentence:
     """The same sentence that the log used when it happened."""
     if record.kind == "alert":
         key = "log.person_seen"

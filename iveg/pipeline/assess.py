@@ -34,7 +34,7 @@ from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.ageing import Ageing
 from iveg.pipeline.alarming import Alarming
-from iveg.pipeline.evidence import record_of
+from iveg.pipeline.evidence import places_of, record_of
 from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.notices import Notices
@@ -239,6 +239,7 @@ class Assessor:
                 self.rule,
                 noticed=None if notice is None else notice.at,
                 answered=None if notice is None else notice.answered,
+                places=tuple(places_of(crossing, self.world)),
             )
             self.decisions.put(decision)
             self._minutes.decision(decision, now)

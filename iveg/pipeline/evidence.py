@@ -1,14 +1,17 @@
 """A decision as it is written down and read: each link with time, value and verdict."""
 
 import json
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import asdict, replace
 
 from iveg.domain.alerts import Rule
-from iveg.domain.decisions import Decision, Link
+from iveg.domain.decisions import Decision, Link, Place
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.hazards import Hazard
+from iveg.domain.mandates import Crossing
 from iveg.domain.observations import Instant
 from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.world import World
 
 
 def record_of(decision: Decision, now: Instant) -> DecisionRecord:
@@ -33,7 +36,12 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         reason=hazard.reason,
         rule_id=decision.rule.id,
         rule_version=str(decision.rule.version),
-        rule_parameters=json.dumps(_parameters(decision.rule, hazard)),
+        rule_parameters=json.dumps(
+            {
+                **_parameters(decision.rule, hazard),
+                "places": [asdict(one) for one in decision.places],
+            }
+        ),
         in_sight=crossing.in_sight,
         feedback_at=wall_of(decision.feedback),
         applied_at=wall_of(decision.applied),
@@ -43,6 +51,17 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         speed_after=decision.speed_after,
         links=json.dumps([_link(link) for link in decision.links(now)]),
     )
+
+
+def places_of(crossing: Crossing, world: World) -> Iterator[Place]:
+    """Where the robot that is slowed and the observer are now, as far as is known."""
+    for robot_id in dict.fromkeys((crossing.robot_id, crossing.hazard.observer)):
+        robot = world.robots.get(robot_id or "")
+        if robot is not None and robot.odometry is not None:
+            pose = robot.odometry.pose
+            yield Place(
+                robot.robot_id, round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
+            )
 
 
 def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:

@@ -14,6 +14,7 @@ from iveg.domain.records import (
     DetectionRecord,
     OdometryRecord,
 )
+from iveg.models.decision import Decision
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.fakes.records import alert_record
 from tests.unit.pipeline.desk import Desk, conditions_of
@@ -37,6 +38,17 @@ def watched(desk: Desk) -> Desk:
 def meet(desk: Desk, x: float = 1.5) -> None:
     """AGII sees a farmer ``x`` metres before AGI."""
     desk.look("AGII", detection("farmer", x))
+
+
+def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    view = Decision.of_record(desk.records(DecisionRecord)[-1])
+    assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
+    assert isinstance(view.rule.parameters, dict)
+    assert "places" not in view.rule.parameters
 
 
 # --- feedback ---------------------------------------------------------------------

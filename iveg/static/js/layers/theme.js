@@ -8,8 +8,11 @@
  * }} Theme `robots[slot - 1]` is a robot's hue
  */
 
-/** Used where a page defines no token, so that a map is never painted invisible. */
-const FALLBACK = {
+/**
+ * Used on paper, and where a page defines no token, so that a map is never painted
+ * invisible.
+ */
+export const PAPER = {
   "--map-bg": "#eceff1",
   "--map-lane": "#f8f9fa",
   "--map-crop": "#b7c4b1",
@@ -46,9 +49,9 @@ const FALLBACK = {
 export function readTheme(element, overrides = {}) {
   const before = element.style.color;
   const computed = getComputedStyle(element);
-  /** @param {keyof typeof FALLBACK} token */
+  /** @param {keyof typeof PAPER} token */
   const colour = (token) => {
-    element.style.color = `var(${token}, ${FALLBACK[token]})`;
+    element.style.color = `var(${token}, ${PAPER[token]})`;
     return overrides[token] ?? computed.color;
   };
   const theme = build(colour, computed.fontFamily || "sans-serif");
@@ -57,13 +60,13 @@ export function readTheme(element, overrides = {}) {
 }
 
 /**
- * @param {(token: keyof typeof FALLBACK) => string} colour
+ * @param {(token: keyof typeof PAPER) => string} colour
  * @param {string} font
  * @returns {Theme}
  */
 function build(colour, font) {
   const robots = Array.from({ length: 8 }, (_, i) =>
-    colour(/** @type {keyof typeof FALLBACK} */ (`--robot-${i + 1}`)),
+    colour(/** @type {keyof typeof PAPER} */ (`--robot-${i + 1}`)),
   );
   return {
     bg: colour("--map-bg"),

@@ -4,6 +4,8 @@
  */
 
 import { readApi } from "../api.js";
+import { dayAndTime, millisecondsOf } from "../history/madrid.js";
+import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
 
 /**
@@ -12,7 +14,10 @@ import { make, need } from "./dom.js";
  *   verdict: "ok" | "late" | "missing" | "n/a" | "open" | "unknown"}} Link
  * @typedef {{decision_id: string, kind: string, robot_id: string | null,
  *   person_id: string | null, started_at: string | null, ended_at: string | null,
- *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}} Decision
+ *   class_id: string | null, speed_factor: number | null,
+ *   rule: {id: string | null, version: string | null, parameters: any},
+ *   links: Link[], sentence: {key: string, slots: Record<string, any>} | null}
+ *   & import("./decision_map.js").Drawn} Decision
  */
 
 /** @param {{words: import("../i18n.js").Words, dialogs: any}} app */
@@ -36,6 +41,8 @@ export function createDecisionPanel({ words, dialogs }) {
 export function createRecord(place, words) {
   /** @type {Decision | null} */
   let shown = null;
+  /** @type {import("../protocol.js").GreenhouseMap | null} */
+  let map = null;
   let asked = "";
 
   /** @param {string} decisionId */
@@ -44,8 +51,12 @@ export function createRecord(place, words) {
     shown = null;
     place.replaceChildren(make("p", "empty", words.t("decision.loading")));
     const path = `decisions/${encodeURIComponent(decisionId)}`;
-    const { status, body } = await readApi(path);
+    const [{ status, body }, house] = await Promise.all([
+      readApi(path),
+      map ? null : readApi("map"),
+    ]);
     if (asked !== decisionId) return;
+    if (house?.status === 200) map = house.body;
     shown = status === 200 ? body : null;
     place.setAttribute("aria-busy", "false");
     if (shown) draw();
@@ -58,14 +69,20 @@ export function createRecord(place, words) {
     const { sentence } = shown;
     const head = sentence ? words.t(sentence.key, sentence.slots) : shown.kind;
     const chain = make("ol", "chain");
-    chain.append(...(shown.links ?? []).map((link) => makeLink(link, words)));
-    const began = shown.started_at ? words.time(shown.started_at) : "—";
+    const delays = delaysOf(shown.links ?? []);
+    chain.append(
+      ...(shown.links ?? []).map((link, i) => makeLink(link, delays[i], words)),
+    );
+    const began = momentSaid(shown.started_at);
     const ended = shown.ended_at
-      ? `${words.t("decision.ended")} ${words.time(shown.ended_at)}`
+      ? `${words.t("decision.ended")} ${momentSaid(shown.ended_at)}`
       : words.t("decision.running");
+    const picture = drawDecision(shown, map, words);
     place.replaceChildren(
-      make("p", "decision__sentence", `${dateOf(shown, words)}${head}`),
+      make("p", "decision__sentence", `${dateOf(shown)}${head}`),
       make("small", "", `${words.t("decision.started")} ${began} · ${ended}`),
+      ...(picture ? [picture] : []),
+      makeFacts(shown, words),
       chain,
       make("small", "", `${words.t("decision.id")} ${shown.decision_id}`),
       makeShare(shown.decision_id, words),
@@ -76,17 +93,71 @@ export function createRecord(place, words) {
   return { show };
 }
 
-/** When it was, as the sentence to share begins. @param {Decision} decision
- * @param {import("../i18n.js").Words} words */
-function dateOf({ started_at }, words) {
-  return started_at ? `${words.time(started_at)} ` : "";
+/** Date and time of day to the millisecond. @param {string | number | null} at */
+function momentSaid(at) {
+  if (at === null) return "—";
+  const day = dayAndTime(at, { withYear: true }).split(" ")[0];
+  return `${day} ${millisecondsOf(at)}`;
+}
+
+/** When it was, as the sentence to share begins. @param {Decision} decision */
+function dateOf({ started_at }) {
+  return started_at ? `${momentSaid(started_at)} ` : "";
+}
+
+/**
+ * Who saw what where, and the rule with its numbers as they were.
+ *
+ * @param {Decision} decision
+ * @param {import("../i18n.js").Words} words
+ */
+function makeFacts(decision, words) {
+  const { x, y } = decision.position ?? { x: null, y: null };
+  const { id, version, parameters } = decision.rule;
+  const slots = { ...parameters, ...decision, id, version, x, y };
+  const seen = decision.class_id === null ? "told" : "seen";
+  const facts = [
+    [`decision.fact.${seen}`, `decision.facts.${seen}`],
+    ["decision.fact.obeys", `decision.facts.${sightOf(decision)}`],
+    ["decision.fact.rule", "decision.facts.rule"],
+  ];
+  const list = make("dl", "facts");
+  for (const [name, said] of facts) {
+    list.append(make("dt", "", words.t(name)), make("dd", "", words.t(said, slots)));
+  }
+  return list;
+}
+
+/** @param {Decision} decision */
+function sightOf({ in_sight }) {
+  return in_sight === false ? "obeys_blind" : "obeys";
+}
+
+/**
+ * How long each link took after the one before it that is known (ms); the first none.
+ *
+ * @param {Link[]} links
+ * @returns {(number | null)[]}
+ */
+export function delaysOf(links) {
+  /** @type {number | null} */
+  let before = null;
+  return links.map(({ at }) => {
+    if (at === null) return null;
+    const now = new Date(at).getTime();
+    const took = before === null ? null : now - before;
+    before = now;
+    return took;
+  });
 }
 
 /** @param {string} decisionId @param {import("../i18n.js").Words} words */
 function makeShare(decisionId, words) {
   const line = make("p", "record__link");
   const link = make("a", "", words.t("decision.link_to"));
-  link.href = `/decisions/${encodeURIComponent(decisionId)}`;
+  // In full: on paper an address without its server leads nowhere.
+  const path = `/decisions/${encodeURIComponent(decisionId)}`;
+  link.setAttribute("href", new URL(path, location.href).href);
   const copy = make("button", "button no-print", words.t("decision.copy"));
   copy.type = "button";
   // A clipboard takes HTTPS or the computer itself; the link can be copied by hand.
@@ -99,22 +170,34 @@ function makeShare(decisionId, words) {
   return line;
 }
 
-/** @param {Link} link @param {import("../i18n.js").Words} words */
-function makeLink(link, words) {
+/**
+ * @param {Link} link
+ * @param {number | null} delayMs
+ * @param {import("../i18n.js").Words} words
+ */
+function makeLink(link, delayMs, words) {
   const item = make("li");
   item.dataset.verdict = link.verdict;
   const name = words.has(`decision.link.${link.link}`)
     ? words.t(`decision.link.${link.link}`)
     : link.link;
   const verdict = words.t(`decision.verdict.${link.verdict}`);
-  const when = link.at === null ? "" : ` ${words.time(link.at)}`;
+  const when = link.at === null ? "" : ` ${millisecondsOf(link.at)}`;
+  const delay = delayMs === null ? "" : ` ${delaySaid(delayMs, words)}`;
   item.append(
     make("span", "shape"),
     make("b", "", name),
-    make("small", "", `${verdict}${when}`),
+    make("small", "", `${verdict}${when}${delay}`),
     make("p", "", saidOf(link, words)),
   );
   return item;
+}
+
+/** A robot may have known before it was told. @param {number} ms
+ * @param {import("../i18n.js").Words} words */
+function delaySaid(ms, words) {
+  const key = ms < 0 ? "decision.delay_before" : "decision.delay";
+  return words.t(key, { ms: Math.abs(ms) });
 }
 
 /** What a link found, with its unit. @param {Link} link

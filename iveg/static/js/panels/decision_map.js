@@ -1,0 +1,124 @@
+/**
+ * A small picture of one decision, drawn from its record by the layers of the live map:
+ * who was where when it began.  Always on the light palette, so that it prints.
+ *
+ * @typedef {{position: {x: number, y: number} | null, class?: string | null,
+ *   observer: string | null, robot_id: string | null, in_sight: boolean | null,
+ *   distance_m: number | null, confidence: number | null,
+ *   rule: {parameters: {ring_m?: number} | null},
+ *   places: {robot_id: string, x: number, y: number, yaw: number}[]}} Drawn
+ * @typedef {import("../protocol.js").GreenhouseMap} GreenhouseMap
+ */
+
+import * as greenhouse from "../layers/greenhouse.js";
+import * as grid from "../layers/grid.js";
+import * as links from "../layers/links.js";
+import * as people from "../layers/people.js";
+import * as robots from "../layers/robot.js";
+import * as scalebar from "../layers/scalebar.js";
+import { PAPER, readTheme } from "../layers/theme.js";
+import { createWords } from "../layers/words.js";
+import { createViewport, fitTo } from "../viewport.js";
+
+const WIDTH = 360;
+const HEIGHT = 260;
+const ROUND_M = 1.5;
+const BODY = { drive: "differential", length: 1, width: 0.6 };
+
+/**
+ * What the map would have shown when it began; null where nobody knows where.
+ *
+ * @param {Drawn} decision
+ * @param {GreenhouseMap | null} map
+ */
+export function sceneOf({ position, places, rule, ...told }, map) {
+  if (!position) return null;
+  const acting = { robot_id: String(told.robot_id), distance_m: told.distance_m ?? 0 };
+  const person = {
+    id: "",
+    peer: told.class === "robot",
+    stage: /** @type {const} */ ("seen"),
+    ...position,
+    ageS: 0,
+    ringM: rule.parameters?.ring_m ?? 2,
+    confidence: told.confidence ?? 1,
+    observers: told.observer ? [told.observer] : [],
+    acting: [{ ...acting, in_sight: told.in_sight !== false }],
+    decisionId: null,
+  };
+  return {
+    nowMs: 0,
+    map,
+    isVeiled: false,
+    robots: places.map(({ robot_id, ...pose }, i) => ({
+      ...BODY,
+      id: robot_id,
+      slot: i + 1,
+      pose,
+      link: /** @type {const} */ ("LIVE"),
+      ageS: 0,
+      mode: /** @type {const} */ ("RUNNING"),
+      replay: false,
+      task: null,
+      goal: null,
+      path: [],
+      unsureM: 0,
+    })),
+    people: [person],
+    detections: [],
+    scans: [],
+    costmap: null,
+    coverage: null,
+  };
+}
+
+/**
+ * @param {Drawn} decision
+ * @param {GreenhouseMap | null} map
+ * @param {import("../i18n.js").Words} words
+ * @returns {HTMLCanvasElement | null}
+ */
+export function drawDecision(decision, map, words) {
+  const scene = sceneOf(decision, map);
+  if (!scene) return null;
+  const canvas = document.createElement("canvas");
+  const ratio = Math.max(2, devicePixelRatio);
+  [canvas.width, canvas.height] = [WIDTH * ratio, HEIGHT * ratio];
+  canvas.className = "decision__map";
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", words.t("decision.picture"));
+  const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const theme = { ...readTheme(document.body, PAPER) };
+  ctx.fillStyle = theme.bg;
+  ctx.fillRect(0, 0, WIDTH, HEIGHT);
+  const paint = {
+    ctx,
+    view: fitTo(createViewport(WIDTH, HEIGHT), boxOf(scene), 34),
+    theme,
+    scene,
+    words: createWords(words.t),
+    followed: null,
+    tape: { points: [] },
+  };
+  for (const layer of [grid, greenhouse, links, robots, people, scalebar]) {
+    layer.draw(paint);
+  }
+  return canvas;
+}
+
+/** All that the picture is about (m). @param {NonNullable<ReturnType<typeof sceneOf>>} s */
+function boxOf({ people: [person], robots: placed }) {
+  const xs = [person.x - person.ringM, person.x + person.ringM];
+  const ys = [person.y - person.ringM, person.y + person.ringM];
+  for (const { pose } of placed) {
+    xs.push(pose.x - ROUND_M, pose.x + ROUND_M);
+    ys.push(pose.y - ROUND_M, pose.y + ROUND_M);
+  }
+  return {
+    xmin: Math.min(...xs),
+    xmax: Math.max(...xs),
+    ymin: Math.min(...ys),
+    ymax: Math.max(...ys),
+  };
+}
