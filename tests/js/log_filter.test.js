@@ -1,4 +1,4 @@
-import { sentenceOf } from "../../iveg/static/js/panels/log.js";
+import { entryAt, sentenceOf } from "../../iveg/static/js/panels/log.js";
 import { createChosen, facetsOf } from "../../iveg/static/js/panels/log_filter.js";
 import { equal, test } from "./harness.js";
 import { memory } from "./memory.js";
@@ -74,4 +74,16 @@ test("13.9 a slow-down far from anybody says that the ring had grown", () => {
     sentenceOf(entry({ slots: { ...slots, radius: 6, unseen: 2.5 } }), words),
     "log.speed_down.person_nlos log.grown",
   );
+});
+
+test("13.15: the strip leads to the log's newest entry of that time", () => {
+  const at = (/** @type {number} */ second) =>
+    /** @type {any} */ ({ id: second, at: `2026-11-20T12:00:0${second}.000Z` });
+  const entries = [at(1), at(3), at(5)];
+  const moment = (/** @type {number} */ second) => Date.parse(at(second).at);
+  equal(
+    [4, 5, 9, 0].map((second) => entryAt(entries, moment(second))?.id),
+    [3, 5, 5, 1],
+  );
+  equal(entryAt([], moment(1)), undefined);
 });

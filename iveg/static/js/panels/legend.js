@@ -108,7 +108,7 @@ export const SIGNS = [
     layer: "robot",
     draw: robots.draw,
     scene: oneRobot({ link: "LATE", ageS: 1.8 }),
-    right: 0.7,
+    right: 0.95,
     up: 0.75,
   },
   {
@@ -116,7 +116,7 @@ export const SIGNS = [
     layer: "robot",
     draw: robots.draw,
     scene: oneRobot({ link: "LOST", ageS: 12 }),
-    right: 0.7,
+    right: 0.95,
     up: 0.75,
   },
   {
@@ -124,7 +124,7 @@ export const SIGNS = [
     layer: "robot",
     draw: robots.draw,
     scene: oneRobot({ mode: "SLOW" }),
-    right: 0.7,
+    right: 0.95,
     up: 0.75,
   },
   {

@@ -91,6 +91,25 @@ export function createLogPanel(app, decision) {
     setHidden(clear, !isHidden);
   }
 
+  /** @param {number} atMs Unix time */
+  function goTo(atMs) {
+    const wanted = entryAt(store.log().filter(chosen.admits), atMs);
+    const opener = need(".drawer-open");
+    const isDrawer = opener.offsetParent !== null;
+    if (isDrawer && !need("#log-panel").hasAttribute("data-open")) opener.click();
+    for (const item of list.querySelectorAll("[data-here]")) {
+      item.removeAttribute("data-here");
+    }
+    // Those before the list's oldest are in the history; the oldest is the nearest.
+    const item =
+      list.querySelector(`[data-id="${wanted?.id}"]`) ?? list.lastElementChild;
+    item?.setAttribute("data-here", "");
+    item?.scrollIntoView({ block: "nearest" });
+  }
+
+  document.addEventListener("iveg:log-at", (event) =>
+    goTo(/** @type {CustomEvent<number>} */ (event).detail),
+  );
   clear.addEventListener("click", () => {
     chosen.clear();
     chips.draw();
@@ -127,4 +146,15 @@ function keyOf({ key, slots }) {
   return isBare && (slots.reason === "person" || slots.reason === "robot")
     ? "log.speed_down"
     : key;
+}
+
+/**
+ * The newest entry that is not after a moment; the oldest where all are.
+ *
+ * @param {readonly Entry[]} entries oldest first
+ * @param {number} atMs Unix time
+ * @returns {Entry | undefined}
+ */
+export function entryAt(entries, atMs) {
+  return entries.findLast(({ at }) => Date.parse(at) <= atMs) ?? entries[0];
 }

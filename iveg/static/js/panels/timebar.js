@@ -1,5 +1,6 @@
 /**
- * The bar under the map: the greenhouse's clock and what happened in the last minutes.
+ * The bar under the map: the greenhouse's clock and what happened in the last minutes; a
+ * press on it, or the arrow keys, jump to the log at that time.
  */
 
 import { makeSvg, need, setAttribute, setText } from "./dom.js";
@@ -7,6 +8,15 @@ import { makeSvg, need, setAttribute, setText } from "./dom.js";
 const TICK_MS = 1000;
 const MINUTES = 10;
 const WIDTH = 600;
+/** How far a key goes back (minutes). */
+const STEPS = {
+  ArrowLeft: 0.5,
+  ArrowDown: 0.5,
+  ArrowRight: -0.5,
+  ArrowUp: -0.5,
+  Home: MINUTES,
+  End: -MINUTES,
+};
 const MARK_WIDTH = 2;
 /** Detections come by the dozen; they draw low, what changed something draws high. */
 const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
@@ -14,6 +24,27 @@ const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, aler
 /** @param {import("../main.js").App} app */
 export function createTimebar({ store, words, line }) {
   const strip = need("#time-strip");
+  let minutesAgo = 0;
+
+  /** @param {number} minutes ago */
+  function jump(minutes) {
+    minutesAgo = Math.min(MINUTES, Math.max(0, minutes));
+    const atS = line.serverNow() - 60 * minutesAgo;
+    setAttribute(strip, "aria-valuenow", String(-minutesAgo));
+    setAttribute(strip, "aria-valuetext", words.time(atS));
+    document.dispatchEvent(new CustomEvent("iveg:log-at", { detail: 1000 * atS }));
+  }
+
+  strip.addEventListener("click", (event) => {
+    const { left, width } = strip.getBoundingClientRect();
+    jump(MINUTES * (1 - (event.clientX - left) / width));
+  });
+  strip.addEventListener("keydown", (event) => {
+    const steps = STEPS[/** @type {keyof typeof STEPS} */ (event.key)];
+    if (steps === undefined) return;
+    event.preventDefault();
+    jump(minutesAgo + steps);
+  });
 
   function draw() {
     const nowS = line.serverNow();
