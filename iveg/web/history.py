@@ -6,6 +6,7 @@ Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Annotated, Any, Generic, TypeVar
 
 import orjson
@@ -33,6 +34,9 @@ from iveg.web import charts, exports
 from iveg.web.answers import Json
 from iveg.web.exports import MEDIA_TYPES, Form
 from iveg.web.history_filters import Filters, Range, Span, filter_of, range_of
+from iveg.web.madrid import in_madrid
+from iveg.web.sentences import Sentences
+from iveg.web.words import read_words
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
@@ -223,12 +227,23 @@ async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> R
     first = await one.ask(asked)
     pages = _pages(one, first, asked, whole=filters.limit is None)
     if form == "csv":
-        body = exports.write_csv(one.of.kind, pages)
+        body = exports.write_csv(one.of.kind, pages, _reader(filters.language))
     else:
         body = exports.write_ndjson(one.view, pages)
-    name = f"{one.path}.{form}"
+    name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
+
+
+@cache
+def _reader(language: str | None) -> Sentences | None:
+    return None if language is None else Sentences(read_words(language))
+
+
+def _day(asked: Filter) -> str:
+    """The day that a file is about, for its name: the first that was asked for."""
+    at = clock.now().wall if asked.since is None else asked.since
+    return f"-{in_madrid(at):%Y-%m-%d}"
 
 
 async def _pages(

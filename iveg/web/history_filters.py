@@ -5,7 +5,7 @@ refused: a misspelt filter that answers everything would mislead.
 """
 
 from datetime import UTC, datetime
-from typing import Annotated, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import (
@@ -86,6 +86,10 @@ class Filters(Range):
         None, max_length=200, description="`next` of the page before"
     )
     format: Form | None = Field(None, description="Instead of an `Accept` header")
+    language: Literal["es", "en"] | None = Field(
+        None,
+        description="CSV as that reader's spreadsheet expects it, with sentences",
+    )
 
 
 def filter_of(filters: Filters, of: ListOf[R]) -> Filter:

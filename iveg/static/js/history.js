@@ -4,7 +4,7 @@
 
 import { createAsked, queryOf } from "./history/asked.js";
 import { drawCharts } from "./history/charts.js";
-import { dayAndTime } from "./history/madrid.js";
+import { dayAndTime, wallText } from "./history/madrid.js";
 import { commandCells, createTable, decisionCells } from "./history/tables.js";
 import { loadWords } from "./i18n.js";
 import { createDecisionPanel } from "./panels/decision.js";
@@ -57,7 +57,7 @@ async function start() {
     asked = picker.read();
     if (asked === null) return fail("range");
     say();
-    linkExports(asked);
+    linkExports(asked, words.language());
     need("#history").toggleAttribute("data-busy", true);
     try {
       await show(asked, signal);
@@ -137,6 +137,7 @@ async function start() {
     if (button) decision.open(String(button.dataset.decision), button);
   });
   words.onChange(() => {
+    if (asked) linkExports(asked, words.language());
     say();
     draw();
   });
@@ -161,12 +162,16 @@ async function read(path, signal) {
   return answer.json();
 }
 
-/** @param {Asked} asked */
-function linkExports(asked) {
+/** @param {Asked} asked @param {string} language */
+function linkExports(asked, language) {
   const links = /** @type {HTMLAnchorElement[]} */ (all("a[data-export]"));
   for (const link of links) {
     const query = queryOf(asked);
     query.set("format", String(link.dataset.format));
+    // A spreadsheet has its reader's separator and decimals; programs read NDJSON.
+    if (link.dataset.format === "csv") query.set("language", language);
+    const day = wallText(asked.since).slice(0, 10);
+    link.download = `${link.dataset.export}-${day}.${link.dataset.format}`;
     link.href = `/api/v1/${link.dataset.export}?${query}`;
   }
 }

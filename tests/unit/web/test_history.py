@@ -389,6 +389,39 @@ async def test_csv_has_a_column_a_field_and_times_in_utc(
     assert (row["x"], row["confident"], row["person_id"]) == ("-3.5", "true", "")
 
 
+async def test_13_18_a_csv_for_a_reader_is_one_that_her_excel_opens(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(decision_record(distance_m=1.43))
+    asked = {"format": "csv", "language": "es", "since": "2023-11-14T00:00:00Z"}
+
+    answer = await client.get("/api/v1/decisions", params=asked)
+
+    assert answer.content.startswith(b"\xef\xbb\xbf")
+    name = answer.headers["content-disposition"]
+    assert "decisions-2023-11-14.csv" in name
+    [row] = csv.DictReader(
+        io.StringIO(answer.content.decode("utf-8-sig")), delimiter=";"
+    )
+    assert row["distance_m"] == "1,43"
+    assert row["started_at"] == "2023-11-14T22:13:20.000Z"
+    assert "50\u00a0%" in row["qué pasó"]
+
+
+async def test_13_18_programs_get_what_they_got(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    past.holds(log_record())
+
+    plain = await client.get("/api/v1/log", params={"format": "csv"})
+    english = await client.get(
+        "/api/v1/log", params={"format": "csv", "language": "en"}
+    )
+
+    assert plain.text.startswith("id,at,kind")
+    assert "what happened,id,at,kind" in english.text
+
+
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t"])
 async def test_a_spreadsheet_runs_nothing_from_a_csv(
     client: httpx.AsyncClient, past: Past, start: str
