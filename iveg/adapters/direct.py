@@ -6,10 +6,8 @@ agent drops a whole message for one apostrophe and falls seconds behind under lo
 """
 
 from collections.abc import Callable, Iterable
-from typing import Literal
 
 from iveg.domain.observations import (
-    CommandAnswer,
     DetectionFrame,
     Instant,
     LaserScan,
@@ -20,28 +18,17 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec, names
+from iveg.ngsi.sensors import SENSORS
+from iveg.pipeline.kinds import Scope, read_directly
 
-Scope = Literal["all", "safety", "off"]
-
-_KINDS: dict[Scope, tuple[type[Observation], ...]] = {
-    "all": (DetectionFrame, SafetyReport, Odometry, LaserScan, Navigation),
-    "safety": (DetectionFrame, SafetyReport),
-    "off": (),
+_SUFFIXES: dict[type[Observation], str] = {
+    Odometry: "_odom",
+    LaserScan: "_lidar2D",
+    DetectionFrame: "_yolox_bounding_boxes",
+    SafetyReport: "_safety",
+    Navigation: "_nav",
+    **{sensor.of: sensor.suffix for sensor in SENSORS},
 }
-_QOS: dict[Scope, dict[str, int]] = {
-    "all": {
-        "": 1,
-        "_safety": 1,
-        "_yolox_bounding_boxes": 1,
-        "_odom": 0,
-        "_lidar2D": 0,
-        "_nav": 0,
-    },
-    "safety": {"": 1, "_safety": 1, "_yolox_bounding_boxes": 1},
-    "off": {},
-}
-"""Of each device's topics.  Poses, scans and intent are worth nothing when a newer one
-is there: at QoS 0 the inbox keeps the newest of a topic alone."""
 
 
 class DirectReader:
@@ -64,15 +51,18 @@ class DirectReader:
         self._clock = clock
         self._offer = offer
         self._reject = reject
-        self._kinds = (*_KINDS[scope], CommandAnswer)
+        kinds = read_directly(scope)
+        self._kinds = tuple(kinds)
         self._devices: dict[str, str] = {}
         self._dense: set[str] = set()
         self._answers: dict[str, str] = {}
         self._subscriptions: dict[str, int] = {}
         for robot_id in robots:
-            for suffix, qos in _QOS[scope].items():
-                self._listen(apikey, robot_id, suffix, qos)
-            if scope != "off":
+            for kind, qos in kinds.items():
+                if kind in _SUFFIXES:
+                    self._listen(apikey, robot_id, _SUFFIXES[kind], qos)
+            if kinds:
+                self._listen(apikey, robot_id, "", 1)
                 answers = names.answer_topic(apikey, robot_id)
                 self._answers[answers] = robot_id
                 self._subscriptions[answers] = 1

@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from iveg.domain.observations import LaserScan, Odometry
 from iveg.domain.transports import Copied
 from iveg.ngsi import names
+from iveg.ngsi.sensors import SENSORS
 
 PREFIX = "iVeg: "
 TOKEN_HEADER = "X-Iveg-Notify-Token"  # noqa: S105 - a header's name
@@ -82,6 +83,7 @@ WANTED_OF_ALL = (
     Wanted("detections", _ROBOTS, (names.BOXES, names.BOXES_HEADER)),
     Wanted("safety", _ROBOTS, (names.SAFETY,)),
     Wanted("navigation", _ROBOTS, (names.NAVIGATION,)),
+    *(Wanted(one.attribute, _ROBOTS, (one.attribute,)) for one in SENSORS),
     Wanted("commands", _ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)),
     Wanted(
         "single uplink",

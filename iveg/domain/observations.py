@@ -238,6 +238,23 @@ class Navigation:
 
 
 @dataclass(frozen=True, slots=True)
+class Battery:
+    """What ``sensor_msgs/BatteryState`` says that people ask for.
+
+    Attributes:
+        percentage: 0 to 1; None when unknown.
+        charging: Its ``power_supply_status``; None when unknown.
+        voltage: (V); None when unknown.
+    """
+
+    robot_id: str
+    origin: Origin
+    percentage: float | None = None
+    charging: bool | None = None
+    voltage: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class CommandStatus:
     """The IoT Agent's opinion of a command; displayed, never believed."""
 
@@ -304,6 +321,7 @@ Observation = (
     | CommandAnswer
     | Climate
     | Canary
+    | Battery
     | Overtaken
 )
 

@@ -21,6 +21,7 @@ from iveg.domain.observations import (
     Canary,
     Climate,
     CommandAnswer,
+    CommandStatus,
     DetectionFrame,
     Instant,
     LaserScan,
@@ -45,6 +46,18 @@ _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 GAIN_OVER_S = 1.0
 
 
+@dataclass(frozen=True, slots=True)
+class Sensed:
+    """The newest of one kind, and the moment it was not measured before.
+
+    Attributes:
+        at: None while nobody knows.
+    """
+
+    observation: Observation
+    at: Instant | None
+
+
 @dataclass(slots=True)
 class RobotState:
     """What is known of one robot.
@@ -66,6 +79,7 @@ class RobotState:
         refused_at: When a message that calls itself a replay was last refused, because
             the robot is live (monotonic, s).
         map_frame: Of a recording, the frame that its messages name.
+        sensed: The newest of each kind that has no member of its own.
     """
 
     robot_id: str
@@ -93,6 +107,7 @@ class RobotState:
     live_at: float | None = None
     refused_at: float | None = None
     map_frame: str | None = None
+    sensed: dict[type[Observation], Sensed] = field(default_factory=dict)
     clock: RobotClock = field(default_factory=RobotClock)
     _orders: dict[type[Observation], Order] = field(default_factory=dict)
     _poses: deque[tuple[float, Pose2D]] = field(
@@ -413,26 +428,40 @@ def _update(robot: RobotState, received: Received, moment: float | None) -> None
             robot.scan, robot.scan_received = observation, _dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():
-            robot.detections_at = _not_before(
-                robot.detections_at, robot.frame, observation.origin, moment
-            )
-            robot.frame, robot.frame_road = observation, received.road
-            if observation.unreadable:
-                robot.unreadable_at = at.mono
+            _see(robot, observation, received, moment)
         case SafetyReport():
-            known = robot.safety_received
-            moment = _not_before(
-                None if known is None else known.mono,
-                robot.safety,
-                observation.origin,
-                moment,
-            )
-            robot.safety, robot.safety_received = observation, _dated(at, moment)
-            robot.safety_road = received.road
+            _hear(robot, observation, received, moment)
         case Navigation():
             robot.navigation, robot.navigation_received = observation, at
+        case CommandStatus():
+            robot.command_status = observation.status
+        case CommandAnswer():
+            pass  # an event: the machine of its command takes it
         case _:
-            robot.command_status = getattr(observation, "status", robot.command_status)
+            robot.sensed[type(observation)] = Sensed(observation, _dated(at, moment))
+
+
+def _see(
+    robot: RobotState, frame: DetectionFrame, received: Received, moment: float | None
+) -> None:
+    """Take the newest detection frame in."""
+    robot.detections_at = _not_before(
+        robot.detections_at, robot.frame, frame.origin, moment
+    )
+    robot.frame, robot.frame_road = frame, received.road
+    if frame.unreadable:
+        robot.unreadable_at = received.at.mono
+
+
+def _hear(
+    robot: RobotState, report: SafetyReport, received: Received, moment: float | None
+) -> None:
+    """Take the newest safety report in."""
+    known = robot.safety_received
+    before = None if known is None else known.mono
+    moment = _not_before(before, robot.safety, report.origin, moment)
+    robot.safety, robot.safety_received = report, _dated(received.at, moment)
+    robot.safety_road = received.road
 
 
 def _drive(

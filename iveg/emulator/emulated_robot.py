@@ -11,7 +11,7 @@ from pathlib import Path
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.geometry import Twist2D
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Battery, Instant, Origin
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import every
 from iveg.emulator.relay import Relay
@@ -23,6 +23,9 @@ SLOTS = 3
 LONGEST_STEP_S = 0.1
 """A machine that slept must not let a robot leap."""
 _NAVIGATION_EVERY_S = 1.0
+_BATTERY_EVERY_S = 5.0
+_BATTERY_LASTS_S = 8 * 3600.0
+_BATTERY_FULL, _BATTERY_SWAPPED = 0.95, 0.30
 LINK_FIELDS = {
     "drop_percent",
     "duplicate_percent",
@@ -83,6 +86,7 @@ class EmulatedRobot:
         self._tasks: asyncio.TaskGroup
         self._run_began = 0.0
         self._told: tuple[str, float] = ("", -_NAVIGATION_EVERY_S)
+        self._battery_told = -_BATTERY_EVERY_S
         self._is_odometry_frozen = False
         self._is_deaf = False
         self._wish = REST
@@ -150,6 +154,9 @@ class EmulatedRobot:
         if navigation.task != task or now - told_at >= _NAVIGATION_EVERY_S:
             self._told = (navigation.task, now)
             node.sense(navigation)
+        if now - self._battery_told >= _BATTERY_EVERY_S:
+            self._battery_told = now
+            node.sense(battery_after(now))
 
     def _scan(self, _: float) -> None:
         if self._node_task is not None:
@@ -222,3 +229,10 @@ class EmulatedRobot:
         if self._node_task is not None:
             self._node_task.cancel()
             self._node_task = None
+
+
+def battery_after(driven_s: float) -> Battery:
+    """A battery that drains while it drives and is swapped before it is low."""
+    usable = _BATTERY_FULL - _BATTERY_SWAPPED
+    level = _BATTERY_FULL - (driven_s / _BATTERY_LASTS_S) % usable
+    return Battery("", Origin(), round(level, 3), charging=False, voltage=25.6)

@@ -37,6 +37,7 @@ def _heard_at(robot: RobotState, suffix: str) -> float | None:
         "_yolox_bounding_boxes": robot.sighted_at,
         "_safety": robot.safety_received,
         "_nav": robot.navigation_received,
+        **{f"_{of.__name__.lower()}": one.at for of, one in robot.sensed.items()},
     }
     at = newest.get(suffix)
     return None if at is None else at.mono

@@ -1,7 +1,8 @@
 """A robot of the fleet, with the age of everything that is said of it."""
 
-from typing import Literal
+from typing import Any, Literal
 
+from iveg.domain import observations
 from iveg.domain.feedback import Mandate
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
@@ -111,6 +112,31 @@ class SpeedLimit(Model):
         )
 
 
+class Battery(Model):
+    """The robot's battery, as it said last."""
+
+    percentage: float | None
+    """0 to 1."""
+    charging: bool | None
+    voltage: float | None
+    """V."""
+    age_s: float | None
+
+    @classmethod
+    def of(cls, robot: RobotState, now: Instant) -> "Battery | None":
+        """None before the first."""
+        read = robot.sensed.get(observations.Battery)
+        if read is None or not isinstance(read.observation, observations.Battery):
+            return None
+        battery = read.observation
+        return cls(
+            percentage=battery.percentage,
+            charging=battery.charging,
+            voltage=battery.voltage,
+            age_s=None if read.at is None else round(now.mono - read.at.mono, 1),
+        )
+
+
 class Navigation(Model):
     """The robot's intent, in ``map`` (m)."""
 
@@ -186,3 +212,9 @@ class Robot(Model):
     margin: Margin | None
     cmd_status: str | None
     """The agent's opinion, never believed."""
+    battery: Battery | None
+
+    @staticmethod
+    def sensed(robot: RobotState, now: Instant) -> "dict[str, Any]":
+        """The members that are a sensor's newest word."""
+        return {"battery": Battery.of(robot, now)}

@@ -3,6 +3,8 @@
 import re
 from dataclasses import dataclass
 
+from iveg.ngsi.sensors import SENSORS
+
 ROBOT_TYPE = "Robot"
 CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
 CANARY_ID, CANARY_TYPE = "iveg-canary", "Probe"
@@ -59,6 +61,7 @@ ROBOT_DEVICES = (
             (NAVIGATION, "object"),
             (LIDAR_HEADER, "object"),
             (LIDAR, "array"),
+            *((sensor.attribute, "object") for sensor in SENSORS),
         ),
         has_command=True,
     ),
@@ -67,6 +70,7 @@ ROBOT_DEVICES = (
     Device("_yolox_bounding_boxes", ((BOXES, "object"), (BOXES_HEADER, "object"))),
     Device("_safety", ((SAFETY, "object"),)),
     Device("_nav", ((NAVIGATION, "object"),)),
+    *(Device(sensor.suffix, ((sensor.attribute, "object"),)) for sensor in SENSORS),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
 keeps its registry in memory, so that either registry picks it (fiware.md §4)."""

@@ -22,7 +22,6 @@ from iveg.domain.observations import (
     Climate,
     DetectionFrame,
     Instant,
-    LaserScan,
     Odometry,
     Origin,
     Received,
@@ -35,6 +34,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.ageing import Ageing
 from iveg.pipeline.alarming import Alarming
 from iveg.pipeline.evidence import places_of, record_of
+from iveg.pipeline.kinds import LowValues, kind
 from iveg.pipeline.looks import Looks
 from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.notices import Notices
@@ -91,6 +91,7 @@ class Assessor:
         self._new_id = new_id
         self._applied: dict[str, tuple[float, str]] = {}
         self._notices = Notices()
+        self._low = LowValues()
         self._moved: set[str] = set()
         self._unjudged: Instant | None = None
         self._untold = False
@@ -147,13 +148,13 @@ class Assessor:
             self._notice(observation.robot_id, received.at)
         if verdict != "new":
             return False
+        for topic in kind(observation).touches:
+            self._hub.changed(topic.of(getattr(observation, "robot_id", "")))
         match observation:
             case Odometry():
                 self._drove(observation, received.at)
             case Climate():
                 self._minutes.climate(observation, received.at)
-            case LaserScan():
-                self._hub.changed(topics.SCAN.of(observation.robot_id))
             case SafetyReport():
                 self._reported(observation, received.at)
             case DetectionFrame():
@@ -181,7 +182,6 @@ class Assessor:
             self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
         self._unjudged = _later(self._unjudged, at)
         self._moved.add(odometry.robot_id)
-        self._hub.changed(topics.ROBOT.of(odometry.robot_id))
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):
@@ -193,7 +193,6 @@ class Assessor:
             self._applied[report.robot_id] = applied
             if before is None or before[0] != applied[0]:
                 self._log_speed(report, at)
-        self._hub.changed(topics.ROBOT.of(report.robot_id))
 
     def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
         if after is not before:
@@ -284,6 +283,7 @@ class Assessor:
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
+            yield from self._low.conditions(robot)
             yield from conditions.of_kind(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_pictures(self._mandates.overload, now)

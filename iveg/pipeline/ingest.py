@@ -11,19 +11,16 @@ from collections.abc import Callable, Iterable
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
-    CommandAnswer,
-    DetectionFrame,
     Observation,
     Received,
-    SafetyReport,
     kind_of,
 )
+from iveg.pipeline.kinds import kind
 
 _log = logging.getLogger(__name__)
 
 MAX_QUEUED = 2000
 _MAX_TOLD = 500
-_NEVER_DROPPED = (SafetyReport, CommandAnswer, DetectionFrame)
 
 
 class Ingest:
@@ -58,10 +55,10 @@ class Ingest:
         if robot_id is not None and not self._known(robot_id):
             self.reject(robot_id, "unknown_robot", str(UnknownRobotError(robot_id)))
             return
-        kind = kind_of(received.observation).__name__
+        name = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.
         way = "asked" if received.asked else received.road
-        self.counters[f"{way}.{kind}"] += 1
+        self.counters[f"{way}.{name}"] += 1
         self._passed(received)
         if len(self._queue) >= MAX_QUEUED:
             self._make_room()
@@ -100,8 +97,8 @@ class Ingest:
 
     def _make_room(self) -> None:
         for index, waiting in enumerate(self._queue):
-            if not isinstance(waiting.observation, _NEVER_DROPPED):
-                kind = type(waiting.observation).__name__
-                self.counters[f"dropped.{kind}"] += 1
+            if kind(waiting.observation).may_drop:
+                name = type(waiting.observation).__name__
+                self.counters[f"dropped.{name}"] += 1
                 del self._queue[index]
                 return

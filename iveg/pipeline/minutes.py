@@ -225,8 +225,7 @@ class Minutes:
         )
 
     def climate(self, read: Climate, at: Instant) -> None:
-        """The air was measured: pages are told each time, history once a minute."""
-        self._hub.changed(topics.CLIMATE.name)
+        """The air was measured: history keeps it once a minute."""
         # Devices that send every minute are late as often as early.
         kept = self._climate_kept
         if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:

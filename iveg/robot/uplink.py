@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Literal
 
 from iveg.domain.observations import (
+    Battery,
     CommandAnswer,
     DetectionFrame,
     Instant,
@@ -23,12 +24,13 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.ngsi import codec, names
+from iveg.ngsi.sensors import SENSORS
 from iveg.robot.echo import Echo
 from iveg.robot.lane import Message
 from iveg.robot.rates import Rates
 from iveg.robot.single import SinglePayload
 
-Sensed = Odometry | LaserScan | DetectionFrame | Navigation | Unplaced
+Sensed = Odometry | LaserScan | DetectionFrame | Navigation | Battery | Unplaced
 Form = Literal["per-topic", "single"]
 
 _SUFFIX: dict[type, str] = {
@@ -36,6 +38,7 @@ _SUFFIX: dict[type, str] = {
     LaserScan: "_lidar2D",
     DetectionFrame: "_yolox_bounding_boxes",
     Navigation: "_nav",
+    **{sensor.of: sensor.suffix for sensor in SENSORS},
 }
 _UNPLACED = {"odometry": "_odom", "scan": "_lidar2D"}
 _ANSWERS = "cmdexe"
@@ -88,7 +91,7 @@ class Uplink:
     def send(self, observation: Sensed, at: Instant) -> None:
         """Send what a sensor said at this moment."""
         if self._single is not None and not isinstance(
-            observation, Navigation | Unplaced
+            observation, Navigation | Battery | Unplaced
         ):
             self._send_single(self._single, observation, at)
             return
@@ -194,3 +197,5 @@ def _written(observation: Sensed) -> bytes:
             return codec.write_detections(observation)
         case Navigation():
             return codec.write_navigation(observation)
+        case _:
+            return codec.write_sensed(observation)

@@ -118,6 +118,7 @@ class Views:
             profile=Profile.of(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
             cmd_status=robot.command_status,
+            **Robot.sensed(robot, now),
         )
 
     def _margin(

@@ -29,6 +29,7 @@ from iveg.ngsi.codec.reports import (
     write_odometry,
     write_safety,
     write_scan,
+    write_sensed,
     write_unplaced,
 )
 
@@ -59,6 +60,7 @@ __all__ = [
     "write_resume",
     "write_safety",
     "write_scan",
+    "write_sensed",
     "write_stop",
     "write_unplaced",
 ]

@@ -29,6 +29,7 @@ from iveg.domain.observations import (
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.door import Reading, first_complaint, merge, unread
 from iveg.ngsi.codec.fields import read_holds, read_origin
+from iveg.ngsi.sensors import SENSORS, Sensor
 
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
@@ -310,6 +311,14 @@ def _stamped(attributes: Mapping[str, Any]) -> Origin:
     return read_origin(payloads.OriginFields.model_validate(fields))
 
 
+def _reader_of(sensor: Sensor) -> _Reader:
+    def read(robot_id: str, attributes: Mapping[str, Any]) -> Observation:
+        value = sensor.value.model_validate(attributes[sensor.attribute])
+        return sensor.read(robot_id, read_origin(value), value)
+
+    return read
+
+
 _READERS: Mapping[str, _Reader] = {
     names.ODOMETRY: _odometry,
     names.LIDAR: _scan,
@@ -321,6 +330,7 @@ _READERS: Mapping[str, _Reader] = {
     "pose": _single_pose,
     "laser_scan": _single_scan,
     "class": _single_detection,
+    **{sensor.attribute: _reader_of(sensor) for sensor in SENSORS},
 }
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import orjson
 
 from iveg.domain.observations import (
+    Battery,
     Climate,
     CommandAnswer,
     DetectionFrame,
@@ -23,6 +24,7 @@ from iveg.ngsi.codec.fields import (
     write_origin,
     write_ranges,
 )
+from iveg.ngsi.sensors import SENSOR_OF
 
 
 def write_odometry(value: Odometry) -> bytes:
@@ -154,6 +156,13 @@ def write_navigation(value: Navigation) -> bytes:
             }
         },
     )
+
+
+def write_sensed(value: Battery) -> bytes:
+    """The bytes of a sensor's topic, ``/{apikey}/{robot}{suffix}/attrs``."""
+    sensor = SENSOR_OF[type(value)]
+    told = {**sensor.write(value), **write_origin(value.origin)}
+    return _measure(value.origin, {sensor.attribute: told})
 
 
 def write_answer(value: CommandAnswer) -> bytes:

@@ -200,7 +200,7 @@ class Battery:
 
 
 def read_battery(state: m.BatteryState) -> Battery:
-    """The battery; iVeg has no observation for it yet, this is where it begins.
+    """The battery.
 
     ROS writes NaN for what is not measured, and some drivers percent for a share.
     """

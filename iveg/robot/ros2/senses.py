@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import Battery as BatterySaid
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
@@ -51,6 +52,8 @@ _BACK_MESSAGES = 5
 _PICTURES = 6
 _SAME_PICTURE_S = 0.05
 _DEPTH_LATE_S = 0.3
+BATTERY_EVERY_S = 5.0
+"""A battery says nothing new more often than that."""
 
 _M = TypeVar("_M", bound=Message)
 
@@ -146,6 +149,7 @@ class Senses:
         self._look: tuple[m.Detection2DArray, float] | None = None
         self.battery: Battery | None = None
         """What the battery said last."""
+        self._battery_told = float("-inf")
         self.troubles = Troubles()
 
     @property
@@ -354,9 +358,14 @@ class Senses:
 
     def _battery(self, payload: bytes, now: Instant) -> list[Sensed]:
         message = self._read("battery", m.BatteryState, payload, now.mono)
-        if message is not None:
-            self.battery = reading.read_battery(message)
-        return []
+        if message is None:
+            return []
+        self.battery = said = reading.read_battery(message)
+        if now.mono - self._battery_told < BATTERY_EVERY_S:
+            return []
+        self._battery_told = now.mono
+        share, charging, volts = said.percentage, said.charging, said.voltage
+        return [BatterySaid("", Origin(), share, charging, volts)]
 
     # --- pictures -----------------------------------------------------------------
 

@@ -38,6 +38,8 @@
  *   profile: {drive: string, length: number, width: number, max_speed: number,
  *     turning_radius: number} | null,
  *   margin?: Margin | null, cmd_status: string | null,
+ *   battery?: {percentage: number | null, charging: boolean | null,
+ *     voltage: number | null, age_s: number | null} | null,
  * }} Robot
  *
  * @typedef {Aged & {

@@ -3,7 +3,7 @@
 import orjson
 import pytest
 
-from iveg.adapters.direct import DirectReader, Scope
+from iveg.adapters.direct import DirectReader
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
@@ -12,6 +12,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
+from iveg.pipeline.kinds import Scope
 from tests.builders import (
     detection,
     detection_frame,
@@ -50,6 +51,7 @@ TELEMETRY = {
     "/iveg/AGI_lidar2D/attrs": 0,
     "/AGI/iveg/lidar2D": 0,
     "/iveg/AGI_nav/attrs": 0,
+    "/iveg/AGI_battery/attrs": 0,
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.observations import (
+    Battery,
     Climate,
     CommandStatus,
     Hold,
@@ -275,6 +276,7 @@ async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> No
     desk.drive("AGI", 1.0)
     desk.clock.now = 40.0
     desk.look("AGI", detection("farmer", 1.0))
+    desk.hear(Battery("AGI", desk.next_origin(), 0.5))
     desk.clock.now = 42.0
 
     told = await get(desk, "/devices")
@@ -290,6 +292,7 @@ async def test_13_11_the_server_tells_when_each_device_was_last_heard_of() -> No
         "AGI_yolox_bounding_boxes": 2.0,
         "AGI_safety": None,
         "AGI_nav": None,
+        "AGI_battery": 2.0,
     }
 
 

@@ -5,6 +5,7 @@
 import { readApi } from "../api.js";
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
+import { readingsOf } from "../panels/readings.js";
 import { isHeard, modeSaid, taskSaid } from "../panels/robot_words.js";
 import { judgeChain } from "./chain.js";
 import { createTiles } from "./tiles.js";
@@ -154,7 +155,14 @@ function machineCells(robot, words) {
     clock_offset_s === null ? "—" : words.t("fleet.clock", { offset: clock_offset_s }),
     robot.cmd_status ?? "—",
     sources.length ? [...new Set(sources)].join(", ") : "—",
+    readingsSaid(robot, words),
   ];
+}
+
+/** @param {Robot} robot @param {Words} words */
+function readingsSaid(robot, words) {
+  const readings = readingsOf(robot, words);
+  return readings.map(({ label, said }) => `${label}: ${said}`).join(" · ");
 }
 
 /**

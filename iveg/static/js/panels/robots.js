@@ -5,9 +5,10 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
-import { all, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
+import { all, make, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge, readingOf } from "./gauge.js";
+import { readingsOf } from "./readings.js";
 import { createRelease } from "./release.js";
 import { faultsSaid, marginSaid, modeSaid, taskSaid, whySaid } from "./robot_words.js";
 
@@ -181,6 +182,7 @@ function createCard(app, card) {
     setText(partOf("certainty"), certaintyOf(robotId));
     drawMargin(robot?.margin ?? null);
     drawTask(robot);
+    drawReadings(robot);
     release.draw(robot);
     drill.draw(release.factsOf(robot));
   }
@@ -270,6 +272,23 @@ function createCard(app, card) {
   /** @param {Robot | undefined} robot */
   function drawTask(robot) {
     setText(partOf("task"), taskSaid(robot?.navigation?.task, words));
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawReadings(robot) {
+    const place = partOf("readings");
+    const readings = readingsOf(robot, words);
+    while (place.children.length > readings.length) place.lastElementChild?.remove();
+    while (place.children.length < readings.length) {
+      const line = make("p", "card__line");
+      line.append(make("span", "card__label"), " ", make("span"));
+      place.append(line);
+    }
+    readings.forEach(({ label, said }, i) => {
+      const [name, value] = place.children[i].children;
+      setText(name, label);
+      setText(value, said);
+    });
   }
 
   return { draw };

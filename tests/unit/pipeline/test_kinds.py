@@ -1,0 +1,92 @@
+"""The table of kinds is whole, and is what the pipeline does."""
+
+import typing
+
+import pytest
+
+from iveg.domain.observations import Battery, Observation, Overtaken
+from iveg.domain.world import RobotState, World
+from iveg.ngsi import codec, names
+from iveg.ngsi.sensors import SENSORS, Sensor
+from iveg.pipeline.kinds import KINDS, Kind, read_directly
+from tests.builders import origin
+from tests.unit.pipeline.desk import Desk, conditions_of
+
+LOW = "alert.battery_low"
+
+
+def battery(desk: Desk, level: float | None, *, charging: bool | None = False) -> None:
+    desk.hear(Battery("AGI", desk.next_origin(), level, charging, 25.1))
+
+
+def test_every_kind_of_observation_has_one_row() -> None:
+    kinds = set(typing.get_args(Observation)) - {Overtaken}
+
+    assert [row.of for row in KINDS if row.of in kinds] == [row.of for row in KINDS]
+    assert {row.of for row in KINDS} == kinds
+
+
+@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.of.__name__)
+def test_a_kind_lands_where_its_row_says(row: Kind) -> None:
+    places = {*RobotState.__dataclass_fields__, *vars(World(("AGI",))), "commander"}
+
+    assert row.lands in places
+
+
+@pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.attribute)
+def test_a_sensor_has_a_device_a_kind_and_no_name_of_another(sensor: Sensor) -> None:
+    suffixes = [device.suffix for device in names.ROBOT_DEVICES]
+
+    assert suffixes.count(sensor.suffix) == 1
+    assert sensor.of in {row.of for row in KINDS}
+    assert sensor.of in read_directly("all")
+
+
+def test_a_battery_is_read_as_it_was_written() -> None:
+    said = Battery("AGI", origin(3), 0.42, charging=True, voltage=25.1)
+
+    reading = codec.read_measure("AGI_battery", codec.write_sensed(said))
+
+    assert reading.observations == (said,)
+
+
+@pytest.mark.parametrize("level", [-0.1, 1.1, 42, "0.4"])
+def test_a_level_that_is_no_share_is_refused(level: object) -> None:
+    reading = codec.read_attributes("AGI", {"battery": {"percentage": level}})
+
+    assert [one.reason for one in reading.problems] == ["bad_battery"]
+
+
+async def test_a_battery_at_a_fifth_is_a_p3_until_it_is_at_a_quarter() -> None:
+    desk = Desk()
+    told = []
+    for level in (0.50, 0.21, 0.20, 0.22, 0.249, 0.25, 0.22):
+        battery(desk, level)
+        await desk.wait(0.1)
+        told.append(LOW in conditions_of(desk))
+
+    assert told == [False, False, True, True, True, False, False]
+
+
+async def test_one_that_charges_or_does_not_know_raises_nothing() -> None:
+    desk = Desk()
+    battery(desk, 0.1, charging=True)
+    await desk.wait(0.1)
+    charging = [*conditions_of(desk)]
+    battery(desk, None)
+    await desk.wait(0.1)
+
+    assert LOW not in charging
+    assert LOW not in conditions_of(desk)
+
+
+def test_an_older_battery_changes_nothing() -> None:
+    desk = Desk()
+    late = desk.next_origin()
+    battery(desk, 0.5)
+    desk.hear(Battery("AGI", late, 0.1))
+
+    kept = desk.world.robot("AGI").sensed[Battery].observation
+
+    assert isinstance(kept, Battery)
+    assert kept.percentage == 0.5
