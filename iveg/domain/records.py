@@ -5,6 +5,7 @@ A decision, a command and an alert change state: a later record with the same id
 the place of the earlier one.  The other records are facts that are only ever added.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -233,6 +234,21 @@ class LatencyRecord:
     bins: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadingRecord:
+    """What one small sensor of one robot said.
+
+    Attributes:
+        kind: Name of the observation in lower case, such as ``battery``.
+        value: Its fields by name.
+    """
+
+    at: float
+    robot_id: str
+    kind: str
+    value: Mapping[str, float | str | bool | None]
+
+
 Record = (
     DecisionRecord
     | DetectionRecord
@@ -243,6 +259,7 @@ Record = (
     | OdometryRecord
     | ClimateRecord
     | LatencyRecord
+    | ReadingRecord
 )
 RECORD_TYPES: tuple[type[Record], ...] = (
     DecisionRecord,
@@ -254,11 +271,17 @@ RECORD_TYPES: tuple[type[Record], ...] = (
     OdometryRecord,
     ClimateRecord,
     LatencyRecord,
+    ReadingRecord,
 )
 
 
 def is_telemetry(record: Record) -> bool:
     """Whether a record may be dropped under pressure; the others never are."""
     return isinstance(
-        record, OdometryRecord | DetectionRecord | ClimateRecord | LatencyRecord
+        record,
+        OdometryRecord
+        | DetectionRecord
+        | ClimateRecord
+        | LatencyRecord
+        | ReadingRecord,
     )

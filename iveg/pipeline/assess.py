@@ -148,8 +148,11 @@ class Assessor:
             self._notice(observation.robot_id, received.at)
         if verdict != "new":
             return False
-        for topic in kind(observation).touches:
-            self._hub.changed(topic.of(getattr(observation, "robot_id", "")))
+        row, robot_id = kind(observation), getattr(observation, "robot_id", "")
+        for topic in row.touches:
+            self._hub.changed(topic.of(robot_id))
+        if row.kept:
+            self._minutes.reading(observation, robot_id, received.at)
         match observation:
             case Odometry():
                 self._drove(observation, received.at)

@@ -7,12 +7,12 @@ API and the database say the same.
 import json
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 
 from iveg.domain.alarms import Alarm, Occurrence
 from iveg.domain.decisions import Decision
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Climate, Instant, Road
+from iveg.domain.observations import Climate, Instant, Observation, Road
 from iveg.domain.people import Placed
 from iveg.domain.records import (
     AlertRecord,
@@ -23,6 +23,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LogRecord,
     OdometryRecord,
+    ReadingRecord,
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.world import RobotState
@@ -34,6 +35,8 @@ from iveg.pipeline.record import OdometryThinner, RecordSink
 _KEPT_LINES = 500
 CLIMATE_PERIOD_S = 60.0
 """Air changes slowly: a day is 1,440 rows."""
+READING_PERIOD_S = 60.0
+_NOT_VALUES = ("robot_id", "origin")
 
 
 class Minutes:
@@ -48,6 +51,7 @@ class Minutes:
         self._sink = sink
         self._thinner = OdometryThinner()
         self._climate_kept: float | None = None
+        self._readings_kept: dict[tuple[str, type[Observation]], float] = {}
         # Starting at the clock keeps ids growing over restarts without asking anyone.
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
@@ -237,6 +241,23 @@ class Minutes:
                 temperature=read.temperature,
                 relative_humidity=read.relative_humidity,
                 co2=read.co2,
+            )
+        )
+
+    def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
+        """A small sensor spoke: history keeps each of them once a minute."""
+        kind = type(read)
+        kept = self._readings_kept.get((robot_id, kind))
+        if kept is not None and at.mono - kept < 0.9 * READING_PERIOD_S:
+            return
+        self._readings_kept[robot_id, kind] = at.mono
+        own = (one.name for one in fields(read) if one.name not in _NOT_VALUES)
+        self._sink.offer(
+            ReadingRecord(
+                at=at.wall,
+                robot_id=robot_id,
+                kind=kind.__name__.lower(),
+                value={name: getattr(read, name) for name in own},
             )
         )
 

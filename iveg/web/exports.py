@@ -10,7 +10,7 @@ is never held in memory.
 import codecs
 import csv
 import io
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Literal, TypeVar
 
@@ -115,6 +115,8 @@ def _cell(name: str, value: object, reader: Sentences | None) -> str:
     if isinstance(value, float) and reader is not None:
         text = str(value)
         return text.replace(".", ",") if reader.words.language == "es" else text
+    if isinstance(value, Mapping | list):
+        return write_json(value).decode()
     return _safe(value) if isinstance(value, str) else str(value)
 
 

@@ -30,6 +30,7 @@ from iveg.models.climate import ClimateReading
 from iveg.models.command import Command
 from iveg.models.decision import Decision
 from iveg.models.people import Detection
+from iveg.models.reading import Reading
 from iveg.web import charts, exports
 from iveg.web.answers import Json
 from iveg.web.exports import MEDIA_TYPES, Form
@@ -180,6 +181,14 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             _each(LogEntry.of_record),
             Listing[LogEntry],
             "The action and inference log",
+        ),
+        _List(
+            "readings",
+            lists.READINGS,
+            queries.readings,
+            _each(Reading.of_record),
+            Listing[Reading],
+            "What small sensors of robots said; `class` asks for a kind, as `battery`",
         ),
     )
 

@@ -31,6 +31,7 @@ from iveg.domain.records import (
     DecisionRecord,
     DetectionRecord,
     LogRecord,
+    ReadingRecord,
     Record,
 )
 
@@ -126,6 +127,14 @@ LOG = ListOf(
     tables.log.c.at,
     tables.log.c.row_id,
     (tables.log.c.class_,),
+)
+
+READINGS = ListOf(
+    ReadingRecord,
+    tables.readings,
+    tables.readings.c.at,
+    tables.readings.c.row_id,
+    (tables.readings.c.kind,),
 )
 
 

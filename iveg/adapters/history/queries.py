@@ -33,6 +33,7 @@ from iveg.domain.records import (
     DetectionRecord,
     LatencyRecord,
     LogRecord,
+    ReadingRecord,
 )
 
 _THREADS = 4
@@ -68,6 +69,10 @@ class Queries:
     async def log(self, asked: Filter) -> Page[LogRecord]:
         """Log lines by ``at``."""
         return await self._ask(lambda c: lists.read_page(c, lists.LOG, asked))
+
+    async def readings(self, asked: Filter) -> Page[ReadingRecord]:
+        """What small sensors said, by ``at``; the class filter asks for the kind."""
+        return await self._ask(lambda c: lists.read_page(c, lists.READINGS, asked))
 
     async def decision(self, decision_id: str) -> DecisionRecord | None:
         """One decision; None when it is not known."""

@@ -23,6 +23,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.types import TypeEngine
 
+from iveg.adapters.history.json_column import JsonValue
 from iveg.domain.records import (
     AlertRecord,
     ClimateRecord,
@@ -33,6 +34,7 @@ from iveg.domain.records import (
     LatencyRecord,
     LogRecord,
     OdometryRecord,
+    ReadingRecord,
 )
 
 metadata = MetaData(
@@ -245,6 +247,20 @@ latency = Table(
 )
 
 
+readings = Table(
+    "readings",
+    metadata,
+    _row_id(),
+    _number("at", null=False),
+    _text("robot_id", null=False),
+    _text("kind", null=False),
+    Column("value", JsonValue, nullable=False),
+    Index(None, "at", "row_id"),
+    Index(None, "robot_id", "at"),
+    sqlite_autoincrement=True,
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Shelf:
     """Where one kind of record is kept.
@@ -271,4 +287,5 @@ SHELVES: dict[type, Shelf] = {
     OdometryRecord: Shelf(odometry),
     ClimateRecord: Shelf(climate),
     LatencyRecord: Shelf(latency, keep_s=86400.0),
+    ReadingRecord: Shelf(readings),
 }

@@ -5,6 +5,7 @@ import typing
 import pytest
 
 from iveg.domain.observations import Battery, Observation, Overtaken
+from iveg.domain.records import ReadingRecord
 from iveg.domain.world import RobotState, World
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS, Sensor
@@ -90,3 +91,16 @@ def test_an_older_battery_changes_nothing() -> None:
 
     assert isinstance(kept, Battery)
     assert kept.percentage == 0.5
+
+
+async def test_a_battery_is_kept_once_a_minute() -> None:
+    desk = Desk()
+    for _ in range(25):
+        battery(desk, 0.5)
+        desk.clock.now += 5.0
+
+    kept = desk.records(ReadingRecord)
+
+    assert [one.at - kept[0].at for one in kept] == [0.0, 55.0, 110.0]
+    assert kept[0].kind == "battery"
+    assert kept[0].value == {"percentage": 0.5, "charging": False, "voltage": 25.1}

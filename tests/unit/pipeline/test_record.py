@@ -45,7 +45,7 @@ def test_only_telemetry_may_be_dropped() -> None:
     assert is_telemetry(climate_record())
     assert not any(is_telemetry(record) for record in KEPT)
     assert is_telemetry(latency_record())
-    assert len(RECORD_TYPES) == len(KEPT) + 4
+    assert len(RECORD_TYPES) == len(KEPT) + 5
 
 
 def test_a_full_queue_drops_its_oldest_telemetry_and_counts_it() -> None:

@@ -13,7 +13,7 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import NotAllowedError
 from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.records import DecisionRecord, ReadingRecord, Record
 from iveg.pipeline.record import Waiting
 from iveg.web import charts, problems
 from iveg.web.history import router
@@ -29,7 +29,7 @@ from tests.fakes.records import (
     odometry_record,
 )
 
-LISTS = ("decisions", "detections", "commands", "alerts", "log")
+LISTS = ("decisions", "detections", "commands", "alerts", "log", "readings")
 
 
 class Past:
@@ -608,3 +608,27 @@ async def test_the_lists_are_described_for_integrators(past: Past) -> None:
     }
     fields = described["components"]["schemas"]["Detection"]["properties"]
     assert {"class", "position", "road"} <= set(fields)
+
+
+async def test_a_reading_reads_as_it_was_said(
+    client: httpx.AsyncClient, past: Past
+) -> None:
+    value = {"percentage": 0.42, "charging": False, "voltage": None}
+    past.holds(
+        ReadingRecord(at=NOON, robot_id="AGI", kind="battery", value=value),
+        ReadingRecord(at=NOON, robot_id="AGI", kind="rain", value={}),
+    )
+
+    told = await client.get("/api/v1/readings?class=battery&robot=AGI")
+    lines = await client.get("/api/v1/readings?format=csv")
+
+    assert told.json()["items"] == [
+        {
+            "at": "2023-11-14T22:13:20.000Z",
+            "robot_id": "AGI",
+            "kind": "battery",
+            "value": value,
+        }
+    ]
+    csv_value = '"{""percentage"":0.42,""charging"":false,""voltage"":null}"'
+    assert lines.text.splitlines()[-1].endswith(csv_value)

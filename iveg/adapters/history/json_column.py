@@ -1,0 +1,35 @@
+"""A column that holds JSON and hands out values: PostgreSQL's own, SQLite's text."""
+
+from typing import Any
+
+import orjson
+from sqlalchemy import JSON, Dialect, Text
+from sqlalchemy.types import TypeDecorator, TypeEngine
+
+
+class JsonValue(TypeDecorator[Any]):
+    """JSON as PostgreSQL keeps it; in SQLite, which has no such type, its text.
+
+    A text that is damaged reads as null: one bad row must not hide a list.
+    """
+
+    impl = JSON
+    cache_ok = True
+
+    def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
+        """What the database knows."""
+        kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSON()
+        return dialect.type_descriptor(kind)
+
+    def process_bind_param(self, value: Any, dialect: Dialect) -> Any:
+        """A value on its way in."""
+        return orjson.dumps(value).decode() if dialect.name == "sqlite" else value
+
+    def process_result_value(self, value: Any, dialect: Dialect) -> Any:
+        """A value on its way out."""
+        if dialect.name != "sqlite" or value is None:
+            return value
+        try:
+            return orjson.loads(value)
+        except orjson.JSONDecodeError:
+            return None
