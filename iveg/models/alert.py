@@ -1,5 +1,7 @@
 """Alerts (ISA-18.2) and lines of the log: sentences that people are told."""
 
+from typing import cast
+
 from pydantic import Field, JsonValue
 
 from iveg.domain import alarms, flood
@@ -12,7 +14,7 @@ from iveg.models.remembered import read_objects, read_slots, read_stamp
 class Occurrence(Model):
     """One time that an alert was raised."""
 
-    priority: str
+    priority: alarms.Priority
     raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
@@ -36,7 +38,7 @@ class Occurrence(Model):
         """One that is remembered."""
         by, note = one.get("acknowledged_by"), one.get("note")
         return cls(
-            priority=str(one.get("priority")),
+            priority=cast("alarms.Priority", one.get("priority")),
             raised_at=read_stamp(one.get("raised_at")) or "",
             cleared_at=read_stamp(one.get("cleared_at")),
             acknowledged_at=read_stamp(one.get("acknowledged_at")),
@@ -49,7 +51,7 @@ class Alert(Model):
     """A notice to people: all occurrences of one kind and subject as one."""
 
     alert_id: str
-    priority: str
+    priority: alarms.Priority
     key: str
     slots: Slots
     robot_id: str | None
@@ -89,7 +91,7 @@ class Alert(Model):
         """One alert as it is remembered."""
         return cls(
             alert_id=record.alert_id,
-            priority=record.priority,
+            priority=cast("alarms.Priority", record.priority),
             key=record.key,
             slots=read_slots(record.slots),
             robot_id=record.robot_id,

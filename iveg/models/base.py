@@ -19,7 +19,12 @@ class Model(BaseModel):
     some 2,000 models a second.  ``model_validate`` validates, and the tests do.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", serialize_by_alias=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        serialize_by_alias=True,
+        use_attribute_docstrings=True,
+    )
     _defaults: ClassVar[dict[str, Any]] = {}
 
     def __eq__(self, other: object) -> bool:

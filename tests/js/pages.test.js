@@ -5,31 +5,34 @@ import {
   summaryOf,
   tookOf,
 } from "../../iveg/static/js/pages/latency.js";
+import { command } from "./builders.js";
 import { equal, test } from "./harness.js";
 
 /** @param {Record<string, "ok" | "late" | "down" | "unknown">} states */
 const hops = (states) =>
   ORDER.map((hop) => ({ hop, state: states[hop] ?? /** @type {const} */ ("ok") }));
 
-/** @param {object} [differs] */
-const order = (differs = {}) => ({
-  command_id: "1",
-  robot_id: "AGI",
-  kind: "stop",
-  state: "STANDING",
-  requested_by: "Ana",
-  tries: 1,
-  standstill_ms: 412,
-  times: {
-    requested: "2026-11-20T12:00:00.000Z",
-    sent_fiware: "2026-11-20T12:00:00.004Z",
-    sent_direct: "2026-11-20T12:00:00.002Z",
-    answer_fiware: "2026-11-20T12:00:00.050Z",
-    answer_direct: null,
-    standing: "2026-11-20T12:00:00.412Z",
-  },
-  ...differs,
-});
+/** @param {Partial<import("../../iveg/static/js/protocol.js").Command>} [differs] */
+const order = (differs = {}) =>
+  command({
+    command_id: "1",
+    robot_id: "AGI",
+    kind: "stop",
+    state: "STANDING",
+    requested_by: "Ana",
+    tries: 1,
+    standstill_ms: 412,
+    times: {
+      pressed: null,
+      requested: "2026-11-20T12:00:00.000Z",
+      sent_fiware: "2026-11-20T12:00:00.004Z",
+      sent_direct: "2026-11-20T12:00:00.002Z",
+      answer_fiware: "2026-11-20T12:00:00.050Z",
+      answer_direct: null,
+      standing: "2026-11-20T12:00:00.412Z",
+    },
+    ...differs,
+  });
 
 test("a whole chain is said to work", () => {
   equal(judgeChain(hops({}), [], true).key, "fleet.whole");

@@ -101,7 +101,8 @@ test("a sweep fades while late and is gone when lost", () => {
 
 test("a box in the robot's frame turns with the robot, one in the map does not", () => {
   const store = storeOf({ robots: [robot({ pose: { x: 0, y: 0, yaw: 1.5 } })] });
-  const box = { xmin: 3, xmax: 3.4, ymin: -0.3, ymax: 0.3, frame_id: "base_link" };
+  const sides = { xmin: 3, xmax: 3.4, ymin: -0.3, ymax: 0.3, zmin: 0, zmax: 1.8 };
+  const box = { ...sides, frame_id: "base_link" };
   const items = [detection({ box }), detection()];
   store.apply(
     "detections/AGI",

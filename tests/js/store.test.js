@@ -55,7 +55,13 @@ test("a robot's move and its state are told as the robot, whole", () => {
 
 test("the ages of a pose and of a state count from when each was true", () => {
   const { store } = storeByHand();
-  const applied = { reason: "clear", cause: null, age_s: 2, feedback_age_s: 0 };
+  const applied = {
+    reason: "clear",
+    cause: null,
+    age_s: 2,
+    feedback_age_s: 0,
+    faults: [],
+  };
   store.apply("snapshot", snapshot({ robots: [robot({ age_s: 0.5, applied })] }), 1000);
   const known = () => store.robots().get("AGI");
   const stateAge = () =>
@@ -105,13 +111,6 @@ test("ages count from the arrival, in lists too", () => {
   const { store } = storeByHand();
   store.apply("people", [person({ age_s: 0.5 })], 1000);
   near(ageOf(store.people()[0], 3000), 2.5);
-});
-
-test("a look in a snapshot is as old as its stamp says", () => {
-  const { store } = storeByHand();
-  const look = { robot_id: "AGI", stamp: "2026-11-20T08:59:57.500Z", road: "mqtt" };
-  store.apply("snapshot", snapshot({ detections: { AGI: { ...look, items: [] } } }), 0);
-  near(ageOf(store.looks().get("AGI"), 0), 2.5);
 });
 
 test("a state is told once a frame, with its newest value", () => {

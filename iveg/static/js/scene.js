@@ -189,8 +189,9 @@ export function marked(people) {
  * @param {number} ageS
  */
 function ringNow(person, stage, ageS) {
-  if (stage === "seen") return person.radius_m;
-  return ringRadius(person.radius_m, ageS, person.age_s ?? 0);
+  const radiusM = person.radius_m ?? 0;
+  if (stage === "seen") return radiusM;
+  return ringRadius(radiusM, ageS, person.age_s ?? 0);
 }
 
 /**
@@ -198,10 +199,11 @@ function ringNow(person, stage, ageS) {
  *
  * @param {Person["stage"]} stage
  * @param {number} ageS
- * @returns {Person["stage"]}
+ * @returns {ScenePerson["stage"]}
  */
 function stageAt(stage, ageS) {
-  if (stage === "last_seen" || ageS > LIMITS.ring_lasts_s) return "last_seen";
+  if (stage === "gone" || stage === "last_seen") return "last_seen";
+  if (ageS > LIMITS.ring_lasts_s) return "last_seen";
   return stage === "seen" && ageS <= LIMITS.seen_s ? "seen" : "remembered";
 }
 

@@ -321,11 +321,7 @@ function topicsOf(snapshot) {
     ...(snapshot.robots ?? []).map(under("robots", "robot_id")),
     ["people", snapshot.people ?? []],
     ...Object.entries(snapshot.detections ?? {}).map(
-      ([id, look]) =>
-        /** @type {[string, unknown]} */ ([
-          `detections/${id}`,
-          { ...look, age_s: look.age_s ?? secondsBetween(look.stamp, snapshot.t) },
-        ]),
+      ([id, look]) => /** @type {[string, unknown]} */ ([`detections/${id}`, look]),
     ),
     ...(snapshot.commands ?? []).map(under("commands", "command_id")),
     ["alerts", snapshot.alerts ?? []],
@@ -343,9 +339,4 @@ function topicsOf(snapshot) {
  */
 function under(head, key) {
   return (value) => [`${head}/${value[key]}`, value];
-}
-
-/** @param {string} earlier ISO-8601 @param {string} later ISO-8601 */
-function secondsBetween(earlier, later) {
-  return Math.max(0, (Date.parse(later) - Date.parse(earlier)) / 1000) || 0;
 }

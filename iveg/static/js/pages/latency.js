@@ -1,13 +1,7 @@
 /**
  * What a STOP took on each road, from the press on: pure arithmetic on its times.
  *
- * @typedef {{command_id: string, robot_id: string, kind: string, state: string,
- *   requested_by: string, tries: number, drill?: boolean, standstill_ms: number | null,
- *   reason?: string | null, outcome?: string, was_loud?: boolean,
- *   steps?: {at: string, state: string, why: string}[],
- *   times: {pressed?: string | null, requested: string, sent_fiware: string | null,
- *     sent_direct: string | null, answer_fiware: string | null,
- *     answer_direct: string | null, standing: string | null}}} Order
+ * @typedef {import("../types.js").Command} Order
  * @typedef {{median: number, worst: number}} Stat (ms)
  */
 

@@ -15,10 +15,7 @@ import { since } from "./stop_view.js";
 /** @typedef {import("../i18n.js").Words} Words */
 /** @typedef {import("../protocol.js").Command} Command */
 /** @typedef {import("./release.js").Facts} Facts */
-/**
- * @typedef {{robot_id: string, command_id: string, drilled_at: string, by: string, passed: boolean | null,
- *   standstill_ms: number | null}} Drill one of GET /drills
- */
+/** @typedef {import("../types.js").Drill} Drill one of GET /drills */
 
 /** At most this fast a robot may be stopped for a drill (m/s), as the server has it. */
 const CREEP_M_S = 0.2;

@@ -164,7 +164,7 @@ export function createRelease(app, card, robotId) {
  * What became of a release or resume, and what a late IoT Agent had to do with it.
  *
  * @param {Command} order
- * @returns {{key: string, slots: Record<string, string | number>}[]}
+ * @returns {import("../types.js").Sentence[]}
  */
 export function saidOfOrder({ state, reason, note }) {
   const told = endOfOrder(state, reason);
@@ -174,7 +174,7 @@ export function saidOfOrder({ state, reason, note }) {
 /**
  * @param {string} state
  * @param {string | null} reason
- * @returns {{key: string, slots: Record<string, string | number>}}
+ * @returns {import("../types.js").Sentence}
  */
 function endOfOrder(state, reason) {
   if (state === "RELEASING") return { key: "release.sent", slots: {} };

@@ -1,0 +1,102 @@
+"""The types of the page, from the models: ``python -m iveg.models.typescript``.
+
+The output is ``static/js/types.d.ts``, checked in; a test fails when it is stale, so
+that a field has one name, one type and one meaning on both sides.
+"""
+
+from collections.abc import Iterator, Mapping
+from importlib.resources import files
+from typing import Any
+
+from pydantic.json_schema import models_json_schema
+
+from iveg.models.alert import AlertListing
+from iveg.models.base import Model
+from iveg.models.climate import ClimateReading
+from iveg.models.command import Drill, FleetPressed, Latency
+from iveg.models.decision import Decision
+from iveg.models.places import Costmap, Coverage, Scan
+from iveg.models.reading import Reading
+from iveg.models.snapshot import Snapshot
+
+TOLD: tuple[type[Model], ...] = (
+    Snapshot,
+    Scan,
+    Costmap,
+    Coverage,
+    Decision,
+    Drill,
+    Latency,
+    FleetPressed,
+    AlertListing,
+    ClimateReading,
+    Reading,
+)
+"""All that a page reads; what they are made of comes with them."""
+_PLAIN = {
+    "string": "string",
+    "integer": "number",
+    "number": "number",
+    "boolean": "boolean",
+    "null": "null",
+}
+_HEAD = """\
+/**
+ * Written by `python -m iveg.models.typescript`; change the models, not this file.
+ * Lengths in metres, angles in radians, ages in seconds, times ISO-8601 UTC.
+ */
+"""
+_Schema = Mapping[str, Any]
+
+
+def write_types() -> str:
+    """The whole file."""
+    _, document = models_json_schema([(one, "serialization") for one in TOLD])
+    schemas = sorted(document["$defs"].items())
+    return _HEAD + "".join(_declared(name, schema) for name, schema in schemas)
+
+
+def _declared(name: str, schema: _Schema) -> str:
+    if "properties" not in schema:
+        return f"\nexport type {name} = {_type(schema)};\n"
+    lines = "\n".join(_members(schema))
+    return f"\n{_comment(schema, '')}export type {name} = {{\n{lines}\n}};\n"
+
+
+def _members(schema: _Schema) -> Iterator[str]:
+    for name, member in schema["properties"].items():
+        yield f"{_comment(member, '  ')}  {name}: {_type(member)};"
+
+
+def _comment(schema: _Schema, indent: str) -> str:
+    told = schema.get("description", "").split("\n\n")[0].replace("\n", " ")
+    return f"{indent}/** {told} */\n" if told else ""
+
+
+def _type(schema: _Schema) -> str:
+    if "$ref" in schema:
+        return str(schema["$ref"].rpartition("/")[2])
+    if "enum" in schema or "const" in schema:
+        values = schema.get("enum", [schema.get("const")])
+        return " | ".join(f'"{value}"' for value in values)
+    if "anyOf" in schema:
+        return " | ".join(dict.fromkeys(_type(one) for one in schema["anyOf"]))
+    if schema.get("type") == "array":
+        return _list(schema)
+    if schema.get("type") == "object":
+        inner = schema.get("additionalProperties")
+        return (
+            f"Record<string, {_type(inner) if isinstance(inner, dict) else 'unknown'}>"
+        )
+    return _PLAIN.get(schema.get("type", ""), "unknown")
+
+
+def _list(schema: _Schema) -> str:
+    if "prefixItems" in schema:
+        return f"[{', '.join(_type(one) for one in schema['prefixItems'])}]"
+    inner = _type(schema["items"])
+    return f"({inner})[]" if " | " in inner else f"{inner}[]"
+
+
+if __name__ == "__main__":
+    (files("iveg") / "static/js/types.d.ts").write_text(write_types())  # type: ignore[attr-defined]

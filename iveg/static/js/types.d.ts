@@ -1,0 +1,684 @@
+/**
+ * Written by `python -m iveg.models.typescript`; change the models, not this file.
+ * Lengths in metres, angles in radians, ages in seconds, times ISO-8601 UTC.
+ */
+
+/** A robot that is slowed for somebody. */
+export type Acting = {
+  robot_id: string;
+  distance_m: number;
+  in_sight: boolean;
+};
+
+/** A notice to people: all occurrences of one kind and subject as one. */
+export type Alert = {
+  alert_id: string;
+  priority: "P1" | "P2" | "P3";
+  key: string;
+  slots: Record<string, string | boolean | number | null>;
+  robot_id: string | null;
+  /** The first time; ``last_raised_at`` the newest. */
+  raised_at: string;
+  last_raised_at: string;
+  cleared_at: string | null;
+  acknowledged_at: string | null;
+  acknowledged_by: string | null;
+  note: string | null;
+  count: number;
+  /** The newest occurrences, oldest first. */
+  members: Occurrence[];
+};
+
+/** From the frame that a slow-down rests on to the robot's own report (ms). */
+export type AlertLatency = {
+  p50_ms: number | null;
+  p95_ms: number | null;
+  p99_ms: number | null;
+  count: number;
+  window_s: number;
+  age_s: number | null;
+};
+
+/** One page of alerts, and how fast they come now. */
+export type AlertListing = {
+  items: Alert[];
+  next: string | null;
+  flood: Flood;
+};
+
+/** What the robot itself says it applies. */
+export type Applied = {
+  reason: string;
+  cause: string | null;
+  age_s: number;
+  feedback_age_s: number | null;
+  faults: Fault[];
+};
+
+/** A rectangle along the axes of ``map`` (m). */
+export type Area = {
+  xmin: number;
+  ymin: number;
+  xmax: number;
+  ymax: number;
+};
+
+/** The robot's battery, as it said last. */
+export type Battery = {
+  /** 0 to 1. */
+  percentage: number | null;
+  charging: boolean | null;
+  /** V. */
+  voltage: number | null;
+  age_s: number | null;
+};
+
+/** The newest reading. */
+export type Climate = {
+  /** °C. */
+  temperature: number | null;
+  /** 0 to 1. */
+  relative_humidity: number | null;
+  /** ppm. */
+  co2: number | null;
+  received_at: string;
+  age_s: number;
+};
+
+/** One reading of the past, or the mean of a slice of time. */
+export type ClimateReading = {
+  /** °C. */
+  temperature: number | null;
+  /** 0 to 1. */
+  relative_humidity: number | null;
+  /** ppm. */
+  co2: number | null;
+  at: string;
+};
+
+/** One STOP, release or resume. */
+export type Command = {
+  command_id: string;
+  robot_id: string;
+  kind: "stop" | "release" | "resume";
+  drill: boolean;
+  state: string;
+  requested_by: string;
+  times: CommandTimes;
+  standstill_ms: number | null;
+  tries: number;
+  reason: string | null;
+  requesters: string[];
+  hold_id: string | null;
+  pressed_doubted: boolean;
+  age_s: number | null;
+  transports: Record<string, string>;
+  /** ``transports`` for one version more. */
+  roads: Record<string, string>;
+  agent_lag_s: number | null;
+  note: Sentence | null;
+  robot: CommandRobot | null;
+  challenge_fresh: boolean;
+  /** How it ended; null on ``/live``, where ``state`` says how it stands. */
+  outcome: "open" | "stood" | "not_seen_standing" | "released" | "resumed" | "refused" | "expired" | "replaced" | null;
+  was_loud: boolean;
+  /** Of the audit trail; empty on ``/live``, where each step is told. */
+  steps: CommandStep[];
+};
+
+/** The robot's last word, while a command is open. */
+export type CommandRobot = {
+  v: number;
+  report_age_s: number | null;
+  moved_m: number;
+};
+
+/** One line of the audit trail of a command. */
+export type CommandStep = {
+  at: string;
+  state: string;
+  why: string;
+};
+
+/** When each step came to be known; null where it has not yet. */
+export type CommandTimes = {
+  /** By the browser's corrected clock; null where no page told, or it cannot be. */
+  pressed: string | null;
+  requested: string;
+  sent_fiware: string | null;
+  sent_direct: string | null;
+  answer_fiware: string | null;
+  answer_direct: string | null;
+  /** The first standing sample. */
+  standing: string | null;
+};
+
+/** Cells from the south-western corner, row by row: 0-100, -1 unknown. */
+export type Costmap = {
+  /** Metres a cell. */
+  resolution: number;
+  width: number;
+  height: number;
+  origin: Point;
+  data: number[];
+  /** Since the newest scan in it; null before the first. */
+  age_s: number | null;
+};
+
+/** When a camera last looked at each cell of the aisles. */
+export type Coverage = {
+  at: string;
+  /** That look now. */
+  cameras: number;
+  within_s: number;
+  /** Of the cells, looked at within that (0-1); null without aisles. */
+  share: number | null;
+  lanes: LaneCoverage[];
+};
+
+/** Who was seen by whom, which rule fired, and when the robot obeyed. */
+export type Decision = {
+  decision_id: string;
+  kind: "alert" | "mandate";
+  robot_id: string;
+  person_id: string | null;
+  observer: string | null;
+  class: string | null;
+  class_id: string | null;
+  confidence: number | null;
+  position: Position | null;
+  /** From the robot to the centre of the ring. */
+  distance_m: number | null;
+  speed_factor: number | null;
+  reason: string | null;
+  rule: DecisionRule;
+  in_sight: boolean | null;
+  started_at: string;
+  feedback_at: string | null;
+  applied_at: string | null;
+  observed_at: string | null;
+  ended_at: string | null;
+  /** m/s; ``speed_after`` at ``observed_at``. */
+  speed_before: number | null;
+  speed_after: number | null;
+  links: DecisionLink[];
+  sentence: Sentence;
+  /** Of the robot and its observer; empty for those of the earlier version. */
+  places: DecisionPlace[];
+};
+
+/** One link of the chain of evidence. */
+export type DecisionLink = {
+  link: string;
+  at: string | null;
+  value: JsonValue;
+  verdict: string;
+};
+
+/** Where a robot was when a decision began, in ``map`` (m, rad). */
+export type DecisionPlace = {
+  robot_id: string;
+  x: number;
+  y: number;
+  yaw: number;
+};
+
+/** The rule that fired, as it was at that moment. */
+export type DecisionRule = {
+  id: string | null;
+  version: string | null;
+  parameters: JsonValue;
+};
+
+/** One box of one detection frame, placed in ``map``. */
+export type Detection = {
+  robot_id: string;
+  stamp: string | null;
+  /** When it reached iVeg; null on ``/live``, where its frame has an age. */
+  received_at: string | null;
+  class: string | null;
+  class_id: string;
+  probability: number;
+  position: Position;
+  box: DetectionBox | null;
+  confident: boolean;
+  person_id: string | null;
+  /** The robot of the fleet that was seen. */
+  peer: string | null;
+  road: string;
+};
+
+/** A 3D box (m) in ``frame_id``. */
+export type DetectionBox = {
+  xmin: number;
+  xmax: number;
+  ymin: number;
+  ymax: number;
+  zmin: number;
+  zmax: number;
+  frame_id: string;
+};
+
+/** Everything that one robot saw at one moment, faint detections included. */
+export type DetectionFrame = {
+  robot_id: string;
+  stamp: string | null;
+  road: string;
+  age_s: number;
+  items: Detection[];
+};
+
+/** One drill and its verdict. */
+export type Drill = {
+  robot_id: string;
+  command_id: string;
+  drilled_at: string;
+  by: string;
+  /** Standing in time; null while it may still come true. */
+  passed: boolean | null;
+  standstill_ms: number | null;
+  command: Command;
+};
+
+/** What a robot finds wrong with its own data. */
+export type Fault = {
+  code: string;
+  about: string;
+  for_s: number | null;
+};
+
+/** A fleet STOP: one command a robot. */
+export type FleetPressed = {
+  commands: Pressed[];
+};
+
+/** How many alerts sounded within the window; ``since`` null: no flood. */
+export type Flood = {
+  count: number;
+  limit: number;
+  window_s: number;
+  since: string | null;
+};
+
+/** The greenhouse as the page draws it. */
+export type GreenhouseMap = {
+  name: string;
+  bounds: Area;
+  lanes: Lane[];
+  rows: Area[];
+  posts: Post[];
+  obstacles: Obstacle[];
+};
+
+/** Whether the data path is whole, what was counted, how the fleet is told. */
+export type Health = {
+  ok: boolean;
+  hops: Hop[];
+  counters: Record<string, number>;
+  safety: Safety;
+  /** What an earlier run left open. */
+  earlier: "known" | "reading" | "unknown";
+};
+
+/** A reason why a robot may not move. */
+export type Hold = {
+  id: string;
+  source: string;
+  ack: string;
+};
+
+/** One hop of the data path from robot to screen. */
+export type Hop = {
+  hop: string;
+  state: "ok" | "late" | "down" | "unknown";
+  age_s: number | null;
+  key: string;
+  detail: string;
+  /** How late measures pass it, at least. */
+  lag_s: number | null;
+  growing: boolean;
+};
+
+export type JsonValue = unknown;
+
+/** Where robots drive. */
+export type Lane = {
+  xmin: number;
+  ymin: number;
+  xmax: number;
+  ymax: number;
+  label: string;
+};
+
+/** One aisle in cells: rows from the south, each from west to east. */
+export type LaneCoverage = {
+  xmin: number;
+  ymin: number;
+  xmax: number;
+  ymax: number;
+  label: string;
+  columns: number;
+  rows: number;
+  /** Whole seconds since a camera last looked at a cell; null: never. */
+  ages_s: (number | null)[];
+};
+
+/** How long the newest STOPs of a range took. */
+export type Latency = {
+  since: string;
+  until: string;
+  robots: RobotLatency[];
+};
+
+/** Times of one step (ms); null where nothing was measured. */
+export type LatencySpread = {
+  count: number;
+  p50_ms: number | null;
+  p95_ms: number | null;
+  max_ms: number | null;
+};
+
+/** One line of the action and inference log. */
+export type LogEntry = {
+  id: number;
+  at: string;
+  kind: string;
+  robot_id: string | null;
+  key: string;
+  slots: Record<string, string | boolean | number | null>;
+  class: string | null;
+  decision_id: string | null;
+};
+
+/** The gap to a person less what stopping takes; shown, never acted on. */
+export type Margin = {
+  robot_id: string;
+  person_id: string;
+  /** Between surfaces. */
+  gap_m: number;
+  needs_m: number;
+  margin_m: number;
+  band: "clear" | "tight" | "inside" | "unknown";
+  parts: MarginParts;
+  /** Of the older position. */
+  age_s: number;
+  /** Counted on (m/s²). */
+  braking: number;
+  /** Counted on (m/s). */
+  walking_speed: number;
+};
+
+/** What stopping takes, term by term (m). */
+export type MarginParts = {
+  person_walks_m: number;
+  reaction_m: number;
+  braking_m: number;
+  uncertainty_m: number;
+};
+
+/** The robot's intent, in ``map`` (m). */
+export type Navigation = {
+  task: string;
+  goal: Point | null;
+  path: [number, number][];
+};
+
+/** How much of today's known time some margin was below zero (0 to 1). */
+export type NegativeMargin = {
+  share: number | null;
+  known_s: number;
+  unknown_s: number;
+  count: number;
+  since: string | null;
+  age_s: number | null;
+};
+
+/** Alerts that a robot did not answer in time, of those that it should have. */
+export type NotEchoed = {
+  count: number;
+  of: number;
+  within_s: number;
+  window_s: number;
+  age_s: number | null;
+};
+
+/** What stands in the way. */
+export type Obstacle = {
+  xmin: number;
+  ymin: number;
+  xmax: number;
+  ymax: number;
+  kind: string;
+};
+
+/** One time that an alert was raised. */
+export type Occurrence = {
+  priority: "P1" | "P2" | "P3";
+  raised_at: string;
+  cleared_at: string | null;
+  acknowledged_at: string | null;
+  acknowledged_by: string | null;
+  note: string | null;
+};
+
+/** A person, or a robot that is none of the fleet. */
+export type Person = {
+  person_id: string;
+  class: "person" | "robot";
+  /** As the detector said. */
+  class_id: string;
+  stage: "seen" | "remembered" | "last_seen" | "gone";
+  position: Position;
+  /** Of the widest ring. */
+  radius_m: number | null;
+  confidence: number;
+  first_seen: string;
+  last_seen: string;
+  age_s: number;
+  observers: string[];
+  /** Below the threshold but seen again and again. */
+  possible: boolean;
+  /** Seen beyond the walls: the position is its observer's. */
+  doubtful: boolean;
+  /** Of the newest slow-down for it that goes on. */
+  decision_id: string | null;
+  lane: string | null;
+  acting: Acting[];
+  margin: Margin | null;
+};
+
+/** A place in ``map`` (m). */
+export type Point = {
+  x: number;
+  y: number;
+};
+
+/** Pose of ``base_link`` in ``map``. */
+export type Pose = {
+  x: number;
+  y: number;
+  yaw: number;
+};
+
+/** A place in ``map`` with its height (m). */
+export type Position = {
+  x: number;
+  y: number;
+  z: number;
+};
+
+/** A round thing (m). */
+export type Post = {
+  x: number;
+  y: number;
+  radius: number;
+};
+
+/** A STOP, release or resume that was accepted. */
+export type Pressed = {
+  robot_id: string;
+  command_id: string;
+  state: string;
+};
+
+/** What is known of this kind of robot (m, m/s). */
+export type Profile = {
+  drive: string;
+  length: number;
+  width: number;
+  max_speed: number;
+  turning_radius: number;
+};
+
+/** One reading: the sensor's own fields by name. */
+export type Reading = {
+  at: string;
+  robot_id: string;
+  kind: string;
+  value: Record<string, JsonValue>;
+};
+
+/** One robot with the age of what is said of it. */
+export type Robot = {
+  robot_id: string;
+  link: "UNKNOWN" | "LIVE" | "LATE" | "LOST";
+  /** What the robot has just said; while it says nothing, what it was told. */
+  mode: "RUNNING" | "SLOW" | "STOPPED";
+  pose: Pose | null;
+  twist: Twist | null;
+  /** As the robot sent it. */
+  stamp: string | null;
+  received_at: string | null;
+  /** At most; null while nobody knows. */
+  age_s: number | null;
+  age_estimated: boolean;
+  /** What the robot says it applies. */
+  speed_factor: number | null;
+  applied: Applied | null;
+  mandate: SpeedLimit;
+  holds: Hold[];
+  stop: Command | null;
+  stop_state: string;
+  navigation: Navigation | null;
+  replay: boolean;
+  clock_offset_s: number | null;
+  /** Of the newest detections. */
+  road: string;
+  /** That feeds the pose. */
+  transport: "direct" | "fiware";
+  profile: Profile;
+  margin: Margin | null;
+  /** The agent's opinion, never believed. */
+  cmd_status: string | null;
+  battery: Battery | null;
+};
+
+/** One robot's STOPs: how many, and each step from the press on. */
+export type RobotLatency = {
+  robot_id: string;
+  stops: number;
+  accepted: LatencySpread;
+  sent_direct: LatencySpread;
+  sent_fiware: LatencySpread;
+  answer_direct: LatencySpread;
+  answer_fiware: LatencySpread;
+  standing: LatencySpread;
+};
+
+/** One version of the detection rule. */
+export type Rule = {
+  id: string;
+  version: number;
+  /** 0 to 1, inclusive; ``class_thresholds`` by class. */
+  confidence_threshold: number;
+  class_thresholds: Record<string, number>;
+  radius_m: number;
+  factor: number;
+  /** A detector's word → the class that it stands for. */
+  aliases: Record<string, "person" | "robot">;
+  possible_people: boolean;
+  author: string;
+  since: string | null;
+};
+
+/** How soon the fleet obeys and how close it comes to people; never "safe". */
+export type Safety = {
+  alert_latency: AlertLatency;
+  not_echoed: NotEchoed;
+  negative_margin: NegativeMargin;
+  worst_margin: WorstMargin;
+};
+
+/** One sweep: points in ``map`` (m). */
+export type Scan = {
+  robot_id: string;
+  stamp: string | null;
+  frame_id: string;
+  points: [number, number][];
+};
+
+/** The name of a template and what fills its holes. */
+export type Sentence = {
+  key: string;
+  slots: Record<string, string | boolean | number | null>;
+};
+
+/** Which iVeg speaks. */
+export type Server = {
+  /** Random, new at each start. */
+  boot: string;
+  version: string;
+  demo: boolean;
+  /** Its clock (Unix s). */
+  wall: number;
+};
+
+/** The first frame of ``/live``. */
+export type Snapshot = {
+  t: string;
+  server: Server;
+  user: User;
+  rule: Rule;
+  map: GreenhouseMap;
+  robots: Robot[];
+  people: Person[];
+  detections: Record<string, DetectionFrame>;
+  /** Those that go on. */
+  commands: Command[];
+  alerts: Alert[];
+  flood: Flood;
+  /** The newest 200, oldest first. */
+  log: LogEntry[];
+  health: Health;
+  climate: Climate | null;
+};
+
+/** What iVeg tells the robot; the key is ``mandate``. */
+export type SpeedLimit = {
+  speed_factor: number;
+  reason: string;
+  cause: string | null;
+  distance_m: number | null;
+  decision_id: string | null;
+};
+
+/** Speed (m/s) and turn rate (rad/s). */
+export type Twist = {
+  linear: number;
+  angular: number;
+};
+
+/** Who is signed in. */
+export type User = {
+  name: string;
+  role: string;
+};
+
+/** The least margin of today, when it was, and of how many looks. */
+export type WorstMargin = {
+  margin: Margin | null;
+  at: string | null;
+  count: number;
+  since: string | null;
+  age_s: number | null;
+};

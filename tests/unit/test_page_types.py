@@ -1,0 +1,31 @@
+"""The page's types are those of the models, and name what the server sends."""
+
+from iveg.models.typescript import TOLD, write_types
+from tests.processes import ROOT
+
+TYPES = ROOT / "iveg/static/js/types.d.ts"
+
+
+def test_the_pages_types_are_fresh() -> None:
+    stale = "python -m iveg.models.typescript"
+
+    assert TYPES.read_text() == write_types(), stale
+
+
+def test_a_field_of_a_model_is_a_member_of_its_type() -> None:
+    written = write_types()
+
+    for model in TOLD:
+        declared = written.split(f"export type {model.__name__} = {{")[1].split("};")[0]
+        for name, field in model.model_fields.items():
+            assert f"  {field.serialization_alias or name}: " in declared
+
+
+def test_null_lists_words_and_maps_are_written_as_typescript_has_them() -> None:
+    written = write_types()
+
+    assert 'mode: "RUNNING" | "SLOW" | "STOPPED";' in written
+    assert "points: [number, number][];" in written
+    assert "detections: Record<string, DetectionFrame>;" in written
+    assert 'class: "person" | "robot";' in written
+    assert "climate: Climate | null;" in written
