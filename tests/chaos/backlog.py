@@ -7,12 +7,12 @@ measures a second on two cores, then seconds and minutes of delay).
 
 import asyncio
 import contextlib
-import threading
 from collections import deque
 from dataclasses import dataclass
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import HopError
+from tests.threads import running
 
 _MEASURES, _ANSWERS, _COMMANDS = "/+/+/attrs", "/+/+/cmdexe", "/+/+/cmd"
 _STEP_S = 0.005
@@ -53,27 +53,19 @@ class Backlog:
         up = {_MEASURES: 1, _ANSWERS: 1}
         self._field = MqttLink(field, "backlog field", up, self._from_field)
         self._south = MqttLink(south, "backlog south", {_COMMANDS: 0}, self._from_south)
-        self._thread = threading.Thread(target=self._run, name="backlog")
+        self._life = contextlib.ExitStack()
 
     def __enter__(self) -> "Backlog":
-        self._loop = asyncio.new_event_loop()
-        self._task = self._loop.create_task(self._serve())
-        self._thread.start()
+        self._life.enter_context(running(self._serve(), "backlog"))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._task.cancel)
-        self._thread.join(10)
-        self._loop.close()
+        self._life.close()
 
     @property
     def waiting(self) -> int:
         """Messages in the queue."""
         return len(self._queue)
-
-    def _run(self) -> None:
-        with contextlib.suppress(asyncio.CancelledError):
-            self._loop.run_until_complete(self._task)
 
     async def _serve(self) -> None:
         async with asyncio.TaskGroup() as tasks:
@@ -82,16 +74,16 @@ class Backlog:
             tasks.create_task(self._carry_forever())
 
     def _from_field(self, topic: str, payload: bytes) -> None:
-        self._queue.append((self._loop.time(), self._south, topic, payload))
+        self._queue.append((_now(), self._south, topic, payload))
 
     def _from_south(self, topic: str, payload: bytes) -> None:
-        self._queue.append((self._loop.time(), self._field, topic, payload))
+        self._queue.append((_now(), self._field, topic, payload))
 
     async def _carry_forever(self) -> None:
-        credit, at = 0.0, self._loop.time()
+        credit, at = 0.0, _now()
         while True:
             await asyncio.sleep(_STEP_S)
-            now, pace = self._loop.time(), self.pace
+            now, pace = _now(), self.pace
             credit = min(credit + (now - at) * pace.per_s, max(1.0, pace.per_s / 20))
             at = now
             while credit >= 1.0 and self._is_due(now, pace):
@@ -108,3 +100,7 @@ class Backlog:
         with contextlib.suppress(HopError):
             await link.publish(topic, payload, qos=0)
         self.carried += 1
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()

@@ -9,9 +9,10 @@ says, packet by packet; this one spoils the connection, in both directions.
 import asyncio
 import contextlib
 import socket
-import threading
 from dataclasses import dataclass
 from random import Random
+
+from tests.threads import running
 
 _CHUNK = 65_536
 _RESET_EVERY_S = 2.0
@@ -77,22 +78,14 @@ class Radio:
         self._carrying: set[asyncio.Task[None]] = set()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
-        self._thread = threading.Thread(target=self._run, name="radio")
+        self._life = contextlib.ExitStack()
 
     def __enter__(self) -> "Radio":
-        self._loop = asyncio.new_event_loop()
-        self._task = self._loop.create_task(self._serve())
-        self._thread.start()
+        self._life.enter_context(running(self._serve(), "radio"))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._task.cancel)
-        self._thread.join(10)
-        self._loop.close()
-
-    def _run(self) -> None:
-        with contextlib.suppress(asyncio.CancelledError):
-            self._loop.run_until_complete(self._task)
+        self._life.close()
 
     async def _serve(self) -> None:
         server = await asyncio.start_server(self._accept, sock=self._listener)
@@ -145,7 +138,7 @@ class Radio:
         try:
             while piece := await source.read(_CHUNK):
                 await asyncio.sleep(self.weather.repeat(self._rnd))
-                free = max(free, self._loop.time())
+                free = max(free, _now())
                 free += len(piece) / self.weather.bytes_per_s
                 last = max(last, free + self.weather.delay(self._rnd))
                 await pieces.put((last, piece))
@@ -162,9 +155,13 @@ class Radio:
     ) -> None:
         while True:
             due, piece = await pieces.get()
-            await asyncio.sleep(max(0.0, due - self._loop.time()))
+            await asyncio.sleep(max(0.0, due - _now()))
             if not piece or sink.is_closing():
                 return
             with contextlib.suppress(OSError):
                 sink.write(piece)
                 await sink.drain()
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()

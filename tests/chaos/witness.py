@@ -1,14 +1,13 @@
 """A witness on the field broker: what robots do, beside what people allowed them."""
 
-import asyncio
 import contextlib
-import threading
 from dataclasses import dataclass, field
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Odometry, SafetyReport
 from iveg.ngsi import codec
+from tests.threads import running
 
 
 @dataclass
@@ -41,18 +40,14 @@ class Witness:
         topics = {"/iveg/+/attrs": 0, "/+/iveg/odom": 0, "/+/iveg/safety": 0}
         address = BrokerAddress("127.0.0.1", self.port)
         self._link = MqttLink(address, "witness", topics, self.take)
-        self._thread = threading.Thread(target=self._run, name="witness")
+        self._life = contextlib.ExitStack()
 
     def __enter__(self) -> "Witness":
-        self._loop = asyncio.new_event_loop()
-        self._task = self._loop.create_task(self._link.run())
-        self._thread.start()
+        self._life.enter_context(running(self._link.run(), "witness"))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._task.cancel)
-        self._thread.join(10)
-        self._loop.close()
+        self._life.close()
 
     def of(self, robot_id: str) -> Seen:
         return self.robots.setdefault(robot_id, Seen())
@@ -69,10 +64,6 @@ class Witness:
     @property
     def starts(self) -> int:
         return sum(one.starts for one in self.robots.values())
-
-    def _run(self) -> None:
-        with contextlib.suppress(asyncio.CancelledError):
-            self._loop.run_until_complete(self._task)
 
     def take(self, topic: str, payload: bytes) -> None:
         """One message of the field broker."""

@@ -7,7 +7,6 @@ obeys slowly, never, only in words, or for a while.
 import asyncio
 import contextlib
 import secrets
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +22,7 @@ from iveg.ngsi.codec import format_stamp, read_feedback
 from iveg.ngsi.codec.fields import write_origin
 from iveg.robot.echo import Echo
 from tests.processes import Site, site
+from tests.threads import running
 
 _APIKEY = "iveg"
 _EVERY_S = 0.1
@@ -179,18 +179,5 @@ def stage(directory: Path, **settings: str) -> Iterator[tuple[Site, Puppet]]:
 def puppet(robot_id: str, mqtt_url: str) -> Iterator[Puppet]:
     """A robot that lives as long as the block."""
     found = Puppet(robot_id, BrokerAddress.from_url(mqtt_url))
-    loop = asyncio.new_event_loop()
-    living = loop.create_task(found.live())
-
-    def run() -> None:
-        with contextlib.suppress(asyncio.CancelledError):
-            loop.run_until_complete(living)
-
-    thread = threading.Thread(target=run, name=robot_id)
-    thread.start()
-    try:
+    with running(found.live(), robot_id):
         yield found
-    finally:
-        loop.call_soon_threadsafe(living.cancel)
-        thread.join(10)
-        loop.close()

@@ -15,6 +15,7 @@ from typing import Literal
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import HopError
+from tests.threads import running
 
 Mood = Literal["open", "shut", "slow", "hanging", "angry", "mad", "odd"]
 SLOW_S = 2.0
@@ -211,24 +212,8 @@ def bridge(
     front: BrokerAddress, behind: BrokerAddress, per_s: float | None = None
 ) -> Iterator[None]:
     """A bridge that runs in a thread of its own."""
-    started = threading.Event()
-    held: list[tuple[asyncio.AbstractEventLoop, asyncio.Task[None]]] = []
-
-    async def run() -> None:
-        work = asyncio.create_task(Bridge(front, behind, per_s).run())
-        held.append((asyncio.get_running_loop(), work))
-        started.set()
-        await asyncio.gather(work, return_exceptions=True)
-
-    thread = threading.Thread(target=asyncio.run, args=(run(),), daemon=True)
-    thread.start()
-    started.wait(10.0)
-    try:
+    with running(Bridge(front, behind, per_s).run(), "bridge"):
         yield
-    finally:
-        loop, work = held[0]
-        loop.call_soon_threadsafe(work.cancel)
-        thread.join(10.0)
 
 
 @contextmanager
