@@ -36,24 +36,16 @@ from iveg.domain.alerts import Rule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.latency.hops import WINDOW_S
-from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.domain.stop.drills import Drills
-from iveg.domain.world import World
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
-from iveg.pipeline.assess import Assessor
-from iveg.pipeline.command import Commander
+from iveg.pipeline.build import Choices, Doors, build
 from iveg.pipeline.earlier import remember
-from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.latency import LatencyMonitor, hours_of
-from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.latency import hours_of
 from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.publish import Hub
 from iveg.pipeline.rules import Rules
 from iveg.pipeline.watching import Watch
 from iveg.settings import Settings
@@ -123,30 +115,15 @@ class Dss:
         directory = data_directory if beside is None else beside.parent
         directory.mkdir(parents=True, exist_ok=True)
 
-        self.hub = Hub()
         self.recorder = Recorder(url, journal_file(url, directory))
         self.queries = Queries(url)
-        self.minutes = Minutes(self.hub, self.recorder, start)
-        self.chain = HealthMonitor(start)
-        world = World(self.fleet, self.chain.probe)
-        self.latency = LatencyMonitor(
-            LatencyWatch(world.robots, world.ledger.composed_at),
-            self.recorder,
-            self.minutes,
-        )
-        self.ingest = Ingest(
-            world.robots.__contains__,
-            self._rejected,
-            world.is_past,
-            self.latency.watch.arrived,
-        )
         self.journal = FileJournal(directory / "commands.jsonl")
         self._direct = DirectReader(
             settings.apikey,
             self.fleet.ids,
             clock.now,
-            self.ingest.offer,
-            self.ingest.reject,
+            lambda received: self.ingest.offer(received),
+            lambda *told: self.ingest.reject(*told),
             settings.direct_read,
         )
         self.link = MqttLink(
@@ -163,7 +140,6 @@ class Dss:
         self.agent = IotAgentClient(
             settings.iota_url, settings.fiware_service, settings.fiware_servicepath
         )
-        road = MqttRoad(self.link, settings.apikey)
         rule_store = FileRules(directory / "rules.jsonl")
         versions = rule_store.load(
             Rule(
@@ -172,44 +148,32 @@ class Dss:
             ),
             start,
         )
-        self.assessor = Assessor(
-            world,
+        parts = build(
+            self.fleet,
             load_greenhouse(settings.greenhouse),
-            versions[-1],
-            road,
-            self.minutes,
-            self.hub,
-            new_id,
-            format_stamp,
-            self._boot,
-            self.chain.probe.lag,
+            Doors(
+                MqttRoad(self.link, settings.apikey),
+                OrionRoad(self.orion),
+                self.journal,
+                self.recorder,
+                clock.now,
+                new_id,
+                format_stamp,
+                self._rejected,
+                lambda: self.recorder.health(clock.now()).state,
+            ),
+            Choices(
+                versions[-1],
+                settings.stop_direct,
+                Drills(settings.drill_days),
+                self._boot,
+            ),
         )
+        self.hub, self.minutes, self.chain = parts.hub, parts.minutes, parts.chain
+        self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
+        self.assessor, self.commander = parts.assessor, parts.commander
+        world = parts.world
         self.rules = Rules(self.assessor, rule_store, self.minutes, versions)
-        self.commander = Commander(
-            self.fleet.ids,
-            road,
-            OrionRoad(self.orion),
-            self.journal,
-            self.minutes,
-            self.hub,
-            new_id,
-            clock.now,
-            direct=settings.stop_direct,
-            drills=Drills(settings.drill_days),
-            agent_lag_s=self.chain.probe.lag,
-            fiware_is_cut=self.chain.is_cut,
-        )
-        self.loop = RuleLoop(
-            self.ingest,
-            self.assessor,
-            self.commander,
-            self.chain,
-            self.minutes,
-            self.hub,
-            clock.now,
-            lambda: self.recorder.health(clock.now()).state,
-            self.latency,
-        )
         self.provisioner = Provisioner(
             self.orion,
             self.agent,

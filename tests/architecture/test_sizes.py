@@ -45,7 +45,6 @@ LARGE_FUNCTIONS = {
     "iveg/static/js/socket.js connect": STATE,
     "iveg/static/js/store.js createStore": STATE,
     "iveg/web/views.py Views.robot": TABLE,
-    "tests/unit/pipeline/desk.py Desk.__init__": LIST,
 }
 LARGE_CLOSURES = {
     "iveg/static/js/map.js createMap": STATE,

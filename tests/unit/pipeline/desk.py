@@ -5,10 +5,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from iveg.domain.alerts import Rule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import (
     CommandAnswer,
     Detection,
@@ -18,18 +16,9 @@ from iveg.domain.observations import (
     Received,
     Road,
 )
-from iveg.domain.world import World
 from iveg.ngsi.codec import format_stamp
-from iveg.pipeline.assess import Assessor
-from iveg.pipeline.command import Commander
-from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.latency import LatencyMonitor
-from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.publish import Hub
+from iveg.pipeline.build import Choices, Doors, build
 from tests.builders import (
-    START,
     detection_frame,
     fleet_of,
     odometry,
@@ -65,55 +54,29 @@ class Desk:
         self.journal = FakeJournal()
         self.ids = FakeIds()
         self.sink = FakeRecorder()
-        self.hub = Hub()
-        self.minutes = Minutes(self.hub, self.sink, START)
-        self.description = fleet_of(*robots)
-        self.world = World(self.description)
         self.rejected: list[tuple[str, str]] = []
-        watch = LatencyWatch(robots, self.world.ledger.composed_at)
-        self.latency = LatencyMonitor(watch, self.sink, self.minutes)
-        self.ingest = Ingest(
-            self.world.robots.__contains__,
-            lambda source, reason: self.rejected.append((source, reason)),
-            passed=watch.arrived,
-        )
-        self.chain = HealthMonitor(START)
-        self.assessor = Assessor(
-            self.world,
+        self.description = fleet_of(*robots)
+        parts = build(
+            self.description,
             house,
-            Rule(),
-            self.fleet,
-            self.minutes,
-            self.hub,
-            self.ids,
-            format_stamp,
-            "iveg-boot",
-            self.chain.probe.lag,
+            Doors(
+                self.fleet,
+                self.broker,
+                self.journal,
+                self.sink,
+                self.clock,
+                self.ids,
+                format_stamp,
+                lambda source, reason: self.rejected.append((source, reason)),
+                agent_lag_s=lambda _: self.lag_s,
+                fiware_is_cut=lambda _: self.is_cut,
+            ),
+            Choices(direct=direct),
         )
-        self.commander = Commander(
-            self.description.ids,
-            self.fleet,
-            self.broker,
-            self.journal,
-            self.minutes,
-            self.hub,
-            self.ids,
-            self.clock,
-            direct=direct,
-            agent_lag_s=lambda _: self.lag_s,
-            fiware_is_cut=lambda _: self.is_cut,
-        )
-        self.loop = RuleLoop(
-            self.ingest,
-            self.assessor,
-            self.commander,
-            self.chain,
-            self.minutes,
-            self.hub,
-            self.clock,
-            lambda: "ok",
-            self.latency,
-        )
+        self.hub, self.minutes, self.chain = parts.hub, parts.minutes, parts.chain
+        self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
+        self.assessor, self.commander = parts.assessor, parts.commander
+        self.world = parts.world
         self.seq = 0
 
     # --- what arrives -------------------------------------------------------------

@@ -1,0 +1,138 @@
+"""Puts the pipeline together: what iVeg is between its doors, running or in a test."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from iveg.domain.alerts import Rule
+from iveg.domain.fleet import FleetDescription
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.observations import Instant
+from iveg.domain.stop.drills import Drills
+from iveg.domain.world import World
+from iveg.pipeline.assess import Assessor
+from iveg.pipeline.command import Commander
+from iveg.pipeline.health_monitor import HealthMonitor, HopState
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.latency import LatencyMonitor
+from iveg.pipeline.loop import RuleLoop
+from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.ports import ContextBroker, Fleet, Journal
+from iveg.pipeline.publish import Hub
+from iveg.pipeline.record import RecordSink
+
+
+@dataclass(frozen=True, slots=True)
+class Doors:
+    """What the pipeline reaches of the outside.
+
+    Attributes:
+        fleet: Straight to the robots.
+        context_broker: To them through FIWARE.
+        journal: What is wanted of each robot, on disk.
+        sink: The history.
+        clock: The time.
+        new_id: A new id, sortable by time.
+        stamp: Writes a time (Unix s) as robots read it.
+        rejected: Told of each new kind of message that cannot be used.
+        history_state: How the history does.
+        agent_lag_s: How far the IoT Agent is behind; None asks the probe.
+        fiware_is_cut: Whether orders get nowhere there; None asks the health monitor.
+    """
+
+    fleet: Fleet
+    context_broker: ContextBroker
+    journal: Journal
+    sink: RecordSink
+    clock: Callable[[], Instant]
+    new_id: Callable[[], str]
+    stamp: Callable[[float], str]
+    rejected: Callable[[str, str], None] | None = None
+    history_state: Callable[[], HopState] = lambda: "ok"
+    agent_lag_s: Callable[[Instant], float | None] | None = None
+    fiware_is_cut: Callable[[Instant], bool] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """What an operator chose of it.
+
+    Attributes:
+        direct: Whether STOP also goes straight to the robots.
+        boot: This life of iVeg, in what it tells.
+    """
+
+    rule: Rule = field(default_factory=Rule)
+    direct: bool = True
+    drills: Drills | None = None
+    boot: str = "iveg-boot"
+
+
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """The parts, each by its name; nothing runs until ``loop.run()``."""
+
+    hub: Hub
+    minutes: Minutes
+    chain: HealthMonitor
+    world: World
+    latency: LatencyMonitor
+    ingest: Ingest
+    assessor: Assessor
+    commander: Commander
+    loop: RuleLoop
+
+
+def build(
+    fleet: FleetDescription, house: Greenhouse, doors: Doors, choices: Choices
+) -> Pipeline:
+    """All parts, wired."""
+    start, hub = doors.clock(), Hub()
+    minutes = Minutes(hub, doors.sink, start)
+    chain = HealthMonitor(start)
+    world = World(fleet, chain.probe)
+    watch = LatencyWatch(world.robots, world.ledger.composed_at)
+    latency = LatencyMonitor(watch, doors.sink, minutes)
+    ingest = Ingest(
+        world.robots.__contains__, doors.rejected, world.is_past, watch.arrived
+    )
+    assessor = Assessor(
+        world,
+        house,
+        choices.rule,
+        doors.fleet,
+        minutes,
+        hub,
+        doors.new_id,
+        doors.stamp,
+        choices.boot,
+        chain.probe.lag,
+    )
+    commander = Commander(
+        fleet.ids,
+        doors.fleet,
+        doors.context_broker,
+        doors.journal,
+        minutes,
+        hub,
+        doors.new_id,
+        doors.clock,
+        direct=choices.direct,
+        drills=choices.drills,
+        agent_lag_s=doors.agent_lag_s or chain.probe.lag,
+        fiware_is_cut=doors.fiware_is_cut or chain.is_cut,
+    )
+    loop = RuleLoop(
+        ingest,
+        assessor,
+        commander,
+        chain,
+        minutes,
+        hub,
+        doors.clock,
+        doors.history_state,
+        latency,
+    )
+    return Pipeline(
+        hub, minutes, chain, world, latency, ingest, assessor, commander, loop
+    )
