@@ -6,9 +6,15 @@ RUN := $(VENV)/.run
 DEV := $(VENV)/.dev
 BENCH := $(VENV)/.bench
 # A module of tests and what it starts stay together; most of its time is waiting.
-WORKERS ?= 2
-SIDE_BY_SIDE := -n $(WORKERS) --dist loadscope --no-loadscope-reorder
+WORKERS ?= 3
+quick: WORKERS = 2
+# A worker that dies ends the run: loadscope would wait for it for ever.
+SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
+# No end for a test that takes hours.
+FOR_HOURS := -o faulthandler_timeout=0
 export PYTHONPATH := $(CURDIR)
+# Tests are compiled once, not in each worker of each run.
+export PYTHONDONTWRITEBYTECODE :=
 
 .NOTPARALLEL:
 .PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos mutants soak migration lock clean
@@ -16,13 +22,13 @@ export PYTHONPATH := $(CURDIR)
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
 test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
-quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
+quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 IVEG_STOP_LIVES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check
 bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
-deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest tests/properties/test_stop.py
-chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py
+deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest $(FOR_HOURS) tests/properties/test_stop.py
+chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"

@@ -1,4 +1,8 @@
-"""The browser of the tests: the system's Chromium, or Playwright's own without one."""
+"""The browser of the tests: the system's Chromium, or Playwright's own without one.
+
+Chromium's headless shell is taken first: without the windows of the whole browser, a
+page opens at less than half the cost.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,6 +13,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 FLAGS = [
     "--no-sandbox",
+    "--disable-gpu",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
@@ -17,6 +22,9 @@ FLAGS = [
 
 def chromium() -> str | None:
     """Where the system's is; None without one, or where a snap confines it."""
+    shell = which("chromium-headless-shell")
+    if shell is not None:
+        return shell
     found = which("chromium")
     is_snap = found is not None and Path(found).resolve().name == "snap"
     return None if is_snap else found
@@ -27,7 +35,7 @@ def running_browser() -> Iterator[Browser]:
     """One that ends with the block.
 
     Playwright's synchronous driver keeps an event loop of its own in the thread, so it
-    lives for one module at a time and leaves asynchronous tests elsewhere alone.
+    ends before asynchronous tests begin elsewhere.
     """
     with sync_playwright() as playwright:
         found = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)

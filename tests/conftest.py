@@ -1,6 +1,7 @@
 """What all tests share."""
 
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -16,23 +17,55 @@ settings.register_profile("thorough", deadline=None, max_examples=2000)
 expect.set_options(timeout=20_000)
 settings.load_profile(os.environ.get("IVEG_HYPOTHESIS", "iveg"))
 
-_LONGEST_FIRST = ("chaos", "e2e", "integration", "properties", "contract", "unit")
-"""Where tests run side by side, no worker ends with the longest module alone."""
+_FOLDERS = ("chaos", "e2e", "integration", "properties", "contract", "unit")
+_BUSY = (
+    *("e2e/test_stop_states", "e2e/test_matrix", "e2e/test_pages"),
+    *("e2e/test_supervision", "e2e/test_stop", "e2e/test_live", "e2e/test_pacing"),
+    *(
+        "chaos/test_backlog",
+        "e2e/test_stop_restart",
+        "e2e/test_pictures",
+        "e2e/test_faults",
+    ),
+    *("e2e/test_probes", "e2e/test_stop_drills"),
+)
+_WAITING = (
+    *("integration/test_faults", "integration/test_overload"),
+    *("integration/test_scenarios", "integration/test_replay"),
+    *("chaos/test_ros2_kills", "integration/test_emulator", "chaos/test_network"),
+    *("integration/test_robot_node", "chaos/test_kills", "chaos/test_faults"),
+    *("integration/test_deploy", "integration/test_decisions"),
+    "integration/test_doctor",
+)
+"""The longest modules of both sorts, in falling order."""
+_FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
+"""So browsers run beside modules that wait for processes, and no worker ends with a
+long module alone."""
 _REAL = {"browser", "postgresql", "postgresql_url", "database_url"}
 """Fixtures that start programs."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what needs programs or a browser, and let the longest folders begin."""
+    """Mark what needs programs or a browser, and let the longest modules begin."""
     for item in items:
         if _folder(item) in ("chaos", "e2e", "integration") or _REAL & _fixtures(item):
             item.add_marker("real")
-    items.sort(key=lambda item: _LONGEST_FIRST.index(_folder(item)))
+    items.sort(key=_turn)
+
+
+def _turn(item: pytest.Item) -> tuple[int, int]:
+    name = str(_path(item).with_suffix(""))
+    first = _FIRST.index(name) if name in _FIRST else len(_FIRST)
+    return first, _FOLDERS.index(_folder(item))
 
 
 def _folder(item: pytest.Item) -> str:
-    found = item.path.relative_to(item.config.rootpath / "tests").parts[0]
-    return found if found in _LONGEST_FIRST else "unit"
+    found = _path(item).parts[0]
+    return found if found in _FOLDERS else "unit"
+
+
+def _path(item: pytest.Item) -> Path:
+    return item.path.relative_to(item.config.rootpath / "tests")
 
 
 def _fixtures(item: pytest.Item) -> set[str]:

@@ -42,6 +42,7 @@ LARGE_FUNCTIONS = {
     "iveg/robot/node.py RobotNode.__init__": LIST,
     "iveg/static/js/i18n.js createWords": STATE,
     "iveg/static/js/map.js createMap": STATE,
+    "iveg/static/js/panels/stop.js createStopPanel": STATE,
     "iveg/static/js/socket.js connect": STATE,
     "iveg/static/js/store.js createStore": STATE,
     "iveg/web/views.py Views.robot": TABLE,

@@ -13,9 +13,9 @@ from tests.processes import EMULATOR, Site, site
 OpenPage = Callable[..., Page]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
-    """The system's Chromium, or Playwright's own where there is none."""
+    """One for all modules in a row; each test has pages of its own, and closes them."""
     with running_browser() as found:
         yield found
 
@@ -84,11 +84,15 @@ def page(open_page: OpenPage) -> Page:
 
 
 @pytest.fixture
-def screens() -> Path:
-    """Where a test may leave pictures for people; only where they are asked for."""
-    folder = Path(os.environ.get("IVEG_SCREENS", "test-output/screens"))
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+def shoot() -> Callable[[Page, str], None]:
+    """Leaves a picture for people, where ``IVEG_SCREENS`` names a folder for them."""
+    wanted = os.environ.get("IVEG_SCREENS")
+
+    def take(page: Page, name: str) -> None:
+        if wanted:
+            page.screenshot(path=Path(wanted) / f"{name}.png", full_page=True)
+
+    return take
 
 
 def _listen(page: Page, complaints: list[str]) -> None:

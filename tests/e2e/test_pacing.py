@@ -21,7 +21,7 @@ from tests.processes import ROOT, Site, site
 pytestmark = pytest.mark.e2e
 
 ROBOTS = names(20)
-SECONDS = 6.0
+SECONDS = 3.0
 FAR = Weather(late_s=0.15, bytes_per_s=125_000)
 
 WATCH = """() => {

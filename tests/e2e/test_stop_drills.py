@@ -4,7 +4,7 @@ import hashlib
 import re
 import secrets
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -114,7 +114,7 @@ def test_a_robot_that_does_not_brake_fails_its_drill(page: Page, agv: Puppet) ->
 
 @pytest.mark.usefixtures("agv")
 def test_the_sheet_of_drills_prints_with_the_honest_sentence_and_a_line_to_sign(
-    page: Page, stack: Site, screens: Path
+    page: Page, stack: Site, shoot: Callable[[Page, str], None]
 ) -> None:
     page.goto(f"{stack.url}/commands")
     line = page.locator('[data-drills-of="AGV"]')
@@ -128,7 +128,7 @@ def test_the_sheet_of_drills_prints_with_the_honest_sentence_and_a_line_to_sign(
     expect(sheet).to_contain_text("No es una parada de emergencia ni está certificado")
     expect(sheet).to_contain_text("Nombre y firma:")
     expect(page.locator("#stops")).to_be_hidden()
-    page.screenshot(path=screens / "drills-on-paper.png", full_page=True)
+    shoot(page, "drills-on-paper")
 
 
 @pytest.mark.usefixtures("agv")

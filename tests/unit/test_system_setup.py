@@ -106,11 +106,12 @@ def test_on_debian_root_installs_what_is_missing_and_says_so_first(
     done = debian.set_up("venv", "test", "check")
 
     (said,) = done.stdout.splitlines()
-    assert "iVeg needs chromium mosquitto npm postgresql" in said
+    assert "iVeg needs chromium-headless-shell mosquitto npm postgresql" in said
     assert "IVEG_SETUP=off" in said
     assert done.returncode == 0
     assert debian.asked_of_apt()[-2].endswith(
-        "install -y --no-install-recommends chromium mosquitto npm postgresql"
+        "install -y --no-install-recommends "
+        "chromium-headless-shell mosquitto npm postgresql"
     )
 
 
@@ -211,7 +212,7 @@ def test_elsewhere_nothing_is_installed_and_one_line_names_what_and_how(
 
     (said,) = done.stderr.splitlines()
     assert done.returncode == 1
-    assert "chromium mosquitto" in said
+    assert "chromium-headless-shell mosquitto" in said
     assert "playwright install chromium" in said
     assert debian.asked_of_apt() == []
 

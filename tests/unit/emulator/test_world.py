@@ -48,6 +48,7 @@ def nearest_person(world: World, robot_id: str) -> float:
     return min(pose.distance_to(person.x, person.y) for person in world.people)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
     house = load_greenhouse(scenario_named(scenario).house)
@@ -62,6 +63,7 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
             assert min(gaps) > RADIUS_M
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robots", "house"),
     [
