@@ -54,6 +54,7 @@ from iveg.web import (
     commands,
     costmap,
     coverage,
+    day,
     health,
     history,
     latency,
@@ -381,6 +382,8 @@ def create_app(dss: Dss) -> FastAPI:
     app.include_router(robots.router(dss.views, clock.now))
     app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
     app.include_router(coverage.router(dss.watch, clock.now))
+    days = day.Days(dss.queries, dss.assessor.greenhouse, settings.drill_days)
+    app.include_router(day.router(days, drawn, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.assessor, clock.now))
     app.include_router(rule.router(dss.rules, clock.now))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from iveg.domain.alerts import Rule
+from iveg.models.day import Day
 from iveg.web.openapi import ApiDoc
 
 Theme = Literal["auto", "light", "dark", "sunlight"]
@@ -135,6 +136,22 @@ class DecisionPage:
 
 
 @dataclass(frozen=True, slots=True)
+class DayPage:
+    """``day.html``: one day of the fleet on one sheet.
+
+    Attributes:
+        day: What was, read from the history.
+        before: The day before, ``after`` the one after it, as ISO dates.
+    """
+
+    template: ClassVar[str] = "day.html"
+    frame: Frame
+    day: Day
+    before: str
+    after: str
+
+
+@dataclass(frozen=True, slots=True)
 class DocsPage:
     """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
 
@@ -186,6 +203,7 @@ class ErrorPage:
 
 Page = (
     LivePage
+    | DayPage
     | HistoryPage
     | AlertsPage
     | CommandsPage

@@ -24,6 +24,7 @@ from iveg.adapters.history.tables import (
     latency,
     log,
 )
+from iveg.domain.day import Pose, Seen
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
@@ -229,6 +230,13 @@ class Queries:
     ) -> tuple[series.SpeedSeries, ...]:
         """Speed and factors of each robot over a range, at most 2,000 points each."""
         return await self._ask(lambda c: series.speed_series(c, since, until, robot))
+
+    async def day_series(
+        self, since: float, until: float
+    ) -> tuple[tuple[Pose, ...], tuple[Seen, ...]]:
+        """Where robots and people were in each second of a range."""
+        poses = await self._ask(lambda c: series.poses_of(c, since, until))
+        return poses, await self._ask(lambda c: series.people_seen(c, since, until))
 
     async def climate_series(self, since: float, until: float) -> series.ClimateSeries:
         """The air over a range, at most 288 points."""

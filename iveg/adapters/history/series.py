@@ -20,6 +20,7 @@ from sqlalchemy import (
 
 from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.tables import climate, commands, detections, odometry
+from iveg.domain.day import Pose, Seen
 from iveg.domain.records import CommandRecord
 
 _Point = tuple[Any, ...]
@@ -143,6 +144,39 @@ def climate_series(
 def _climate(rows: list[_Point], slice_s: float) -> ClimateSeries:
     at, warm, humid, co2 = zip(*rows, strict=True) if rows else ((),) * 4
     return ClimateSeries(at, warm, humid, co2, slice_s)
+
+
+def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
+    """Where robots were in each second of ``since <= at < until``, in order."""
+    c = odometry.c
+    second = _whole(connection, c.at)
+    wanted = (
+        select(
+            c.robot_id,
+            second,
+            func.avg(c.x),
+            func.avg(c.y),
+            func.avg(func.abs(c.linear)),
+        )
+        .where(c.at >= since, c.at < until)
+        .group_by(c.robot_id, second)
+        .order_by(second)
+    )
+    return tuple(Pose(*row) for row in connection.execute(wanted))
+
+
+def people_seen(connection: Connection, since: float, until: float) -> tuple[Seen, ...]:
+    """Where people were seen for sure in each second of ``since <= at < until``."""
+    c = detections.c
+    second = _whole(connection, c.at)
+    wanted = (
+        select(second, func.avg(c.x), func.avg(c.y), c.robot_id)
+        .where(c.at >= since, c.at < until, c.confident, c.class_ == "person")
+        # Two people of one second must not become one between them.
+        .group_by(c.robot_id, c.person_id, second)
+        .order_by(second)
+    )
+    return tuple(Seen(*row) for row in connection.execute(wanted))
 
 
 def confidence_counts(

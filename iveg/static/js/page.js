@@ -28,6 +28,7 @@ const ROUTES = {
   latency: () => import("./pages/hops.js"),
   settings: () => import("./pages/settings.js"),
   decision: () => import("./pages/decision.js"),
+  day: () => import("./pages/day.js"),
   about: () => import("./pages/about.js"),
 };
 

@@ -1,0 +1,58 @@
+"""The evening sheet: one day of the fleet (docs/interfaces.md §5)."""
+
+from iveg.models.base import Model
+from iveg.models.command import Command
+from iveg.models.places import GreenhouseMap, Point
+
+
+class Worked(Model):
+    """Minutes that one robot drove in one aisle."""
+
+    lane: str
+    robot_id: str
+    minutes: float
+
+
+class Slowed(Model):
+    """Minutes of robots slowed, by what slowed them and the aisle that it was in."""
+
+    cause: str
+    """``person`` or ``robot``."""
+    lane: str | None
+    """Null: outside the aisles, or unknown."""
+    minutes: float
+
+
+class Pass(Model):
+    """A moving robot near a person; positions are means over a second."""
+
+    at: str
+    robot_id: str
+    distance_m: float
+    """Between the middles of both."""
+    speed: float
+    robot: Point
+    person: Point
+    lane: str | None
+
+
+class Day(Model):
+    """What the fleet did on one day, Europe/Madrid, and what is due on the next."""
+
+    day: str
+    """ISO date."""
+    since: str
+    until: str
+    """The end of the day, or the moment of asking while it goes on."""
+    robots: list[str]
+    worked: list[Worked]
+    slowed: list[Slowed]
+    passes: list[Pass]
+    """The nearest, nearest first."""
+    stops: list[Command]
+    """STOPs and drills, oldest first."""
+    drills_due: list[str]
+    """Robots whose STOP drill is due by the end of the next day."""
+    unseen: int
+    """P1s that nobody has acknowledged."""
+    map: GreenhouseMap
