@@ -57,6 +57,7 @@ from iveg.web import (
     day,
     health,
     history,
+    installed,
     latency,
     limits,
     live,
@@ -398,6 +399,7 @@ def create_app(dss: Dss) -> FastAPI:
         )
     )
     app.include_router(latency.router(watch, clock.now))
+    app.include_router(installed.router())
     app.include_router(health.router(clock.now, dss.views.health))
     app.include_router(metrics.router(clock.now, dss.views.health, watch, dss.queues))
     app.include_router(

@@ -6,6 +6,7 @@ the dependencies that are handed in.
 
 import json
 from collections.abc import Callable
+from datetime import datetime
 from importlib.resources import files
 from typing import Annotated, Any, Protocol
 
@@ -38,8 +39,10 @@ from iveg.web.contexts import (
     Site,
     Theme,
 )
+from iveg.web.madrid import in_madrid
 from iveg.web.openapi import ApiDoc
 from iveg.web.problems import Problem
+from iveg.web.sentences import Sentences
 from iveg.web.words import LANGUAGES, Slot, Words, preferred_language, read_words
 
 LANGUAGE_COOKIE = "iveg_language"
@@ -234,6 +237,11 @@ def limits_text() -> str:
     return json.dumps({row.name: row.value for row in limits.rows()})
 
 
+def _clock(stamp: str) -> str:
+    """Time of day in Madrid of an ISO-8601 stamp."""
+    return f"{in_madrid(datetime.fromisoformat(stamp).timestamp()):%H:%M:%S}"
+
+
 def _environment(words: Words) -> Environment:
     """Templates that speak one language."""
     environment = Environment(
@@ -243,6 +251,9 @@ def _environment(words: Words) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+    environment.filters["clock"] = _clock
+    environment.filters["lane"] = Sentences(words).lane
 
     def say(key: str, **slots: Slot) -> Markup:
         data = Markup(' data-slots="{}"').format(json.dumps(slots)) if slots else ""

@@ -4,6 +4,7 @@
  * Each part starts on its own: one that fails is reported and the others go on.
  */
 
+import { createInstalling, registerWorker } from "./installing.js";
 import { createAlertsPanel } from "./panels/alerts.js";
 import { createDecisionPanel } from "./panels/decision.js";
 import { createHealthPanel } from "./panels/health.js";
@@ -16,6 +17,7 @@ import { createWakeLock } from "./wakelock.js";
  * @typedef {App & {
  *   tone: import("./panels/tone.js").Tone,
  *   wake: import("./wakelock.js").WakeLock,
+ *   installing: ReturnType<typeof createInstalling>,
  * }} Page what the page of a route is given
  */
 
@@ -35,11 +37,13 @@ const ROUTES = {
 /** @param {App} app */
 export async function startPage(app) {
   const decision = createDecisionPanel(app);
-  const page = { ...app, tone: createTone(), wake: createWakeLock() };
+  const installing = createInstalling();
+  const page = { ...app, installing, tone: createTone(), wake: createWakeLock() };
   attempt(() => createAlertsPanel(app, page.tone));
   attempt(() => createHealthPanel(app));
   attempt(() => createSignOut(app));
   attempt(wirePrinting);
+  registerWorker();
   const route = ROUTES[document.body.dataset.route ?? ""];
   if (route) (await route()).start(page);
   if (!document.querySelector("#map")) return;

@@ -11,9 +11,10 @@ import { createRuleForm } from "./rule.js";
 /** @typedef {import("../protocol.js").Rule} Rule */
 
 /** @param {import("../page.js").Page} page */
-export function start({ store, words, tone, wake }) {
+export function start({ store, words, tone, wake, installing }) {
   createSoundPanel(words, tone);
   wireWake(wake, words);
+  wireInstall(installing, words);
   const forms = [createRuleForm(store, words), createClassForm(store, words)];
 
   function draw() {
@@ -64,6 +65,23 @@ function wireWake(wake, words) {
     setText(need("#wake-state"), words.t(`device.wake_state.${said}`));
   }
   setHidden(need("#wake-state"), false);
+  words.onChange(draw);
+  draw();
+}
+
+/**
+ * @param {import("../page.js").Page["installing"]} installing
+ * @param {import("../i18n.js").Words} words
+ */
+function wireInstall(installing, words) {
+  const button = need("#install");
+  function draw() {
+    const state = installing.state();
+    setHidden(button, state !== "ready");
+    setText(need("#install-state"), words.t(`device.install_state.${state}`));
+  }
+  button.addEventListener("click", () => installing.install());
+  installing.onChange(draw);
   words.onChange(draw);
   draw();
 }
