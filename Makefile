@@ -17,7 +17,7 @@ export PYTHONPATH := $(CURDIR)
 export PYTHONDONTWRITEBYTECODE :=
 
 .NOTPARALLEL:
-.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos mutants soak migration lock clean
+.PHONY: test-needs check-needs demo demo-ros2 test quick setup format check bench deep chaos mutants experiment soak migration lock clean
 
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
@@ -30,6 +30,7 @@ bench: test-needs $(BENCH) ; $(BIN)/python -m benchmarks
 deep: $(DEV) ; IVEG_STOP_EXAMPLES=20000 $(BIN)/python -m pytest $(FOR_HOURS) tests/properties/test_stop.py
 chaos: test-needs $(DEV) ; IVEG_CHAOS_SEED=$(or $(SEED),1) IVEG_CHAOS_KILLS=$(or $(KILLS),200) IVEG_CHAOS_TIMES=$(or $(TIMES),20) $(BIN)/python -m pytest $(FOR_HOURS) tests/chaos/test_kills.py tests/chaos/test_backlog.py tests/chaos/test_ros2_kills.py
 mutants: $(DEV) ; $(BIN)/python -m tests.mutants
+experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
 lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra bench -c requirements/dev.lock pyproject.toml -o requirements/bench.lock

@@ -191,6 +191,7 @@ class Dss:
             boot=self._boot,
             read_clock=clock.now,
         )
+        self.provisioner.throttle.allowed = settings.orion_throttle
         self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
         self.watch = Watch(world, self.assessor.greenhouse)
         self.views = Views(

@@ -234,6 +234,13 @@ class Settings:
         True,
         "STOP, RELEASE and RESUME also straight over MQTT.",
     )
+    orion_throttle: bool = setting(
+        "IVEG_ORION_THROTTLE",
+        _switch,
+        True,
+        "Orion leaves out copies of odometry and scans while they come straight; `off` "
+        "measures every message at every hop, as `iveg experiment` does.",
+    )
     direct_read: Literal["all", "safety", "off"] = setting(
         "IVEG_DIRECT_READ",
         _direct_read,

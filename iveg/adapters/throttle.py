@@ -32,6 +32,7 @@ class Throttle:
     Attributes:
         copies: Id of each subscription that may be throttled, and whether it is.
         switches: How often something was switched.
+        allowed: Whether anything may be throttled at all.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Throttle:
         self._must_read = False
         self.copies: dict[Wanted, tuple[str, bool]] = {}
         self.switches = 0
+        self.allowed = True
 
     def found(
         self, copies: Mapping[Wanted, tuple[str, bool]], switches: int = 0
@@ -108,8 +110,8 @@ class Throttle:
         for want, (_, throttled) in self.copies.items():
             assert want.copied is not None  # noqa: S101 - all of these are copies
             wish = self._feeds.of(*want.copied).judge(now, connected=connected)
-            if wish is not None and wish != throttled:
-                changes[want] = wish
+            if wish is not None and (wish and self.allowed) != throttled:
+                changes[want] = wish and self.allowed
         return changes
 
     async def _switch(self, want: Wanted, throttled: bool) -> None:

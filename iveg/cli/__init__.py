@@ -9,7 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from iveg import __version__
-from iveg.cli.words import add_network_words, add_robot_words
+from iveg.cli.words import (
+    add_experiment_words,
+    add_network_words,
+    add_robot_words,
+)
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
 from iveg.domain.fleet import is_robot_id
 from iveg.domain.geometry import Pose2D
@@ -65,6 +69,10 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
             from iveg.cli.robot import run_robot
 
             return run_robot(options, settings, data, os.environ)
+        case "experiment":
+            from iveg.cli.experiment import experiment
+
+            return experiment(options, settings, os.environ, data)
         case "demo":
             from iveg.cli.demo import demo
 
@@ -133,6 +141,9 @@ def _parser() -> argparse.ArgumentParser:
         "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
     )
     emulator.add_argument(
+        "--truth", type=Path, metavar="FILE", help="write down what is really in view"
+    )
+    emulator.add_argument(
         "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
     )
     add_network_words(emulator)
@@ -178,6 +189,7 @@ def _parser() -> argparse.ArgumentParser:
             "--until-eof", action="store_true", help="end when the input closes"
         )
     add_robot_words(commands)
+    add_experiment_words(commands)
     commands.add_parser("provision", help="make devices and subscriptions")
     commands.add_parser("doctor", help="try every hop once and say what is broken")
     commands.add_parser("settings", help="print docs/settings.md")

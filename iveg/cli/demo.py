@@ -48,7 +48,7 @@ def demo(
     """Run the demo; returns the exit code."""
     directory = data / "demo"
     placed = replace(
-        _on_free_ports(settings, environment),
+        on_free_ports(settings, environment),
         sign_in_token=settings.sign_in_token or secrets.token_hex(32),
         notify_token=settings.notify_token or secrets.token_hex(32),
         data_directory=str(directory),
@@ -96,7 +96,7 @@ def _free_domain() -> int:
     raise SettingsError("ROS_DOMAIN_ID", "any", "a DDS domain that is free")
 
 
-def _on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
+def on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
     """Defaults that are taken move to a free port; what somebody chose does not."""
     listeners = [_Listener("port", "IVEG_PORT", settings.host, settings.port)]
     for field, variable in (
@@ -154,18 +154,19 @@ async def _supervise(
     running: list[tuple[str, asyncio.subprocess.Process]] = []
     try:
         for arguments in parts:
-            process = await _start(arguments, environment)
+            process = await start_part(arguments, environment)
             running.append((arguments[0], process))
-            await _ready(arguments[0], process)
+            await wait_ready(arguments[0], process)
         print(f"iVeg: {sign_in_link(settings, settings.sign_in_token)}", flush=True)
         await asyncio.gather(*(_watch(name, process) for name, process in running))
     finally:
-        await _stop([process for _, process in reversed(running)])
+        await stop_parts([process for _, process in reversed(running)])
 
 
-async def _start(
+async def start_part(
     arguments: Sequence[str], environment: Mapping[str, str]
 ) -> asyncio.subprocess.Process:
+    """Start one part of iVeg as a program of its own."""
     # A session of its own: Ctrl-C reaches this process alone, which stops the parts
     # in order, so that none complains about another that has already gone.
     return await asyncio.create_subprocess_exec(
@@ -181,7 +182,12 @@ async def _start(
     )
 
 
-async def _ready(name: str, process: asyncio.subprocess.Process) -> None:
+async def wait_ready(name: str, process: asyncio.subprocess.Process) -> None:
+    """Wait until a part says that it is up.
+
+    Raises:
+        SystemExit: it did not.
+    """
     assert process.stdout is not None  # noqa: S101 - it was asked for
     try:
         async with asyncio.timeout(_PATIENCE_S):
@@ -198,7 +204,8 @@ async def _watch(name: str, process: asyncio.subprocess.Process) -> None:
     print(f"iveg: {name} has ended (exit code {code}).", file=sys.stderr, flush=True)
 
 
-async def _stop(processes: list[asyncio.subprocess.Process]) -> None:
+async def stop_parts(processes: list[asyncio.subprocess.Process]) -> None:
+    """End parts, one after the other; what hangs is killed."""
     for process in processes:
         if process.returncode is not None:
             continue

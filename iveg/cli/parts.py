@@ -30,6 +30,7 @@ from iveg.web.bounded import BoundedSocket
 
 if TYPE_CHECKING:
     from iveg.adapters.dds import Dds
+    from iveg.emulator.truth import TruthLog
 
 _log = logging.getLogger(__name__)
 _LIVE_ROBOT_S = 10.0
@@ -145,6 +146,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     with (
         TemporaryDirectory(prefix="iveg-robots-") as directory,
         _network(options) as network,
+        _truth(options.truth) as truth,
     ):
         running = asyncio.create_task(
             run_emulator(
@@ -165,6 +167,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 fault_port=options.fault_port,
                 network=network,
                 description=fleet,
+                truth=truth,
                 camera=options.camera,
             ),
             name="emulator",
@@ -175,6 +178,18 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         finally:
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
+
+
+@contextlib.contextmanager
+def _truth(file: Path | None) -> "Iterator[TruthLog | None]":
+    """Where it is written down what was really in view, if that was asked for."""
+    if file is None:
+        yield None
+        return
+    from iveg.emulator.truth import TruthLog
+
+    with contextlib.closing(TruthLog(file)) as log:
+        yield log
 
 
 @contextlib.contextmanager

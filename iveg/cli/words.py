@@ -1,4 +1,4 @@
-"""What is typed after ``iveg robot``, and where ROS 2 is, for all that speak it."""
+"""What is typed after ``iveg robot`` and ``iveg experiment``, and where ROS 2 is."""
 
 import argparse
 from pathlib import Path
@@ -36,3 +36,34 @@ def add_network_words(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ros-peer", nargs="+", metavar="ADDRESS", help="where multicast does not pass"
     )
+
+
+def add_experiment_words(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+) -> None:
+    """``iveg experiment run`` and ``compare``."""
+    experiment = commands.add_parser("experiment", help="the paper's evaluation")
+    words = experiment.add_subparsers(dest="word", required=True)
+    run = words.add_parser("run", help="run it; what broke off is taken up again")
+    size = run.add_mutually_exclusive_group()
+    for name, told in (
+        ("minimal", "one scenario, seconds: whether it works at all"),
+        ("quick", "every scenario once, three minutes (the usual)"),
+        ("full", "every scenario six times, over 100,000 messages"),
+    ):
+        size.add_argument(
+            f"--{name}", dest="size", action="store_const", const=name, help=told
+        )
+    run.set_defaults(size="quick")
+    run.add_argument(
+        "--fiware",
+        choices=("embedded", "settings"),
+        default="embedded",
+        help="a FIWARE of its own, or the one that the settings name",
+    )
+    run.add_argument("--profile", choices=("field", "simulation"), default="field")
+    run.add_argument("--seed", type=int, metavar="S")
+    run.add_argument("--out", type=Path, metavar="DIR", help="where results go")
+    compare = words.add_parser("compare", help="two results beside each other")
+    compare.add_argument("before", type=Path, metavar="A")
+    compare.add_argument("after", type=Path, metavar="B")

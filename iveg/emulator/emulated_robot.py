@@ -15,6 +15,7 @@ from iveg.domain.observations import Battery, Instant, Origin
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import every
 from iveg.emulator.relay import Relay
+from iveg.emulator.truth import TruthLog
 from iveg.emulator.world import REST, Rig, World
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
@@ -46,6 +47,7 @@ class FleetSettings:
         state_directory: Where hold files live.
         held: Nobody releases the boot hold at the robots.
         rate_hz: Of odometry, laser and camera each.
+        truth: Where it is written down what was really in view.
     """
 
     address: BrokerAddress
@@ -56,6 +58,7 @@ class FleetSettings:
     state_directory: Path
     held: bool
     rate_hz: float
+    truth: TruthLog | None = None
 
 
 class EmulatedRobot:
@@ -163,8 +166,12 @@ class EmulatedRobot:
             self._node.sense(self._rig.scan(self._world))
 
     def _look(self, _: float) -> None:
-        if self._node_task is not None:
-            self._node.sense(self._rig.look(self._now(), self._world))
+        if self._node_task is None:
+            return
+        self._node.sense(self._rig.look(self._now(), self._world))
+        if self._settings.truth is not None:
+            at = self._read_clock().wall
+            self._settings.truth.looked(self._rig, self._world, at)
 
     def _obey_gate(self, command: Twist2D) -> None:
         """The base takes what the gate lets through; a deaf one only when to halt."""

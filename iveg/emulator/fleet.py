@@ -33,6 +33,7 @@ from iveg.emulator.relay import Relay
 from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
+from iveg.emulator.truth import TruthLog
 from iveg.emulator.world import Camera, Rig, World, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
@@ -67,6 +68,7 @@ async def run_emulator(
     ros2: Mapping[str, RobotConfig] | None = None,
     description: FleetDescription | None = None,
     camera: Camera = "boxes",
+    truth: TruthLog | None = None,
 ) -> None:
     """Run a scenario until cancelled.
 
@@ -92,6 +94,7 @@ async def run_emulator(
             where nothing is said.
         description: What each robot is; None: iVeg's own.
         camera: Where boxes come from: drawn about the truth, or by grounding.
+        truth: Where it is written down what was really in view.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the house.
@@ -104,7 +107,15 @@ async def run_emulator(
     detector = DETECTORS[layout.detector or profile]
     world = World(greenhouse, layout, detector, seed, camera)
     settings = FleetSettings(
-        address, apikey, uplink, slow_s, stand_s, state_directory, held, rate_hz
+        address,
+        apikey,
+        uplink,
+        slow_s,
+        stand_s,
+        state_directory,
+        held,
+        rate_hz,
+        truth,
     )
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
     is_radio_bad = bool(incidents) or fault_port is not None

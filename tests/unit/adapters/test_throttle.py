@@ -184,3 +184,23 @@ async def test_the_embedded_orion_switches_both_ways_by_a_change() -> None:
             kept = {one["id"]: one for one in await orion.read_subscriptions()}
             said.append(kept[known].get("throttling"))
     assert said == [1, None]
+
+
+async def test_nothing_is_throttled_where_that_is_not_allowed() -> None:
+    bench = await Bench().found()
+    bench.throttle.allowed = False
+    bench.hear(6.0)
+    await bench.throttle.look()
+    assert bench.throttled() == set()
+    assert bench.reads == 0
+
+
+async def test_what_an_earlier_run_throttled_is_let_go_where_that_is_not_allowed() -> (
+    None
+):
+    bench = await Bench().found()
+    bench.hear(6.0)
+    await bench.throttle.look()
+    bench.throttle.allowed = False
+    await bench.throttle.look()
+    assert bench.throttled() == set()

@@ -8,7 +8,7 @@ import pytest
 
 from iveg import __version__
 from iveg.cli import UNUSABLE, main
-from iveg.cli.demo import _on_free_ports
+from iveg.cli.demo import on_free_ports
 from iveg.cli.running import sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings, describe
@@ -149,9 +149,9 @@ def test_a_default_port_that_is_taken_moves_and_a_chosen_one_does_not() -> None:
         port = taken.getsockname()[1]
         settings = Settings(port=port, mqtt_url=f"mqtt://127.0.0.1:{port}")
 
-        moved = _on_free_ports(settings, {})
+        moved = on_free_ports(settings, {})
         with pytest.raises(SettingsError, match="a port that is free"):
-            _on_free_ports(settings, {"IVEG_PORT": str(port)})
+            on_free_ports(settings, {"IVEG_PORT": str(port)})
 
     assert moved.port != port
     assert moved.mqtt_url != settings.mqtt_url
@@ -159,7 +159,7 @@ def test_a_default_port_that_is_taken_moves_and_a_chosen_one_does_not() -> None:
 
 def test_the_demos_fiware_is_on_loopback_alone() -> None:
     with pytest.raises(SettingsError, match="loopback"):
-        _on_free_ports(Settings(mqtt_url="mqtt://10.1.2.3:1883"), {})
+        on_free_ports(Settings(mqtt_url="mqtt://10.1.2.3:1883"), {})
 
 
 @pytest.mark.parametrize(

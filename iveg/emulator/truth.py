@@ -1,0 +1,43 @@
+"""What was really in view of each camera, for whoever scores a detector."""
+
+from pathlib import Path
+from typing import TextIO
+
+import orjson
+
+from iveg.emulator.world import Rig, World
+
+
+class TruthLog:
+    """A line of JSON a picture.
+
+    ``{"robot", "at": Unix s, "visible": [{"key", "class", "x", "y", "part"}]}``: all
+    targets of which a part (0 to 1) is in view, by their true place in ``map`` (m),
+    whatever the detector makes of them.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
+
+    def looked(self, rig: Rig, world: World, at: float) -> None:
+        """A robot has just looked (``at`` Unix s, by its own clock)."""
+        visible = []
+        for target in world.targets_for(rig.robot_id):
+            part = rig.part_seen(target, world)
+            if part > 0.0:
+                pose = target.body.pose
+                visible.append(
+                    {
+                        "key": target.key,
+                        "class": target.class_id,
+                        "x": round(pose.x, 3),
+                        "y": round(pose.y, 3),
+                        "part": round(part, 2),
+                    }
+                )
+        told = {"robot": rig.robot_id, "at": at, "visible": visible}
+        self._file.write(orjson.dumps(told).decode() + "\n")
+
+    def close(self) -> None:
+        """Nothing more comes."""
+        self._file.close()

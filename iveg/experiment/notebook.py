@@ -1,0 +1,73 @@
+"""An experiment's directory: a file a run, so that what broke off can go on.
+
+::
+
+    together-1.json … one for each finished run
+    partial.json, partial.html    it broke off: what there is so far
+    result.json, result.html      it is whole
+"""
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from iveg.domain.errors import DataFileError
+from iveg.experiment.outcome import Outcome, read_json, result_of, write_json
+from iveg.experiment.plan import Plan, Step
+from iveg.experiment.report import write_report
+
+
+class Notebook:
+    """What one experiment has come to."""
+
+    def __init__(self, plan: Plan, directory: Path) -> None:
+        self.directory = directory
+        self._plan = plan
+        directory.mkdir(parents=True, exist_ok=True)
+
+    def steps_left(self) -> list[Step]:
+        """Those that no earlier start has finished."""
+        return [one for one in self._plan.steps() if not self._file(one).exists()]
+
+    def is_last(self, step: Step) -> bool:
+        """Whether nothing comes after it."""
+        return step == [*self._plan.steps()][-1]
+
+    def keep(self, step: Step, outcome: Outcome) -> None:
+        """A run is finished."""
+        write_json(self._file(step), outcome)
+
+    def finish(self, measured: Mapping[str, Any], why: str) -> Path:
+        """Write the result, or as much as there is; ``why`` it broke off, or empty.
+
+        Returns:
+            The report.
+        """
+        for file in self.directory.glob("partial.*"):
+            file.unlink()
+        name = "partial" if why else "result"
+        result = result_of(self._plan, self._outcomes(), measured, why)
+        write_json(self.directory / f"{name}.json", result)
+        report = self.directory / f"{name}.html"
+        report.write_text(write_report(result), encoding="utf-8")
+        return report
+
+    def _outcomes(self) -> list[Outcome]:
+        found = []
+        for step in self._plan.steps():
+            # A file that cannot be read counts as a run that is still to come.
+            with contextlib.suppress(DataFileError):
+                found.append(read_json(self._file(step)))
+        return found
+
+    def _file(self, step: Step) -> Path:
+        return self.directory / f"{step.name}.json"
+
+
+def directory_of(place: Path, plan: Plan) -> Path:
+    """The newest experiment of this size that broke off, else a new one."""
+    known = sorted(place.glob(f"{plan.size}-*")) if place.is_dir() else []
+    if known and not (known[-1] / "result.json").exists():
+        return known[-1]
+    return place / f"{plan.size}-{len(known) + 1:03d}"

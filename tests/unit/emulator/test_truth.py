@@ -1,0 +1,32 @@
+"""What is written down is what is in view, whatever the detector makes of it."""
+
+from contextlib import closing
+from pathlib import Path
+
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.emulator.camera import Counts, DetectorModel
+from iveg.emulator.layout import lay_out
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.truth import TruthLog
+from iveg.emulator.world import World
+from iveg.experiment.outcome import read_truth
+
+BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0, 1)})
+
+
+def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> None:
+    house = load_greenhouse(scenario_named("together").house)
+    layout = lay_out(scenario_named("together"), ("AGI", "AGII"), house)
+    world = World(house, layout, BLIND, seed=1)
+    rig = world.rigs["AGI"]
+
+    with closing(TruthLog(tmp_path / "truth.jsonl")) as log:
+        told = rig.look(0.0, world)
+        log.looked(rig, world, 1000.5)
+
+    [picture] = read_truth(tmp_path / "truth.jsonl")
+    [person] = world.discs()
+    assert told.detections == ()
+    assert (picture.robot_id, picture.at) == ("AGI", 1000.5)
+    [seen] = [one for one in picture.seen if one.class_id == "farmer"]
+    assert (seen.x, seen.y) == (round(person.x, 3), round(person.y, 3))

@@ -1,0 +1,115 @@
+"""Detections against the truth: counted by seconds, the same whatever the machine."""
+
+import random
+
+import pytest
+
+from iveg.experiment.scoring import Picture, Score, Seen, overlap, score, tally
+
+HZ = 10
+
+
+def person(x: float = 5.0, confidence: float = 0.9, key: str = "p") -> Seen:
+    return Seen(key, "farmer", x, 0.0, confidence)
+
+
+def pictures(seconds: int, *seen: Seen, robot_id: str = "AGI") -> list[Picture]:
+    """Ten a second, all with the same in them."""
+    return [
+        Picture(robot_id, 1000.0 + n / HZ, tuple(seen)) for n in range(HZ * seconds)
+    ]
+
+
+def scored(truth: list[Picture], told: list[Picture]) -> Score:
+    tallies, _ = tally(truth, told)
+    return score([tallies["farmer"]])
+
+
+def test_a_person_who_is_told_each_second_is_found_each_second() -> None:
+    found = scored(pictures(4, person()), pictures(4, person(5.05)))
+
+    assert (found.tp, found.fp, found.fn) == (4, 0, 0)
+    assert (found.precision, found.recall, found.ap) == (1.0, 1.0, 1.0)
+
+
+def test_a_person_who_is_never_told_is_missed_each_second() -> None:
+    found = scored(pictures(3, person()), pictures(3))
+
+    assert (found.tp, found.fp, found.fn) == (0, 0, 3)
+    assert found.precision is None
+    assert found.recall == 0.0
+
+
+def test_what_is_not_there_is_a_ghost_and_hides_no_miss() -> None:
+    found = scored(pictures(3, person(5.0)), pictures(3, person(8.0)))
+
+    assert (found.tp, found.fp, found.fn) == (0, 3, 3)
+
+
+def test_one_wrong_picture_of_ten_changes_no_second() -> None:
+    told = pictures(2, person())
+    told[3] = Picture("AGI", told[3].at, (person(9.0),))
+
+    found = scored(pictures(2, person()), told)
+
+    assert (found.tp, found.fp, found.fn) == (2, 0, 0)
+
+
+def test_pictures_that_nobody_wrote_down_are_not_compared() -> None:
+    later = [Picture("AGI", one.at + 60.0, one.seen) for one in pictures(2, person())]
+
+    tallies, compared = tally(pictures(2, person()), later)
+
+    assert (tallies, compared) == ({}, 0)
+
+
+def test_pictures_of_another_robot_prove_nothing() -> None:
+    _, compared = tally(pictures(2, person()), pictures(2, person(), robot_id="AGII"))
+
+    assert compared == 0
+
+
+def test_each_target_takes_its_own_detection_the_surest_first() -> None:
+    two = (person(5.0, key="a"), person(5.6, key="b"))
+    told = (person(5.02, 0.7), person(5.58, 0.95), person(5.1, 0.6))
+
+    found = scored(pictures(2, *two), pictures(2, *told))
+
+    assert (found.tp, found.fp, found.fn) == (4, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("apart", "share"), [(0.0, 1.0), (0.25, 1 / 3), (0.5, 0.0), (9.0, 0.0)]
+)
+def test_overlap_is_intersection_over_union(apart: float, share: float) -> None:
+    assert overlap(person(5.0), person(5.0 + apart)) == pytest.approx(share)
+
+
+def test_average_precision_falls_with_ghosts_that_are_surer_than_what_is_there() -> (
+    None
+):
+    truth = pictures(4, person())
+    sure = pictures(2, person(9.0, 0.99)) + pictures(4, person(5.0, 0.5))[2 * HZ :]
+    unsure = pictures(2, person(9.0, 0.1)) + pictures(4, person(5.0, 0.5))[2 * HZ :]
+
+    low, high = scored(truth, sure), scored(truth, unsure)
+
+    assert (low.tp, low.fp, low.fn) == (high.tp, high.fp, high.fn) == (2, 2, 2)
+    assert low.ap == pytest.approx(0.25)
+    assert high.ap == pytest.approx(0.5)
+
+
+def test_counts_are_the_same_whatever_order_pictures_come_in() -> None:
+    truth, told = pictures(5, person()), pictures(5, person(5.1))
+    mixed = random.Random(2).sample(told, len(told))  # noqa: S311 - an order
+
+    assert scored(truth, mixed) == scored(truth, told)
+
+
+def test_runs_add_up_to_one_score() -> None:
+    one, _ = tally(pictures(3, person()), pictures(3, person()))
+    other, _ = tally(pictures(2, person()), pictures(2))
+
+    both = score([one["farmer"], other["farmer"]])
+
+    assert (both.tp, both.fn) == (3, 2)

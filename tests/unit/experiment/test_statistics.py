@@ -1,0 +1,64 @@
+"""Intervals of shares, and the verdict on two of them."""
+
+import pytest
+
+from iveg.experiment.printed import disagreements
+from iveg.experiment.statistics import Interval, difference, verdict, wilson
+
+
+@pytest.mark.parametrize(
+    ("hits", "of", "low", "high"),
+    # Newcombe 1998, table I, method 3; and the paper's recall of farmers in the field.
+    [
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+        (36, 39, 0.7968, 0.9735),
+    ],
+)
+def test_wilsons_interval_is_the_one_in_the_books(
+    hits: int, of: int, low: float, high: float
+) -> None:
+    found = wilson(hits, of)
+
+    assert found is not None
+    assert (found.low, found.high) == pytest.approx((low, high), abs=2e-4)
+
+
+def test_of_nothing_nothing_is_known() -> None:
+    assert wilson(0, 0) is None
+
+
+def test_newcombes_interval_of_a_difference_is_the_one_in_the_books() -> None:
+    after, before = wilson(56, 70), wilson(48, 80)
+    assert after is not None
+    assert before is not None
+
+    found = difference(before, after)
+
+    assert found.share == pytest.approx(0.2)
+    assert (found.low, found.high) == pytest.approx((0.0524, 0.3339), abs=2e-4)
+    assert verdict(found) == "better"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "told"),
+    [(0.01, 0.2, "better"), (-0.2, -0.01, "worse"), (-0.1, 0.1, "cannot tell")],
+)
+def test_a_difference_is_told_only_where_the_interval_leaves_no_doubt(
+    low: float, high: float, told: str
+) -> None:
+    assert verdict(Interval((low + high) / 2, low, high)) == told
+
+
+def test_the_papers_rates_that_do_not_follow_from_its_counts_are_found() -> None:
+    found = {
+        (one.place, one.class_id, one.rate): one.follows for one in disagreements()
+    }
+
+    assert found == {
+        ("simulation", "AGI", "precision"): 90.0,
+        ("simulation", "AGI", "recall"): 90.0,
+        ("simulation", "AGII", "recall"): 90.32,
+    }
