@@ -42,7 +42,7 @@ def story(robots: tuple[str, ...], *, storm: bool) -> Iterator[Received]:
             number, kind = divmod(place, 3)
             origin = Origin("b", tick, "2026-11-20T14:13:07.754Z", WALL + at)
             told = _told(robots[number], number, kind, origin, at, draw, storm)
-            yield Received(told, Instant(at, WALL + at), "orion")
+            yield Received(told, Instant(at, WALL + at), "fiware")
 
 
 def _told(

@@ -29,9 +29,9 @@ from iveg.adapters.journal import FileJournal
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
-from iveg.adapters.roads import MqttRoad, OrionRoad
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
+from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.domain.alerts import Rule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -39,6 +39,7 @@ from iveg.domain.latency.hops import WINDOW_S
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.domain.stop.drills import Drills
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
@@ -142,6 +143,7 @@ class Dss:
         self.agent = IotAgentClient(
             settings.iota_url, settings.fiware_service, settings.fiware_servicepath
         )
+        mqtt = MqttTransport(self.link, settings.apikey)
         rule_store = FileRules(directory / "rules.jsonl")
         versions = rule_store.load(
             Rule(
@@ -154,8 +156,11 @@ class Dss:
             self.fleet,
             load_greenhouse(settings.greenhouse),
             Doors(
-                MqttRoad(self.link, settings.apikey),
-                OrionRoad(self.orion),
+                mqtt,
+                {
+                    DIRECT.switched(on=settings.stop_direct): mqtt,
+                    FIWARE: OrionTransport(self.orion),
+                },
                 self.journal,
                 self.recorder,
                 clock.now,
@@ -166,7 +171,6 @@ class Dss:
             ),
             Choices(
                 versions[-1],
-                settings.stop_direct,
                 Drills(settings.drill_days),
                 self._boot,
             ),
@@ -279,6 +283,7 @@ class Dss:
         """Everything that is counted."""
         total = Counter(self.ingest.counters)
         total.update(self.assessor.world.counters)
+        total.update(self.commander.counters)
         total.update(self.recorder.counters)
         total.update(floods.counted)
         total["live.browsers"] = self.hub.watchers

@@ -18,9 +18,9 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     Received,
-    Road,
     SafetyReport,
 )
+from iveg.domain.transports import TransportId
 from iveg.ngsi.codec import format_stamp
 
 AGI = built_in().of_robot("AGI").profile
@@ -145,10 +145,10 @@ def safety_report(
 
 
 def received(
-    observation: Observation, *, after: float = 0.0, road: Road = "orion"
+    observation: Observation, *, after: float = 0.0, transport: TransportId = "fiware"
 ) -> Received:
     """An observation that came ``after`` seconds from the start."""
-    return Received(observation, at(after), road)
+    return Received(observation, at(after), transport)
 
 
 def notification(

@@ -105,13 +105,13 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: one refused copy ends a release that another may still carry out",
-        "if attempt.refused is None or not attempt.is_spent(episode.report):",
-        "if attempt.refused is None:",
+        "if self.refused is None or not self.is_spent(report):",
+        "if self.refused is None:",
         ("unit/domain/test_stop_release.py",),
     ),
     Mutant(
         "STOP: a hold that a late release may still lift is held on to for good",
-        "return now.mono - max(heard_at, self.begun_at) > LIMITS.report_fresh_s",
+        "return now.mono - max(heard_at, self._begun_at) > LIMITS.report_fresh_s",
         "return False",
         ("unit/domain/test_stop_release.py",),
     ),
@@ -189,7 +189,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a standstill is told by reports however old they are",
-        "if episode.evidence_age(at) > LIMITS.report_stale_s:",
+        "if self.evidence_age(at) > LIMITS.report_stale_s:",
         "if False:",
         ("unit/pipeline/test_age.py",),
     ),

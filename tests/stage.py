@@ -204,7 +204,7 @@ class Stage:
         reading = codec.read_measure(topic.split("/")[2], payload)
         assert reading.problems == ()
         for observation in reading.observations:
-            self._desk.ingest.offer(Received(observation, self.now, "mqtt"))
+            self._desk.ingest.offer(Received(observation, self.now, "direct"))
 
     def _deliver(self) -> None:
         """Every robot listens to what is told to any."""

@@ -17,6 +17,7 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
+from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS
 from iveg.pipeline.kinds import Scope, read_directly
@@ -32,7 +33,7 @@ _SUFFIXES: dict[type[Observation], str] = {
 
 
 class DirectReader:
-    """Turns messages of robots into observations on the ``mqtt`` road.
+    """Turns messages of robots into observations of the ``direct`` transport.
 
     Args:
         offer: Where observations go; ``reject`` where the unreadable is counted.
@@ -95,4 +96,4 @@ class DirectReader:
         for observation in reading.observations:
             if isinstance(observation, self._kinds):
                 sparse = topic not in self._dense
-                self._offer(Received(observation, at, "mqtt", sparse=sparse))
+                self._offer(Received(observation, at, DIRECT.id, sparse=sparse))

@@ -119,7 +119,7 @@ class IotAgentClient:
         return found
 
 
-class CommandRoads(Entities, Protocol):
+class CommandRegistrations(Entities, Protocol):
     """What provisioning looks at in Orion."""
 
     async def read_registrations(self) -> list[Document]:
@@ -150,12 +150,12 @@ class Provisioned:
 
 async def provision(
     agent: IotAgentClient,
-    orion: CommandRoads,
+    orion: CommandRegistrations,
     robots: Sequence[str],
     apikey: str,
     cbroker_url: str,
 ) -> Provisioned:
-    """Make group, devices and command roads of a fleet what they should be.
+    """Make group, devices and command registrations of a fleet what they should be.
 
     Args:
         agent: The IoT Agent.
@@ -239,7 +239,7 @@ async def _remove_doctor(
 
 async def _ensure_robot(
     agent: IotAgentClient,
-    orion: CommandRoads,
+    orion: CommandRegistrations,
     known: dict[str, Document],
     robot_id: str,
     apikey: str,
@@ -261,7 +261,7 @@ async def _ensure_robot(
     mended += await _ensure_device(
         agent, known, device, anew=not last or not registered
     )
-    return mended + await _clear_road(orion, robot_id)
+    return mended + await _clear_registration(orion, robot_id)
 
 
 async def _ensure_device(
@@ -302,7 +302,7 @@ def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
     )
 
 
-async def _clear_road(orion: CommandRoads, robot_id: str) -> list[str]:
+async def _clear_registration(orion: CommandRegistrations, robot_id: str) -> list[str]:
     """See that nothing at Orion stands between a command and the agent."""
     mended = []
     registered = _registered(await orion.read_registrations(), robot_id)

@@ -20,8 +20,9 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_for
 from iveg.adapters.throttle import Throttle
 from iveg.domain.errors import HopError, NoAnswerError
+from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Canary, Instant, Origin, Received
-from iveg.domain.transports import Feeds
+from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
 from iveg.pipeline.ingest import Ingest
@@ -305,7 +306,7 @@ class Provisioner:
         for entity in entities:
             for observation in codec.read_entity(entity).observations:
                 if getattr(observation, "robot_id", None) in self._robots:
-                    self._ingest.offer(Received(observation, at, "orion", asked=True))
+                    self._ingest.offer(Received(observation, at, FIWARE.id, asked=True))
 
     # --- telling ------------------------------------------------------------------
 

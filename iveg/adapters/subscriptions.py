@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from iveg.domain.feeds import Copied
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.domain.transports import Copied
 from iveg.ngsi import names
 from iveg.ngsi.sensors import SENSORS
 

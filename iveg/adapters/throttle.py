@@ -17,8 +17,8 @@ from iveg.adapters.subscriptions import (
     write_subscription,
 )
 from iveg.domain.errors import HopError
+from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Instant
-from iveg.domain.transports import Feeds
 
 _LOOKS_EVERY_S, _AGAIN_S = 0.2, 1.0
 

@@ -16,9 +16,11 @@ was set.  Moments are iVeg's monotonic clock, which nobody sets.
 """
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from iveg.domain.observations import Instant, Origin, Road
+from iveg.domain.observations import Instant, Origin
+from iveg.domain.transports import FIWARE, TransportId
 
 _BUCKET_S, _BUCKETS = 5.0, 12
 STEP_S = 0.5
@@ -117,24 +119,31 @@ class ClockFilter:
 class RobotClock:
     """All that is estimated of one robot's clock: a filter a transport and boot."""
 
-    _filters: dict[tuple[Road, str | None], ClockFilter] = field(default_factory=dict)
+    _filters: dict[tuple[TransportId, str | None], ClockFilter] = field(
+        default_factory=dict
+    )
     _warned: tuple[float, float] = (float("-inf"), 0.0)
 
     def delay(
-        self, kind: _Kind, origin: Origin, at: Instant, road: Road, lag: float | None
+        self,
+        kind: _Kind,
+        origin: Origin,
+        at: Instant,
+        transport: TransportId,
+        lag: float | None,
     ) -> float | None:
         """How old a message was when it arrived (s), estimated; None unknown.
 
         ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
         back: what FIWARE alone brings is never younger.
         """
-        key = road, origin.boot
+        key = transport, origin.boot
         if key not in self._filters:
             while len(self._filters) >= _MAX_FILTERS:
                 del self._filters[next(iter(self._filters))]
             self._filters[key] = ClockFilter()
         own = self._filters[key].observe(kind, origin, at.mono)
-        if road == "mqtt":
+        if transport != FIWARE.id:
             return own
         against_direct = self._against_direct(origin, at.mono)
         if against_direct is not None:
@@ -143,7 +152,11 @@ class RobotClock:
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
         """The delay against the fastest direct message, while there are such (s)."""
-        direct = self._filters.get(("mqtt", origin.boot))
+        direct = max(
+            (one for boot, one in self._direct() if boot == origin.boot),
+            key=lambda one: one.seen_at,
+            default=None,
+        )
         if direct is None or origin.stamp_s is None or direct.least is None:
             return None
         beyond = now - origin.stamp_s - direct.least
@@ -152,9 +165,15 @@ class RobotClock:
             return None
         return max(0.0, beyond)
 
+    def _direct(self) -> Iterator[tuple[str | None, ClockFilter]]:
+        """Boot and filter of everything that came by another way than FIWARE."""
+        for (transport, boot), one in self._filters.items():
+            if transport != FIWARE.id:
+                yield boot, one
+
     def offset_s(self, now: Instant) -> float | None:
         """How far the robot's clock is behind ours (s), by direct messages alone."""
-        direct = [one for (road, _), one in self._filters.items() if road == "mqtt"]
+        direct = (one for _, one in self._direct())
         newest = max(direct, key=lambda one: one.seen_at, default=None)
         if newest is None or newest.least is None:
             return None

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
-
-Road = Literal["orion", "mqtt"]
+from iveg.domain.transports import FIWARE, TransportId, alias_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +332,7 @@ def kind_of(observation: Observation) -> type[Observation]:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """An observation with the moment and the road that brought it.
+    """An observation with the moment and the transport that brought it.
 
     Attributes:
         asked: It is Orion's answer to a question, so nobody knows how old it is.
@@ -343,7 +342,12 @@ class Received:
 
     observation: Observation
     at: Instant
-    road: Road = "orion"
+    transport: TransportId = FIWARE.id
     asked: bool = False
     thinned: bool = False
     sparse: bool = True
+
+    @property
+    def road(self) -> str:
+        """The transport as the JSON key ``road`` has it, for one version."""
+        return alias_of(self.transport)

@@ -1,100 +1,55 @@
-"""Which transport feeds each robot, and which of Orion's copies are not needed.
+"""The ways to a robot and back, as a table: one more is one entry.
 
-Odometry and scans come twice, straight from MQTT (``direct``) and through Orion
-(``fiware``).  While the direct copy is fresh the other is a fallback and the proof that
-the chain lives, and Orion may throttle it::
-
-              direct without a gap for 5 s
-    FULL ─────────────────────────────────────> THINNED
-         <─────────────────────────────────────
-              the broker is lost, or FIWARE still brings what the direct transport
-              does not: nothing for 1 s, or only older messages for 1 s
-
-A robot that is silent on both transports changes nothing.
+Orders, their times, JSON and pages are keyed by a transport's id.  Transports share
+nothing, so that what breaks one leaves the others alone.
 """
 
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
-from iveg.domain.observations import LaserScan, Odometry, Road
-
-Transport = Literal["direct", "fiware"]
-Copied = type[Odometry] | type[LaserScan]
-"""What Orion may bring less often; never detections, reports, states of commands."""
-
-SILENT_S = 1.0
-"""A direct copy older than this is missed."""
-OVERTAKES_S = 0.2
-"""What comes through FIWARE that much after the last direct message is no twin."""
-STEADY_S = 5.0
+TransportId = str
 
 
-@dataclass(slots=True)
-class Feed:
-    """One kind of telemetry of one robot, on both transports (monotonic s).
+@dataclass(frozen=True, slots=True)
+class Transport:
+    """One way.
 
     Attributes:
-        direct_at: Arrival of the newest direct message; ``fiware_at`` of Orion's.
-        thinned: Whether Orion's copy is not needed; None while nobody knows.
+        id: In JSON, columns, file names and translations.
+        can_stop: Whether it carries STOP; ``can_release`` RELEASE and RESUME.
+        confirms: Its word that it took a STOP says that it is on its way (PUBACK);
+            without, only the robot's answer says anything.
+        one_at_a_time: A STOP waits until the one before came back, and is sent to a
+            robot that has it only where there is no other way.
+        alias: The word for it in the JSON key ``road``, for one version.
     """
 
-    direct_at: float = float("-inf")
-    fiware_at: float = float("-inf")
-    thinned: bool | None = None
-    _steady_since: float = float("-inf")
-    _behind_since: float | None = None
+    id: TransportId
+    can_stop: bool = True
+    can_release: bool = True
+    confirms: bool = False
+    one_at_a_time: bool = False
+    alias: str = ""
 
-    def heard(self, road: Road, at: float, *, news: bool) -> None:
-        """A message came; ``news`` when it was newer than all before."""
-        if road == "mqtt":
-            if at - self.direct_at > SILENT_S:
-                self._steady_since = at
-            self.direct_at = at
-            return
-        self.fiware_at = at
-        if not news or at - self.direct_at > SILENT_S:
-            self._behind_since = None
-        elif self._behind_since is None:
-            self._behind_since = at
+    @property
+    def is_off(self) -> bool:
+        """Whether it carries no order at all."""
+        return not (self.can_stop or self.can_release)
 
-    def is_direct(self, now: float) -> bool:
-        """Whether the direct copy is fresh."""
-        return now - self.direct_at <= SILENT_S
-
-    def transport(self, now: float) -> Transport:
-        """Which one brings what counts; of a silent robot, which one did."""
-        if self.direct_at == float("-inf") or self._has_fallen_back(now):
-            return "fiware"
-        return "direct"
-
-    def judge(self, now: float, *, connected: bool) -> bool | None:
-        """Whether Orion's copy may be throttled from now on."""
-        if not connected or self._has_fallen_back(now) or self._is_behind():
-            self.thinned = False
-            self._steady_since = now
-        elif self._is_steady(now):
-            self.thinned = True
-        return self.thinned
-
-    def _has_fallen_back(self, now: float) -> bool:
-        """Whether FIWARE alone still brings it."""
-        return not self.is_direct(now) and self.fiware_at > self.direct_at + OVERTAKES_S
-
-    def _is_behind(self) -> bool:
-        """Whether Orion's copies have been the newer ones for a while."""
-        since = self._behind_since
-        return since is not None and self.fiware_at - since >= 0.9 * SILENT_S
-
-    def _is_steady(self, now: float) -> bool:
-        return self.is_direct(now) and now - self._steady_since >= STEADY_S
+    def switched(self, *, on: bool) -> "Transport":
+        """The same, or one that carries no order."""
+        return self if on else replace(self, can_stop=False, can_release=False)
 
 
-@dataclass(slots=True)
-class Feeds:
-    """The feeds of a fleet, by robot and kind."""
+DIRECT = Transport("direct", confirms=True, alias="mqtt")
+"""Straight over MQTT; its word is the broker's PUBACK."""
+FIWARE = Transport("fiware", one_at_a_time=True, alias="orion")
+"""Through Orion and the IoT Agent; a 204 says nothing."""
 
-    _known: dict[tuple[str, Copied], Feed] = field(default_factory=dict)
+TRANSPORTS = (DIRECT, FIWARE)
+_ALIASES: Mapping[TransportId, str] = {one.id: one.alias for one in TRANSPORTS}
 
-    def of(self, robot_id: str, kind: Copied = Odometry) -> Feed:
-        """One feed."""
-        return self._known.setdefault((robot_id, kind), Feed())
+
+def alias_of(transport: TransportId) -> str:
+    """Its word in the JSON key ``road``, for one version."""
+    return _ALIASES.get(transport) or transport

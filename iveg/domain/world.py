@@ -14,6 +14,7 @@ from typing import Literal
 from iveg.domain.age import FeedbackLedger
 from iveg.domain.clocks import RobotClock
 from iveg.domain.errors import UnknownRobotError
+from iveg.domain.feeds import Feeds
 from iveg.domain.fleet import FleetDescription, RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
@@ -31,13 +32,12 @@ from iveg.domain.observations import (
     Origin,
     Overtaken,
     Received,
-    Road,
     SafetyReport,
     kind_of,
 )
 from iveg.domain.order import Order, Verdict
 from iveg.domain.probe import ProbeLag
-from iveg.domain.transports import Feeds
+from iveg.domain.transports import FIWARE, TransportId
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
 
@@ -93,13 +93,13 @@ class RobotState:
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None
     frame: DetectionFrame | None = None
-    frame_road: Road = "orion"
+    frame_transport: TransportId = FIWARE.id
     detections_at: float | None = None
     sighted_at: Instant | None = None
     unreadable_at: float | None = None
     safety: SafetyReport | None = None
     safety_received: Instant | None = None
-    safety_road: Road = "orion"
+    safety_transport: TransportId = FIWARE.id
     navigation: Navigation | None = None
     navigation_received: Instant | None = None
     command_status: str | None = None
@@ -346,7 +346,7 @@ class World:
         if self._probe is not None:
             lag = self._probe.lag(at) if self._probe.is_known else None
         kind = kind_of(received.observation)
-        return robot.clock.delay(kind, origin, at, received.road, lag)
+        return robot.clock.delay(kind, origin, at, received.transport, lag)
 
     def _measured_at(
         self, origin: Origin, received: Received, likely: float | None
@@ -388,9 +388,9 @@ class World:
             return verdict
         feed = self.feeds.of(robot.robot_id, kind)
         at, counted = received.at.mono, origin.seq is not None
-        if received.road == "orion" and not counted and feed.is_direct(at):
+        if received.transport == FIWARE.id and not counted and feed.is_direct(at):
             verdict = "duplicate"
-        feed.heard(received.road, at, news=verdict == "new")
+        feed.heard(received.transport, at, news=verdict == "new")
         return verdict
 
     def live_robots(self) -> Iterable[RobotState]:
@@ -448,7 +448,7 @@ def _see(
     robot.detections_at = _not_before(
         robot.detections_at, robot.frame, frame.origin, moment
     )
-    robot.frame, robot.frame_road = frame, received.road
+    robot.frame, robot.frame_transport = frame, received.transport
     if frame.unreadable:
         robot.unreadable_at = received.at.mono
 
@@ -461,7 +461,7 @@ def _hear(
     before = None if known is None else known.mono
     moment = _not_before(before, robot.safety, report.origin, moment)
     robot.safety, robot.safety_received = report, _dated(received.at, moment)
-    robot.safety_road = received.road
+    robot.safety_transport = received.transport
 
 
 def _drive(

@@ -107,8 +107,8 @@ class Command(Model):
             requesters=list(of.requesters),
             pressed_doubted=of.times.pressed_doubted,
             age_s=round(now.mono - of.times.requested.mono, 3),
-            transports=dict(of.roads.items()),
-            roads=dict(of.roads.items()),
+            transports=dict(of.transports.items()),
+            roads=dict(of.transports.items()),
             agent_lag_s=rounded(of.agent_lag_s, 1),
             note=_note(of),
             robot=_robot(machine, now),
@@ -156,10 +156,10 @@ def _times(of: Times) -> CommandTimes:
     return CommandTimes(
         pressed=stamp(of.pressed),
         requested=format_stamp(of.requested.wall),
-        sent_fiware=moment(of.sent_fiware),
-        sent_direct=moment(of.sent_direct),
-        answer_fiware=moment(of.answer_fiware),
-        answer_direct=moment(of.answer_direct),
+        sent_fiware=moment(of.sent.get("fiware")),
+        sent_direct=moment(of.sent.get("direct")),
+        answer_fiware=moment(of.answered.get("fiware")),
+        answer_direct=moment(of.answered.get("direct")),
         standing=moment(of.standing),
     )
 
@@ -178,7 +178,7 @@ def _note(of: stop.Command) -> Sentence | None:
     lag = of.agent_lag_s
     if lag is None or lag <= AGENT_LATE_S:
         return None
-    direct = of.roads["direct"] not in ("off", "failed")
+    direct = of.transports["direct"] not in ("off", "failed")
     key = "stop.note.direct" if direct else "stop.note.fiware"
     return Sentence(key=key, slots={"lag": round(lag, 1)})
 

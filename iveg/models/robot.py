@@ -8,7 +8,7 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold as DomainHold
 from iveg.domain.observations import Instant
-from iveg.domain.transports import Transport
+from iveg.domain.transports import TransportId
 from iveg.domain.world import Link, RobotState
 from iveg.models.base import Model, rounded
 from iveg.models.command import Command
@@ -206,7 +206,7 @@ class Robot(Model):
     clock_offset_s: float | None
     road: str
     """Of the newest detections."""
-    transport: Transport
+    transport: TransportId
     """That feeds the pose."""
     profile: Profile
     margin: Margin | None

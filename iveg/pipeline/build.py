@@ -1,6 +1,6 @@
 """Puts the pipeline together: what iVeg is between its doors, running or in a test."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from iveg.domain.alerts import Rule
@@ -9,6 +9,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
+from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
 from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
@@ -17,7 +18,7 @@ from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.ports import ContextBroker, Fleet, Journal
+from iveg.pipeline.ports import CommandPort, Fleet, Journal
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 
@@ -27,8 +28,8 @@ class Doors:
     """What the pipeline reaches of the outside.
 
     Attributes:
-        fleet: Straight to the robots.
-        context_broker: To them through FIWARE.
+        fleet: What all robots are told.
+        transports: The ways of an order to a robot.
         journal: What is wanted of each robot, on disk.
         sink: The history.
         clock: The time.
@@ -41,7 +42,7 @@ class Doors:
     """
 
     fleet: Fleet
-    context_broker: ContextBroker
+    transports: Mapping[Transport, CommandPort]
     journal: Journal
     sink: RecordSink
     clock: Callable[[], Instant]
@@ -58,12 +59,10 @@ class Choices:
     """What an operator chose of it.
 
     Attributes:
-        direct: Whether STOP also goes straight to the robots.
         boot: This life of iVeg, in what it tells.
     """
 
     rule: Rule = field(default_factory=Rule)
-    direct: bool = True
     drills: Drills | None = None
     boot: str = "iveg-boot"
 
@@ -108,19 +107,19 @@ def build(
         choices.boot,
         chain.probe.lag,
     )
+    fiware_is_cut = doors.fiware_is_cut or chain.is_cut
     commander = Commander(
         fleet.ids,
+        doors.transports,
         doors.fleet,
-        doors.context_broker,
         doors.journal,
         minutes,
         hub,
         doors.new_id,
         doors.clock,
-        direct=choices.direct,
         drills=choices.drills,
         agent_lag_s=doors.agent_lag_s or chain.probe.lag,
-        fiware_is_cut=doors.fiware_is_cut or chain.is_cut,
+        is_cut=lambda way, at: way == FIWARE.id and fiware_is_cut(at),
     )
     loop = RuleLoop(
         ingest,

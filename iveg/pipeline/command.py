@@ -5,7 +5,9 @@ module stands between the two and tells people, disk and browsers how far it has
 """
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping
+import logging
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -25,6 +27,7 @@ from iveg.domain.stop import (
     Closed,
     Command,
     Effect,
+    OffTable,
     Press,
     SendOnce,
     SendStop,
@@ -32,14 +35,17 @@ from iveg.domain.stop import (
     StopMachine,
     Wanted,
 )
+from iveg.domain.stop import conditions as stop_conditions
 from iveg.domain.stop.drills import Drills
+from iveg.domain.transports import Transport
 from iveg.pipeline import topics
 from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Ids, Journal
+from iveg.pipeline.ports import Clock, CommandPort, Fleet, Ids, Journal
 from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
-from iveg.pipeline.sending import Sender
+from iveg.pipeline.sending import IsCut, Sender
 
+_log = logging.getLogger(__name__)
 _KEPT = 200
 _PLAIN = Press()
 
@@ -51,12 +57,6 @@ _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
     "release_unconfirmed": "stopped",
 }
 """Changes of what is wanted that no person's call has written down already."""
-_ALARMS = {
-    "UNCONFIRMED": "alert.stop_unconfirmed",
-    "STILL_MOVING": "alert.stop_still_moving",
-}
-_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALARMS}
-"""A STOP in one of these has not been seen to stand, not even once."""
 
 
 class Commander:
@@ -64,42 +64,45 @@ class Commander:
 
     Args:
         robots: The fleet.
-        fleet: Straight to the robots; ``broker`` through Orion.
+        ports: The transports that carry orders, each with its way out.
+        fleet: Keeps the desired state of each robot.
         journal: Outlives a crash.
         minutes: Tells people and the history.
         hub: Tells browsers.
         new_id: Makes ULIDs.
         clock: Reads both clocks.
-        direct: Whether orders go straight to the robots, too.
         drills: When each robot's STOP was last proved.
         agent_lag_s: How far the IoT Agent is behind (s); None where nobody knows.
-        fiware_is_cut: Whether the agent or its broker is known to pass nothing on.
+        is_cut: Whether what lies behind a transport is known to pass nothing on.
     """
 
     def __init__(
         self,
         robots: Iterable[str],
+        ports: Mapping[Transport, CommandPort],
         fleet: Fleet,
-        broker: ContextBroker,
         journal: Journal,
         minutes: Minutes,
         hub: Hub,
         new_id: Ids,
         clock: Clock,
         *,
-        direct: bool = True,
         drills: Drills | None = None,
         agent_lag_s: Callable[[Instant], float | None] = lambda _: None,
-        fiware_is_cut: Callable[[Instant], bool] = lambda _: False,
+        is_cut: IsCut = lambda _transport, _at: False,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
-            robot_id: StopMachine(robot_id, direct=direct) for robot_id in robots
+            robot_id: StopMachine(robot_id, ports) for robot_id in robots
         }
         self.commands: dict[str, Command] = {}
         self.drills = drills or Drills()
+        self.counters: Counter[str] = Counter()
+        self._mistakes: dict[str, OffTable] = {}
+        """Robots whose machine once had no step: shown until iVeg starts again."""
         self._presses = Presses()
+        by_id = {transport.id: port for transport, port in ports.items()}
         self._sender = Sender(
-            fleet, broker, journal, minutes, clock, self._came_back, fiware_is_cut
+            by_id, fleet, journal, minutes, clock, self._came_back, is_cut
         )
         self._agent_lag_s = agent_lag_s
         self._journal = journal
@@ -126,8 +129,7 @@ class Commander:
         """STOP these robots, in parallel; returns when it is sent and on disk."""
         machines = [self.machine(robot_id) for robot_id in robots]
         pressed = [self._press(machine, by, at, press) for machine in machines]
-        await self._write_down(pressed, by, at)
-        return pressed
+        return await self._write_down(pressed, by, at)
 
     def _press(
         self, machine: StopMachine, by: str, at: Instant, press: Press
@@ -145,9 +147,13 @@ class Commander:
         return machine.stop
 
     async def _write_down(
-        self, pressed: Iterable[Command], by: str, at: Instant
-    ) -> None:
-        """What is wanted and who wanted it, on disk before it counts as accepted."""
+        self, pressed: Sequence[Command], by: str, at: Instant
+    ) -> list[Command]:
+        """What is wanted and who wanted it, on disk before it counts as accepted.
+
+        Returns:
+            The commands as they are by then.
+        """
         # Let every send reach its socket before the disk is asked for anything.
         await asyncio.sleep(0)
         stands = [one for one in pressed if self.machine(one.robot_id).follows(one)]
@@ -158,6 +164,7 @@ class Commander:
                 for one in stands
             ),
         )
+        return [self.commands.get(one.command_id, one) for one in pressed]
 
     async def drill(
         self, robot_id: str, by: str, at: Instant, press: Press = _PLAIN
@@ -171,8 +178,7 @@ class Commander:
         press = replace(press, drill=True)
         self._perform(machine, machine.drill(by, at, self._new_id(), press), at)
         assert machine.stop is not None  # noqa: S101 - a drill begins an episode
-        drilled = machine.stop
-        await self._write_down([drilled], by, at)
+        (drilled,) = await self._write_down([machine.stop], by, at)
         return drilled
 
     async def release(
@@ -220,14 +226,14 @@ class Commander:
                 effects = machine.reported(
                     observation,
                     at,
-                    received.road,
+                    received.transport,
                     self._new_id(),
                     age_s,
                     sparse=received.sparse,
                 )
             case CommandAnswer():
                 effects = machine.answered(
-                    observation, at, received.road, self._new_id()
+                    observation, at, received.transport, self._new_id()
                 )
             case Odometry():
                 twist = observation.twist
@@ -279,8 +285,8 @@ class Commander:
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """What is wrong with STOP."""
         yield from self.drills.conditions(now)
-        for machine in self.machines.values():
-            yield from _conditions_of(machine, now)
+        yield from stop_conditions.of_machines(self.machines.values(), now)
+        yield from stop_conditions.of_mistakes(self._mistakes.values())
 
     # --- effects ------------------------------------------------------------------
 
@@ -290,12 +296,12 @@ class Commander:
         for effect in effects:
             match effect:
                 case SendStop():
-                    self._note_lag(machine, at)
+                    machine.note_lag(self._agent_lag_s(at))
                     self._sender.send(machine, effect)
                     # A silent robot says nothing that would carry the new count.
                     self._show(machine)
                 case SendOnce():
-                    self._note_lag(machine, at)
+                    machine.note_lag(self._agent_lag_s(at))
                     self._sender.send(machine, effect)
                 case SetLevel():
                     self._sender.send(machine, effect)
@@ -305,18 +311,25 @@ class Commander:
                         self._minutes.secured(), f"audit-{machine.robot_id}"
                     )
                 case Closed():
+                    self.commands[effect.command.command_id] = effect.command
                     self._minutes.closed(effect, at)
+                case OffTable():
+                    self._note_mistake(effect)
+        for command in _open(machine):
+            if command.command_id in self.commands:
+                self.commands[command.command_id] = command
 
-    def _note_lag(self, machine: StopMachine, at: Instant) -> None:
-        """How far the agent is behind while an order is being sent through it."""
-        sent = machine.once or machine.stop
-        if sent is not None:
-            sent.agent_lag_s = self._agent_lag_s(at)
+    def _note_mistake(self, effect: OffTable) -> None:
+        """A mistake of the program in STOP: told once, counted each time, shown."""
+        self.counters["stop.off_table"] += 1
+        if self._mistakes.get(effect.robot_id) != effect:
+            _log.error("STOP: no step for %s", effect)
+        self._mistakes[effect.robot_id] = effect
 
     def _came_back(
         self, machine: StopMachine, effects: list[Effect], at: Instant
     ) -> None:
-        """A road took it or failed: its part of the command is news, too."""
+        """A transport took it or failed: its part of the command is news, too."""
         self._perform(machine, effects, at)
         self._show(machine)
 
@@ -324,11 +337,13 @@ class Commander:
         self._hub.changed(topics.ROBOT.of(machine.robot_id))
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
-        command = self._command_of(machine, changed)
+        # What is open may know more than this step did: how late the agent is.
+        known = (*changed.commands, *_open(machine))
+        self.commands |= {one.command_id: one for one in known}
+        while len(self.commands) > _KEPT:
+            del self.commands[next(iter(self.commands))]
+        command = self.commands.get(changed.command_id)
         if command is not None:
-            self.commands[command.command_id] = command
-            while len(self.commands) > _KEPT:
-                del self.commands[next(iter(self.commands))]
             self._minutes.command(command, changed, at)
             if command.drill and changed.key == "standing":
                 self.drills.passed(command.robot_id, command.times.requested.wall)
@@ -353,12 +368,6 @@ class Commander:
                 if earlier is not command:
                     self._minutes.command(earlier, None, at)
                 return
-
-    def _command_of(self, machine: StopMachine, changed: Changed) -> Command | None:
-        for command in (machine.once, machine.stop):
-            if command is not None and command.command_id == changed.command_id:
-                return command
-        return self.commands.get(changed.command_id)
 
     def _log_line(
         self,
@@ -385,15 +394,6 @@ class Commander:
         await self._sender.close()
 
 
-def _conditions_of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
-    """What is wrong with one robot's STOP."""
-    stop, robot_id = machine.stop, machine.robot_id
-    if stop is None:
-        return
-    age = round(now.mono - stop.times.requested.mono, 1)
-    slots: dict[str, Slot] = {"robot": robot_id, "age": age}
-    key = _ALARMS.get(machine.state)
-    if key is not None:
-        yield Condition("P1", key, robot_id, robot_id, slots)
-    if stop.reason == "moved" and machine.state in _NOT_AT_REST:
-        yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)
+def _open(machine: StopMachine) -> tuple[Command, ...]:
+    """What is followed of one robot, as it is now."""
+    return tuple(one for one in (machine.stop, machine.once) if one is not None)

@@ -1,7 +1,7 @@
 """The door of the pipeline: a bounded queue that prefers what people's safety needs.
 
-Both roads end here.  When more comes than can be taken, the oldest telemetry gives way
-and is counted; safety reports and answers of robots never do.
+All transports end here.  When more comes than can be taken, the oldest telemetry gives
+way and is counted; safety reports and answers of robots never do.
 """
 
 import asyncio

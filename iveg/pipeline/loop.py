@@ -78,7 +78,7 @@ class RuleLoop:
                 self._chain.received(received.observation.origin, received.at)
             if received.asked or self._assessor.world.refuses(received):
                 continue
-            # The second road's answer is no news, but its time is kept.
+            # The second transport's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
                 self._commander.take(received, self._assessor.world.age_then(received))
         self._assessor.settle()

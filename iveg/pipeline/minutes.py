@@ -12,7 +12,7 @@ from dataclasses import asdict, fields, replace
 from iveg.domain.alarms import Alarm, Occurrence
 from iveg.domain.decisions import Decision
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Climate, Instant, Observation, Road
+from iveg.domain.observations import Climate, Instant, Observation
 from iveg.domain.people import Placed
 from iveg.domain.records import (
     AlertRecord,
@@ -26,6 +26,7 @@ from iveg.domain.records import (
     ReadingRecord,
 )
 from iveg.domain.stop import Changed, Closed, Command
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.domain.world import RobotState
 from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
@@ -99,7 +100,7 @@ class Minutes:
             self._sink.offer(cleared_behind(alert, now.wall))
 
     def detection(
-        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: Road
+        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: str
     ) -> None:
         """One detection that is worth a row."""
         x, y, z = one.position
@@ -163,10 +164,10 @@ class Minutes:
                 state=command.state,
                 requested_by=command.requesters[0],
                 requested_at=times.requested.wall,
-                sent_fiware_at=wall_of(times.sent_fiware),
-                sent_direct_at=wall_of(times.sent_direct),
-                answer_fiware_at=wall_of(times.answer_fiware),
-                answer_direct_at=wall_of(times.answer_direct),
+                sent_fiware_at=wall_of(times.sent.get(FIWARE.id)),
+                sent_direct_at=wall_of(times.sent.get(DIRECT.id)),
+                answer_fiware_at=wall_of(times.answered.get(FIWARE.id)),
+                answer_direct_at=wall_of(times.answered.get(DIRECT.id)),
                 standing_at=wall_of(times.standing),
                 standstill_ms=command.standstill_ms,
                 tries=command.tries,
@@ -177,14 +178,7 @@ class Minutes:
         )
         if changed is not None:
             self._audit(command, changed.state, changed.why or changed.key, at)
-        # A snapshot: what is sent later must still say what was true at this step.
-        step = replace(
-            command,
-            times=replace(times),
-            roads=dict(command.roads),
-            requesters=list(command.requesters),
-        )
-        self._hub.append(topics.COMMAND.of(command.command_id), step)
+        self._hub.append(topics.COMMAND.of(command.command_id), command)
 
     def closed(self, closed: Closed, at: Instant) -> None:
         """A command is followed no more."""

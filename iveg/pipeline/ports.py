@@ -8,8 +8,18 @@ from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant
 
 
-class OneShot(Protocol):
-    """Carries a release or a resume once; never retained, never sent again."""
+class CommandPort(Protocol):
+    """One transport's way out for orders; an answer of 2xx or a PUBACK is no evidence.
+
+    A release or resume is sent once: never retained, never sent again.
+    """
+
+    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
+        """Send a STOP; returns when the next hop has it.
+
+        Raises:
+            HopError: it was not taken.
+        """
 
     async def release(
         self, robot_id: str, ids: Iterable[str], challenge: str, attempt: str
@@ -28,18 +38,11 @@ class OneShot(Protocol):
         """
 
 
-class Fleet(OneShot, Protocol):
-    """Straight to the robots over MQTT."""
+class Fleet(Protocol):
+    """What all robots are told, over MQTT."""
 
     def tell(self, feedback: Feedback) -> None:
         """Offer feedback to the fleet; the newest of each topic counts."""
-
-    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
-        """Publish a STOP; returns when the broker has it.
-
-        Raises:
-            HopError: the broker did not take it.
-        """
 
     async def set_level(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
@@ -49,13 +52,6 @@ class Fleet(OneShot, Protocol):
         Raises:
             HopError: the broker did not take it.
         """
-
-
-class ContextBroker(OneShot, Protocol):
-    """Through Orion and the IoT Agent; an answer of 2xx is no evidence."""
-
-    async def stop(self, robot_id: str, hold_id: str, by: str) -> None:
-        """Ask for a STOP. Raises HopError."""
 
 
 class Journal(Protocol):

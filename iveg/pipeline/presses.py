@@ -1,4 +1,4 @@
-"""One press is one STOP, however often and on whatever road it comes.
+"""One press is one STOP, however often and on whatever way it comes.
 
 A page sends a press over HTTP and over its socket and repeats it until it is taken.
 What is remembered is bounded in time: a name that comes back later than that is taken

@@ -1,12 +1,12 @@
-"""Carries what a STOP machine wants sent, on both transports at once.
+"""Carries what a STOP machine wants sent, on all transports at once.
 
 Each send is a task of its own: nothing is awaited before a STOP's first byte is on its
-way, and nothing that fails on one transport holds up the other.
+way, and nothing that fails on one transport holds up another.
 """
 
 import asyncio
 import logging
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from typing import Any
 
 from iveg.domain.errors import HopError
@@ -17,45 +17,46 @@ from iveg.domain.stop import (
     SendStop,
     SetLevel,
     StopMachine,
-    Transport,
 )
+from iveg.domain.transports import TransportId
 from iveg.pipeline.minutes import Minutes
-from iveg.pipeline.ports import Clock, ContextBroker, Fleet, Journal, OneShot
+from iveg.pipeline.ports import Clock, CommandPort, Fleet, Journal
 
 _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
+IsCut = Callable[[TransportId, Instant], bool]
 
 
 class Sender:
     """The way out: STOPs, releases, resumes and levels, each in its own task.
 
     Args:
-        fleet: Straight to the robots.
-        broker: Through Orion.
+        ports: The way out of each transport.
+        fleet: Keeps the desired state of each robot.
         journal: Knows what a release names before it goes.
         minutes: Holds the audit row of a release before it goes.
         clock: Reads both clocks.
         came_back: Told how each send went.
-        fiware_is_cut: Whether the agent or its broker is known to pass nothing on.
+        is_cut: Whether what lies behind a transport is known to pass nothing on.
     """
 
     def __init__(
         self,
+        ports: Mapping[TransportId, CommandPort],
         fleet: Fleet,
-        broker: ContextBroker,
         journal: Journal,
         minutes: Minutes,
         clock: Clock,
         came_back: CameBack,
-        fiware_is_cut: Callable[[Instant], bool],
+        is_cut: IsCut,
     ) -> None:
+        self._ports = ports
         self._fleet = fleet
-        self._broker = broker
         self._journal = journal
         self._minutes = minutes
         self._clock = clock
         self._came_back = came_back
-        self._fiware_is_cut = fiware_is_cut
+        self._is_cut = is_cut
         self._levels: dict[str, SetLevel] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -65,7 +66,7 @@ class Sender:
         """Begin to send; how it went comes back later."""
         match effect:
             case SendStop():
-                name = f"stop-{effect.road}-{effect.robot_id}"
+                name = f"stop-{effect.transport}-{effect.robot_id}"
                 self.start(self._send_stop(machine, effect), name)
             case SendOnce():
                 name = f"{effect.kind}-{effect.robot_id}"
@@ -100,13 +101,10 @@ class Sender:
     # --- the transports -----------------------------------------------------------
 
     async def _send_stop(self, machine: StopMachine, effect: SendStop) -> None:
-        port = self._port(effect.road)
+        port = self._ports[effect.transport]
         by = effect.command_id[-6:]
         sending = port.stop(effect.robot_id, effect.hold_id, by)
-        await self._attempt(machine, effect.road, effect.command_id, sending)
-
-    def _port(self, transport: Transport) -> Fleet | ContextBroker:
-        return self._fleet if transport == "direct" else self._broker
+        await self._attempt(machine, effect.transport, effect.command_id, sending)
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
         """Once, and never without a trace: the audit row is on disk before it goes."""
@@ -115,7 +113,7 @@ class Sender:
             # The disk took so long that a STOP has come, or taken its place.
             return
         for transport in effect.transports:
-            sending = self._once(self._port(transport), effect)
+            sending = self._once(self._ports[transport], effect)
             self.start(
                 self._attempt(machine, transport, effect.command_id, sending),
                 f"{effect.kind}-{transport}-{effect.robot_id}",
@@ -136,7 +134,7 @@ class Sender:
         )
 
     @staticmethod
-    def _once(port: OneShot, effect: SendOnce) -> Coroutine[Any, Any, None]:
+    def _once(port: CommandPort, effect: SendOnce) -> Coroutine[Any, Any, None]:
         robot_id, challenge = effect.robot_id, effect.challenge
         if effect.kind == "resume":
             return port.resume(robot_id, challenge, effect.command_id)
@@ -145,7 +143,7 @@ class Sender:
     async def _attempt(
         self,
         machine: StopMachine,
-        transport: Transport,
+        transport: TransportId,
         command_id: str,
         sending: Coroutine[Any, Any, None],
     ) -> None:
@@ -158,10 +156,10 @@ class Sender:
             await sending
             ok = True
         except HopError as error:
-            _log.info("STOP road %s: %s", transport, error)
+            _log.info("order by transport %s: %s", transport, error)
         finally:
             at = self._clock()
-            doubtful = transport == "fiware" and self._fiware_is_cut(at)
+            doubtful = self._is_cut(transport, at)
             effects = machine.sent(
                 transport, command_id, at, ok=ok, doubtful=doubtful, left=left
             )

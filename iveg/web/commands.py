@@ -43,7 +43,7 @@ def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
         openapi_extra=DESCRIBED,
     )
     async def stop(request: Request, robot_id: str, who: Pressing) -> Response:
-        """STOP one robot, on both roads at once."""
+        """STOP one robot, on every transport at once."""
         press = await press_of(request)
         pressed = await commander.stop([robot_id], who.name, clock(), press)
         return Json(Pressed.of(pressed[0]), 202)

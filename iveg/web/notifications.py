@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Instant, Received
+from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.web.auth import Action, NotifySecret
@@ -122,7 +123,7 @@ class NotificationEndpoint:
             self._ingest.reject(problem.source, problem.reason, problem.detail)
         thinned = self._is_thinned(subscription_id)
         for observation in reading.observations:
-            self._ingest.offer(Received(observation, at, "orion", thinned=thinned))
+            self._ingest.offer(Received(observation, at, FIWARE.id, thinned=thinned))
         return None
 
 

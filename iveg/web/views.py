@@ -18,6 +18,7 @@ from iveg.domain.records import LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
+from iveg.domain.transports import alias_of
 from iveg.domain.world import RobotState, World
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
@@ -113,7 +114,7 @@ class Views:
             navigation=Navigation.of(robot),
             replay=robot.is_replay,
             clock_offset_s=rounded(robot.clock.offset_s(now)),
-            road=robot.frame_road,
+            road=alias_of(robot.frame_transport),
             transport=self._world.feeds.of(robot_id).transport(now.mono),
             profile=Profile.of(robot.profile),
             margin=Margin.of(self._margin(robot, margins, now)),
@@ -232,7 +233,7 @@ class Views:
         robot = self._world.robot(robot_id)
         if robot.frame is None or robot.detections_at is None:
             return None
-        stamp, road = robot.frame.origin.stamp, robot.frame_road
+        stamp, road = robot.frame.origin.stamp, alias_of(robot.frame_transport)
         return DetectionFrame(
             robot_id=robot_id,
             stamp=stamp,

@@ -55,7 +55,7 @@ def test_f14_a_blocked_loop_stops_the_heartbeat_and_halves_the_robots(
     assert witness.unlicensed == 0
 
 
-def test_f3_without_fiware_the_direct_road_stops_the_robot(
+def test_f3_without_fiware_the_direct_transport_stops_the_robot(
     stack: Field, person: Person
 ) -> None:
     stack.kill("fiware")

@@ -60,7 +60,7 @@ def test_a_press_makes_the_robot_stand_and_says_how_long_it_took(page: Page) -> 
 
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
-    # Its speed comes on a longer road than the word that it stands.
+    # Its speed comes on a longer way than the word that it stands.
     until(lambda: abs(number(page, "AGI", "v")) < 0.02, 8.0, "AGI shows its rest")
     expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
 

@@ -21,9 +21,10 @@ from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.mandates import Mandates
-from iveg.domain.observations import Instant, Odometry, Origin, Received, Road
+from iveg.domain.observations import Instant, Odometry, Origin, Received
 from iveg.domain.people import People
 from iveg.domain.probe import ProbeLag
+from iveg.domain.transports import TransportId
 from iveg.domain.world import World
 from iveg.robot.echo import Echo
 from tests.builders import START, odometry, origin
@@ -89,7 +90,7 @@ class Parcel:
     """What is under way: odometry, or the count of a feedback or a probe."""
 
     content: Odometry | Origin
-    road: Road = "orion"
+    transport: TransportId = "fiware"
     is_probe: bool = False
 
 
@@ -102,7 +103,7 @@ class Rig:
     """
 
     echoes: bool = True
-    transports: tuple[Road, ...] = ("mqtt", "orion")
+    transports: tuple[TransportId, ...] = ("direct", "fiware")
     now: float = 0.0
     robot_clock: float = 0.0
     our_clock: float = 0.0
@@ -151,9 +152,9 @@ class Rig:
             heard=self.echo.heard if self.echoes else None,
         )
         self.measured[boot, seq] = self.now
-        for road in self.transports:
-            weather = phase.direct if road == "mqtt" else phase.fiware
-            self.put(Parcel(odometry(origin=said), road), weather, rnd)
+        for transport in self.transports:
+            weather = phase.direct if transport == "direct" else phase.fiware
+            self.put(Parcel(odometry(origin=said), transport), weather, rnd)
 
     def send_probe(self, fiware: Weather, rnd: Random) -> None:
         one = Origin("iveg", next(self._probes))
@@ -171,7 +172,7 @@ class Rig:
         while self._way and self._way[0][0] <= self.now:
             _, _, parcel = heapq.heappop(self._way)
             if isinstance(parcel.content, Odometry):
-                self.world.apply(Received(parcel.content, self.at(), parcel.road))
+                self.world.apply(Received(parcel.content, self.at(), parcel.transport))
             elif parcel.is_probe:
                 self.probe.returned(parcel.content, self.at())
             else:
@@ -269,7 +270,7 @@ def backlog(seconds: float, grows_s: float, most_s: float) -> Iterator[float]:
 def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_pose(
     grows_s: float, steps: list[float], seed: int
 ) -> None:
-    rig = Rig(echoes=False, transports=("orion",))
+    rig = Rig(echoes=False, transports=("fiware",))
     rnd = Random(seed)  # noqa: S311 - repeatable on purpose
     for number, late in enumerate(backlog(40, grows_s, 25.0)):
         step = steps[number // 15] if number % 15 == 14 else 0.0
@@ -281,7 +282,7 @@ def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_po
 
 
 def test_a_healthy_robot_that_does_not_echo_is_live_by_its_estimate() -> None:
-    rig, rnd = Rig(echoes=False, transports=("orion",)), Random(1)  # noqa: S311
+    rig, rnd = Rig(echoes=False, transports=("fiware",)), Random(1)  # noqa: S311
     links = [rig.robot.link(rig.at()) for _ in rig.drive(quiet(5), rnd)]
 
     assert set(links[20:]) == {"LIVE"}

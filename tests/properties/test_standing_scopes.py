@@ -8,23 +8,24 @@ from random import Random
 
 import pytest
 
-from iveg.domain.observations import Road, SafetyReport
+from iveg.domain.observations import SafetyReport
 from iveg.domain.stop import SendStop, StopMachine
+from iveg.domain.transports import TransportId
 from iveg.ngsi import codec
 from iveg.robot.effects import Effect, Report
 from tests.builders import at
 from tests.unit.robot.rig import STEP_S, Rig
 
-JITTER_S: dict[Road, float] = {"mqtt": 0.06, "orion": 0.25}
-BASE_S: dict[Road, float] = {"mqtt": 0.005, "orion": 0.02}
+JITTER_S: dict[TransportId, float] = {"direct": 0.06, "fiware": 0.25}
+BASE_S: dict[TransportId, float] = {"direct": 0.005, "fiware": 0.02}
 
 
 class Greenhouse:
     """One robot that drives, one iVeg, and what is on the way between them."""
 
     def __init__(self, scope: str, seed: int) -> None:
-        self.roads: tuple[Road, ...] = (
-            ("orion",) if scope == "off" else ("mqtt", "orion")
+        self.transports: tuple[TransportId, ...] = (
+            ("fiware",) if scope == "off" else ("direct", "fiware")
         )
         self.chance = Random(seed)  # noqa: S311 - a delay, no secret
         self.iveg = StopMachine("AGI")
@@ -32,12 +33,12 @@ class Greenhouse:
         self.seen = len(self.rig.log)
         self.count = 0
         self.known = -1
-        self.on_the_way: list[tuple[float, int, SafetyReport, Road]] = []
+        self.on_the_way: list[tuple[float, int, SafetyReport, TransportId]] = []
         self.ids = iter(f"01ID{number:06d}" for number in range(1000))
 
     def press(self) -> None:
         for effect in self.iveg.press("ana", at(self.rig.now), next(self.ids)):
-            if isinstance(effect, SendStop) and effect.road == "direct":
+            if isinstance(effect, SendStop) and effect.transport == "direct":
                 payload = codec.write_stop(effect.hold_id, "ana")
                 self.rig.command(codec.write_command(payload))
 
@@ -54,20 +55,22 @@ class Greenhouse:
         if not isinstance(effect, Report):
             return
         self.count += 1
-        for road in self.roads:
-            if road == "mqtt" or effect.is_measure:
-                late = BASE_S[road] + self.chance.uniform(0.0, JITTER_S[road])
-                self.on_the_way.append((when + late, self.count, effect.report, road))
+        for transport in self.transports:
+            if transport == "direct" or effect.is_measure:
+                late = BASE_S[transport] + self.chance.uniform(0.0, JITTER_S[transport])
+                self.on_the_way.append(
+                    (when + late, self.count, effect.report, transport)
+                )
 
     def _arrive(self) -> None:
         self.on_the_way.sort(key=lambda one: one[:2])
         while self.on_the_way and self.on_the_way[0][0] <= self.rig.now:
-            when, count, report, road = self.on_the_way.pop(0)
+            when, count, report, transport = self.on_the_way.pop(0)
             if count > self.known:
                 self.known = count
-                sparse = road == "orion"
+                sparse = transport == "fiware"
                 self.iveg.reported(
-                    report, at(when), road, next(self.ids), sparse=sparse
+                    report, at(when), transport, next(self.ids), sparse=sparse
                 )
 
 
@@ -91,7 +94,7 @@ def test_a_robot_that_falls_silent_stands_no_more(scope: str) -> None:
     place = Greenhouse(scope, 1)
     place.press()
     place.run(5.0)
-    place.roads = ()
+    place.transports = ()
 
     place.run(2.2)
 

@@ -2,7 +2,8 @@
 
 Lives of iVeg that share one disk and nothing else.  In each a person and a robot do
 what a seed has drawn; then the power goes, now and then while the disk hangs.  What
-happened is read from the log and the roads of each life, what was kept from the disk.
+happened is read from the log and the transports of each life, what was kept from the
+disk.
 """
 
 import asyncio

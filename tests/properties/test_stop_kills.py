@@ -1,8 +1,8 @@
 """Kills in every phase of a STOP, on the virtual clock: 0 motions without a release.
 
 The rig of ``test_stop`` with a seed in place of Hypothesis: a person works the robot,
-and iVeg, the robot or all roads die at a moment that nobody chose (fault F13), reboot
-(F15), or bring back what was said an hour ago (F36).
+and iVeg, the robot or all transports die at a moment that nobody chose (fault F13),
+reboot (F15), or bring back what was said an hour ago (F36).
 """
 
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ from tests.properties.test_stop import (
     TICK_S,
     UP,
     Channel,
-    StopOverBadRoads,
+    StopOverBadTransports,
     Weather,
 )
 
@@ -38,7 +38,7 @@ class Licence:
     known: set[str] = field(default_factory=set)
 
 
-class Watched(StopOverBadRoads):
+class Watched(StopOverBadTransports):
     """The rig with a witness: a hold goes and a motion comes by people alone."""
 
     def __init__(self) -> None:
@@ -97,14 +97,14 @@ class Watched(StopOverBadRoads):
         self.run_for(3.0)
 
     def mend(self) -> None:
-        for road in self.roads.values():
-            road.weather = "open"
+        for transport in self.transports.values():
+            transport.weather = "open"
 
 
 def bring_to(rig: Watched, phase: str, limit_s: float = 25.0) -> bool:
     """Work the robot until iVeg is in this phase; whether it came to be."""
     rig.mend()
-    rig.roads["direct"].weather = "slow" if phase == "SENT" else "open"
+    rig.transports["direct"].weather = "slow" if phase == "SENT" else "open"
     end = rig.now + limit_s
     while rig.iveg.state != phase and rig.now < end:
         sooner = phase in ("SENT", "DELIVERED") and rig.iveg.state == "STANDING"
@@ -119,16 +119,16 @@ def bring_to(rig: Watched, phase: str, limit_s: float = 25.0) -> bool:
 
 def kill(rig: Watched, rnd: Random) -> str:
     """One process dies, for a while or for a moment."""
-    victim = rnd.choice(("iveg", "robot", "roads", "both"))
+    victim = rnd.choice(("iveg", "robot", "transports", "both"))
     away = rnd.choice((0.0, 0.3, 2.0, 4.0))
     if victim in ("iveg", "both"):
         rig.iveg_restarts()
     if victim in ("robot", "both"):
         rig.the_robot_reboots()
-    if victim == "roads":
+    if victim == "transports":
         for name in SORTS:
-            rig.roads[name].weather = "cut"
-            rig.roads[name].waiting.clear()
+            rig.transports[name].weather = "cut"
+            rig.transports[name].waiting.clear()
     rig.run_for(away)
     rig.mend()
     return victim
@@ -163,7 +163,7 @@ def test_f36_a_release_and_a_resume_of_an_hour_ago_are_ignored(seed: int) -> Non
     assert bring_to(rig, "STANDING")
     for _ in range(2):
         rig.let_go()
-        old += rig.roads["fiware"].waiting
+        old += rig.transports["fiware"].waiting
         rig.run_for(rnd.choice((0.5, 1.0)))
     assert len(old) >= 2
     assert bring_to(rig, "STANDING")
@@ -171,7 +171,7 @@ def test_f36_a_release_and_a_resume_of_an_hour_ago_are_ignored(seed: int) -> Non
     rig.run_for(2.0)
 
     for message in rnd.sample(old, len(old)):
-        rig.roads["fiware"].put(message)
+        rig.transports["fiware"].put(message)
         rig.run_for(0.5)
 
     # The witness in the rig has seen every hold and every motion meanwhile.
@@ -194,7 +194,7 @@ def test_f37_whoever_stops_while_another_releases_wins_every_time(seed: int) -> 
 def interleave(rig: Watched, rnd: Random) -> bool:
     """A releases and resumes, B stops somewhere in between; whether B has won."""
     for name in SORTS:
-        rig.roads[name].weather = rnd.choice(WEATHERS)
+        rig.transports[name].weather = rnd.choice(WEATHERS)
     acts = ["let_go", "let_go", "let_go", "stop"]
     rnd.shuffle(acts)
     for act in acts:
@@ -239,7 +239,7 @@ def crawling() -> Watched:
 
 
 class Losing(Channel):
-    """A road on which one kind of word is always lost."""
+    """A transport on which one kind of word is always lost."""
 
     def __init__(self, kind: type) -> None:
         super().__init__()
@@ -252,4 +252,4 @@ class Losing(Channel):
 
 def lose(rig: Watched, kind: type) -> None:
     for name in UP:
-        rig.roads[name] = Losing(kind)
+        rig.transports[name] = Losing(kind)

@@ -16,7 +16,7 @@ from tests.properties.test_stop import (
     SORTS,
     TICK_S,
     Channel,
-    StopOverBadRoads,
+    StopOverBadTransports,
 )
 
 RUNS = int(os.environ.get("IVEG_STOP_RUNS", "200"))
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(max(120, RUNS))]
 
 
 class Late(Channel):
-    """A road on which a message takes 500 ± 200 ms and none overtakes another."""
+    """A transport on which a message takes 500 ± 200 ms and none overtakes another."""
 
     def __init__(self, rig: "Watched", rnd: Random) -> None:
         super().__init__()
@@ -45,7 +45,7 @@ class Late(Channel):
 
 
 class Lossy(Channel):
-    """A road that loses 30 % of what it is given, and now and then everything."""
+    """A transport that loses 30 % of what it is given, and now and then everything."""
 
     def __init__(self, rig: "Watched", rnd: Random) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ class Lossy(Channel):
             super().put(message)
 
 
-class Watched(StopOverBadRoads):
+class Watched(StopOverBadTransports):
     """The rig with one who looks at the wheels, and brakes that are not obedient."""
 
     def __init__(self, rnd: Random) -> None:
@@ -106,11 +106,11 @@ class Watched(StopOverBadRoads):
         return self.now - self.pressed_at
 
 
-def through(road: type[Late] | type[Lossy], rnd: Random) -> Watched:
-    """A robot that drives, behind roads of this sort in both directions."""
+def through(transport: type[Late] | type[Lossy], rnd: Random) -> Watched:
+    """A robot that drives, behind transports of this sort in both directions."""
     rig = Watched(rnd)
     for name in SORTS:
-        rig.roads[name] = road(rig, rnd)
+        rig.transports[name] = transport(rig, rnd)
     rig.run_for(1.0)
     return rig
 

@@ -88,7 +88,7 @@ class CommandLatency:
     Where nobody told when it was pressed, the press is when it was accepted.
 
     Attributes:
-        direct_ms: To the answer on the direct road; ``fiware_ms`` on the other.
+        direct_ms: To the answer by the direct transport; ``fiware_ms`` by the other.
         standstill_ms: To the first standing sample.
         accepted_ms: To this server, where the page told when it was pressed.
         sent_direct_ms: Until it left for the broker; ``sent_fiware_ms`` for Orion.

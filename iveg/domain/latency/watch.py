@@ -15,6 +15,7 @@ from iveg.domain.latency.series import SLICE_S, Series
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
 from iveg.domain.observations import FeedbackRef, Instant, Received
+from iveg.domain.transports import FIWARE
 
 _SECOND_S: Final = 1.0
 _SERIES_A_TICK: Final = 40
@@ -69,7 +70,7 @@ class LatencyWatch:
             return
         origin = received.observation.origin  # type: ignore[union-attr]
         composed_at = self._composed_at(origin.heard)
-        if received.road == "mqtt":
+        if received.transport != FIWARE.id:
             stream.heard(origin, received.at, composed_at, agent=received.sparse)
         else:
             stream.notified(origin, received.at, composed_at, thinned=received.thinned)

@@ -1,9 +1,10 @@
-"""STOP, from a person's hand to a measured standstill (safety.md §2.3)."""
+"""STOP, from a person's hand to a measured standstill (docs/safety.md, "STOP")."""
 
 from iveg.domain.stop.commands import (
     Command,
     CommandState,
     Press,
+    State,
     Times,
     believe,
 )
@@ -11,13 +12,15 @@ from iveg.domain.stop.effects import (
     Changed,
     Closed,
     Effect,
+    Event,
+    Key,
+    OffTable,
     SendOnce,
     SendStop,
     SetLevel,
 )
-from iveg.domain.stop.machine import StopMachine
+from iveg.domain.stop.machine import STEPS, Step, StopMachine
 from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
-from iveg.domain.stop.table import STEPS, SendRoad, State, Transport
 from iveg.domain.stop.wanted import Wanted
 
 __all__ = [
@@ -29,15 +32,17 @@ __all__ = [
     "Command",
     "CommandState",
     "Effect",
+    "Event",
+    "Key",
+    "OffTable",
     "Press",
     "SendOnce",
-    "SendRoad",
     "SendStop",
     "SetLevel",
     "State",
+    "Step",
     "StopMachine",
     "Times",
-    "Transport",
     "Wanted",
     "believe",
 ]

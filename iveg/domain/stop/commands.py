@@ -1,18 +1,32 @@
-"""One STOP, RELEASE or RESUME with the time of each of its steps.
+"""One STOP, RELEASE or RESUME as it is at one moment, with the time of each step.
 
-A STOP's times are t0 the press on the browser's clock, t1 accepted (``requested``),
-t2 sent and t3 answered on each road, and t4 standing (safety.md §2.4).
+A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
+answered on each transport, and standing (docs/interfaces.md §8).
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from iveg.domain.observations import Instant, Road
-from iveg.domain.stop.table import State, Transport
+from iveg.domain.observations import Instant
+from iveg.domain.transports import Transport, TransportId
 
+State = Literal[
+    "RUNNING",
+    "REQUESTED",
+    "SENT",
+    "DELIVERED",
+    "STANDING",
+    "UNCONFIRMED",
+    "STILL_MOVING",
+    "STALE",
+    "RELEASING",
+    "READY",
+]
 CommandState = State | Literal["REPLACED", "EXPIRED"]
 """``REPLACED``: another command took its place.  ``EXPIRED``: a release or resume
 that the robot never confirmed."""
+Kind = Literal["stop", "release", "resume"]
 
 PRESS_OLDEST_S = 60.0
 PRESS_AHEAD_S = 0.25
@@ -34,6 +48,9 @@ class Press:
     drill: bool = False
 
 
+PLAIN = Press()
+
+
 def believe(pressed_at: float | None, at: Instant) -> float | None:
     """When it was pressed (Unix s), if that can be: never ahead of ``at``, not old."""
     if pressed_at is None:
@@ -43,22 +60,22 @@ def believe(pressed_at: float | None, at: Instant) -> float | None:
     return min(pressed_at, at.wall)
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Times:
     """When each step of a command was taken; all but ``pressed`` on our clocks.
 
     Attributes:
         pressed: Unix time (s); None where nobody said, or it was not believed.
         pressed_doubted: Somebody said a time that cannot be.
+        sent: By transport, when it first took it.
+        answered: By transport, when the robot first said that it has it.
     """
 
     requested: Instant
     pressed: float | None = None
     pressed_doubted: bool = False
-    sent_direct: Instant | None = None
-    sent_fiware: Instant | None = None
-    answer_direct: Instant | None = None
-    answer_fiware: Instant | None = None
+    sent: Mapping[TransportId, Instant] = field(default_factory=dict)
+    answered: Mapping[TransportId, Instant] = field(default_factory=dict)
     standing: Instant | None = None
 
     @classmethod
@@ -68,29 +85,22 @@ class Times:
         doubted = pressed is None and press.pressed_at is not None
         return cls(at, pressed, doubted)
 
-    def note_word(self, at: Instant, road: Road) -> None:
-        """The robot has said, for the first time on this way, that it has it."""
-        if road == "mqtt":
-            self.answer_direct = self.answer_direct or at
-        else:
-            self.answer_fiware = self.answer_fiware or at
-
     def ms_from_press(self, at: Instant) -> float:
         """From the press, or the acceptance where it is unknown, to a moment (ms)."""
         lead = 0.0 if self.pressed is None else self.requested.wall - self.pressed
         return max(0.0, 1000.0 * (at.mono - self.requested.mono + lead))
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Command:
     """One STOP, RELEASE or RESUME as people follow it.
 
     Attributes:
         reason: Why it began or ended as it did; None for a plain press.
         standstill_ms: First standing sample − press.
-        tries: How often it was sent before the robot stood; both transports at once
+        tries: How often it was sent before the robot stood; all transports at once
             count once.
-        roads: Per transport ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
+        transports: Each ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
             (docs/interfaces.md §8).
         drill: A STOP that somebody pressed to prove that it works.
         held_as: The hold of an earlier STOP that this one holds on to.
@@ -100,16 +110,14 @@ class Command:
 
     command_id: str
     robot_id: str
-    kind: Literal["stop", "release", "resume"]
+    kind: Kind
     state: CommandState
     times: Times
-    requesters: list[str] = field(default_factory=list)
+    requesters: tuple[str, ...] = ()
     tries: int = 0
     reason: str | None = None
     standstill_ms: float | None = None
-    roads: dict[Transport, str] = field(
-        default_factory=lambda: {"direct": "pending", "fiware": "pending"}
-    )
+    transports: Mapping[TransportId, str] = field(default_factory=dict)
     drill: bool = False
     held_as: str | None = None
     agent_lag_s: float | None = None
@@ -119,9 +127,9 @@ class Command:
         """What this STOP is called at the robot; a release or resume holds nothing."""
         return (self.held_as or self.command_id) if self.kind == "stop" else None
 
-    def note_sent(
+    def sent(
         self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
-    ) -> None:
+    ) -> "Command":
         """A transport took what ``left`` for it, or failed; taken is not yet arrived.
 
         Sent is when it left: the robot's answer is often here before the word of who
@@ -130,17 +138,38 @@ class Command:
         Only a broker's word that it has a STOP (PUBACK) says something; Orion's 204
         and an order at QoS 0 say nothing until the robot answers.
         """
-        if ok and transport == "direct":
-            self.times.sent_direct = self.times.sent_direct or left
-        elif ok:
-            self.times.sent_fiware = self.times.sent_fiware or left
-        confirms = transport == "direct" and self.kind == "stop"
-        if self.roads[transport] == "ok" and not confirms:
-            return  # The robot's answer was faster than the word of who took it.
+        times = self.times
+        if ok:
+            times = replace(times, sent={transport.id: left, **times.sent})
+        confirms = transport.confirms and self.kind == "stop"
+        if self.transports[transport.id] == "ok" and not confirms:
+            # The robot's answer was faster than the word of who took it.
+            return replace(self, times=times)
         taken = "ok" if confirms else "pending"
-        self.roads[transport] = ("unknown" if doubtful else taken) if ok else "failed"
+        now = ("unknown" if doubtful else taken) if ok else "failed"
+        return replace(self, times=times, transports=self._with(transport.id, now))
 
-    def note_answer(self, at: Instant, road: Road) -> None:
+    def heard_of(self, transport: TransportId, at: Instant) -> "Command":
+        """The robot has said on this way that it has it; the first time counts."""
+        if transport in self.times.answered:
+            return self
+        answered = {**self.times.answered, transport: at}
+        return replace(self, times=replace(self.times, answered=answered))
+
+    def answered(self, transport: TransportId, at: Instant) -> "Command":
         """The robot's own answer to it has come."""
-        self.times.note_word(at, road)
-        self.roads["direct" if road == "mqtt" else "fiware"] = "ok"
+        heard = self.heard_of(transport, at)
+        return replace(heard, transports=self._with(transport, "ok"))
+
+    def stood(self, first: Instant) -> "Command":
+        """The robot was measured to stand since ``first``; the first time counts."""
+        if self.times.standing is not None:
+            return self
+        return replace(
+            self,
+            times=replace(self.times, standing=first),
+            standstill_ms=self.times.ms_from_press(first),
+        )
+
+    def _with(self, transport: TransportId, state: str) -> dict[TransportId, str]:
+        return {**self.transports, transport: state}

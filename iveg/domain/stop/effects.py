@@ -1,10 +1,55 @@
-"""What the STOP machine asks the world to do."""
+"""What happens to a STOP machine, and what it asks the world to do."""
 
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.stop.commands import Command
-from iveg.domain.stop.table import State, Transport
+from iveg.domain.observations import Instant
+from iveg.domain.stop.attempt import Attempt
+from iveg.domain.stop.commands import PLAIN, Command, Press, State
+from iveg.domain.transports import TransportId
+
+Key = Literal[
+    "requested",
+    "reasserted",
+    "moved",
+    "release_unconfirmed",
+    "adopted",
+    "sent",
+    "delivered",
+    "standing",
+    "unconfirmed",
+    "still_moving",
+    "stale",
+    "releasing",
+    "resuming",
+    "refused",
+    "ready",
+    "running",
+]
+"""What can happen; also names the sentence that tells of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened, with what the step needs of it.
+
+    Attributes:
+        new_id: Names the command that begins, and its hold unless one is ``kept``.
+        by: Who wants it.
+        press: What the page says of a press.
+        kept: A hold that the robot has already: it is held on to, none is added.
+        doubt: The challenge of a release that may still lift that hold.
+        attempt: The release or resume that begins.
+    """
+
+    key: Key
+    at: Instant
+    new_id: str = ""
+    by: str = "iveg"
+    press: Press = PLAIN
+    kept: str | None = None
+    doubt: str | None = None
+    attempt: Attempt | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +58,7 @@ class SendStop:
 
     robot_id: str
     hold_id: str
-    road: Transport
+    transport: TransportId
     command_id: str
 
 
@@ -30,14 +75,14 @@ class SendOnce:
     command_id: str
     kind: Literal["release", "resume"]
     challenge: str
-    transports: tuple[Transport, ...]
+    transports: tuple[TransportId, ...]
     ids: tuple[str, ...] = ()
     ours: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class SetLevel:
-    """Publish the retained level that a reconnecting robot finds."""
+    """Publish the retained desired state that a reconnecting robot finds."""
 
     robot_id: str
     desired: Literal["stopped", "run"]
@@ -49,14 +94,17 @@ class Changed:
     """The state changed: one audit row, one log line.
 
     Attributes:
+        command_id: Whose step it is.
         key: Names the sentence, such as ``standing`` or ``moved``.
+        commands: The STOP and the order under way, as they are after it.
     """
 
     robot_id: str
     command_id: str
     state: State
-    key: str
+    key: Key
     why: str | None = None
+    commands: tuple[Command, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +117,19 @@ class Closed:
 
     robot_id: str
     command: Command
-    key: str
+    key: Key
 
 
-Effect = SendStop | SendOnce | SetLevel | Changed | Closed
+@dataclass(frozen=True, slots=True)
+class OffTable:
+    """An event came that has no row in this state: a mistake in the machine.
+
+    Nothing has changed, and what is wanted stays wanted.
+    """
+
+    robot_id: str
+    state: State
+    key: Key
+
+
+Effect = SendStop | SendOnce | SetLevel | Changed | Closed | OffTable

@@ -1,15 +1,16 @@
 """When a STOP is sent again, and on which transport.
 
-Direct at 0, 250, 500 and 1000 ms, then every half second, after ten seconds every
-second; to a robot that has it every second, to a standing one every five.  Through
-Orion one request at a time, the next two seconds after the last came back, and none to
-a robot that has it, unless there is no other transport.
+A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half second,
+after ten seconds every second; to a robot that has it every second, to a standing one
+every five.  One that takes one at a time (Orion): the next two seconds after the last
+came back, and none to a robot that has it, unless there is no other transport.
 """
 
+from collections.abc import Iterable
 from typing import Literal
 
 from iveg.domain.observations import Instant
-from iveg.domain.stop.table import Transport
+from iveg.domain.transports import Transport, TransportId
 
 FIWARE_PAUSE_S = 2.0
 DELIVERED_RESEND_S = 1.0
@@ -22,35 +23,99 @@ Progress = Literal["asked", "delivered", "standing"]
 """What the robot has said so far: nothing, that it has it, that it stands."""
 
 
-class Sends:
-    """The timetable of one robot's STOP."""
+class Repeated:
+    """One transport that takes a STOP whenever it is due."""
 
-    def __init__(self, *, direct: bool) -> None:
-        self.has_direct = direct
-        self._sent_direct = float("-inf")
+    def __init__(self) -> None:
+        self._sent_at = float("-inf")
         self._age_then = 0.0
-        self._next_fiware = 0.0
-        self._fiware_busy = False
+
+    def now(self, _: Instant) -> None:
+        """At the next look."""
+        self._sent_at = float("-inf")
+
+    def begin(self) -> None:
+        """A new episode."""
+
+    def came_back(self, at: Instant) -> None:
+        """How it went says nothing of when the next is due."""
+
+    def is_due(self, at: Instant, age_s: float, progress: Progress) -> bool:
+        """Whether to send now; that counts as sent."""
+        pause = _pause(self._age_then, progress)
+        if at.mono - self._sent_at < pause - _EARLY_S:
+            return False
+        self._sent_at, self._age_then = at.mono, age_s
+        return True
+
+
+class OneAtATime:
+    """One transport with at most one request under way.
+
+    Args:
+        alone: There is no other way to the robot.
+    """
+
+    def __init__(self, *, alone: bool) -> None:
+        self._alone = alone
+        self._next = 0.0
+        self._busy = False
+
+    def now(self, at: Instant) -> None:
+        """As soon as nothing is under way."""
+        self._next = at.mono
 
     def begin(self) -> None:
         """A new episode: what is still on its way belongs to an earlier one."""
-        self._fiware_busy = False
-
-    def now(self, at: Instant) -> None:
-        """On both transports at once, whatever was due when."""
-        self.direct_now()
-        self._next_fiware = at.mono
-
-    def direct_now(self) -> None:
-        """On the direct transport at the next tick."""
-        self._sent_direct = float("-inf")
+        self._busy = False
 
     def came_back(self, at: Instant) -> None:
-        """Orion has answered, or will not."""
-        self._fiware_busy = False
-        self._next_fiware = at.mono + FIWARE_PAUSE_S
+        """It has answered, or will not."""
+        self._busy = False
+        self._next = at.mono + FIWARE_PAUSE_S
 
-    def due(self, at: Instant, age_s: float, progress: Progress) -> list[Transport]:
+    def is_due(self, at: Instant, _: float, progress: Progress) -> bool:
+        """Whether to send now; that counts as sent."""
+        if self._busy or (progress != "asked" and not self._alone):
+            return False
+        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
+        self._busy = at.mono >= self._next + rest
+        return self._busy
+
+
+class Sends:
+    """The timetable of one robot's STOP."""
+
+    def __init__(self, transports: Iterable[Transport]) -> None:
+        carriers = [one for one in transports if one.can_stop]
+        alone = all(one.one_at_a_time for one in carriers)
+        self._ways: dict[TransportId, Repeated | OneAtATime] = {
+            one.id: OneAtATime(alone=alone) if one.one_at_a_time else Repeated()
+            for one in carriers
+        }
+
+    def begin(self) -> None:
+        """A new episode."""
+        for way in self._ways.values():
+            way.begin()
+
+    def now(self, at: Instant) -> None:
+        """On every transport at once, whatever was due when."""
+        for way in self._ways.values():
+            way.now(at)
+
+    def repeat_now(self, at: Instant) -> None:
+        """At the next look on those that take any number."""
+        for way in self._ways.values():
+            if isinstance(way, Repeated):
+                way.now(at)
+
+    def came_back(self, transport: TransportId, at: Instant) -> None:
+        """A transport has answered, or will not."""
+        if transport in self._ways:
+            self._ways[transport].came_back(at)
+
+    def due(self, at: Instant, age_s: float, progress: Progress) -> list[TransportId]:
         """The transports to send on now; they count as used.
 
         Args:
@@ -58,24 +123,9 @@ class Sends:
             age_s: Since the press was accepted (s).
             progress: What the robot has said so far.
         """
-        due: list[Transport] = []
-        if self.has_direct and self._direct_is_due(at, progress):
-            self._sent_direct, self._age_then = at.mono, age_s
-            due.append("direct")
-        if self._fiware_is_due(at, progress):
-            self._fiware_busy = True
-            due.append("fiware")
-        return due
-
-    def _direct_is_due(self, at: Instant, progress: Progress) -> bool:
-        waited = at.mono - self._sent_direct
-        return waited >= _pause(self._age_then, progress) - _EARLY_S
-
-    def _fiware_is_due(self, at: Instant, progress: Progress) -> bool:
-        if self._fiware_busy or (progress != "asked" and self.has_direct):
-            return False
-        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
-        return at.mono >= self._next_fiware + rest
+        return [
+            name for name, way in self._ways.items() if way.is_due(at, age_s, progress)
+        ]
 
 
 def _pause(age_s: float, progress: Progress) -> float:

@@ -65,7 +65,7 @@ def test_it_listens_to_what_its_scope_says(
     assert Bench(scope).reader.subscriptions() == topics
 
 
-def test_looks_reports_and_answers_come_in_on_the_mqtt_road() -> None:
+def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
     bench = Bench()
     frame = detection_frame("AGI", detection("farmer", 1.0))
     answer = b'{"cmd": {"id": "01A", "r": "LATCHED", "holds": []}}'

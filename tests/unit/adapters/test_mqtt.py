@@ -9,7 +9,7 @@ import orjson
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.adapters.roads import MqttRoad
+from iveg.adapters.transports import MqttTransport
 from iveg.domain.errors import HopError
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Origin
@@ -156,19 +156,19 @@ async def test_a_broker_that_is_not_there_yet_is_told_once_and_found_when_it_com
             assert (heard.connects, heard.losses) == (1, 0)
 
 
-# --- the direct road --------------------------------------------------------------
+# --- the direct transport ---------------------------------------------------------
 
 
-async def test_the_direct_road_speaks_as_the_contract_says() -> None:
+async def test_the_direct_transport_speaks_as_the_contract_says() -> None:
     async with mqtt_broker("127.0.0.1", 0) as broker:
         port = broker.port
         heard = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired", "/+/mqtt_feedback")
-        road = MqttRoad(heard.link, "iveg")
+        transport = MqttTransport(heard.link, "iveg")
         async with running(heard.link):
             await until(lambda: heard.link.connected)
-            await road.stop("AGI", "01A", "x")
-            await road.set_level("AGI", "stopped", ["01A"])
-            road.tell(Feedback("AGI", Origin("b", 1, "t")))
+            await transport.stop("AGI", "01A", "x")
+            await transport.set_level("AGI", "stopped", ["01A"])
+            transport.tell(Feedback("AGI", Origin("b", 1, "t")))
             await until(lambda: len(heard.messages) == 3)
 
     said = {topic: orjson.loads(payload) for topic, payload in heard.messages}
@@ -181,11 +181,11 @@ async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> N
     async with mqtt_broker("127.0.0.1", 0) as broker:
         port = broker.port
         iveg = Heard(port)
-        road = MqttRoad(iveg.link, "iveg")
+        transport = MqttTransport(iveg.link, "iveg")
         async with running(iveg.link):
             await until(lambda: iveg.link.connected)
-            await road.set_level("AGI", "stopped", ["01A"])
-            await road.stop("AGI", "01A", "x")
+            await transport.set_level("AGI", "stopped", ["01A"])
+            await transport.stop("AGI", "01A", "x")
             robot = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired")
             async with running(robot.link):
                 await until(lambda: robot.messages)
@@ -209,9 +209,9 @@ async def test_a_release_and_a_resume_are_published_once_at_qos_0_and_not_kept()
         ) -> None:
             sent.append((topic, payload, qos, retain))
 
-    road = MqttRoad(Written(BrokerAddress("127.0.0.1", 1), "iveg"), "iveg")
-    await road.release("AGI", ["01A", "boot-1"], "c", "01T")
-    await road.resume("AGI", "d", "01U")
+    transport = MqttTransport(Written(BrokerAddress("127.0.0.1", 1), "iveg"), "iveg")
+    await transport.release("AGI", ["01A", "boot-1"], "c", "01T")
+    await transport.resume("AGI", "d", "01U")
 
     assert [(topic, qos, retain) for topic, _, qos, retain in sent] == [
         ("/iveg/AGI/cmd", 0, False)
@@ -225,10 +225,10 @@ async def test_a_release_and_a_resume_are_published_once_at_qos_0_and_not_kept()
 async def test_a_release_without_a_broker_fails_and_is_kept_for_nobody() -> None:
     (port,) = free_ports(1)
     heard = Heard(port, "/iveg/AGI/cmd")
-    road = MqttRoad(heard.link, "iveg")
+    transport = MqttTransport(heard.link, "iveg")
     async with running(heard.link):
         with pytest.raises(HopError):
-            await road.release("AGI", ["01A"], "c", "01T")
+            await transport.release("AGI", ["01A"], "c", "01T")
         async with mqtt_broker("127.0.0.1", port):
             await until(lambda: heard.link.connected)
             await heard.link.publish("/iveg/AGI/cmd", b"last")

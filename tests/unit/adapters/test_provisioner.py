@@ -14,8 +14,8 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.subscriptions import wanted_for
+from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Odometry, Origin, Received
-from iveg.domain.transports import Feeds
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names

@@ -4,16 +4,16 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from iveg.domain.observations import CommandAnswer, Hold, Origin, Road
+from iveg.domain.observations import CommandAnswer, Hold, Origin
 from iveg.domain.stop import (
     Changed,
     Effect,
     SendOnce,
-    SendRoad,
     SendStop,
     SetLevel,
     StopMachine,
 )
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import at, safety_report
 
 BOOT_HOLD = Hold("boot-b1", "boot", "remote")
@@ -30,7 +30,7 @@ class Bench:
     log: list[Effect] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.machine = StopMachine("AGI", direct=self.direct)
+        self.machine = StopMachine("AGI", (DIRECT.switched(on=self.direct), FIWARE))
         self._ids = itertools.count(1)
         self._answers = itertools.count(1)
 
@@ -46,10 +46,12 @@ class Bench:
     def press(self, by: str = "ana") -> list[Effect]:
         return self.keep(self.machine.press(by, at(self.now), self.new_id()))
 
-    def sent(self, road: SendRoad = "direct", *, ok: bool = True) -> list[Effect]:
+    def sent(
+        self, transport: TransportId = "direct", *, ok: bool = True
+    ) -> list[Effect]:
         assert self.machine.stop is not None
         command_id = self.machine.stop.command_id
-        return self.keep(self.machine.sent(road, command_id, at(self.now), ok=ok))
+        return self.keep(self.machine.sent(transport, command_id, at(self.now), ok=ok))
 
     def report(
         self,
@@ -58,7 +60,7 @@ class Bench:
         angular: float = 0.0,
         factor: float = 0.0,
         released: tuple[str, ...] = (),
-        road: Road = "mqtt",
+        transport: TransportId = "direct",
         challenge: str = CHALLENGE,
         sparse: bool = False,
     ) -> list[Effect]:
@@ -74,7 +76,7 @@ class Bench:
         )
         return self.keep(
             self.machine.reported(
-                report, at(self.now), road, self.new_id(), sparse=sparse
+                report, at(self.now), transport, self.new_id(), sparse=sparse
             )
         )
 
@@ -86,14 +88,14 @@ class Bench:
         why: str | None = None,
         seq: int | None = None,
         attempt: str | None = None,
-        road: Road = "mqtt",
+        transport: TransportId = "direct",
     ) -> list[Effect]:
         number = next(self._answers) if seq is None else seq
         named = self.machine.hold_id if id is None else id
         origin = Origin("b1", number)
         answer = CommandAnswer("AGI", origin, named, result, why=why, attempt=attempt)
         return self.keep(
-            self.machine.answered(answer, at(self.now), road, self.new_id())
+            self.machine.answered(answer, at(self.now), transport, self.new_id())
         )
 
     def odometry(self, linear: float, angular: float = 0.0) -> list[Effect]:
@@ -158,9 +160,11 @@ class Bench:
         return [one.key for one in self.log if isinstance(one, Changed)]
 
 
-def sends(effects: list[Effect], road: str | None = None) -> list[SendStop]:
+def sends(effects: list[Effect], transport: str | None = None) -> list[SendStop]:
     return [
-        one for one in effects if isinstance(one, SendStop) and road in (None, one.road)
+        one
+        for one in effects
+        if isinstance(one, SendStop) and transport in (None, one.transport)
     ]
 
 

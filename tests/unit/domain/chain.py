@@ -11,7 +11,8 @@ from iveg.domain.latency.hops import DATA, Data, Hop
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
-from iveg.domain.observations import FeedbackRef, Observation, Origin, Received, Road
+from iveg.domain.observations import FeedbackRef, Observation, Origin, Received
+from iveg.domain.transports import TransportId
 from tests.builders import START, at, detection_frame, odometry, scan
 
 Delay = Callable[[], float]
@@ -71,7 +72,7 @@ class Chain:
         self.watch = LatencyWatch(self.robots, self._ledger.composed_at)
         self._rounds = 0
         self._numbers = count()
-        self._last: dict[Road, Received] = {}
+        self._last: dict[TransportId, Received] = {}
         self._waiting: list[tuple[float, int, Callable[[], None]]] = []
 
     def run(self, seconds: float) -> None:
@@ -96,9 +97,9 @@ class Chain:
         """The last minute of a hop."""
         return merged(self.stream(data, robot_id).hops[hop].parts("1min"))
 
-    def last(self, road: Road) -> Received:
+    def last(self, transport: TransportId) -> Received:
         """What came last on a transport."""
-        return self._last[road]
+        return self._last[transport]
 
     def said(self) -> dict[str, dict[str, str | float]]:
         """What is wrong with the hops now, by its sentence."""
@@ -115,18 +116,20 @@ class Chain:
         broker = self.now + self.up()
         if self.direct:
             read = broker + self.reading()
-            self._later(read, lambda: self._arrive(told, read, "mqtt", data))
+            self._later(read, lambda: self._arrive(told, read, "direct", data))
         if not self.lost_agent(seq):
             orion = broker + self.agent()
-            self._later(orion, lambda: self._arrive(told, orion, "orion", data))
+            self._later(orion, lambda: self._arrive(told, orion, "fiware", data))
 
-    def _arrive(self, told: Observation, when: float, road: Road, data: Data) -> None:
+    def _arrive(
+        self, told: Observation, when: float, transport: TransportId, data: Data
+    ) -> None:
         received = Received(
-            told, at(when), road, thinned=self.thinned and road == "orion"
+            told, at(when), transport, thinned=self.thinned and transport == "fiware"
         )
         self.watch.arrived(received)
-        self._last[road] = received
-        if road == "mqtt" or not self.direct:
+        self._last[transport] = received
+        if transport == "direct" or not self.direct:
             decided = when + self.iveg()
             self._later(decided, lambda: self._decide(received, decided, data))
 

@@ -159,8 +159,8 @@ def test_a_message_that_comes_twice_counts_once() -> None:
     chain.run(5.0)
     before = chain.took("uplink").count
 
-    chain.watch.arrived(chain.last("mqtt"))
-    chain.watch.arrived(chain.last("orion"))
+    chain.watch.arrived(chain.last("direct"))
+    chain.watch.arrived(chain.last("fiware"))
 
     assert chain.took("uplink").count == before
     assert chain.stream("lidar").up.repeated == 1

@@ -1,10 +1,11 @@
 """Every row of the state table of safety.md §2.3 but the releases'."""
 
+from typing import get_args
+
 import pytest
 
-from iveg.domain.errors import CommandRefusedError
-from iveg.domain.observations import Road
-from iveg.domain.stop import Changed, SendRoad, SendStop
+from iveg.domain.stop import STEPS, Changed, Key, OffTable, SendStop, State, StopMachine
+from iveg.domain.transports import TransportId
 from tests.builders import at
 from tests.unit.domain.bench import (
     RED_BUTTON,
@@ -16,13 +17,13 @@ from tests.unit.domain.bench import (
 # --- REQUESTED, SENT --------------------------------------------------------------
 
 
-def test_a_press_asks_for_stop_on_both_roads_and_sets_the_level() -> None:
+def test_a_press_asks_for_stop_on_both_transports_and_sets_the_level() -> None:
     bench = Bench()
 
     effects = bench.press()
 
     assert bench.state == "REQUESTED"
-    assert [one.road for one in sends(effects)] == ["direct", "fiware"]
+    assert [one.transport for one in sends(effects)] == ["direct", "fiware"]
     assert levels(effects) == ["stopped"]
     assert {one.hold_id for one in sends(effects)} == {bench.machine.hold_id}
 
@@ -34,27 +35,27 @@ def test_the_sends_come_before_everything_else_that_a_press_does() -> None:
     assert isinstance(effects[1], SendStop)
 
 
-def test_without_the_direct_road_a_press_takes_the_other_alone() -> None:
+def test_without_the_direct_transport_a_press_takes_the_other_alone() -> None:
     bench = Bench(direct=False)
 
     effects = bench.press()
 
-    assert [one.road for one in sends(effects)] == ["fiware"]
+    assert [one.transport for one in sends(effects)] == ["fiware"]
     assert bench.machine.stop is not None
-    assert bench.machine.stop.roads == {"direct": "off", "fiware": "pending"}
+    assert bench.machine.stop.transports == {"direct": "off", "fiware": "pending"}
 
 
-@pytest.mark.parametrize("road", ["direct", "fiware"])
-def test_a_road_that_took_it_makes_it_sent(road: SendRoad) -> None:
+@pytest.mark.parametrize("transport", ["direct", "fiware"])
+def test_a_transport_that_took_it_makes_it_sent(transport: TransportId) -> None:
     bench = Bench()
     bench.press()
 
-    bench.sent(road)
+    bench.sent(transport)
 
     assert bench.state == "SENT"
 
 
-def test_a_road_that_failed_does_not_make_it_sent() -> None:
+def test_a_transport_that_failed_does_not_make_it_sent() -> None:
     bench = Bench()
     bench.press()
 
@@ -62,7 +63,7 @@ def test_a_road_that_failed_does_not_make_it_sent() -> None:
 
     assert bench.state == "REQUESTED"
     assert bench.machine.stop is not None
-    assert bench.machine.stop.roads["direct"] == "failed"
+    assert bench.machine.stop.transports["direct"] == "failed"
 
 
 def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
@@ -73,18 +74,18 @@ def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
     bench.sent("fiware")
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.roads == {"direct": "ok", "fiware": "pending"}
+    assert bench.machine.stop.transports == {"direct": "ok", "fiware": "pending"}
 
 
 def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() -> None:
     bench = Bench()
     bench.press()
-    bench.answer(road="orion")
+    bench.answer(transport="fiware")
 
     bench.sent("fiware")
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.roads["fiware"] == "ok"
+    assert bench.machine.stop.transports["fiware"] == "ok"
 
 
 def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None:
@@ -95,11 +96,12 @@ def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None
 
     bench.machine.sent("fiware", stop.command_id, at(0.1), ok=True, doubtful=True)
 
-    assert stop.roads["fiware"] == "unknown"
+    assert bench.machine.stop is not None
+    assert bench.machine.stop.transports["fiware"] == "unknown"
     assert bench.state == "REQUESTED"
 
 
-def test_the_first_time_of_each_road_is_kept() -> None:
+def test_the_first_time_of_each_transport_is_kept() -> None:
     bench = Bench()
     bench.press()
     bench.sent("direct")
@@ -108,8 +110,8 @@ def test_the_first_time_of_each_road_is_kept() -> None:
     bench.sent("fiware")
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.times.sent_direct == at(0.0)
-    assert bench.machine.stop.times.sent_fiware == at(0.4)
+    assert bench.machine.stop.times.sent["direct"] == at(0.0)
+    assert bench.machine.stop.times.sent["fiware"] == at(0.4)
 
 
 def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> None:
@@ -133,7 +135,7 @@ def test_a_robot_that_has_the_stop_is_sent_it_once_a_second_until_it_stands() ->
     times = []
     while bench.now < 4.0:
         bench.now = round(bench.now + 0.05, 6)
-        times += [(bench.now, one.road) for one in sends(bench.tick())]
+        times += [(bench.now, one.transport) for one in sends(bench.tick())]
 
     assert times == [(1.0, "direct"), (2.0, "direct"), (3.0, "direct"), (4.0, "direct")]
     assert bench.machine.stop is not None
@@ -146,7 +148,7 @@ def test_without_the_direct_transport_a_robot_that_has_it_is_still_sent_it() -> 
     bench.sent("fiware")
     bench.report(bench.ours, linear=0.8)
 
-    assert [one.road for one in sends(bench.wait(2.05))] == ["fiware"]
+    assert [one.transport for one in sends(bench.wait(2.05))] == ["fiware"]
 
 
 def test_a_robot_that_stands_after_a_second_was_sent_two_stops() -> None:
@@ -185,7 +187,7 @@ def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -
     assert len(sends(later, "fiware")) == 1
 
 
-def test_without_the_direct_road_the_other_repeats_every_two_seconds() -> None:
+def test_without_the_direct_transport_the_other_repeats_every_two_seconds() -> None:
     bench = Bench(direct=False)
     bench.press()
     bench.sent("fiware")
@@ -209,12 +211,12 @@ def test_the_result_of_an_earlier_episode_counts_for_nothing() -> None:
 # --- DELIVERED, UNCONFIRMED, STILL_MOVING ----------------------------------------
 
 
-@pytest.mark.parametrize("road", ["mqtt", "orion"])
-def test_the_robots_answer_with_our_id_means_delivered(road: Road) -> None:
+@pytest.mark.parametrize("transport", ["direct", "fiware"])
+def test_the_robots_answer_with_our_id_means_delivered(transport: TransportId) -> None:
     bench = Bench()
     bench.press()
 
-    bench.answer(road=road)
+    bench.answer(transport=transport)
 
     assert bench.state == "DELIVERED"
 
@@ -253,11 +255,11 @@ def test_the_times_of_both_answers_are_kept() -> None:
     bench.now = 0.02
     bench.answer(seq=1)
     bench.now = 0.08
-    bench.answer(seq=1, road="orion")
+    bench.answer(seq=1, transport="fiware")
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.times.answer_direct == at(0.02)
-    assert bench.machine.stop.times.answer_fiware == at(0.08)
+    assert bench.machine.stop.times.answered["direct"] == at(0.02)
+    assert bench.machine.stop.times.answered["fiware"] == at(0.08)
 
 
 @pytest.mark.parametrize("first", ["REQUESTED", "SENT"])
@@ -492,7 +494,7 @@ def test_a_standing_robot_is_reminded_every_five_seconds() -> None:
     assert bench.state == "STANDING"
 
 
-def test_without_the_direct_road_it_is_reminded_on_the_other() -> None:
+def test_without_the_direct_transport_it_is_reminded_on_the_other() -> None:
     bench = Bench(direct=False)
     bench.press()
     bench.sent("fiware")
@@ -617,7 +619,7 @@ def test_a_second_press_of_the_same_person_sends_again_at_once() -> None:
 
     effects = bench.press()
 
-    assert [one.road for one in sends(effects)] == ["direct"]
+    assert [one.transport for one in sends(effects)] == ["direct"]
     assert bench.changes() == ["requested"]
 
 
@@ -641,6 +643,64 @@ def test_how_far_it_may_have_driven_grows_with_its_last_speed() -> None:
     assert bench.machine.moved_m(at(2.5)) == pytest.approx(2.0)
 
 
-def test_an_illegal_step_says_where_it_stood_and_what_was_asked() -> None:
-    with pytest.raises(CommandRefusedError, match=r"READY.*RUNNING"):
-        Bench().machine.enter("READY", "ready")
+# --- the table ------------------------------------------------------------------
+
+
+def without(*rows: tuple[State, Key]) -> Bench:
+    """A machine whose table lacks these rows: a mistake of the program."""
+    bench = Bench()
+    steps = {row: step for row, step in STEPS.items() if row not in rows}
+    bench.machine = StopMachine("AGI", steps=steps)
+    return bench
+
+
+def test_a_stop_has_a_row_in_every_state() -> None:
+    keys: tuple[Key, ...] = ("requested", "moved", "reasserted", "release_unconfirmed")
+
+    assert {(state, key) for state in get_args(State) for key in keys} <= STEPS.keys()
+
+
+def test_a_step_without_a_row_says_where_it_stood_and_what_came() -> None:
+    bench = without(("DELIVERED", "standing"))
+    bench.press()
+    for _ in range(12):
+        bench.report(bench.ours)
+        bench.wait(0.1)
+
+    assert OffTable("AGI", "DELIVERED", "standing") in bench.log
+    assert bench.state == "DELIVERED"
+
+
+def test_after_a_step_without_a_row_stop_stays_wanted_and_is_sent_on() -> None:
+    bench = without(("REQUESTED", "unconfirmed"), ("SENT", "unconfirmed"))
+    bench.press()
+    bench.wait(2.0)
+
+    assert OffTable("AGI", "REQUESTED", "unconfirmed") in bench.log
+    assert bench.machine.wants_stop
+    assert sends(bench.wait(1.2), "direct")
+
+
+def test_a_release_that_no_row_can_end_is_sent_as_a_stop_again() -> None:
+    bench = without(("RELEASING", "release_unconfirmed"))
+    bench.press()
+    bench.stand()
+    bench.release(bench.ours.id)
+
+    bench.wait(2.1)
+
+    assert OffTable("AGI", "RELEASING", "release_unconfirmed") in bench.log
+    assert sends(bench.wait(1.2), "direct")
+    assert bench.machine.wants_stop
+
+
+def test_the_next_row_that_there_is_leads_out_of_a_lost_state() -> None:
+    bench = without(("DELIVERED", "still_moving"))
+    bench.press()
+    bench.report(bench.ours, linear=0.5)
+    bench.wait(4.0)
+    assert OffTable("AGI", "DELIVERED", "still_moving") in bench.log
+
+    bench.stand()
+
+    assert bench.state == "STANDING"

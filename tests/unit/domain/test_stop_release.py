@@ -44,7 +44,7 @@ def test_without_the_direct_transport_a_release_takes_the_other_alone() -> None:
 
     assert sent.transports == ("fiware",)
     assert bench.machine.once is not None
-    assert bench.machine.once.roads == {"direct": "off", "fiware": "pending"}
+    assert bench.machine.once.transports == {"direct": "off", "fiware": "pending"}
 
 
 def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
@@ -110,7 +110,7 @@ def test_i2_a_release_needs_a_challenge() -> None:
     bench = Bench()
     report = safety_report("AGI", BOOT_HOLD, challenge="")
     silent = type(report)("AGI", report.origin, 0.0, "hold", holds=(BOOT_HOLD,))
-    bench.machine.reported(silent, at(0.0), "mqtt", "unused")
+    bench.machine.reported(silent, at(0.0), "direct", "unused")
 
     with pytest.raises(CommandRefusedError, match="no challenge"):
         bench.release(BOOT_HOLD.id)
@@ -162,7 +162,7 @@ def test_the_answer_released_is_noted_and_decides_nothing() -> None:
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answer_direct == at(bench.now)
+    assert bench.machine.once.times.answered["direct"] == at(bench.now)
 
 
 def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
@@ -204,13 +204,13 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next() -> None:
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
     bench.release(bench.ours.id)
 
-    for road in ("mqtt", "orion"):
-        bench.answer("REFUSED", why="challenge", attempt=first, road=road)
+    for transport in ("direct", "fiware"):
+        bench.answer("REFUSED", why="challenge", attempt=first, transport=transport)
     bench.report(bench.ours, challenge="another")
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answer_direct is None
+    assert bench.machine.once.times.answered.get("direct") is None
 
 
 def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> None:
@@ -219,7 +219,7 @@ def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> 
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
     bench.release(bench.ours.id)
 
-    bench.answer("REFUSED", why="challenge", seq=9, road="orion")
+    bench.answer("REFUSED", why="challenge", seq=9, transport="fiware")
     bench.report(bench.ours, challenge="another")
 
     assert bench.state == "RELEASING"
@@ -239,7 +239,7 @@ def test_an_answer_without_an_attempt_is_matched_by_what_it_names(
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answer_direct is None
+    assert bench.machine.once.times.answered.get("direct") is None
 
 
 def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> None:
@@ -429,8 +429,8 @@ def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
     bench.sent("direct")
 
     assert bench.machine.once is not None
-    assert bench.machine.once.times.sent_direct is None
-    assert bench.machine.once.roads["direct"] == "pending"
+    assert bench.machine.once.times.sent.get("direct") is None
+    assert bench.machine.once.transports["direct"] == "pending"
 
 
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:
@@ -564,7 +564,7 @@ def test_an_adopted_hold_is_sent_like_any_other_that_the_robot_has(
 
     effects = bench.wait(0.1)
 
-    assert {one.road for one in sends(effects)} == {transport}
+    assert {one.transport for one in sends(effects)} == {transport}
 
 
 def test_a_boot_hold_alone_is_not_adopted() -> None:

@@ -315,16 +315,16 @@ def test_an_older_message_changes_nothing_but_the_count() -> None:
     assert world.counters["Odometry.late"] == 1
 
 
-def test_the_same_message_on_the_other_road_changes_nothing_but_the_count() -> None:
+def test_the_same_message_by_the_other_transport_changes_only_the_count() -> None:
     world = World(["AGI"])
-    world.apply(received(safety_report("AGI", hold()), road="mqtt"))
+    world.apply(received(safety_report("AGI", hold()), transport="direct"))
 
-    world.apply(received(safety_report("AGI"), after=1.0, road="orion"))
+    world.apply(received(safety_report("AGI"), after=1.0, transport="fiware"))
 
     robot = world.robot("AGI")
     assert robot.safety is not None
     assert robot.safety.holds == (hold(),)
-    assert robot.safety_road == "mqtt"
+    assert robot.safety_transport == "direct"
     assert world.counters["SafetyReport.duplicate"] == 1
 
 

@@ -99,7 +99,7 @@ class Listener:
         reading = codec.read_measure(device, payload, self._is_past)
         for one in reading.observations:
             self.skipped += isinstance(one, Overtaken)
-            self._waiting.append(Received(one, at, "orion"))
+            self._waiting.append(Received(one, at, "fiware"))
 
     def catch_up(self) -> None:
         for received in self._waiting:

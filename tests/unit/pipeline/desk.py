@@ -14,8 +14,9 @@ from iveg.domain.observations import (
     Observation,
     Origin,
     Received,
-    Road,
 )
+from iveg.domain.stop import Command
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, Doors, build
 from tests.builders import (
@@ -61,7 +62,7 @@ class Desk:
             house,
             Doors(
                 self.fleet,
-                self.broker,
+                {DIRECT.switched(on=direct): self.fleet, FIWARE: self.broker},
                 self.journal,
                 self.sink,
                 self.clock,
@@ -71,7 +72,7 @@ class Desk:
                 agent_lag_s=lambda _: self.lag_s,
                 fiware_is_cut=lambda _: self.is_cut,
             ),
-            Choices(direct=direct),
+            Choices(),
         )
         self.hub, self.minutes, self.chain = parts.hub, parts.minutes, parts.chain
         self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
@@ -82,10 +83,14 @@ class Desk:
     # --- what arrives -------------------------------------------------------------
 
     def hear(
-        self, observation: Observation, road: Road = "mqtt", *, asked: bool = False
+        self,
+        observation: Observation,
+        transport: TransportId = "direct",
+        *,
+        asked: bool = False,
     ) -> None:
         """One observation goes through the rule loop."""
-        received = Received(observation, self.clock(), road, asked)
+        received = Received(observation, self.clock(), transport, asked)
         self.loop.step([received], self.clock())
 
     def drive(self, robot_id: str, x: float = 0.0, *, linear: float = 0.5) -> None:
@@ -148,6 +153,10 @@ class Desk:
             await self.wait(0.1)
         assert machine.state == "STANDING"
         self.report(robot_id, Hold(machine.hold_id or "", "iveg", "remote"))
+
+    def now(self, command: Command) -> Command:
+        """A command as it is by now."""
+        return self.commander.commands[command.command_id]
 
     # --- what was told ------------------------------------------------------------
 

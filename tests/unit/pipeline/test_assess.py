@@ -492,7 +492,7 @@ def test_poses_are_written_down_twice_a_second() -> None:
     assert 19 <= len(desk.records(OdometryRecord)) <= 24
 
 
-def test_the_same_look_on_the_other_road_is_one_sighting() -> None:
+def test_the_same_look_on_the_other_transport_is_one_sighting() -> None:
     desk = watched(Desk())
     frame = detection_frame("AGII", detection("farmer", 9.0), origin=desk.next_origin())
     desk.hear(frame, "mqtt")

@@ -1,4 +1,4 @@
-"""STOP over two roads, a disk and a restart, none of which waits for another."""
+"""STOP over two transports, a disk and a restart, none of which waits for another."""
 
 import asyncio
 
@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop import Command, Wanted
+from iveg.domain.stop import STEPS, Command, StopMachine, Wanted
 from tests.builders import safety_report
 from tests.fakes.records import command_record
 from tests.unit.pipeline.desk import Desk, conditions_of, settle
@@ -31,10 +31,10 @@ async def released(desk: Desk) -> str:
     return held
 
 
-# --- both roads at once -----------------------------------------------------------
+# --- both transports at once ------------------------------------------------------
 
 
-async def test_i5_both_roads_have_it_before_the_disk_is_asked() -> None:
+async def test_i5_both_transports_have_it_before_the_disk_is_asked() -> None:
     desk = Desk()
     desk.journal.opened.clear()
 
@@ -56,7 +56,7 @@ async def test_the_journal_has_it_before_the_press_is_accepted() -> None:
     assert desk.journal.lines == [("AGI", "stopped", command.command_id, "ana")]
 
 
-async def test_both_roads_carry_the_same_id() -> None:
+async def test_both_transports_carry_the_same_id() -> None:
     desk = Desk()
 
     command = await press(desk)
@@ -65,7 +65,7 @@ async def test_both_roads_carry_the_same_id() -> None:
     assert desk.broker.asked == [("stop", "AGI", (command.command_id,))]
 
 
-async def test_a_road_that_hangs_does_not_hold_up_the_other() -> None:
+async def test_a_transport_that_hangs_does_not_hold_up_the_other() -> None:
     desk = Desk()
     desk.broker.opened.clear()
 
@@ -73,7 +73,7 @@ async def test_a_road_that_hangs_does_not_hold_up_the_other() -> None:
     await desk.wait(1.0)
 
     assert len(desk.fleet.stops) == 4
-    assert command.roads == {"direct": "ok", "fiware": "pending"}
+    assert desk.now(command).transports == {"direct": "ok", "fiware": "pending"}
     desk.broker.opened.set()
     await desk.commander.close()
 
@@ -85,11 +85,11 @@ async def test_a_broker_that_hangs_does_not_hold_up_orion() -> None:
     command = await press(desk)
 
     assert desk.broker.asked
-    assert command.state == "SENT"
+    assert desk.now(command).state == "SENT"
     await desk.commander.close()
 
 
-async def test_a_road_that_fails_is_shown_and_tried_again() -> None:
+async def test_a_transport_that_fails_is_shown_and_tried_again() -> None:
     desk = Desk()
     desk.fleet.fails = True
     desk.broker.refuse()
@@ -97,7 +97,7 @@ async def test_a_road_that_fails_is_shown_and_tried_again() -> None:
     command = await press(desk)
     await desk.wait(3.0)
 
-    assert command.roads == {"direct": "failed", "fiware": "failed"}
+    assert desk.now(command).transports == {"direct": "failed", "fiware": "failed"}
     assert len(desk.fleet.stops) == 8
     assert len(desk.broker.asked) == 2
 
@@ -112,7 +112,7 @@ async def test_one_request_to_orion_is_in_flight() -> None:
     await desk.commander.close()
 
 
-async def test_a_failure_nobody_thought_of_is_logged_and_the_road_is_tried_again(
+async def test_a_failure_nobody_thought_of_is_logged_and_the_transport_is_tried_again(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     desk = Desk()
@@ -125,7 +125,7 @@ async def test_a_failure_nobody_thought_of_is_logged_and_the_road_is_tried_again
     assert "nobody thought of this" in caplog.text
 
 
-async def test_without_the_direct_road_only_orion_is_asked() -> None:
+async def test_without_the_direct_transport_only_orion_is_asked() -> None:
     desk = Desk(direct=False)
 
     await press(desk)
@@ -163,7 +163,7 @@ async def test_i3_204_from_orion_and_a_puback_are_no_evidence() -> None:
     command = await press(desk)
     await desk.wait(5.0)
 
-    assert command.state == "UNCONFIRMED"
+    assert desk.now(command).state == "UNCONFIRMED"
 
 
 async def test_f39_reports_alone_bring_standing() -> None:
@@ -172,8 +172,8 @@ async def test_f39_reports_alone_bring_standing() -> None:
 
     await desk.stand()
 
-    assert command.state == "STANDING"
-    assert command.standstill_ms is not None
+    assert desk.now(command).state == "STANDING"
+    assert desk.now(command).standstill_ms is not None
 
 
 async def test_the_robots_answer_alone_brings_delivered() -> None:
@@ -182,7 +182,7 @@ async def test_the_robots_answer_alone_brings_delivered() -> None:
 
     desk.answer("LATCHED")
 
-    assert command.state == "DELIVERED"
+    assert desk.now(command).state == "DELIVERED"
 
 
 async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
@@ -194,7 +194,7 @@ async def test_f41_reports_with_an_old_number_do_not_keep_it_standing() -> None:
         desk.report("AGI", Hold(command.command_id, "iveg", "remote"))
         await desk.wait(0.1)
 
-    assert command.state == "STALE"
+    assert desk.now(command).state == "STALE"
 
 
 async def test_what_was_asked_of_orion_says_nothing_about_stop() -> None:
@@ -204,7 +204,7 @@ async def test_what_was_asked_of_orion_says_nothing_about_stop() -> None:
     desk.report("AGII")
     desk.hear(safety_report("AGI", held, origin=desk.next_origin()), asked=True)
 
-    assert command.state == "SENT"
+    assert desk.now(command).state == "SENT"
 
 
 async def test_odometry_that_moves_stops_a_standing_robot_again() -> None:
@@ -277,8 +277,8 @@ async def test_every_browser_gets_each_try_of_a_stop_that_nobody_answers() -> No
     await desk.wait(3.0)
 
     told = desk.hub.versions["robots/AGI"] - before[0]
-    assert command.tries - before[1] >= 6
-    assert told >= command.tries - before[1]
+    assert desk.now(command).tries - before[1] >= 6
+    assert told >= desk.now(command).tries - before[1]
 
 
 async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> None:
@@ -339,8 +339,8 @@ async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() 
     await settle()
 
     assert len(desk.fleet.asked) == 1
-    assert once.times.sent_direct is not None
-    assert once.roads == {"direct": "pending", "fiware": "pending"}
+    assert desk.now(once).times.sent.get("direct") is not None
+    assert desk.now(once).transports == {"direct": "pending", "fiware": "pending"}
     await desk.commander.close()
 
 
@@ -354,7 +354,7 @@ async def test_13_7_an_order_was_sent_when_it_left_not_when_orion_says_so() -> N
     desk.broker.opened.set()
     await settle()
 
-    assert command.times.sent_fiware == left
+    assert desk.now(command).times.sent["fiware"] == left
     await desk.commander.close()
 
 
@@ -387,7 +387,7 @@ async def test_an_order_remembers_how_far_the_agent_was_behind_when_it_left() ->
         "AGI", [command.command_id], "ana", desk.clock()
     )
 
-    assert (command.agent_lag_s, once.agent_lag_s) == (None, 12.0)
+    assert (desk.now(command).agent_lag_s, desk.now(once).agent_lag_s) == (None, 12.0)
 
 
 async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
@@ -397,8 +397,8 @@ async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
 
     command = await press(desk)
 
-    assert command.roads == {"direct": "failed", "fiware": "unknown"}
-    assert command.state == "REQUESTED"
+    assert desk.now(command).transports == {"direct": "failed", "fiware": "unknown"}
+    assert desk.now(command).state == "REQUESTED"
 
 
 async def test_a_release_that_orion_does_not_take_is_not_sent_again() -> None:
@@ -704,3 +704,23 @@ async def test_old_commands_make_room() -> None:
 
     assert len(desk.commander.commands) <= 200
     await desk.commander.close()
+
+
+async def test_a_step_that_the_table_lacks_is_told_and_counted_and_ends_nothing(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    desk = Desk()
+    rows = {row: step for row, step in STEPS.items() if row[1] != "unconfirmed"}
+    desk.commander.machines = {"AGI": StopMachine("AGI", steps=rows)}
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+
+    await desk.wait(3.0)
+    sent = len(desk.fleet.stops)
+    await desk.wait(1.0)
+
+    told = [line for line in caplog.records if "no step for" in line.message]
+    assert len(told) == 1
+    assert desk.commander.counters["stop.off_table"] >= 40
+    assert "alert.stop_off_table" in conditions_of(desk)
+    assert desk.commander.machine("AGI").wants_stop
+    assert len(desk.fleet.stops) > sent

@@ -83,10 +83,10 @@ def test_a_queue_of_nothing_but_safety_grows_rather_than_losing_one() -> None:
     assert len(list(door.drain())) == MAX_QUEUED + 5
 
 
-def test_what_comes_is_counted_by_road_and_kind() -> None:
+def test_what_comes_is_counted_by_transport_and_kind() -> None:
     door = ingest()
     door.offer(received(odometry()))
-    door.offer(received(safety_report(), road="mqtt"))
+    door.offer(received(safety_report(), transport="direct"))
 
     assert door.counters["orion.Odometry"] == 1
     assert door.counters["mqtt.SafetyReport"] == 1

@@ -6,20 +6,21 @@ import pytest
 
 from iveg.domain.latency.hops import Hop
 from iveg.domain.latency.sketch import Sketch, merged
-from iveg.domain.observations import Received, Road
+from iveg.domain.observations import Received
 from iveg.domain.records import LatencyRecord
+from iveg.domain.transports import TransportId
 from iveg.pipeline.latency import hours_of
 from iveg.web.words import read_words
 from tests.builders import odometry
 from tests.unit.pipeline.desk import Desk
 
 
-def say(desk: Desk, *roads: Road, after_s: float = 0.0) -> None:
-    """One odometry of AGI, on each of the roads, the second so much later."""
+def say(desk: Desk, *transports: TransportId, after_s: float = 0.0) -> None:
+    """One odometry of AGI, on each of the transports, the second so much later."""
     told = odometry("AGI", origin=desk.next_origin())
-    for number, road in enumerate(roads):
+    for number, transport in enumerate(transports):
         desk.clock.now += after_s if number else 0.0
-        desk.ingest.offer(Received(told, desk.clock(), road))
+        desk.ingest.offer(Received(told, desk.clock(), transport))
         desk.loop.step(desk.ingest.drain(), desk.clock())
 
 
@@ -31,7 +32,7 @@ def took(desk: Desk, hop: Hop) -> Sketch:
 def test_both_copies_of_a_message_are_timed_and_it_is_decided_on_once() -> None:
     desk = Desk()
 
-    say(desk, "mqtt", "orion", after_s=0.120)
+    say(desk, "direct", "fiware", after_s=0.120)
 
     assert took(desk, "fiware").mean == pytest.approx(0.120)
     assert took(desk, "robot_orion").mean == pytest.approx(0.120)
@@ -42,7 +43,7 @@ def test_what_waits_for_the_loop_is_part_of_the_third_hop() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())
 
-    desk.ingest.offer(Received(told, desk.clock(), "mqtt"))
+    desk.ingest.offer(Received(told, desk.clock(), "direct"))
     desk.clock.now += 0.3
     desk.loop.step(desk.ingest.drain(), desk.clock())
 
@@ -53,7 +54,7 @@ def test_an_answer_to_a_question_is_no_message() -> None:
     desk = Desk()
 
     told = odometry("AGI", origin=desk.next_origin())
-    desk.ingest.offer(Received(told, desk.clock(), "orion", asked=True))
+    desk.ingest.offer(Received(told, desk.clock(), "fiware", asked=True))
 
     assert took(desk, "robot_orion").count == 0
 
@@ -61,7 +62,7 @@ def test_an_answer_to_a_question_is_no_message() -> None:
 async def test_a_minute_goes_to_the_history_and_comes_back_from_it() -> None:
     desk = Desk()
     for _ in range(8):
-        say(desk, "mqtt", "orion", after_s=0.020)
+        say(desk, "direct", "fiware", after_s=0.020)
         await desk.wait(10.0)
 
     kept = desk.records(LatencyRecord)
@@ -91,9 +92,9 @@ def test_rows_of_a_later_version_and_broken_ones_are_left_alone() -> None:
 
 async def test_an_agent_that_is_behind_is_told_in_the_log_once() -> None:
     desk = Desk()
-    say(desk, "mqtt", "orion")
+    say(desk, "direct", "fiware")
     for _ in range(40):
-        say(desk, "mqtt")
+        say(desk, "direct")
         await desk.wait(0.1)
 
     assert desk.sentences().count("log.behind.fiware") == 1

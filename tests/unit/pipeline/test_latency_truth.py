@@ -13,7 +13,8 @@ import pytest
 
 from iveg.domain.latency.hops import Hop
 from iveg.domain.latency.sketch import Sketch, merged
-from iveg.domain.observations import Instant, Received, Road
+from iveg.domain.observations import Instant, Received
+from iveg.domain.transports import TransportId
 from iveg.emulator.radio import LinkFaults, Packet, Radio
 from iveg.ngsi import codec
 from tests.builders import START
@@ -36,7 +37,7 @@ class Air(Stage):
         self.put_in: list[float] = []
         self._radio = Radio(frozenset(), np.random.default_rng(3))
         self._radio.faults = faults
-        self._on_way: list[tuple[float, int, Road, str, bytes]] = []
+        self._on_way: list[tuple[float, int, TransportId, str, bytes]] = []
         self._numbers = count()
         # Robots speak as soon as they are made.
         super().__init__("viewpoints")
@@ -45,10 +46,10 @@ class Air(Stage):
         """What is due by the end of a step arrives in it, each at its own moment."""
         end = self.now.mono + 0.05
         while self._on_way and self._on_way[0][0] <= end:
-            due, _, road, device, payload = heapq.heappop(self._on_way)
+            due, _, transport, device, payload = heapq.heappop(self._on_way)
             at = Instant(due, START.wall + due - START.mono)
             for observation in codec.read_measure(device, payload).observations:
-                self._desk.ingest.offer(Received(observation, at, road))
+                self._desk.ingest.offer(Received(observation, at, transport))
         await super().step()
 
     def _hear(self, topic: str, payload: bytes) -> None:
@@ -59,13 +60,13 @@ class Air(Stage):
             [(due, _)] = self._radio.pass_on(Packet(topic, 1, payload), now)
         if device == "AGI_odom":
             self.put_in.append(due - now)
-        roads: tuple[tuple[Road, float], ...] = (
-            ("mqtt", due),
-            ("orion", due + self.agent_s),
+        transports: tuple[tuple[TransportId, float], ...] = (
+            ("direct", due),
+            ("fiware", due + self.agent_s),
         )
-        for road, when in roads:
+        for transport, when in transports:
             number = next(self._numbers)
-            heapq.heappush(self._on_way, (when, number, road, device, payload))
+            heapq.heappush(self._on_way, (when, number, transport, device, payload))
 
     def took(self, robot_id: str, hop: Hop) -> Sketch:
         """What a hop took for a robot's odometry in the last minute."""

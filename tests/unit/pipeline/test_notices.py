@@ -14,7 +14,7 @@ class LateDesk(Desk):
     """Messages of the robots arrive ``DELAY_S`` after they were stamped."""
 
     def arrive(self, observation: Observation) -> None:
-        self.loop.step([Received(observation, self.clock(), "mqtt")], self.clock())
+        self.loop.step([Received(observation, self.clock(), "direct")], self.clock())
 
     def told(self) -> Echoes:
         return echoes_of(self.assessor.live_decisions(), self.clock())

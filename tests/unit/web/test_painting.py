@@ -18,7 +18,7 @@ START = at(0.0).mono
 def watching() -> tuple[LatencyWatch, Painting]:
     """AGI's odometry was decided on at 1.0 s."""
     watch = LatencyWatch(("AGI",))
-    watch.decided([Received(odometry(origin=origin()), at(0.9), "mqtt")], at(1.0))
+    watch.decided([Received(odometry(origin=origin()), at(0.9), "direct")], at(1.0))
     return watch, Painting(watch)
 
 

@@ -1,4 +1,4 @@
-"""A STOP on two real roads, one of which is slow, gone or overtaken (F7, F12)."""
+"""A STOP on two real transports, one of which is slow, gone or overtaken (F7, F12)."""
 
 import asyncio
 import time
@@ -6,7 +6,7 @@ import time
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.roads import OrionRoad
+from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
 from iveg.embedded.http_server import Request, Response, http_server
 from tests.fakes.context_broker import FakeContextBroker
@@ -29,14 +29,14 @@ async def test_f7_a_slow_orion_is_given_up_after_a_second_and_a_half() -> None:
     ):
         began = time.monotonic()
         with pytest.raises(HopError):
-            await OrionRoad(orion).stop("AGI", "01HOLD", "x")
+            await OrionTransport(orion).stop("AGI", "01HOLD", "x")
         took = time.monotonic() - began
 
     assert GIVEN_UP_S <= took < ORION_SLOW_S
 
 
 @pytest.mark.parametrize("orion_hangs", [False, True])
-async def test_f7_the_direct_road_is_as_fast_while_orion_hangs(
+async def test_f7_the_direct_transport_is_as_fast_while_orion_hangs(
     orion_hangs: bool,
 ) -> None:
     desk = Desk()
@@ -48,7 +48,7 @@ async def test_f7_the_direct_road_is_as_fast_while_orion_hangs(
 
     command = desk.commander.machine("AGI").stop
     assert command is not None
-    assert command.times.sent_direct == command.times.requested
+    assert desk.now(command).times.sent["direct"] == desk.now(command).times.requested
     await desk.wait(1.0)
     # At 0, 250, 500 and 1000 ms, whatever Orion does.
     assert len(desk.fleet.stops) == 4
@@ -74,7 +74,7 @@ async def test_f40_a_robot_that_says_yes_and_drives_on_is_told_in_five_seconds()
     assert "STANDING" not in states
 
 
-async def test_i5_nothing_is_awaited_before_the_first_byte_on_either_road() -> None:
+async def test_i5_nothing_is_awaited_before_the_first_byte_on_any_transport() -> None:
     desk = Desk()
     broker: FakeContextBroker = desk.broker
     desk.journal.opened.clear()

@@ -1,6 +1,6 @@
-"""The two roads to a robot: straight over MQTT, and through Orion and the IoT Agent.
+"""What carries orders: straight over MQTT, and through Orion and the IoT Agent.
 
-They share nothing, so that what breaks one leaves the other alone.
+Both share nothing, so that what breaks one leaves the other alone.
 """
 
 from collections.abc import Iterable, Mapping
@@ -12,8 +12,8 @@ from iveg.domain.feedback import Feedback
 from iveg.ngsi import codec, names
 
 
-class MqttRoad:
-    """Straight to the robots; implements ``pipeline.ports.Fleet``."""
+class MqttTransport:
+    """Straight to the robots; implements ``CommandPort`` and ``Fleet`` of the ports."""
 
     def __init__(self, link: MqttLink, apikey: str) -> None:
         self._link = link
@@ -55,8 +55,8 @@ class MqttRoad:
         await self._link.publish(topic, payload, qos=1, retain=True)
 
 
-class OrionRoad:
-    """Through Orion; implements ``pipeline.ports.ContextBroker``."""
+class OrionTransport:
+    """Through Orion; implements ``pipeline.ports.CommandPort``."""
 
     def __init__(self, orion: OrionClient) -> None:
         self._orion = orion

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.observations import LaserScan, Odometry, Origin, Road
-from iveg.domain.transports import Feed
+from iveg.domain.feeds import Feed
+from iveg.domain.observations import LaserScan, Odometry, Origin
+from iveg.domain.transports import TransportId
 from iveg.domain.world import World
 from tests.builders import START, at, odometry, origin, received
 
@@ -32,9 +33,9 @@ class Bench:
         for _ in range(round(seconds * HZ)):
             self.now = round(self.now + 1 / HZ, 6)
             if direct:
-                self.feed.heard("mqtt", self.now, news=True)
+                self.feed.heard("direct", self.now, news=True)
             if fiware:
-                self.feed.heard("orion", self.now, news=fiware_leads or not direct)
+                self.feed.heard("fiware", self.now, news=fiware_leads or not direct)
             judged = self.feed.judge(self.now, connected=connected)
             if judged != self.switches[-1][1]:
                 self.switches.append((self.now, judged))
@@ -104,19 +105,21 @@ def test_a_short_burst_of_orions_copies_is_no_loss() -> None:
 # --- in the world -------------------------------------------------------------------
 
 
-def heard(world: World, road: Road, seq: int, after: float, x: float = 0.0) -> str:
+def heard(
+    world: World, transport: TransportId, seq: int, after: float, x: float = 0.0
+) -> str:
     observation = odometry(x=x, origin=origin(seq, after=after))
-    return world.apply(received(observation, after=after, road=road))
+    return world.apply(received(observation, after=after, transport=transport))
 
 
 def test_the_newest_by_count_wins_whatever_brought_it() -> None:
     world = World(["AGI"])
     verdicts = [
-        heard(world, "mqtt", 2, 0.1, x=2.0),
-        heard(world, "orion", 1, 0.2, x=1.0),
-        heard(world, "orion", 2, 0.3, x=2.0),
-        heard(world, "orion", 3, 0.4, x=3.0),
-        heard(world, "mqtt", 3, 0.5, x=3.0),
+        heard(world, "direct", 2, 0.1, x=2.0),
+        heard(world, "fiware", 1, 0.2, x=1.0),
+        heard(world, "fiware", 2, 0.3, x=2.0),
+        heard(world, "fiware", 3, 0.4, x=3.0),
+        heard(world, "direct", 3, 0.5, x=3.0),
     ]
     assert verdicts == ["new", "late", "duplicate", "new", "duplicate"]
     pose = world.robot("AGI").odometry
@@ -127,34 +130,36 @@ def test_the_newest_by_count_wins_whatever_brought_it() -> None:
 def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:
     world = World(["AGI"])
     blank = odometry(origin=Origin())
-    assert world.apply(received(blank, after=0.0, road="mqtt")) == "new"
-    assert world.apply(received(blank, after=0.9, road="orion")) == "duplicate"
-    assert world.apply(received(blank, after=1.1, road="orion")) == "new"
+    assert world.apply(received(blank, after=0.0, transport="direct")) == "new"
+    assert world.apply(received(blank, after=0.9, transport="fiware")) == "duplicate"
+    assert world.apply(received(blank, after=1.1, transport="fiware")) == "new"
 
 
 def test_a_throttled_copy_is_never_live_by_itself() -> None:
     world = World(["AGI"])
-    copy = replace(received(odometry(), road="orion"), thinned=True)
+    copy = replace(received(odometry(), transport="fiware"), thinned=True)
     assert world.apply(copy) == "new"
     assert world.robot("AGI").link(START) == "LATE"
 
 
 def test_a_throttled_copy_makes_no_pose_older() -> None:
     world = World(["AGI"])
-    heard(world, "mqtt", 1, 0.0)
-    copy = received(odometry(origin=origin(2, after=0.1)), after=0.1, road="orion")
+    heard(world, "direct", 1, 0.0)
+    copy = received(
+        odometry(origin=origin(2, after=0.1)), after=0.1, transport="fiware"
+    )
     world.apply(replace(copy, thinned=True))
     assert world.robot("AGI").link(at(0.9)) == "LIVE"
 
 
 def test_scans_and_poses_have_feeds_of_their_own() -> None:
     world = World(["AGI"])
-    heard(world, "mqtt", 1, 0.0)
+    heard(world, "direct", 1, 0.0)
     assert world.feeds.of("AGI", Odometry).transport(START.mono) == "direct"
     assert world.feeds.of("AGI", LaserScan).transport(START.mono) == "fiware"
 
 
 def test_what_was_asked_of_orion_feeds_nobody() -> None:
     world = World(["AGI"])
-    world.apply(replace(received(odometry(), road="orion"), asked=True))
+    world.apply(replace(received(odometry(), transport="fiware"), asked=True))
     assert world.feeds.of("AGI").fiware_at == float("-inf")

@@ -1,4 +1,4 @@
-"""The FIWARE road: what reaches Orion, and what its failures become."""
+"""The FIWARE transport: what reaches Orion, and what its failures become."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -8,14 +8,14 @@ import orjson
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.roads import OrionRoad
+from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
 
 
 @asynccontextmanager
 async def orion(
     status: bytes, *, answers: bool = True
-) -> AsyncIterator[tuple[OrionRoad, list[tuple[str, object]]]]:
+) -> AsyncIterator[tuple[OrionTransport, list[tuple[str, object]]]]:
     """A server that answers every request alike, and what it was asked."""
     asked: list[tuple[str, object]] = []
     hanging = asyncio.Event()
@@ -34,7 +34,7 @@ async def orion(
     server = await asyncio.start_server(serve, "127.0.0.1", 0)
     port = server.sockets[0].getsockname()[1]
     async with OrionClient(f"http://127.0.0.1:{port}", "s", "/p") as client:
-        yield OrionRoad(client), asked
+        yield OrionTransport(client), asked
     hanging.set()
     server.close()
     await server.wait_closed()
@@ -52,11 +52,11 @@ async def orion(
     ],
 )
 async def test_a_command_is_one_attribute_alone(what: str, value: object) -> None:
-    async with orion(b"204 No Content") as (road, asked):
+    async with orion(b"204 No Content") as (transport, asked):
         calls = {
-            "stop": lambda: road.stop("AGI", "01A", "x"),
-            "release": lambda: road.release("AGI", ["01A", "boot-1"], "c", "01T"),
-            "resume": lambda: road.resume("AGI", "c", "01T"),
+            "stop": lambda: transport.stop("AGI", "01A", "x"),
+            "release": lambda: transport.release("AGI", ["01A", "boot-1"], "c", "01T"),
+            "resume": lambda: transport.resume("AGI", "c", "01T"),
         }
         await calls[what]()
 
@@ -70,12 +70,12 @@ async def test_a_command_is_one_attribute_alone(what: str, value: object) -> Non
 
 @pytest.mark.parametrize("status", [b"404 Not Found", b"500 Oh"])
 async def test_f6_a_refusal_is_a_failed_hop(status: bytes) -> None:
-    async with orion(status) as (road, _):
+    async with orion(status) as (transport, _):
         with pytest.raises(HopError):
-            await road.stop("AGI", "01A", "x")
+            await transport.stop("AGI", "01A", "x")
 
 
 async def test_f7_a_slow_orion_is_given_up_after_a_second_and_a_half() -> None:
-    async with orion(b"204 No Content", answers=False) as (road, _):
+    async with orion(b"204 No Content", answers=False) as (transport, _):
         with pytest.raises(HopError, match=r"1\.5 s"):
-            await road.stop("AGI", "01A", "x")
+            await transport.stop("AGI", "01A", "x")

@@ -1,0 +1,47 @@
+"""What is wrong with the STOP of a fleet, for whoever raises alerts of it."""
+
+from collections.abc import Iterable
+
+from iveg.domain.alarms import Condition
+from iveg.domain.events import Slot
+from iveg.domain.observations import Instant
+from iveg.domain.stop.effects import OffTable
+from iveg.domain.stop.machine import StopMachine
+
+_ALARMS = {
+    "UNCONFIRMED": "alert.stop_unconfirmed",
+    "STILL_MOVING": "alert.stop_still_moving",
+}
+_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALARMS}
+"""A STOP in one of these has not been seen to stand, not even once."""
+
+
+def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condition]:
+    """STOPs that are not confirmed or not obeyed."""
+    for machine in machines:
+        yield from _of(machine, now)
+
+
+def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
+    """Mistakes of the machine itself."""
+    for one in mistakes:
+        slots: dict[str, Slot] = {
+            "robot": one.robot_id,
+            "state": one.state,
+            "event": one.key,
+        }
+        yield Condition("P2", "alert.stop_off_table", one.robot_id, one.robot_id, slots)
+
+
+def _of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
+    """What is wrong with one robot's STOP."""
+    stop, robot_id = machine.stop, machine.robot_id
+    if stop is None:
+        return
+    age = round(now.mono - stop.times.requested.mono, 1)
+    slots: dict[str, Slot] = {"robot": robot_id, "age": age}
+    key = _ALARMS.get(machine.state)
+    if key is not None:
+        yield Condition("P1", key, robot_id, robot_id, slots)
+    if stop.reason == "moved" and machine.state in _NOT_AT_REST:
+        yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)
