@@ -1,25 +1,27 @@
 """What is wanted of each robot, on disk before anybody is told that it was accepted.
 
-An append-only file of JSON lines, flushed to the disk at each line; it outlives a
-crash of iVeg and a lost database, and is read once at the start.
+A file of JSON lines, flushed to the disk at each; it outlives a crash of iVeg and a
+lost database.  It is read once, at the start, and then written anew with what it still
+says, so that it does not grow for ever.
 """
 
 import asyncio
 import logging
-import os
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 import orjson
 
+from iveg.adapters.files import AppendedFile, Form, read_lines, write_lines
+from iveg.domain.errors import DataFileError
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Wanted
 
 _log = logging.getLogger(__name__)
 
-
+FORM = Form("stop-journal")
 _STOPPED = {"stopped": True, "run": False}
 _NAMED_KEPT = 64
 """As many as a robot remembers to have released."""
@@ -30,24 +32,20 @@ class FileJournal:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._file: IO[bytes] | None = None
+        self._file = AppendedFile(path, FORM)
         self._lock = asyncio.Lock()
-        self._torn = False
-        """The last line may be half written: the next one must not be glued to it."""
+        self._is_newer = False
 
     def read(self) -> dict[str, Wanted]:
         """Robots that were to stand when iVeg last ran → what was wanted of them.
 
-        A line that a crash cut short is skipped.
+        A line that a crash cut short is skipped.  The file is compacted unless a newer
+        iVeg wrote it.
         """
         memory: dict[str, _Memory] = defaultdict(_Memory)
-        try:
-            lines = self._path.read_bytes().splitlines()
-        except FileNotFoundError:
-            return {}
-        for number, line in enumerate(lines, 1):
-            if not line:
-                continue
+        lines = 0
+        for number, line in self._lines():
+            lines += 1
             try:
                 entry = orjson.loads(line)
                 robot_id, by = str(entry["robot_id"]), str(entry["by"])
@@ -55,11 +53,33 @@ class FileJournal:
                 memory[robot_id].take(entry, by, stopped=stopped)
             except (orjson.JSONDecodeError, KeyError, TypeError):
                 _log.warning("%s, line %d: not readable, skipped", self._path, number)
+        if not self._is_newer:
+            self._compact(memory, lines)
         return {
             robot_id: one.wanted
             for robot_id, one in memory.items()
             if one.wanted is not None
         }
+
+    def _lines(self) -> Iterator[tuple[int, bytes]]:
+        try:
+            yield from read_lines(self._path, FORM)
+        except DataFileError as error:
+            # Its lines are still the best that is known of what is to stand.
+            _log.error("%s  It is read all the same and left as it is.", error)
+            self._is_newer = True
+            yield from enumerate(self._path.read_bytes().splitlines()[1:], 2)
+
+    def _compact(self, memory: Mapping[str, "_Memory"], lines: int) -> None:
+        kept = [
+            entry for robot_id, one in memory.items() for entry in one.entries(robot_id)
+        ]
+        if len(kept) >= lines:
+            return
+        try:
+            write_lines(self._path, FORM, kept)
+        except OSError as error:
+            _log.warning("the command journal could not be compacted: %s", error)
 
     async def wanted(
         self,
@@ -73,7 +93,7 @@ class FileJournal:
 
         A disk that fails is logged and does not hold up the STOP.
         """
-        await self._write(robot_id, desired, hold_id, by, at, [], None)
+        await self._write(_entry(robot_id, desired, hold_id, by, at.wall))
 
     async def named(
         self,
@@ -85,61 +105,39 @@ class FileJournal:
         at: Instant,
     ) -> None:
         """Append what a release is about to name; likewise."""
-        await self._write(robot_id, "stopped", hold_id, by, at, list(ids), challenge)
+        entry = _entry(robot_id, "stopped", hold_id, by, at.wall, ids, challenge)
+        await self._write(entry)
 
-    async def _write(
-        self,
-        robot_id: str,
-        desired: Literal["stopped", "run"],
-        hold_id: str | None,
-        by: str,
-        at: Instant,
-        named: list[str],
-        challenge: str | None,
-    ) -> None:
-        line = orjson.dumps(
-            {
-                "at": at.wall,
-                "robot_id": robot_id,
-                "desired": desired,
-                "hold_id": hold_id,
-                "by": by,
-                "named": named,
-                "ch": challenge,
-            }
-        )
+    async def _write(self, entry: Mapping[str, Any]) -> None:
         async with self._lock:
             try:
-                await asyncio.to_thread(self._append, line + b"\n")
+                await asyncio.to_thread(self._file.append, entry)
             except OSError:
                 _log.exception("the command journal could not be written")
 
-    def _append(self, line: bytes) -> None:
-        if self._file is None:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = self._path.open("a+b", buffering=0)
-            self._torn = not _ends_a_line(self._file)
-        if self._torn:
-            line = b"\n" + line
-        self._torn = True
-        written = self._file.write(line)
-        os.fsync(self._file.fileno())
-        if written != len(line):
-            raise OSError(f"{written} of {len(line)} bytes written")
-        self._torn = False
-
     def close(self) -> None:
         """Let the file go."""
-        if self._file is not None:
-            self._file.close()
-            self._file = None
+        self._file.close()
 
 
-def _ends_a_line(file: IO[bytes]) -> bool:
-    if file.seek(0, os.SEEK_END) == 0:
-        return True
-    file.seek(-1, os.SEEK_END)
-    return file.read(1) == b"\n"
+def _entry(
+    robot_id: str,
+    desired: Literal["stopped", "run"],
+    hold_id: str | None,
+    by: str,
+    wall: float,
+    named: Sequence[str] = (),
+    challenge: str | None = None,
+) -> dict[str, Any]:
+    return {
+        "at": wall,
+        "robot_id": robot_id,
+        "desired": desired,
+        "hold_id": hold_id,
+        "by": by,
+        "named": list(named),
+        "ch": challenge,
+    }
 
 
 class _Memory:
@@ -147,6 +145,7 @@ class _Memory:
 
     def __init__(self) -> None:
         self.wanted: Wanted | None = None
+        self._by, self._at = "", 0.0
         self._named: tuple[str, ...] = ()
         self._asked: tuple[str, ...] = ()
         self._challenge: str | None = None
@@ -156,6 +155,7 @@ class _Memory:
         # A line of the earlier version does not say what a release has named.
         told = entry.get("named")
         hold_id = None if told is None else entry["hold_id"]
+        self._by, self._at = by, entry.get("at", 0.0)
         if told:
             self._asked, self._challenge = tuple(told), entry["ch"]
             fresh = tuple(one for one in self._named if one not in told)
@@ -164,3 +164,18 @@ class _Memory:
             self.wanted, self._asked, self._challenge = None, (), None
             return
         self.wanted = Wanted(by, hold_id, self._named, self._asked, self._challenge)
+
+    def entries(self, robot_id: str) -> Iterator[dict[str, Any]]:
+        """The fewest lines that say the same."""
+        by, at, hold_id = self._by, self._at, None
+        if self.wanted is not None:
+            hold_id = self.wanted.hold_id
+        older = [one for one in self._named if one not in self._asked]
+        if older:
+            # Named, and since then over.
+            yield _entry(robot_id, "run", None, by, at, older)
+        if self._asked:
+            asked = self._asked
+            yield _entry(robot_id, "stopped", hold_id, by, at, asked, self._challenge)
+        desired: Literal["stopped", "run"] = "run" if self.wanted is None else "stopped"
+        yield _entry(robot_id, desired, hold_id, by, at)

@@ -6,19 +6,23 @@ of their own.
 """
 
 import asyncio
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Annotated
 
-import orjson
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from iveg.domain.alerts import Rule
+from iveg.adapters.files import Form, read_lines, write_lines
+from iveg.domain.alerts import ALIASES, Class, Rule
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
+FORM = Form("rules")
 _SETTINGS = "settings"
+_FIRST = Rule()
+_Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
 class FileRules:
@@ -65,36 +69,47 @@ class FileRules:
             raise HopError("disk", str(error)) from error
 
     def _read(self) -> list[Rule]:
-        try:
-            lines = self._path.read_bytes().splitlines()
-        except FileNotFoundError:
-            return []
-        return [self._rule(line, number) for number, line in enumerate(lines, 1)]
-
-    def _rule(self, line: bytes, number: int) -> Rule:
-        where = f"line {number}"
-        try:
-            rule = Rule(**orjson.loads(line))
-            usable = (
-                0.0 <= rule.threshold <= 1.0
-                and LIMITS.ring_least_m <= rule.radius_m <= LIMITS.ring_most_m
-            )
-        except (orjson.JSONDecodeError, TypeError) as error:
-            raise DataFileError(str(self._path), where, str(error)) from error
-        if not usable:
-            reason = "threshold or radius out of range"
-            raise DataFileError(str(self._path), where, reason)
-        return rule
+        rules = []
+        for number, line in read_lines(self._path, FORM):
+            try:
+                rules.append(_StoredRule.model_validate_json(line).rule())
+            except ValidationError as error:
+                where = f"line {number}"
+                raise DataFileError(str(self._path), where, _first(error)) from error
+        return rules
 
     def _write(self, versions: list[Rule]) -> None:
-        beside = self._path.with_suffix(".new")
-        with beside.open("wb") as file:
-            for rule in versions:
-                file.write(orjson.dumps(_fields(rule)) + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(self._path)
+        write_lines(self._path, FORM, map(_fields, versions))
         self._versions = versions
+
+
+class _StoredRule(BaseModel):
+    """One line of the file; a key that is missing has the rule's default."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    id: str = _FIRST.id
+    version: int = Field(1, ge=1)
+    threshold: _Share = LIMITS.detection_threshold
+    class_thresholds: dict[Class, _Share] = Field(default_factory=dict)
+    radius_m: float = Field(
+        LIMITS.ring_default_m, ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m
+    )
+    aliases: dict[str, Class] = Field(default_factory=lambda: dict(ALIASES))
+    possible_people: bool = False
+    author: str = _SETTINGS
+    since: float | None = None
+
+    def rule(self) -> Rule:
+        """The version that it says."""
+        return Rule(**dict(self))
+
+
+def _first(error: ValidationError) -> str:
+    """What is wrong, in a few words."""
+    told = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in told["loc"])
+    return f"{place}: {told['msg']}" if place else told["msg"]
 
 
 def _agree(one: Rule, other: Rule) -> bool:

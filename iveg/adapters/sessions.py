@@ -6,16 +6,21 @@ SHA-256.
 """
 
 import logging
-import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from threading import Lock
+from typing import Annotated
 
-import orjson
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from iveg.adapters.files import Form, read_lines, write_lines
+from iveg.domain.errors import DataFileError
 
 _log = logging.getLogger(__name__)
+
+FORM = Form("sessions")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,27 +52,20 @@ class FileSessions:
 
     def load(self) -> tuple[Session, ...]:
         """All that were kept; a line that cannot be read is nobody's session."""
+        sessions = []
         try:
-            lines = self._path.read_bytes().splitlines()
-        except FileNotFoundError:
-            return ()
-        except OSError as error:
+            for number, line in read_lines(self._path, FORM):
+                try:
+                    stored = _StoredSession.model_validate_json(line)
+                except ValidationError:
+                    _log.warning(
+                        "%s, line %d: not readable, skipped", self._path, number
+                    )
+                else:
+                    sessions.append(Session(**dict(stored)))
+        except (OSError, DataFileError) as error:
             _log.warning("sessions are not remembered: %s", error)
-            return ()
-        read = [self._session(line, number) for number, line in enumerate(lines, 1)]
-        return tuple(session for session in read if session is not None)
-
-    def _session(self, line: bytes, number: int) -> Session | None:
-        try:
-            session = Session(**orjson.loads(line))
-            whole = len(bytes.fromhex(session.digest)) == 32
-            times = isinstance(session.began + session.seen, float)
-            if whole and times and isinstance(session.name, str):
-                return session
-        except (ValueError, TypeError):
-            pass
-        _log.warning("%s, line %d: not readable, skipped", self._path, number)
-        return None
+        return tuple(sessions)
 
     def keep(self, sessions: Iterable[Session]) -> None:
         """Have these on disk soon; returns at once.  What is newest wins."""
@@ -89,7 +87,7 @@ class FileSessions:
         with self._lock:
             sessions, self._newest = self._newest or (), None
         try:
-            self._replace(sessions)
+            write_lines(self._path, FORM, map(asdict, sessions))
         except OSError:
             # Told once, until it works again: every request may come here.
             if not self._failing:
@@ -98,13 +96,14 @@ class FileSessions:
         else:
             self._failing = False
 
-    def _replace(self, sessions: Iterable[Session]) -> None:
-        beside = self._path.with_suffix(".new")
-        beside.unlink(missing_ok=True)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-        with os.fdopen(os.open(beside, flags, 0o600), "wb") as file:
-            for session in sessions:
-                file.write(orjson.dumps(asdict(session)) + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(self._path)
+
+class _StoredSession(BaseModel):
+    """One line of the file."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    name: str
+    role: str
+    began: Annotated[float, Field(allow_inf_nan=False)]
+    seen: Annotated[float, Field(allow_inf_nan=False)]

@@ -1,7 +1,8 @@
 """The door of the pipeline: a bounded queue that prefers what people's safety needs.
 
-All transports end here.  When more comes than can be taken, the oldest telemetry gives
-way and is counted; safety reports and answers of robots never do.
+All transports end here.  When more comes than can be taken, the oldest telemetry of the
+same robot and kind gives way, or of the stream that has most waiting, and is counted;
+safety reports, answers and detections never do.  So a robot that floods drops its own.
 """
 
 import asyncio
@@ -45,6 +46,8 @@ class Ingest:
         self.is_past = is_past
         self._rejected = rejected
         self._queue: deque[Received] = deque()
+        self._waiting: Counter[_Stream] = Counter()
+        """How much telemetry waits, by robot and kind."""
         self._wake = asyncio.Event()
         self._told: set[tuple[str, str]] = set()
         self.counters: Counter[str] = Counter()
@@ -60,9 +63,12 @@ class Ingest:
         way = "asked" if received.asked else received.road
         self.counters[f"{way}.{name}"] += 1
         self._passed(received)
-        if len(self._queue) >= MAX_QUEUED:
-            self._make_room()
+        stream = _stream(received)
+        if len(self._queue) >= MAX_QUEUED and not self._make_room(stream):
+            return
         self._queue.append(received)
+        if stream is not None:
+            self._waiting[stream] += 1
         self._wake.set()
 
     def reject(self, source: str, reason: str, detail: str = "") -> None:
@@ -84,7 +90,11 @@ class Ingest:
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
         while self._queue:
-            yield self._queue.popleft()
+            received = self._queue.popleft()
+            stream = _stream(received)
+            if stream is not None:
+                self._left(stream)
+            yield received
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
@@ -95,10 +105,44 @@ class Ingest:
             return
         self._wake.clear()
 
-    def _make_room(self) -> None:
-        for index, waiting in enumerate(self._queue):
-            if kind(waiting.observation).may_drop:
-                name = type(waiting.observation).__name__
-                self.counters[f"dropped.{name}"] += 1
-                del self._queue[index]
-                return
+    def _make_room(self, stream: "_Stream | None") -> bool:
+        """Drop the oldest of a stream; whether there is room for what comes.
+
+        Nothing that matters is dropped for telemetry, nor telemetry of others for a
+        stream that has enough waiting itself.
+        """
+        victim = stream
+        if victim is None or not self._waiting[victim]:
+            victim = max(
+                self._waiting, key=lambda one: self._waiting[one], default=None
+            )
+        if victim is None:
+            self._dropped(stream)
+            return stream is None
+        index = next(
+            number for number, one in enumerate(self._queue) if _stream(one) == victim
+        )
+        del self._queue[index]
+        self._left(victim)
+        self._dropped(victim)
+        return True
+
+    def _dropped(self, stream: "_Stream | None") -> None:
+        if stream is not None:
+            self.counters[f"dropped.{stream[1].__name__}"] += 1
+
+    def _left(self, stream: "_Stream") -> None:
+        self._waiting[stream] -= 1
+        if not self._waiting[stream]:
+            del self._waiting[stream]
+
+
+_Stream = tuple[str | None, type[Observation]]
+
+
+def _stream(received: Received) -> _Stream | None:
+    """Whose telemetry of which kind; None for what is never dropped."""
+    observation = received.observation
+    if not kind(observation).may_drop:
+        return None
+    return getattr(observation, "robot_id", None), type(observation)

@@ -4,12 +4,12 @@ Written aside, forced to the disk and renamed, so a loss of power leaves the old
 the new one.  A file that cannot be read is not an empty one.
 """
 
-import os
 from pathlib import Path
 
 import orjson
 from pydantic import TypeAdapter, ValidationError
 
+from iveg.adapters.files import write_bytes
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Hold
 from iveg.ngsi.codec import load_json
@@ -46,14 +46,4 @@ def write_holds(file: Path, holds: HoldSet) -> None:
         OSError: the disk refused; the file is as it was.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
-    aside = file.with_name(file.name + ".new")
-    with aside.open("wb") as stream:
-        stream.write(orjson.dumps(holds))
-        stream.flush()
-        os.fsync(stream.fileno())
-    aside.replace(file)
-    directory = os.open(file.parent, os.O_RDONLY)
-    try:
-        os.fsync(directory)
-    finally:
-        os.close(directory)
+    write_bytes(file, orjson.dumps(holds))

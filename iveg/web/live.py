@@ -150,8 +150,11 @@ def router(
                 )
                 ear = Ear(websocket, subscriber, clock, stop, principal, feed)
                 tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
-        except* (WebSocketDisconnect, ConnectionError, RuntimeError) as gone:
+        except* (WebSocketDisconnect, ConnectionError) as gone:
             _log.debug("browser gone: %s", gone)
+        except* Exception:
+            # A mistake of ours, told as one; the browser comes back by itself.
+            _log.exception("live: the line of a browser has failed")
         finally:
             hub.leave(subscriber)
 
@@ -175,7 +178,7 @@ class Line:
 
     async def say(self, frame: bytes) -> None:
         """Send JSON."""
-        await self._websocket.send_text(frame.decode())
+        await _sent(self._websocket.send_text(frame.decode()))
 
     async def send_all(self) -> None:
         """The newest of every topic, as fast as the browser reads."""
@@ -201,14 +204,14 @@ class Line:
         except TimeoutError:
             pass
         sending.close()
-        await self._websocket.close(TOO_SLOW)
+        await _sent(self._websocket.close(TOO_SLOW))
         return False
 
     async def _send_with(self, feed: TelemetryFeed) -> None:
         await self._send_news(lambda topic: not is_telemetry(topic))
         frame = feed.next_frame(self._clock())
         if frame is not None:
-            await self._websocket.send_bytes(frame)
+            await _sent(self._websocket.send_bytes(frame))
 
     async def _send_news(self, wanted: Callable[[str], bool]) -> None:
         for topic, item in self._subscriber.take_events():
@@ -218,7 +221,7 @@ class Line:
             if frame is None:
                 continue
             if topics.find(topic)[0] is topics.SCAN:
-                await self._websocket.send_bytes(frame)
+                await _sent(self._websocket.send_bytes(frame))
             else:
                 await self.say(frame)
 
@@ -228,8 +231,20 @@ async def _watch_session(websocket: WebSocket, principal: Principal) -> None:
     while True:
         await asyncio.sleep(_SESSION_CHECK_S)
         if not _may_still(websocket, principal, "read"):
-            await websocket.close(NO_SESSION)
+            await _sent(websocket.close(NO_SESSION))
             return
+
+
+async def _sent(sending: Coroutine[Any, Any, None]) -> None:
+    """Send; of a socket that has closed meanwhile a server says RuntimeError.
+
+    Raises:
+        ConnectionResetError: nobody is there any more.
+    """
+    try:
+        await sending
+    except RuntimeError as error:
+        raise ConnectionResetError(str(error)) from error
 
 
 def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bool:

@@ -3,6 +3,8 @@
 import asyncio
 import logging
 from pathlib import Path
+from random import Random
+from typing import Literal
 
 import orjson
 import pytest
@@ -36,7 +38,7 @@ async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
 
-    (line,) = path.read_bytes().splitlines()
+    (_, line) = path.read_bytes().splitlines()
 
     assert orjson.loads(line) == {
         "at": START.wall,
@@ -119,7 +121,7 @@ async def test_a_line_that_a_crash_cut_short_hurts_no_other(
         "AGI": Wanted("ana", "01A"),
         "AGII": Wanted("ana", "01A"),
     }
-    assert "line 2: not readable, skipped" in caplog.text
+    assert "line 3: not readable, skipped" in caplog.text
 
 
 @pytest.mark.parametrize(
@@ -168,3 +170,69 @@ async def test_a_disk_that_fails_is_logged_and_holds_up_nothing(
     await write(tmp_path / "taken" / "commands.jsonl", ("AGI", "stopped"))
 
     assert "could not be written" in caplog.text
+
+
+async def _live_long(journal: FileJournal, rnd: Random) -> None:
+    """Presses, releases that are named, and resumes, in any order."""
+    for number in range(rnd.randrange(1, 60)):
+        robot = rnd.choice(("AGI", "AGII"))
+        what = rnd.choice(("stopped", "named", "run"))
+        ids = [f"n{rnd.randrange(number + 1)}" for _ in range(rnd.randrange(1, 4))]
+        if what == "named":
+            names = list(dict.fromkeys(ids))
+            await journal.named(robot, ids[0], names, f"c{number}", "ana", START)
+        else:
+            hold = None if what == "run" else ids[0]
+            desired: Literal["stopped", "run"] = "run" if hold is None else "stopped"
+            await journal.wanted(robot, desired, hold, f"by{number}", START)
+
+
+@pytest.mark.parametrize("seed", range(40))
+async def test_a_compacted_journal_says_what_the_long_one_said(
+    tmp_path: Path, seed: int
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = FileJournal(path)
+    await _live_long(journal, Random(seed))  # noqa: S311 - repeatable on purpose
+    journal.close()
+
+    long = FileJournal(path).read()
+    lines = path.read_bytes().splitlines()
+    assert FileJournal(path).read() == long
+    assert len(lines) <= 1 + 2 * 3
+
+    # A press and a release more say the same on both.
+    again = FileJournal(path)
+    await again.wanted("AGI", "stopped", "new", "ben", START)
+    again.close()
+    assert FileJournal(path).read()["AGI"].hold_id == "new"
+
+
+async def test_names_of_releases_survive_that_the_journal_is_compacted(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, ("AGI", "stopped"))
+    await journal.named("AGI", "01A", ["01A"], "c1", "ana", START)
+    await journal.wanted("AGI", "run", None, "ana", START)
+    journal.close()
+    assert FileJournal(path).read() == {}
+
+    later = FileJournal(path)
+    await later.wanted("AGI", "stopped", "01B", "ben", START)
+    later.close()
+
+    assert FileJournal(path).read() == {"AGI": Wanted("ben", "01B", named=("01A",))}
+
+
+async def test_a_journal_of_a_newer_iveg_is_believed_and_left_as_it_is(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    (await write(path, ("AGI", "stopped"), ("AGI", "stopped"))).close()
+    newer = path.read_bytes().replace(b'"version":1', b'"version":9', 1)
+    path.write_bytes(newer)
+
+    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
+    assert path.read_bytes() == newer
+    assert "stop-journal 9" in caplog.text

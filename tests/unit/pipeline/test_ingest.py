@@ -146,3 +146,30 @@ def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
     queue.offer(received(odometry()))
 
     assert queue.counters == {"asked.Odometry": 1, "orion.Odometry": 1}
+
+
+def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> None:
+    door = ingest()
+    quiet = [odometry("AGII", float(x)) for x in range(3)]
+    for one in quiet:
+        door.offer(received(one))
+    for _ in range(MAX_QUEUED + 50):
+        door.offer(received(odometry("AGI")))
+    door.offer(received(safety_report("AGI")))
+
+    left = [one.observation for one in door.drain()]
+
+    assert [one for one in left if one in quiet] == quiet
+    assert isinstance(left[-1], SafetyReport)
+    assert door.counters["dropped.Odometry"] == 54
+
+
+def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
+    door = ingest()
+    for _ in range(MAX_QUEUED):
+        door.offer(received(safety_report()))
+
+    door.offer(received(odometry()))
+
+    assert len(list(door.drain())) == MAX_QUEUED
+    assert door.counters["dropped.Odometry"] == 1

@@ -381,3 +381,17 @@ async def test_how_fast_alarms_come_is_told_when_it_changes() -> None:
         told = (await browser.read_until("flood"))[-1]
 
     assert told["data"] == {"count": 1, "limit": 10, "window_s": 600.0, "since": None}
+
+
+async def test_a_mistake_of_ours_is_told_as_an_error_and_ends_that_line(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    desk = WebDesk()
+    async with desk.serving() as address, looking(desk, address) as browser:
+        await browser.read()
+        desk.hub.append("commands/nonsense", object())
+
+        await browser.close_code()
+
+    told = [line for line in caplog.records if "has failed" in line.message]
+    assert [line.levelname for line in told] == ["ERROR"]

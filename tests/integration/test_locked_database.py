@@ -1,0 +1,94 @@
+"""What people's safety needs waits for no database, also just after a start."""
+
+import asyncio
+import sqlite3
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import ExitStack, asynccontextmanager, contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from iveg.adapters import clock
+from iveg.app import Dss, create_app
+from iveg.domain.observations import Received
+from iveg.settings import Settings
+from tests.builders import odometry
+from tests.ports import free_ports
+
+SOON_S = 1.0
+"""What does not wait for a database that never answers takes no longer than this."""
+
+
+@asynccontextmanager
+async def running(directory: Path) -> AsyncIterator[tuple[Dss, httpx.AsyncClient]]:
+    """An iVeg whose neighbours are all away, and a browser before it."""
+    mqtt, orion, agent = free_ports(3)
+    settings = Settings(
+        mqtt_url=f"mqtt://127.0.0.1:{mqtt}",
+        orion_url=f"http://127.0.0.1:{orion}",
+        iota_url=f"http://127.0.0.1:{agent}",
+        sign_in_token="ab" * 32,
+    )
+    dss = Dss(settings, directory)
+    transport = httpx.ASGITransport(create_app(dss))
+    browser = httpx.AsyncClient(transport=transport, base_url="http://iveg")
+    async with browser, dss.running():
+        yield dss, browser
+
+
+@contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    locker = sqlite3.connect(directory / "iveg.sqlite", isolation_level=None)
+    locker.execute("BEGIN EXCLUSIVE")
+    try:
+        yield
+    finally:
+        locker.execute("ROLLBACK")
+        locker.close()
+
+
+async def so(fact: Callable[[], bool]) -> None:
+    """Return when it is so; the caller has a deadline."""
+    while not fact():  # noqa: ASYNC110 - nothing tells of it
+        await asyncio.sleep(0.01)
+
+
+async def press(browser: httpx.AsyncClient) -> httpx.Response:
+    headers = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+    return await browser.post("/api/v1/robots/AGI/stop", headers=headers)
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
+    tmp_path: Path,
+) -> None:
+    async with running(tmp_path) as (dss, browser):
+        signed_in = await browser.get("/", params={"token": "ab" * 32})
+        assert (await press(browser)).status_code == 202
+        cookies = {**browser.cookies}
+        await dss.recorder.caught_up()
+    assert signed_in.status_code in (302, 303, 307)
+
+    with ExitStack() as stack:
+        stack.enter_context(locked(tmp_path))
+        async with asyncio.timeout(30), running(tmp_path) as (dss, browser):
+            browser.cookies.update(cookies)
+            async with asyncio.timeout(SOON_S):
+                machine = dss.commander.machine("AGI")
+                await so(lambda: machine.wants_stop)
+                read = await browser.get("/api/v1/robots")
+                pressed = await press(browser)
+                dss.ingest.offer(Received(odometry("AGI", 3.0), clock.now()))
+                robot = dss.assessor.world.robot("AGI")
+                await so(lambda: robot.odometry is not None)
+                judged = dss.assessor.mandates["AGI"]
+
+            written = dss.recorder.counters["history_written"]
+            stack.close()  # an end that waits for the database is another matter
+
+    assert machine.stop is not None
+    assert machine.stop.reason == "reasserted"
+    assert (read.status_code, pressed.status_code) == (200, 202)
+    assert judged.speed_factor == 0.5
+    assert written == 0
