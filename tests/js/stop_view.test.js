@@ -1,5 +1,6 @@
 import { linkOf } from "../../iveg/static/js/clock.js";
 import { LIMITS } from "../../iveg/static/js/limits.js";
+import { transportsSaid } from "../../iveg/static/js/panels/stop_loud.js";
 import {
   doubtOf,
   viewOfFleet,
@@ -292,4 +293,15 @@ test("I12 a standstill that nobody repeats becomes one of the past by itself", (
     key: "stop.stale",
     slots: { seconds: 3.1 },
   });
+});
+
+test("every transport of an order is told, also one that this page never heard of", () => {
+  const words = { t: (/** @type {string} */ key) => key.replace("stop.", "") };
+
+  const said = transportsSaid({ direct: "ok", fiware: "off", dds: "failed" }, words);
+
+  equal(
+    said,
+    "transport_direct transport.ok, FIWARE transport.off, DDS transport.failed",
+  );
 });

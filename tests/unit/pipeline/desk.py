@@ -1,7 +1,7 @@
 """The pipeline with fakes round it, on one clock that is moved by hand."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -16,9 +16,10 @@ from iveg.domain.observations import (
     Received,
 )
 from iveg.domain.stop import Command
-from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, Doors, build
+from iveg.pipeline.ports import CommandPort
 from tests.builders import (
     detection_frame,
     fleet_of,
@@ -46,6 +47,7 @@ class Desk:
         house: Greenhouse = FIELD,
         *,
         direct: bool = True,
+        also: Mapping[Transport, CommandPort] | None = None,
     ) -> None:
         self.clock = FakeClock()
         self.lag_s: float | None = None
@@ -62,7 +64,11 @@ class Desk:
             house,
             Doors(
                 self.fleet,
-                {DIRECT.switched(on=direct): self.fleet, FIWARE: self.broker},
+                {
+                    DIRECT.switched(on=direct): self.fleet,
+                    FIWARE: self.broker,
+                    **(also or {}),
+                },
                 self.journal,
                 self.sink,
                 self.clock,

@@ -43,11 +43,9 @@ export function createLoudLines({ words, line }) {
 
   /** @param {Command} command */
   function sentenceOf(command) {
-    const { robot, roads, times } = command;
+    const { robot, transports, times } = command;
     const doubt = doubtOf(command, performance.now());
     const state = String(stateOfCommand(command));
-    /** @param {string} road */
-    const roadSaid = (road) => words.t(`stop.road.${roads?.[road] ?? "unknown"}`);
     return words.t(`stop.p1.${state}`, {
       robot: command.robot_id,
       seconds: since(times.pressed ?? times.requested, line.serverNow()),
@@ -57,12 +55,27 @@ export function createLoudLines({ words, line }) {
         ? words.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
         : words.t("stop.p1.no_report"),
       moved: doubt ? words.t("stop.p1.could", { distance: doubt.movedM }) : " ",
-      roads: words.t("stop.p1.roads", {
-        direct: roadSaid("direct"),
-        fiware: roadSaid("fiware"),
+      transports: words.t("stop.p1.transports", {
+        said: transportsSaid(transports ?? {}, words),
       }),
     });
   }
 
   return { draw };
+}
+
+/**
+ * Every transport that the table of the server has, with how far the order came on it.
+ *
+ * @param {Record<string, string>} transports by id
+ * @param {{t: (key: string) => string}} words
+ */
+export function transportsSaid(transports, words) {
+  return Object.entries(transports)
+    .map(([id, state]) => {
+      const name =
+        id === "direct" ? words.t("stop.transport_direct") : id.toUpperCase();
+      return `${name} ${words.t(`stop.transport.${state}`)}`;
+    })
+    .join(", ");
 }
