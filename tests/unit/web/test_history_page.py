@@ -19,14 +19,15 @@ from iveg.adapters.history.store import Store
 from iveg.domain.alerts import Rule
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
-from iveg.web import history, problems
-from iveg.web.auth import Principal
+from iveg.web import history, installed, problems
+from iveg.web.auth import Door, Principal
 from iveg.web.contexts import Site
 from iveg.web.openapi import describe_api
 from iveg.web.pacing import SUBPROTOCOL
 from iveg.web.pages import Pages, router
 from iveg.web.security import SecurityHeaders
 from tests.browsers import running_browser
+from tests.builders import START
 from tests.fakes.records import (
     command_record,
     decision_record,
@@ -58,6 +59,10 @@ class Server:
 
     def _app(self) -> SecurityHeaders:
         app = FastAPI(docs_url=None)
+        app.state.door = Door(
+            sign_in_token="cd" * 32, api_token="", clock=lambda: START
+        )
+        app.include_router(installed.router())
         app.include_router(history.router(self._queries, reader=lambda: None))
         app.include_router(
             router(
