@@ -17,7 +17,8 @@ from urllib.parse import unquote, urlsplit
 import aiomqtt
 
 from iveg.adapters.floods import quiet
-from iveg.adapters.mqtt_inbox import GreedyClient, Inbox
+from iveg.adapters.mqtt_inbox import Inbox
+from iveg.adapters.mqtt_outbox import PromptClient
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
@@ -119,7 +120,7 @@ class MqttLink:
 
     async def _session(self) -> None:
         address, inbox = self._address, Inbox(_MAX_INCOMING)
-        async with GreedyClient(
+        async with PromptClient(
             address.host,
             address.port,
             username=address.user,
@@ -129,7 +130,7 @@ class MqttLink:
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=_NODELAY,
             max_queued_incoming_messages=_MAX_INCOMING,
-            queue_type=lambda maxsize: inbox,  # type: ignore[arg-type] # noqa: ARG005
+            queue_type=lambda maxsize: inbox,  # noqa: ARG005
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
@@ -156,20 +157,32 @@ class MqttLink:
         if self._on_message is not None and isinstance(message.payload, bytes):
             self._on_message(message.topic.value, message.payload)
 
-    async def _send_offered(self, client: aiomqtt.Client) -> None:
+    async def _send_offered(self, client: PromptClient) -> None:
         while True:
             await self._wake.wait()
             self._wake.clear()
             while self._offered:
-                topic = next(iter(self._offered))
-                payload, qos = self._offered.pop(topic)
-                try:
-                    await client.publish(topic, payload, qos=qos)
-                except aiomqtt.MqttError:
-                    # A broker that is slow to confirm may still be there; when it is
-                    # gone, the session ends and this task with it.
-                    _log.debug("%s: %s was not confirmed", self._name, topic)
-                _heed_cancellation()
+                offered, self._offered = self._offered, {}
+                client.send(
+                    (topic, payload)
+                    for topic, (payload, qos) in offered.items()
+                    if not qos
+                )
+                for topic, (payload, qos) in offered.items():
+                    if qos:
+                        await self._send_confirmed(client, topic, payload, qos)
+                await client.written()
+
+    async def _send_confirmed(
+        self, client: PromptClient, topic: str, payload: bytes, qos: int
+    ) -> None:
+        try:
+            await client.publish(topic, payload, qos=qos)
+        except aiomqtt.MqttError:
+            # A broker that is slow to confirm may still be there; when it is gone, the
+            # session ends and this task with it.
+            _log.debug("%s: %s was not confirmed", self._name, topic)
+        _heed_cancellation()
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when there is time; a newer message of the topic takes its place."""

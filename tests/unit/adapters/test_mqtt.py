@@ -117,6 +117,39 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
     assert heard.link.replaced == 9
 
 
+async def test_while_the_socket_is_full_only_the_newest_of_a_topic_waits() -> None:
+    heard, reads = bytearray(), asyncio.Event()
+
+    async def deaf_broker(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        await reader.read(64)
+        writer.write(b"\x20\x02\x00\x00")  # CONNACK
+        await reads.wait()
+        while more := await reader.read(2**20):
+            heard.extend(more)
+        writer.close()
+
+    server = await asyncio.start_server(deaf_broker, "127.0.0.1", 0, limit=1024)
+    port = server.sockets[0].getsockname()[1]
+    link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
+    async with server, running(link):
+        await until(lambda: link.connected)
+
+        link.offer("/large", bytes(16 * 2**20))
+        await asyncio.sleep(0)  # the sender takes it, and finds no room for all of it
+        await asyncio.sleep(0)
+        for number in range(5):
+            link.offer("/small", b"number %d" % number)
+            await asyncio.sleep(0)
+        reads.set()
+        await until(lambda: b"number 4" in heard)
+
+    assert len(heard) > 16 * 2**20
+    assert heard.count(b"number") == 1
+    assert link.replaced == 4
+
+
 async def test_publishing_while_away_fails_loudly() -> None:
     link = Heard(free_ports(1)[0]).link
 
