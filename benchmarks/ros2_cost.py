@@ -25,22 +25,20 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import make_idl_struct, types
 from cyclonedds.pub import DataWriter
-from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 from benchmarks.process import Usage, machine, pause, percentile, print_table
-from iveg.adapters.dds import Dds, DdsReader, DdsWriter
+from iveg.adapters.dds import Dds, DdsReader, DdsWriter, announced, write_qos
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.ros2 import cdr, names
 from iveg.ros2 import messages as m
-from iveg.ros2.schema import Many, Message, One, Structure, Text, fields_of
+from iveg.ros2.schema import Message
 from tests.brokers import broker_on
 from tests.dds import free_domain, loopback
 from tests.ports import free_ports
@@ -54,51 +52,22 @@ SENSORS: dict[str, type[Message]] = {
     "/tf": m.TFMessage,
     "/detections_3d": m.Detection3DArray,
 }
+WISHES: dict[str, type[Message]] = {"/cmd_vel_nav": m.Twist}
+_HEARD = write_qos(names.SENSOR_DATA.newest(50))
 _ANY = SampleState.NotRead | ViewState.Any | InstanceState.Any
 
 
 # --- the two that are compared with --------------------------------------------------
 
 
-def idl(message: type[Message]) -> Any:
-    """A message as Cyclone's Python has it, which then decodes it."""
-    typename = names.dds_type(message.ROS).replace("::", ".")
-    members = {name: _member(kind) for name, kind in fields_of(message)}
-    return make_idl_struct(message.__name__, typename, members)
-
-
-def _member(kind: One | Many | Text | Structure) -> Any:
-    match kind:
-        case One("boolean"):
-            return bool
-        case One(primitive):
-            return getattr(types, primitive)
-        case Many(primitive, None):
-            return types.sequence[getattr(types, primitive)]
-        case Many(primitive, count):
-            return types.array[getattr(types, primitive), count]
-        case Text():
-            return str
-        case Structure(message, many):
-            return types.sequence[idl(message)] if many else idl(message)
-
-
-def _qos(*, reliable: bool) -> Qos:
-    return Qos(
-        Policy.Reliability.Reliable(duration(milliseconds=100))
-        if reliable
-        else Policy.Reliability.BestEffort,
-        Policy.History.KeepLast(50),
-        Policy.DataRepresentation(use_cdrv0_representation=True),
-    )
-
-
 def bare(domain: int) -> None:
-    """Take and decode every message, as they come."""
+    """Take and decode every message that the robot is sent, as they come."""
     participant, waitset, readers = _participant(domain)
-    for name, message in SENSORS.items():
-        topic = Topic(participant, names.dds_topic(name), idl(message))
-        readers.append(DataReader(participant, topic, _qos(reliable=False)))
+    for name, message in (SENSORS | WISHES).items():
+        topic = Topic(
+            participant, names.dds_topic(name), announced(message, decodes=True)
+        )
+        readers.append(DataReader(participant, topic, _HEARD))
     conditions = [ReadCondition(reader, _ANY) for reader in readers]
     for condition in conditions:
         waitset.attach(condition)
@@ -111,11 +80,11 @@ def bare(domain: int) -> None:
 def echo(domain: int) -> None:
     """Answer each twist with itself, decoded and encoded."""
     participant, waitset, _ = _participant(domain)
-    kind = idl(m.Twist)
+    kind = announced(m.Twist, decodes=True)
     heard = Topic(participant, names.dds_topic("/echo_in"), kind)
     said = Topic(participant, names.dds_topic("/echo_out"), kind)
-    reader = DataReader(participant, heard, _qos(reliable=False))
-    writer = DataWriter(participant, said, _qos(reliable=True))
+    reader = DataReader(participant, heard, _HEARD)
+    writer = DataWriter(participant, said, write_qos(names.DEFAULT))
     condition = ReadCondition(reader, _ANY)
     waitset.attach(condition)
     while True:

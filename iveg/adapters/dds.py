@@ -169,13 +169,15 @@ class Dds:
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> "DdsReader":
         """Subscribe to a topic by its full ROS name."""
-        reader = DataReader(self._participant, self._topic(name, message), _qos(qos))
+        reader = DataReader(
+            self._participant, self._topic(name, message), write_qos(qos)
+        )
         return DdsReader(reader)
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
-        return DdsWriter(DataWriter(self._participant, topic, _qos(qos)), topic)
+        return DdsWriter(DataWriter(self._participant, topic, write_qos(qos)), topic)
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
         key = name, message.ROS
@@ -310,27 +312,33 @@ class _Payload:
 @cache
 def _raw(message: type[Message]) -> type[IdlStruct]:
     """A type that DDS announces and checks, and whose samples stay bytes."""
-    kind = _idl(message)
+    kind = announced(message)
     for name in ("__init__", "serialize", "deserialize", "deserialize_key"):
         setattr(kind, name, _Payload.__dict__[name])
     return kind
 
 
-@cache
-def _nested(message: type[Message]) -> type[IdlStruct]:
-    return _idl(message)
+def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:
+    """The type that DDS announces for a message.
 
-
-def _idl(message: type[Message]) -> type[IdlStruct]:
-    members = {name: _idl_type(kind) for name, kind in fields_of(message)}
+    Args:
+        message: Ours.
+        decodes: Cyclone's Python shall make and read its samples.
+    """
+    members = {name: _idl_type(kind, decodes) for name, kind in fields_of(message)}
     typename = dds_type(message.ROS).replace("::", ".")
     kind: type[IdlStruct] = make_idl_struct(
-        message.__name__, typename, members, dataclassify=False
+        message.__name__, typename, members, dataclassify=decodes
     )
     return kind
 
 
-def _idl_type(kind: One | Many | Text | Structure) -> Any:
+@cache
+def _nested(message: type[Message], decodes: bool) -> type[IdlStruct]:
+    return announced(message, decodes=decodes)
+
+
+def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> Any:
     match kind:
         case One("boolean"):
             return bool
@@ -343,11 +351,12 @@ def _idl_type(kind: One | Many | Text | Structure) -> Any:
         case Text():
             return str
         case Structure(message, many):
-            nested = _nested(message)
+            nested = _nested(message, decodes)
             return types.sequence[nested] if many else nested
 
 
-def _qos(qos: Qos) -> DdsQos:
+def write_qos(qos: Qos) -> DdsQos:
+    """A quality of service in Cyclone's words, and what ROS 2 adds to each."""
     reliability = (
         Policy.Reliability.Reliable(duration(milliseconds=100))
         if qos.reliable
@@ -382,7 +391,7 @@ def _read_qos(qos: DdsQos) -> Qos:
 
 
 class _Watch:
-    """A thread that waits for news and wakes the loop, which lets it wait again."""
+    """A thread that waits for news and wakes the loop, which takes it."""
 
     def __init__(
         self,
@@ -398,32 +407,30 @@ class _Watch:
             self._waitset.attach(condition)
         self._loop, self._on_data = loop, on_data
         self._ended = threading.Event()
-        self._rearmed = threading.Event()
+        self._told = False
         self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """Wait for nothing more."""
         self._ended.set()
-        self._rearmed.set()
         self._thread.join()
 
     def _wait(self) -> None:
         while not self._ended.is_set():
             if not self._waitset.wait(duration(milliseconds=_WAIT_MS)):
                 continue
-            self._rearmed.clear()
-            if self._ended.is_set():
-                return
-            try:
-                self._loop.call_soon_threadsafe(self._tell)
-            except RuntimeError:  # the loop has closed
-                return
-            self._rearmed.wait()
+            if not self._told:
+                self._told = True
+                try:
+                    self._loop.call_soon_threadsafe(self._tell)
+                except RuntimeError:  # the loop has closed
+                    return
+            # The loop takes what came meanwhile; a flood wakes it no more often.
+            self._ended.wait(_REARM_S)
 
     def _tell(self) -> None:
-        if self._ended.is_set():
-            return
-        # Whatever becomes of this news, the next must be heard.
-        self._loop.call_later(_REARM_S, self._rearmed.set)
-        self._on_data()
+        # First, so that news which on_data just misses is told again.
+        self._told = False
+        if not self._ended.is_set():
+            self._on_data()

@@ -44,6 +44,8 @@ from iveg.robot.uplink import Form, Sensed, Uplink
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
+_SAID_WITHIN_S = 0.03
+"""Odometry, a wish and feedback that come together are one word to the drive."""
 
 
 class RobotNode:
@@ -96,6 +98,10 @@ class RobotNode:
         self._on_feedback_read = on_feedback
         self._faults: tuple[RobotFault, ...] = ()
         self._nobody_there = held
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._told: tuple[Twist2D, float] = REST, 0.0
+        self._tick_due = asyncio.Event()
+        self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
         self._link = MqttLink(
@@ -178,6 +184,9 @@ class RobotNode:
                 ):
                     tasks.create_task(work, name=f"robot-{self._id}-{name}")
         finally:
+            self._loop = None
+            if self._next_tick is not None:
+                self._next_tick.cancel()
             self._drive(REST)
 
     def sense(self, observation: Sensed) -> None:
@@ -217,9 +226,20 @@ class RobotNode:
             self._perform(self._machine.release_locally(self._read_clock().mono))
 
     async def _tick_forever(self) -> None:
+        """Tick whenever the drive was told nothing for 40 ms."""
+        self._loop = asyncio.get_running_loop()
         while True:
+            self._tick_due.clear()
+            self._put_off_tick()
             self._perform(self._machine.tick(self._read_clock().mono))
-            await asyncio.sleep(_GATE_EVERY_S)
+            await self._tick_due.wait()
+
+    def _put_off_tick(self) -> None:
+        if self._loop is None:
+            return
+        if self._next_tick is not None:
+            self._next_tick.cancel()
+        self._next_tick = self._loop.call_later(_GATE_EVERY_S, self._tick_due.set)
 
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono
@@ -250,13 +270,23 @@ class RobotNode:
         for effect in effects:
             match effect:
                 case Drive(twist):
-                    self._drive(twist)
+                    self._tell_drive(twist)
                 case Persist(holds):
                     self._lane.persist(holds)
                 case Answer(answer):
                     self._answer(answer)
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
+
+    def _tell_drive(self, twist: Twist2D) -> None:
+        """Rest and news at once; what it was told a moment ago is not said twice."""
+        now = self._read_clock().mono
+        told, at = self._told
+        if twist == told and twist != REST and now - at < _SAID_WITHIN_S:
+            return
+        self._told = twist, now
+        self._put_off_tick()
+        self._drive(twist)
 
     def _answer(self, answer: CommandAnswer) -> None:
         self.counters[answer.result] += 1

@@ -11,9 +11,10 @@ call, prepared for each of the eight ways in which they can lie.
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import count
 from typing import Any, Literal, Protocol, TypeVar, cast
 
 import numpy as np
@@ -32,6 +33,9 @@ from iveg.ros2.schema import (
 ByteOrder = Literal["<", ">"]
 _ORDERS: dict[bytes, ByteOrder] = {b"\x00\x00": ">", b"\x00\x01": "<"}
 _HEADS: dict[ByteOrder, bytes] = {">": b"\x00\x00\x00\x00", "<": b"\x00\x01\x00\x00"}
+_COUNT: dict[ByteOrder, struct.Struct] = {
+    order: struct.Struct(order + "I") for order in _HEADS
+}
 
 _M = TypeVar("_M", bound=Message)
 
@@ -48,7 +52,7 @@ def read(message: type[_M], payload: bytes) -> _M:
     cursor = _Cursor(memoryview(payload)[4:], order)
     codec = _codec_of(message)
     codec.read(cursor)
-    return cast("_M", codec.build(cursor.values, 0)[0])
+    return cast("_M", codec.build(cursor.values))
 
 
 def write(message: Message, order: ByteOrder = "<") -> bytes:
@@ -75,8 +79,22 @@ class _Codec:
     def __init__(self, message: type[Message]) -> None:
         self._message = message
         self._fields = [(name, _nested(kind)) for name, kind in fields_of(message)]
-        self._nested = [nested for _, nested in self._fields]
         self._steps = _merged(self.leaves())
+        names: dict[str, Any] = {}
+        words = self._words(names, count())
+        # As dataclasses makes __init__: one expression is twice as fast as a recursion.
+        self.build: Callable[[list[Any]], Any] = eval(f"lambda v: {words}", names)  # noqa: S307
+        """The message of its values."""
+
+    def _words(self, names: dict[str, Any], at: "count[int]") -> str:
+        """What makes a message: ``m1(m0(v[0], v[1]), v[2])``."""
+        parts = [
+            f"v[{next(at)}]" if nested is None else nested._words(names, at)
+            for _, nested in self._fields
+        ]
+        name = f"m{len(names)}"
+        names[name] = self._message
+        return f"{name}({', '.join(parts)})"
 
     def leaves(self) -> Iterator["One | _Step"]:
         """What lies on the wire in order, structures dissolved."""
@@ -97,18 +115,6 @@ class _Codec:
         """Write as many values as this message has."""
         for step in self._steps:
             step.write(out, values)
-
-    def build(self, values: list[Any], at: int) -> tuple[Any, int]:
-        """The message of the values from ``at`` on, and where the next begins."""
-        parts = []
-        for nested in self._nested:
-            if nested is None:
-                parts.append(values[at])
-                at += 1
-            else:
-                part, at = nested.build(values, at)
-                parts.append(part)
-        return self._message(*parts), at
 
     def flatten(self, message: Any, values: list[Any]) -> None:
         """The values of this message, in order."""
@@ -143,20 +149,19 @@ class _Cursor:
     at: int = 0
     values: list[Any] = field(default_factory=list)
 
-    def numbers(self, layout: str) -> tuple[Any, ...]:
+    def numbers(self, layout: struct.Struct) -> tuple[Any, ...]:
         """Numbers at this place."""
-        layout = self.order + layout
         try:
-            numbers = struct.unpack_from(layout, self.data, self.at)
+            numbers = layout.unpack_from(self.data, self.at)
         except struct.error as error:
             raise UnreadableError("too_short", f"at byte {self.at}") from error
-        self.at += struct.calcsize(layout)
+        self.at += layout.size
         return numbers
 
     def count(self) -> int:
         """A length or count."""
         self.at += -self.at % 4
-        (count,) = self.numbers("I")
+        (count,) = self.numbers(_COUNT[self.order])
         return int(count)
 
     def take(self, size: int) -> memoryview:
@@ -182,7 +187,7 @@ class _Out:
     def count(self, count: int) -> None:
         """A length or count."""
         self.align(4)
-        self.data += struct.pack(self.order + "I", count)
+        self.data += _COUNT[self.order].pack(count)
 
 
 class _Run:
@@ -190,15 +195,18 @@ class _Run:
 
     def __init__(self, primitives: list[str]) -> None:
         self._size = len(primitives)
-        self._layouts = [_layout(primitives, start) for start in range(8)]
+        self._layouts = {
+            order: [struct.Struct(order + _layout(primitives, n)) for n in range(8)]
+            for order in _HEADS
+        }
 
     def read(self, cursor: _Cursor) -> None:
-        cursor.values += cursor.numbers(self._layouts[cursor.at % 8])
+        cursor.values += cursor.numbers(self._layouts[cursor.order][cursor.at % 8])
 
     def write(self, out: _Out, values: Iterator[Any]) -> None:
         numbers = [next(values) for _ in range(self._size)]
-        layout = out.order + self._layouts[len(out.data) % 8]
-        out.data += struct.pack(layout, *numbers)
+        layout = self._layouts[out.order][len(out.data) % 8]
+        out.data += layout.pack(*numbers)
 
 
 def _layout(primitives: list[str], start: int) -> str:
@@ -214,10 +222,10 @@ def _layout(primitives: list[str], start: int) -> str:
 
 class _String:
     def read(self, cursor: _Cursor) -> None:
-        raw = bytes(cursor.take(cursor.count()))
+        raw = cursor.take(cursor.count())
         try:
             # One byte is the zero at its end; some senders leave an empty text without.
-            cursor.values.append(raw[:-1].decode())
+            cursor.values.append(str(raw[:-1], "utf-8"))
         except UnicodeDecodeError as error:
             raise UnreadableError("bad_text", f"at byte {cursor.at}") from error
 
@@ -269,7 +277,7 @@ class _Messages:
         for _ in range(count):
             cursor.values = []
             self._codec.read(cursor)
-            found.append(self._codec.build(cursor.values, 0)[0])
+            found.append(self._codec.build(cursor.values))
         cursor.values = outer
         outer.append(tuple(found))
 

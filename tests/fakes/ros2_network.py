@@ -45,6 +45,7 @@ class Writer:
 
     kind: type[Message]
     sent: list[bytes] = field(default_factory=list)
+    readers: int = 1
 
     def write(self, payload: bytes) -> None:
         self.sent.append(payload)

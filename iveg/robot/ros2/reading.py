@@ -13,12 +13,13 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Navigation, Origin
 from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
-from iveg.robot.ros2.transforms import Rigid, rigid_of
+from iveg.robot.ros2.transforms import Rigid, matrix_of, parts_of, rigid_of
 from iveg.ros2 import messages as m
 
 FASTEST_M_S = 20.0
 """Faster than anything that drives between crop rows: a number that cannot be meant."""
 _FARTHEST_M = 1e6
+_UNTURNED = (0.0, 0.0, 0.0, 1.0)
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
@@ -114,14 +115,19 @@ def read_detection(
         UnreadableError: ``no_class``, ``bad_probability``, ``not_a_number``.
     """
     class_id, probability = read_hypothesis(detection.results, classes)
-    box = rigid_of(detection.bbox.center.position, detection.bbox.center.orientation)
-    size = detection.bbox.size
-    half = np.array((size.x, size.y, size.z)) / 2
-    if box is None or not (np.isfinite(half).all() and (half >= 0).all()):
+    centre, size = detection.bbox.center, detection.bbox.size
+    box = parts_of(centre.position, centre.orientation)
+    sides = size.x, size.y, size.z
+    if box is None or not all(0.0 <= side < math.inf for side in sides):
         raise UnreadableError("not_a_number", "a box")
-    corners = _CORNERS * half
+    move, turn = box
+    # Most detectors turn no boxes.
+    axes = place.turn if turn == _UNTURNED else place.turn @ matrix_of(turn)
+    middle = place.turn @ np.array(move) + place.move
+    # A turned box reaches as far as its half sides do together, along each axis.
+    reach = np.abs(axes) @ (0.5 * np.array(sides))
     det_id = clean(detection.id) or None
-    hull = hull_of(place.compose(box).of(corners))
+    hull = _box_of(middle - reach, middle + reach)
     return Detection(class_id, probability, hull, "map", det_id)
 
 
@@ -150,18 +156,17 @@ def _score(hypothesis: m.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 
 
-_CORNERS = np.array(
-    [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
-)
-
-
 def hull_of(points: np.ndarray) -> Box3D:
     """The upright box about points of shape (n, 3).
 
     Raises:
         UnreadableError: ``not_a_number``, ``absurd``.
     """
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return _box_of(points.min(axis=0), points.max(axis=0))
+
+
+def _box_of(least: np.ndarray, most: np.ndarray) -> Box3D:
+    low, high = least.tolist(), most.tolist()
     if not all(abs(side) <= _FARTHEST_M for side in (*low, *high)):
         raise UnreadableError("absurd", "a box outside of the world")
     return Box3D(low[0], high[0], low[1], high[1], low[2], high[2])

@@ -7,6 +7,7 @@ dies nothing is.
 """
 
 import asyncio
+import itertools
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -32,8 +33,8 @@ RATE_HZ = 30.0
 _DEPTH = 50
 """A topic of which this much waits after a thirtieth of a second is flooded."""
 _PICTURE_DEPTH = 2
-_LOOK_ROUND_S = 0.5
-_TELL_NEIGHBOURS_S = 0.2
+_LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
+"""Twice, and five times a second."""
 _KNOWN_WITHIN_S = 8.0
 _MET_WITHIN_S = 5.0
 
@@ -51,6 +52,11 @@ class Writer(Protocol):
 
     def write(self, payload: bytes) -> None:
         """Send it."""
+        ...
+
+    @property
+    def readers(self) -> int:
+        """How many listen."""
         ...
 
 
@@ -198,17 +204,20 @@ class Ros2Robot:
         async with asyncio.TaskGroup() as tasks:
             for name, work in (
                 ("node", self.node.run()),
-                ("senses", self._every(1 / RATE_HZ, self._sense)),
-                ("round", self._every(_LOOK_ROUND_S, self._look_round)),
-                ("tell", self._every(_TELL_NEIGHBOURS_S, self._tell_neighbours)),
+                ("senses", self._sense_forever()),
             ):
                 tasks.create_task(work, name=f"{self._id}-{name}")
 
-    async def _every(self, period: float, work: Callable[[], None]) -> None:
+    async def _sense_forever(self) -> None:
+        """One timer for all: each that wakes the process costs as much as its work."""
         due = clock.now().mono
-        while True:
-            work()
-            due = max(due + period, clock.now().mono)
+        for tick in itertools.count():
+            self._sense()
+            if tick % _LOOK_ROUND_TICKS == 0:
+                self._look_round()
+            if tick % _TELL_TICKS == 0:
+                self._tell_neighbours()
+            due = max(due + 1 / RATE_HZ, clock.now().mono)
             await asyncio.sleep(max(0.0, due - clock.now().mono))
 
     # --- in -----------------------------------------------------------------------
@@ -272,25 +281,32 @@ class Ros2Robot:
     # --- out ----------------------------------------------------------------------
 
     def _drive(self, twist: Twist2D) -> None:
+        now = clock.now()
         try:
-            self._out.write(self._topics.write(twist, clock.now().wall))
+            self._out.write(self._topics.write(twist, now.wall))
         except HopError as error:
             # Nothing arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
             out = self._names.cmd_vel_out
-            self._troubles.note("drive_refused", out, clock.now().mono)
+            self._troubles.note("drive_refused", out, now.mono)
 
     def _tell_neighbours(self) -> None:
         place = self.senses.place
-        if place is None:
+        cloud, drawing = _heard(self._cloud), _heard(self._markers)
+        if place is None or (cloud is None and drawing is None):
             return
         now = clock.now()
         own, stamp = place.flat(), m.Time.of(now.wall)
         present = self._neighbours.present(own, now.mono)
         frames = self._config.frames
-        if self._cloud is not None:
+        if cloud is not None:
             found = neighbours.cloud(present, own, stamp, frames.base_link)
-            self._cloud.write(cdr.write(found))
-        if self._markers is not None:
+            cloud.write(cdr.write(found))
+        if drawing is not None:
             drawn = neighbours.markers(present, stamp, frames.map)
-            self._markers.write(cdr.write(drawn))
+            drawing.write(cdr.write(drawn))
+
+
+def _heard(writer: Writer | None) -> Writer | None:
+    """The writer if anybody listens."""
+    return writer if writer is not None and writer.readers else None

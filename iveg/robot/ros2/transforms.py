@@ -6,10 +6,12 @@ the newest (``max_age_s``), or it is missing, and then it says since when.
 """
 
 import math
+import operator
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,8 @@ Vector = NDArray[np.float64]
 """Shape (3,)."""
 Matrix = NDArray[np.float64]
 """Shape (3, 3)."""
+_Three = tuple[float, float, float]
+_Four = tuple[float, float, float, float]
 
 
 class NoTransformError(IvegError):
@@ -79,16 +83,25 @@ HERE = Rigid(np.eye(3), np.zeros(3))
 
 def rigid_of(translation: m.Vector3 | m.Point, rotation: m.Quaternion) -> Rigid | None:
     """A translation and a quaternion of any length; None for what is no turn."""
-    q = np.array((rotation.x, rotation.y, rotation.z, rotation.w))
-    move = np.array((translation.x, translation.y, translation.z))
-    length = float(np.sqrt(q @ q))
-    if not (np.isfinite(move).all() and 1e-6 < length < math.inf):
+    parts = parts_of(translation, rotation)
+    return None if parts is None else Rigid(matrix_of(parts[1]), np.array(parts[0]))
+
+
+def parts_of(
+    translation: m.Vector3 | m.Point, rotation: m.Quaternion
+) -> tuple[_Three, _Four] | None:
+    """Move and unit quaternion in plain numbers, which for so few NumPy only slows."""
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    move = translation.x, translation.y, translation.z
+    if not (1e-6 < length < math.inf and all(map(math.isfinite, move))):
         return None
-    return Rigid(_matrix(q / length), move)
+    return move, (x / length, y / length, z / length, w / length)
 
 
-def _matrix(q: NDArray[np.float64]) -> Matrix:
-    x, y, z, w = q.tolist()
+def matrix_of(q: _Four) -> Matrix:
+    """The turn of a unit quaternion x, y, z, w."""
+    x, y, z, w = q
     return np.array(
         (
             (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -98,38 +111,41 @@ def _matrix(q: NDArray[np.float64]) -> Matrix:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _At:
     """One transform at its stamp (s)."""
 
     stamp: float
-    move: Vector
-    q: NDArray[np.float64]
+    move: _Three
+    q: _Four
 
     def towards(self, later: "_At", stamp: float) -> Rigid:
         """Between the two: straight, and turning least at an even pace (slerp)."""
         part = (stamp - self.stamp) / (later.stamp - self.stamp)
-        move = self.move + part * (later.move - self.move)
-        return Rigid(_matrix(_slerp(self.q, later.q, part)), move)
+        ends = zip(self.move, later.move, strict=True)
+        move = np.array([a + part * (b - a) for a, b in ends])
+        return Rigid(matrix_of(_slerp(self.q, later.q, part)), move)
 
+    @cached_property
     def rigid(self) -> Rigid:
-        return Rigid(_matrix(self.q), self.move)
+        """What is asked for several times a tick, once made."""
+        return Rigid(matrix_of(self.q), np.array(self.move))
 
 
-def _slerp(
-    a: NDArray[np.float64], b: NDArray[np.float64], part: float
-) -> NDArray[np.float64]:
-    cosine = float(a @ b)
-    if cosine < 0.0:
-        b, cosine = -b, -cosine
+def _slerp(a: _Four, b: _Four, part: float) -> _Four:
+    cosine = sum(map(operator.mul, a, b))
+    side = -1.0 if cosine < 0.0 else 1.0
+    cosine = abs(cosine)
     if cosine > 0.9995:
-        q = a + part * (b - a)
+        of_a, of_b = 1.0 - part, part
     else:
         angle = math.acos(cosine)
-        q = (math.sin((1 - part) * angle) * a + math.sin(part * angle) * b) / (
-            math.sin(angle)
-        )
-    return np.asarray(q / np.sqrt(q @ q))
+        of_a, of_b = math.sin((1.0 - part) * angle), math.sin(part * angle)
+    x, y, z, w = (
+        of_a * one + side * of_b * other for one, other in zip(a, b, strict=True)
+    )
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return x / length, y / length, z / length, w / length
 
 
 class _Link:
@@ -172,21 +188,17 @@ class TransformBuffer:
         return sum(not self._add(one, static=static) for one in message.transforms)
 
     def _add(self, one: m.TransformStamped, *, static: bool) -> bool:
-        rotation, translation = one.transform.rotation, one.transform.translation
         parent = one.header.frame_id.lstrip("/")
         child = one.child_frame_id.lstrip("/")
-        q = np.array((rotation.x, rotation.y, rotation.z, rotation.w))
-        move = np.array((translation.x, translation.y, translation.z))
-        length = float(np.sqrt(q @ q))
-        usable = np.isfinite(move).all() and 1e-6 < length < math.inf
-        if not usable or not parent or not child or parent == child:
+        parts = parts_of(one.transform.translation, one.transform.rotation)
+        if parts is None or not parent or not child or parent == child:
             return False
         link = self._links.get(child)
         if link is None or link.parent != parent or link.static != static:
             if link is None and len(self._links) >= MOST_FRAMES:
                 return False
             link = self._links[child] = _Link(parent, static=static)
-        return link.add(_At(one.header.stamp.seconds, move, q / length))
+        return link.add(_At(one.header.stamp.seconds, *parts))
 
     def clear(self) -> None:
         """Forget what moves: time itself has jumped."""
@@ -226,19 +238,19 @@ class TransformBuffer:
         link = self._links[child]
         known, name = link.known, f"{link.parent} → {child}"
         if link.static:
-            return known[-1].rigid()
+            return known[-1].rigid
         newest, oldest = known[-1], known[0]
         if stamp >= newest.stamp:
             if stamp - newest.stamp > self._max_age_s:
                 raise NoTransformError(name, stamp - newest.stamp)
-            return newest.rigid()
+            return newest.rigid
         if stamp < oldest.stamp:
             if oldest.stamp - stamp > self._max_age_s:
                 raise NoTransformError(name, None)
-            return oldest.rigid()
+            return oldest.rigid
         place = bisect_left(known, stamp, key=lambda one: one.stamp)
         if known[place].stamp == stamp:
-            return known[place].rigid()
+            return known[place].rigid
         return known[place - 1].towards(known[place], stamp)
 
     def age(self, child: str, stamp: float) -> float | None:
