@@ -1,0 +1,161 @@
+"""``iveg robot`` as a process: one gate a robot, and a flood on a real DDS."""
+
+import asyncio
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from urllib.parse import urlsplit
+
+import pytest
+
+from iveg.adapters import clock
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Origin, SafetyReport
+from iveg.ngsi import codec
+from iveg.ngsi.names import direct_topic
+from iveg.ros2 import cdr, names
+from iveg.ros2 import messages as m
+from tests.brokers import broker_on
+from tests.dds import Dds, free_domain, loopback
+from tests.processes import Program, Site, site
+
+ROBOT = "AGI"
+_BURST = 100
+"""Twice what a reader holds."""
+
+
+@dataclass
+class Riding:
+    """A gate that runs, and two that were started for the same robot after it.
+
+    Attributes:
+        here: On the same machine.
+        elsewhere: On one that shares but DDS with it.
+    """
+
+    place: Site
+    domain: int
+    gate: Program
+    here: Program
+    elsewhere: Program
+
+
+@pytest.fixture(scope="module")
+def riding(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Riding]:
+    domain = free_domain()
+    words = ["robot", "--id", ROBOT, "--attended", "--ros-domain", str(domain)]
+    words += ["--ros-interface", "127.0.0.1", "--ros-peer", "127.0.0.1"]
+    one, other = (tmp_path_factory.mktemp(name) for name in ("one", "other"))
+    with site(one, IVEG_ROBOTS=ROBOT) as place:
+        gate = place.start(*words)
+        gate.wait_until_ready()
+        with site(other, **place.settings | {"XDG_DATA_HOME": str(other)}) as second:
+            here, elsewhere = place.start(*words), second.start(*words)
+            yield Riding(place, domain, gate, here, elsewhere)
+
+
+class Iveg:
+    """As much of iVeg as lets a robot drive, and what the robot reported last."""
+
+    def __init__(self, address: BrokerAddress) -> None:
+        self.report: SafetyReport | None = None
+        self.link = MqttLink(
+            address, "iveg", {direct_topic(ROBOT, "_safety"): 1}, self._take
+        )
+
+    def _take(self, _: str, payload: bytes) -> None:
+        for one in codec.read_measure(f"{ROBOT}_safety", payload).observations:
+            if isinstance(one, SafetyReport):
+                self.report = one
+
+    async def talk(self) -> None:
+        """Name the newest report ten times a second."""
+        seq = 0
+        while True:
+            seq += 1
+            heard = 0 if self.report is None else self.report.origin.seq or 0
+            said = Feedback(ROBOT, Origin("b", seq), seen={ROBOT: heard})
+            topic = f"/{ROBOT}/mqtt_feedback"
+            self.link.offer(topic, codec.write_feedback(said), 1)
+            await asyncio.sleep(0.1)
+
+
+class Sensors:
+    """A base's odometry, on DDS."""
+
+    def __init__(self, dds: Dds) -> None:
+        self._odometry = dds.writer("/odom", m.Odometry, names.DEFAULT.newest(_BURST))
+        self._tf = dds.writer("/tf", m.TFMessage, names.DEFAULT)
+        self.burst = 1
+
+    async def talk(self) -> None:
+        """Say where the base is thirty times a second, as often as ``burst``."""
+        while True:
+            stamp = m.Time.of(clock.now().wall)
+            odom = m.Header(stamp, "odom")
+            links = (
+                m.TransformStamped(m.Header(stamp, "map"), "odom"),
+                m.TransformStamped(odom, "base_link"),
+            )
+            self._tf.write(cdr.write(m.TFMessage(links)))
+            for _ in range(self.burst):
+                self._odometry.write(cdr.write(m.Odometry(odom, "base_link")))
+            await asyncio.sleep(1 / 30)
+
+
+@asynccontextmanager
+async def at_work(riding: Riding) -> AsyncIterator[tuple[Iveg, Sensors]]:
+    """A broker, iVeg and sensors for the gate that runs."""
+    port = urlsplit(riding.place.settings["IVEG_MQTT_URL"]).port or 0
+    async with broker_on(port, riding.place.directory) as address:
+        iveg = Iveg(address)
+        with Dds(loopback(riding.domain)) as dds:
+            sensors = Sensors(dds)
+            tasks = [
+                asyncio.create_task(work)
+                for work in (iveg.link.run(), iveg.talk(), sensors.talk())
+            ]
+            try:
+                yield iveg, sensors
+            finally:
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def reported(iveg: Iveg, faults: set[str], factor: float) -> None:
+    """Until the robot says that it drives so fast, because of these."""
+    async with asyncio.timeout(20.0):
+        while not (  # noqa: ASYNC110 - another process changes it
+            iveg.report is not None
+            and {one.code for one in iveg.report.faults} == faults
+            and iveg.report.speed_factor == factor
+        ):
+            await asyncio.sleep(0.05)
+
+
+async def test_a_flood_on_dds_is_named_and_slows_the_robot_until_it_is_over(
+    riding: Riding,
+) -> None:
+    async with at_work(riding) as (iveg, sensors):
+        await reported(iveg, set(), 1.0)
+
+        sensors.burst = _BURST
+        await reported(iveg, {"flood"}, 0.5)
+        sensors.burst = 1
+        await reported(iveg, set(), 1.0)
+
+    assert "AGI: flood, /odom" in riding.gate.text()
+    assert "AGI: over: flood, /odom" in riding.gate.text()
+
+
+def test_a_second_gate_refuses_and_says_who_drives(riding: Riding) -> None:
+    """On the same machine by its lease, on another by the drive's publisher."""
+    codes = [one.process.wait(20) for one in (riding.here, riding.elsewhere)]
+
+    assert codes == [1, 1]
+    said = f"AGI is driven already, by process {riding.gate.pid}"
+    assert said in riding.here.text()
+    assert "only one program may drive this robot" in riding.elsewhere.text()
+    assert riding.gate.process.poll() is None
