@@ -13,16 +13,13 @@ from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Battery, Instant, Origin
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.pacing import every
+from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, in_slots
 from iveg.emulator.relay import Relay
 from iveg.emulator.truth import TruthLog
 from iveg.emulator.world import REST, Rig, World
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
-SLOTS = 3
-LONGEST_STEP_S = 0.1
-"""A machine that slept must not let a robot leap."""
 _NAVIGATION_EVERY_S = 1.0
 _BATTERY_EVERY_S = 5.0
 _BATTERY_LASTS_S = 8 * 3600.0
@@ -114,14 +111,6 @@ class EmulatedRobot:
     async def run(self, began: float, phase: float) -> None:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
-        slots = (self._drive, self._scan, self._look)
-        turn = 0
-
-        def slot(dt: float) -> None:
-            nonlocal turn
-            slots[turn % SLOTS](dt)
-            turn += 1
-
         async with AsyncExitStack() as stack:
             if self._relay is not None:
                 await stack.enter_async_context(self._relay)
@@ -132,7 +121,9 @@ class EmulatedRobot:
             self._start_node()
             self.started.set()
             await asyncio.sleep(phase)
-            await every(1.0 / self._settings.rate_hz / SLOTS, slot)
+            await in_slots(
+                1.0 / self._settings.rate_hz, (self._drive, self._scan, self._look)
+            )
 
     # --- the slots ----------------------------------------------------------------
 
@@ -194,7 +185,7 @@ class EmulatedRobot:
             self._clock_offset_s = order.clock_offset_s
         self._freeze(order)
         self._disturb(order)
-        self._blind(order)
+        self._rig.blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
         if order.release_locally:
@@ -219,13 +210,6 @@ class EmulatedRobot:
         if order.freeze_odometry is not None:
             repeats = order.freeze_odometry == "repeat"
             radio.faults = replace(radio.faults, repeats_odometry=repeats)
-
-    def _blind(self, order: FaultOrder) -> None:
-        if order.hide_people is not None:
-            self._rig.hides_people = order.hide_people
-        if "false_person" in order.model_fields_set:
-            place = order.false_person
-            self._rig.false_person = None if place is None else (place.x, place.y)
 
     def _start_node(self) -> None:
         self._node_task = self._tasks.create_task(

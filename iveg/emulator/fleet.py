@@ -18,16 +18,11 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS
-from iveg.emulator.emulated_robot import (
-    LONGEST_STEP_S,
-    SLOTS,
-    EmulatedRobot,
-    FleetSettings,
-)
+from iveg.emulator.emulated_robot import EmulatedRobot, FleetSettings
 from iveg.emulator.faults import open_faults
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder, Order
-from iveg.emulator.pacing import every
+from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every
 from iveg.emulator.radio import Radio
 from iveg.emulator.relay import Relay
 from iveg.emulator.ros2_base import Ros2Base

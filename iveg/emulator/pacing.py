@@ -1,9 +1,14 @@
 """Doing something once a period, for ever."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from iveg.adapters import clock
+
+SLOTS = 3
+"""A robot's period has one each for drive and odometry, laser, camera."""
+LONGEST_STEP_S = 0.1
+"""A machine that slept must not let a robot leap."""
 
 
 async def every(period: float, work: Callable[[float], None]) -> None:
@@ -19,3 +24,15 @@ async def every(period: float, work: Callable[[float], None]) -> None:
         last = now
         due = max(due + period, now)
         await asyncio.sleep(max(0.0, due - clock.now().mono))
+
+
+async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> None:
+    """Call each of ``work`` once a period (s), evenly apart, for ever."""
+    turn = 0
+
+    def slot(dt: float) -> None:
+        nonlocal turn
+        work[turn % len(work)](dt)
+        turn += 1
+
+    await every(period / len(work), slot)

@@ -15,7 +15,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.pacing import every
+from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.emulator.world import REST, Rig, World
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
@@ -27,8 +27,6 @@ from iveg.ros2.schema import Message
 _log = logging.getLogger(__name__)
 TIMEOUT_S = 0.5
 """A base to which nothing is said for so long halts."""
-_SLOTS = 3
-_LONGEST_STEP_S = 0.1
 _SECOND = 1.0
 _LASER = "laser"
 _GIVES_UP_S, _RESTS_S = 1.0, 0.8
@@ -137,29 +135,18 @@ class Ros2Base:
         """Drive and sense until cancelled; ``began`` is when the run began."""
         self._run_began = began
         self._tf_static.write(cdr.write(self._mounts()))
-        slots = (self._drive, self._scan, self._look)
-        turn = 0
-
-        def slot(dt: float) -> None:
-            nonlocal turn
-            slots[turn % _SLOTS](dt)
-            turn += 1
-
         self.started.set()
         await asyncio.sleep(phase)
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(every(_SECOND, self._tell_slowly), name="slow")
-            await every(1.0 / self._rate_hz / _SLOTS, slot)
+            slots = self._drive, self._scan, self._look
+            await in_slots(1.0 / self._rate_hz, slots)
 
     def obey(self, order: FaultOrder) -> None:
         """Do what a fault order says of sensors; the rest is its software's."""
         if order.freeze_odometry is not None:
             self._is_odometry_frozen = bool(order.freeze_odometry)
-        if order.hide_people is not None:
-            self._rig.hides_people = order.hide_people
-        if "false_person" in order.model_fields_set:
-            place = order.false_person
-            self._rig.false_person = None if place is None else (place.x, place.y)
+        self._rig.blind(order)
 
     # --- the slots ----------------------------------------------------------------
 
@@ -171,7 +158,7 @@ class Ros2Base:
         wish = self._rig.wish(now.mono - self._run_began, self._world)
         asked = self._navigation.wish(wish, command, now.mono)
         self._wishes.write(cdr.write(write_twist(asked)))
-        self._rig.move(min(dt * _SLOTS, _LONGEST_STEP_S))
+        self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if not self._is_odometry_frozen:
             self._tell_place(m.Time.of(now.wall))
 

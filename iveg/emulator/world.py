@@ -36,6 +36,7 @@ from iveg.emulator.grounded import GroundedCamera
 from iveg.emulator.kinematics import Odometer, Vehicle
 from iveg.emulator.layout import Layout
 from iveg.emulator.lidar import LaserModel, sweep
+from iveg.emulator.orders import FaultOrder
 from iveg.emulator.people import Person
 from iveg.emulator.scripts import RobotScript
 
@@ -90,6 +91,14 @@ class Rig:
         self.vehicle.step(self.command, dt)
         truth, twist = self.vehicle.pose, self.vehicle.twist
         self._believed = self._odometer.measure(truth, twist, dt)
+
+    def blind(self, order: FaultOrder) -> None:
+        """Do what a fault order says of what the camera sees."""
+        if order.hide_people is not None:
+            self.hides_people = order.hide_people
+        if "false_person" in order.model_fields_set:
+            place = order.false_person
+            self.false_person = None if place is None else (place.x, place.y)
 
     def body(self) -> Body:
         """Seen from above."""
