@@ -5,6 +5,7 @@ Mosquitto where it is installed, the embedded broker elsewhere.
 
 import asyncio
 import contextlib
+import itertools
 import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
@@ -234,6 +235,23 @@ async def test_a_crew_at_the_robot_lets_it_drive_and_a_mandate_halves_it(
         await until(lambda: robot.speed == 0.5)
         await until(lambda: cloud.reports[-1].reason == "person")
         assert cloud.reports[-1].cause == "person-1"
+
+
+async def test_a_drive_is_told_the_same_again_and_again_but_not_twice_at_once(
+    broker: BrokerAddress, tmp_path: Path
+) -> None:
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    robot.node.release_locally()
+    async with running(robot, cloud):
+        await until(lambda: robot.speed == 1.0, within_s=20.0)
+        begins = len(robot.driven)
+
+        await until(lambda: len(robot.driven) > begins + 30)
+
+    told = robot.driven[begins:-1]  # the last is the rest at its end
+    gaps = [later[0] - at[0] for at, later in itertools.pairwise(told)]
+    assert {twist.linear_x for _, twist in told} == {1.0}
+    assert min(gaps) > 0.028
 
 
 async def test_silence_slows_then_holds_and_the_link_hold_clears_itself(
