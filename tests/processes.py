@@ -130,12 +130,12 @@ class Site:
         """What a grower opens first."""
         return f"{self.url}/?token={self.settings['IVEG_SIGN_IN_TOKEN']}"
 
-    def start(self, *words: str) -> Program:
-        """Start ``python -m iveg WORD …`` here."""
+    def start(self, *words: str, module: str = "iveg") -> Program:
+        """Start ``python -m iveg WORD …`` here, or another module."""
         log = self.directory / f"{len(self.programs)}-{words[0]}.log"
         with log.open("wb") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", "iveg", *words],
+                [sys.executable, "-m", module, *words],
                 cwd=self.directory,
                 env=self._environment(),
                 stdin=subprocess.DEVNULL,

@@ -5,10 +5,9 @@ by a call each.  Topics, payloads and the north port are what the real one shows
 it does not do is told in ``docs/fiware.md``.
 """
 
-import asyncio
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import orjson
@@ -34,22 +33,6 @@ from iveg.embedded.registrations import read_registration
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True)
-class Faults:
-    """Ways in which an agent fails in the field, for tests.
-
-    Attributes:
-        deaf: Measures and answers are not heard; the north port says all is well.
-        slow_s: Everything is done so much later (s), in order.
-        stuck: Requests of the context broker are taken and not answered until this
-            ends; then they are carried out, late.
-    """
-
-    deaf: bool = False
-    slow_s: float = 0.0
-    stuck: bool = False
-
-
 class IotAgent:
     """Devices, their measures and their commands.
 
@@ -62,22 +45,11 @@ class IotAgent:
         self._broker = broker
         self._mqtt = mqtt
         self.registry = Registry()
-        self.faults = Faults()
         self.url = ""
         """Address of the north port, for registrations; set when it is known."""
         self.discarded = 0
         """Messages that were not taken; devices are never told."""
-        self._unstuck = asyncio.Event()
-        self._unstuck.set()
         mqtt.listen(self.hear)
-
-    def fail(self, faults: Faults) -> None:
-        """From now on, fail like this."""
-        self.faults = faults
-        if faults.stuck:
-            self._unstuck.clear()
-        else:
-            self._unstuck.set()
 
     # --- from devices -----------------------------------------------------------
 
@@ -92,13 +64,9 @@ class IotAgent:
             del parts[0]
         named = len(parts) == 5 and parts[3] == "attrs"
         plain = len(parts) == 4 and parts[3] in ("attrs", "cmdexe")
-        if not (named or plain) or parts[0] not in ("", "json") or self.faults.deaf:
+        if not (named or plain) or parts[0] not in ("", "json"):
             return
-        if self.faults.slow_s > 0:
-            loop = asyncio.get_running_loop()
-            loop.call_later(self.faults.slow_s, self._take, parts, payload)
-        else:
-            self._take(parts, payload)
+        self._take(parts, payload)
 
     def _take(self, parts: list[str], payload: bytes) -> None:
         _, apikey, device_id, kind, *name = parts
@@ -235,9 +203,6 @@ class IotAgent:
         Raises:
             AgentError: 404, no device has this entity.
         """
-        await self._unstuck.wait()
-        if self.faults.slow_s > 0:
-            await asyncio.sleep(self.faults.slow_s)
         device = self._device_for(tenancy, name, kind)
         now = clock.now().wall
         known = {one: values[one] for one in values if one in device.commands}
@@ -264,7 +229,6 @@ class IotAgent:
         Raises:
             AgentError: 404, no device has this entity.
         """
-        await self._unstuck.wait()
         device = self._device_for(tenancy, name, kind)
         told = {
             command: {"type": "command", "value": ""}

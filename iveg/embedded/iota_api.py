@@ -13,7 +13,7 @@ from iveg.embedded.devices import (
     wrong_syntax,
 )
 from iveg.embedded.http_server import Request, Response
-from iveg.embedded.iot_agent import Faults, IotAgent
+from iveg.embedded.iot_agent import IotAgent
 
 _ABOUT = {
     "libVersion": "4.14.0-iveg-embedded",
@@ -32,7 +32,7 @@ class IotaApi:
     """
 
     def __init__(self, agent: IotAgent) -> None:
-        self._agent = agent
+        self.agent = agent
 
     async def handle(self, request: Request) -> Response:
         """Answer one request."""
@@ -53,7 +53,7 @@ class IotaApi:
 
     async def list_groups(self, request: Request) -> Response:
         """``GET /iot/services``."""
-        groups = self._agent.registry.groups(_tenancy(request))
+        groups = self.agent.registry.groups(_tenancy(request))
         limit, offset = _paging(request)
         shown = [one.show() for one in groups[offset : offset + limit]]
         return _json({"count": len(groups), "services": shown})
@@ -62,26 +62,26 @@ class IotaApi:
         """``POST /iot/services``."""
         tenancy = _tenancy(request)
         for raw in _listed(request, "services"):
-            self._agent.registry.add_group(read_group(raw, tenancy))
+            self.agent.registry.add_group(read_group(raw, tenancy))
         return _json({}, 201)
 
     async def change_group(self, request: Request) -> Response:
         """``PUT /iot/services``."""
-        self._agent.registry.change_group(
+        self.agent.registry.change_group(
             _tenancy(request), *_group_key(request), _object(request)
         )
         return Response(204)
 
     async def delete_group(self, request: Request) -> Response:
         """``DELETE /iot/services``."""
-        self._agent.registry.remove_group(_tenancy(request), *_group_key(request))
+        self.agent.registry.remove_group(_tenancy(request), *_group_key(request))
         return Response(204)
 
     # --- devices ----------------------------------------------------------------
 
     async def list_devices(self, request: Request) -> Response:
         """``GET /iot/devices``."""
-        devices = self._agent.registry.devices(_tenancy(request))
+        devices = self.agent.registry.devices(_tenancy(request))
         entity = request.query.get("entity")
         if entity is not None:
             devices = [one for one in devices if one.entity_name == entity]
@@ -93,24 +93,24 @@ class IotaApi:
         """``POST /iot/devices``."""
         tenancy = _tenancy(request)
         for raw in _listed(request, "devices"):
-            self._agent.provision(raw, tenancy)
+            self.agent.provision(raw, tenancy)
         return _json({}, 201)
 
     async def get_device(self, request: Request) -> Response:
         """``GET /iot/devices/{id}``."""
-        registry = self._agent.registry
+        registry = self.agent.registry
         return _json(registry.device(_tenancy(request), _last(request)).show())
 
     async def change_device(self, request: Request) -> Response:
         """``PUT /iot/devices/{id}``."""
-        old = self._agent.registry.device(_tenancy(request), _last(request))
-        self._agent.change(old, changed_device(old, _object(request)))
+        old = self.agent.registry.device(_tenancy(request), _last(request))
+        self.agent.change(old, changed_device(old, _object(request)))
         return Response(204)
 
     async def delete_device(self, request: Request) -> Response:
         """``DELETE /iot/devices/{id}``."""
-        device = self._agent.registry.device(_tenancy(request), _last(request))
-        self._agent.forget(device)
+        device = self.agent.registry.device(_tenancy(request), _last(request))
+        self.agent.forget(device)
         return Response(204)
 
     # --- what the context broker asks -------------------------------------------
@@ -125,7 +125,7 @@ class IotaApi:
                 for one, part in entity.items()
                 if one not in ("id", "type") and isinstance(part, dict)
             }
-            await self._agent.command(tenancy, name, kind, values)
+            await self.agent.command(tenancy, name, kind, values)
         return Response(204)
 
     async def query(self, request: Request) -> Response:
@@ -135,24 +135,8 @@ class IotaApi:
         told = []
         for entity in _listed(request, "entities"):
             name, kind = _entity_key(entity)
-            told.append(await self._agent.query(tenancy, name, kind, names))
+            told.append(await self.agent.query(tenancy, name, kind, names))
         return _json(told)
-
-    # --- for tests --------------------------------------------------------------
-
-    async def set_faults(self, request: Request) -> Response:
-        """``POST /test/faults``: fail from now on as the body says."""
-        raw = _object(request)
-        try:
-            faults = Faults(
-                bool(raw.get("deaf")),
-                float(raw.get("slow_s", 0.0)),
-                bool(raw.get("stuck")),
-            )
-        except (TypeError, ValueError):
-            raise wrong_syntax() from None
-        self._agent.fail(faults)
-        return Response(204)
 
 
 _TABLE: Mapping[tuple[str, str], _Route] = {
@@ -171,7 +155,6 @@ _TABLE: Mapping[tuple[str, str], _Route] = {
     ("POST", "op/query"): IotaApi.query,
     ("POST", "v2/op/update"): IotaApi.update,
     ("POST", "v2/op/query"): IotaApi.query,
-    ("POST", "test/faults"): IotaApi.set_faults,
 }
 
 

@@ -11,10 +11,12 @@ from iveg.embedded.http_server import http_server
 from iveg.embedded.iot_agent import IotAgent
 from iveg.embedded.iota_api import IotaApi
 from iveg.embedded.loopback import require_loopback
-from iveg.embedded.mqtt_broker import mqtt_broker
+from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
 from iveg.embedded.ngsi_api import NgsiApi
 
 Address = tuple[str, int]
+MakeAgent = Callable[[ContextBroker, MqttBroker], IotAgent]
+MakeApi = Callable[[IotAgent], IotaApi]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +58,18 @@ async def embedded_fiware(
     mqtt: Address = ("127.0.0.1", 0),
     orion: Address = ("127.0.0.1", 0),
     iota: Address = ("127.0.0.1", 0),
+    *,
+    make_agent: MakeAgent = IotAgent,
+    make_api: MakeApi = IotaApi,
 ) -> AsyncIterator[Running]:
     """Run all three while the block lasts; port 0 takes a free one.
+
+    Args:
+        mqtt: Host and port of the MQTT broker.
+        orion: Host and port of the context broker.
+        iota: Host and port of the agent's north side.
+        make_agent: Gives the agent; ``make_api`` its north port.
+        make_api: See above.
 
     Raises:
         SettingsError: an address that is not loopback.
@@ -69,13 +81,13 @@ async def embedded_fiware(
         south = await stack.enter_async_context(mqtt_broker(*mqtt))
         broker = ContextBroker(clock.now().wall)
         stack.callback(broker.close)
-        agent = IotAgent(broker, south)
+        agent = make_agent(broker, south)
         api = NgsiApi(broker)
         orion_port = await stack.enter_async_context(
             http_server(api.handle, orion_host, orion[1])
         )
         iota_port = await stack.enter_async_context(
-            http_server(IotaApi(agent).handle, iota_host, iota[1])
+            http_server(make_api(agent).handle, iota_host, iota[1])
         )
         agent.url = f"http://{iota_host}:{iota_port}"
         yield Running(south.port, orion_port, iota_port, broker, agent)
@@ -87,6 +99,8 @@ async def serve_fiware(
     iota: Address,
     *,
     notify_ready: Callable[[], None] | None = None,
+    make_agent: MakeAgent = IotAgent,
+    make_api: MakeApi = IotaApi,
 ) -> None:
     """Run the embedded FIWARE until cancelled.
 
@@ -95,12 +109,17 @@ async def serve_fiware(
         orion: Host and port of the context broker.
         iota: Host and port of the agent's north side.
         notify_ready: Called once when all three take requests.
+        make_agent: Gives the agent; ``make_api`` its north port.
+        make_api: See above.
 
     Raises:
         SettingsError: an address that is not loopback.
         OSError: a port that is taken.
     """
-    async with embedded_fiware(mqtt, orion, iota):
+    running = embedded_fiware(
+        mqtt, orion, iota, make_agent=make_agent, make_api=make_api
+    )
+    async with running:
         if notify_ready is not None:
             notify_ready()
         await asyncio.Event().wait()

@@ -31,7 +31,7 @@ import httpx
 import orjson
 
 from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import embedded_fiware
+from tests.faulty_fiware import faulty_fiware
 
 PATIENCE_S = 8.0
 SETTLED_S = 0.15
@@ -50,7 +50,7 @@ class Stack:
 @asynccontextmanager
 async def embedded_stack() -> AsyncIterator[Stack]:
     """The embedded pair on free ports."""
-    async with embedded_fiware() as up:
+    async with faulty_fiware() as up:
         yield Stack(up.orion_url, up.iota_url, ("127.0.0.1", up.mqtt_port))
 
 

@@ -17,9 +17,9 @@ from iveg.cli.diagnosis import Hop, State, exit_code, judge
 from iveg.cli.doctor import Examination
 from iveg.cli.probe import DESCRIPTION, PROBE_ID
 from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.iot_agent import Faults
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.embedded.server import Running
 from iveg.settings import Settings
+from tests.faulty_fiware import MODULE, Faults, fail, faulty_fiware
 from tests.integration.emulator_cloud import until
 from tests.ports import free_ports
 from tests.processes import Site
@@ -31,7 +31,7 @@ TENANT = ("agroconnect", "/greenhouse")
 
 @pytest.fixture
 async def up() -> AsyncIterator[Running]:
-    async with embedded_fiware() as running:
+    async with faulty_fiware() as running:
         yield running
 
 
@@ -135,7 +135,7 @@ async def test_what_a_killed_doctor_left_is_no_hindrance_and_goes(
 async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
     up: Running, settings: Settings, tmp_path: Path
 ) -> None:
-    up.agent.fail(Faults(deaf=True))
+    fail(up, Faults(deaf=True))
 
     states, examination = await examine(settings, tmp_path, SHORT_S)
 
@@ -150,7 +150,7 @@ async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
 async def test_an_agent_that_is_behind_is_called_late_and_not_misconfigured(
     up: Running, settings: Settings, tmp_path: Path
 ) -> None:
-    up.agent.fail(Faults(slow_s=1.4))
+    fail(up, Faults(slow_s=1.4))
 
     states, examination = await examine(settings, tmp_path, 1.0)
 
@@ -196,7 +196,7 @@ async def test_a_measure_that_comes_after_the_doctor_went_leaves_nothing(
         OrionClient(up.orion_url, *TENANT) as orion,
     ):
         await provision(agent, orion, [], "iveg", up.orion_url)
-        up.agent.fail(Faults(slow_s=3.0))
+        fail(up, Faults(slow_s=3.0))
         before = up.agent.discarded
 
         await examine(settings, tmp_path, SHORT_S)
@@ -277,7 +277,7 @@ async def test_an_address_that_orion_cannot_reach_is_a_failed_notification(
 async def test_a_doctor_that_is_sent_away_still_tidies_up(
     up: Running, settings: Settings, tmp_path: Path
 ) -> None:
-    up.agent.fail(Faults(deaf=True))
+    fail(up, Faults(deaf=True))
     examination = Examination(settings, tmp_path, LONG_S)
     visit = asyncio.create_task(examination.run())
     await until(lambda: Hop.DEVICE in examination.findings, LONG_S)
@@ -333,12 +333,13 @@ def test_the_command_ends_with_0_beside_a_running_iveg(served: Site) -> None:
     served.assert_clean()
 
 
-def test_ctrl_c_ends_a_visit_with_a_table_and_nothing_left(fiware: Site) -> None:
-    agent = fiware.settings["IVEG_IOTA_URL"]
+def test_ctrl_c_ends_a_visit_with_a_table_and_nothing_left(place: Site) -> None:
+    place.start("fiware", module=MODULE).wait_until_ready()
+    agent = place.settings["IVEG_IOTA_URL"]
     tenant = {"Fiware-Service": TENANT[0], "Fiware-ServicePath": TENANT[1]}
     with httpx.Client(base_url=agent, headers=tenant, trust_env=False) as http:
         http.post("/test/faults", json={"deaf": True}).raise_for_status()
-        doctor = fiware.start("doctor")
+        doctor = place.start("doctor")
         wait_for(lambda: PROBE_ID in http.get("/iot/devices").text, 30, "the probe")
 
         code = doctor.interrupt()

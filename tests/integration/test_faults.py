@@ -22,6 +22,7 @@ import pytest
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.adapters.subscriptions import wanted_for
 from tests.brokers import MOSQUITTO, PLAIN
+from tests.faulty_fiware import MODULE
 from tests.integration.gate import Gate, Mood, bridge, gate
 from tests.ports import free_ports
 from tests.processes import EMULATOR, Program, Site, site, until
@@ -63,7 +64,7 @@ class Stack:
     def start_fiware(self) -> None:
         front = dict(self.place.settings)
         self.place.settings.update(self.behind)
-        self.fiware = self.place.start("fiware")
+        self.fiware = self.place.start("fiware", module=MODULE)
         self.place.settings.update(front)
         self.fiware.wait_until_ready()
 

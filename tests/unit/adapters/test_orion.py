@@ -9,8 +9,9 @@ from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.embedded.server import Running
 from iveg.ngsi import codec, names
+from tests.faulty_fiware import faulty_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
 ODOMETRY = {"type": "object", "value": {"x": 1.0, "y": 2.0, "yaw": 0.1}}
@@ -18,7 +19,7 @@ ODOMETRY = {"type": "object", "value": {"x": 1.0, "y": 2.0, "yaw": 0.1}}
 
 @pytest.fixture
 async def up() -> AsyncIterator[Running]:
-    async with embedded_fiware() as running:
+    async with faulty_fiware() as running:
         yield running
 
 

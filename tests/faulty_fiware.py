@@ -1,0 +1,135 @@
+"""An embedded FIWARE whose IoT Agent fails as they do in the field.
+
+In a test's own process: ``faulty_fiware()``.  As a program of its own, on the addresses
+of the settings: ``python -m tests.faulty_fiware``; ``POST /test/faults`` on the agent's
+north port (``{"deaf": bool, "slow_s": seconds, "stuck": bool}``) then says how.
+"""
+
+import asyncio
+import os
+import sys
+from collections.abc import Mapping
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlsplit
+
+import orjson
+
+from iveg.cli.running import run_until_told, tell_ready
+from iveg.embedded.context_broker import ContextBroker
+from iveg.embedded.devices import Tenancy
+from iveg.embedded.http_server import Request, Response
+from iveg.embedded.iot_agent import IotAgent
+from iveg.embedded.iota_api import IotaApi
+from iveg.embedded.mqtt_broker import MqttBroker
+from iveg.embedded.server import Running, embedded_fiware, serve_fiware
+from iveg.settings import Settings
+
+MODULE = "tests.faulty_fiware"
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """How an agent fails.
+
+    Attributes:
+        deaf: Measures and answers are not heard; the north port says all is well.
+        slow_s: Everything is done so much later (s), in order.
+        stuck: Requests of the context broker are taken and not answered until this
+            ends; then they are carried out, late.
+    """
+
+    deaf: bool = False
+    slow_s: float = 0.0
+    stuck: bool = False
+
+
+class FaultyAgent(IotAgent):
+    """The embedded agent, until it is told to fail."""
+
+    def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
+        self._faults = Faults()
+        self._unstuck = asyncio.Event()
+        self._unstuck.set()
+        super().__init__(broker, mqtt)
+
+    def fail(self, faults: Faults) -> None:
+        """From now on, fail like this."""
+        self._faults = faults
+        if faults.stuck:
+            self._unstuck.clear()
+        else:
+            self._unstuck.set()
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        if self._faults.deaf:
+            return
+        if self._faults.slow_s > 0:
+            loop = asyncio.get_running_loop()
+            loop.call_later(self._faults.slow_s, super().hear, topic, payload)
+        else:
+            super().hear(topic, payload)
+
+    async def command(
+        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
+    ) -> None:
+        await self._unstuck.wait()
+        if self._faults.slow_s > 0:
+            await asyncio.sleep(self._faults.slow_s)
+        await super().command(tenancy, name, kind, values)
+
+    async def query(
+        self, tenancy: Tenancy, name: str, kind: str, names: list[str]
+    ) -> dict[str, Any]:
+        await self._unstuck.wait()
+        return await super().query(tenancy, name, kind, names)
+
+
+class FaultyApi(IotaApi):
+    """The agent's north port, with one more request."""
+
+    async def handle(self, request: Request) -> Response:
+        if (request.method, request.path) != ("POST", "/test/faults"):
+            return await super().handle(request)
+        told = orjson.loads(request.body)
+        _agent_of(self).fail(Faults(**told))
+        return Response(204)
+
+
+def _agent_of(api: IotaApi) -> FaultyAgent:
+    agent = api.agent
+    assert isinstance(agent, FaultyAgent)
+    return agent
+
+
+def fail(up: Running, faults: Faults) -> None:
+    """From now on, the agent of a faulty FIWARE fails like this."""
+    assert isinstance(up.agent, FaultyAgent)
+    up.agent.fail(faults)
+
+
+def faulty_fiware() -> AbstractAsyncContextManager[Running]:
+    """On free ports, while the block lasts."""
+    return embedded_fiware(make_agent=FaultyAgent, make_api=FaultyApi)
+
+
+def main() -> int:
+    settings = Settings.from_environment(os.environ)
+    urls = settings.mqtt_url, settings.orion_url, settings.iota_url
+    parts = [urlsplit(url) for url in urls]
+    mqtt, orion, iota = ((part.hostname or "", part.port or 0) for part in parts)
+    return run_until_told(
+        serve_fiware(
+            mqtt,
+            orion,
+            iota,
+            notify_ready=tell_ready,
+            make_agent=FaultyAgent,
+            make_api=FaultyApi,
+        )
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())
