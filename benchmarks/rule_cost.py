@@ -84,7 +84,9 @@ def cost(count: int, batch: int, *, storm: bool) -> float:
     for start in range(0, len(everything), batch):
         part = everything[start : start + batch]
         now = part[-1].at
-        assessor.take_all(part)
+        for received in part:
+            assessor.take(received)
+        assessor.settle()
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
             assessor.tick(now)

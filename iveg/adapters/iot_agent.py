@@ -181,22 +181,6 @@ async def provision(
     return Provisioned(tuple(mended), tuple(problems))
 
 
-async def remove_robot(agent: IotAgentClient, robot_id: str) -> tuple[str, ...]:
-    """Delete the devices of one robot and nothing else; says which.
-
-    Its entity and its past stay in Orion.
-
-    Raises:
-        HopError: the agent does not answer.
-    """
-    removed = []
-    for device in names.ROBOT_DEVICES:
-        device_id = robot_id + device.suffix
-        if await agent.delete_device(device_id):
-            removed.append(f"Removed device {device_id}.")
-    return tuple(removed)
-
-
 async def _ensure_group(
     agent: IotAgentClient, apikey: str, cbroker_url: str
 ) -> list[str]:

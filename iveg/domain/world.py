@@ -99,7 +99,6 @@ class RobotState:
     unreadable_at: float | None = None
     safety: SafetyReport | None = None
     safety_received: Instant | None = None
-    safety_transport: TransportId = FIWARE.id
     navigation: Navigation | None = None
     navigation_received: Instant | None = None
     command_status: str | None = None
@@ -461,7 +460,6 @@ def _hear(
     before = None if known is None else known.mono
     moment = _not_before(before, robot.safety, report.origin, moment)
     robot.safety, robot.safety_received = report, _dated(received.at, moment)
-    robot.safety_transport = received.transport
 
 
 def _drive(

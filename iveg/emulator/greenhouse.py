@@ -5,7 +5,6 @@ in ``map`` (m), laid out for NumPy.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,44 +98,7 @@ class Scenery:
         """Whether something stands between two points."""
         return any(area.crosses(ax, ay, bx, by) for area in self.screens)
 
-    def touches(self, body: Body) -> bool:
-        """Whether a robot overlaps anything, or the wall."""
-        corners = body.corners()
-        if not all(self.bounds.contains(x, y) for x, y in corners):
-            return True
-        boxes = [_box_corners(*sides) for sides in self.rectangles]
-        posts = any(body.gap_to(x, y)[0] < radius for x, y, radius in self.posts)
-        return posts or any(overlap(corners, box) for box in boxes)
-
     def free(self, x: float, y: float, radius: float) -> bool:
         """Whether a disc fits at a place."""
         inside = self.bounds.contains(x, y, -radius)
         return inside and not any(s.contains(x, y, radius) for s in self.screens)
-
-
-def _box_corners(xmin: float, ymin: float, xmax: float, ymax: float) -> Floats:
-    return np.array(((xmax, ymax), (xmin, ymax), (xmin, ymin), (xmax, ymin)))
-
-
-def overlap(first: Floats, second: Floats) -> bool:
-    """Whether two convex quadrilaterals overlap (separating axis theorem)."""
-    return not any(
-        _separates(edge, first, second)
-        for shape in (first, second)
-        for edge in np.roll(shape, -1, axis=0) - shape
-    )
-
-
-def _separates(edge: Floats, first: Floats, second: Floats) -> bool:
-    normal = np.array((-edge[1], edge[0]))
-    one, other = first @ normal, second @ normal
-    return bool(one.max() < other.min() or other.max() < one.min())
-
-
-def bodies_touch(bodies: Sequence[Body]) -> bool:
-    """Whether any two robots overlap."""
-    return any(
-        overlap(one.corners(), other.corners())
-        for index, one in enumerate(bodies)
-        for other in bodies[:index]
-    )

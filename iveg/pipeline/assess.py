@@ -127,12 +127,6 @@ class Assessor:
 
     # --- what arrives -------------------------------------------------------------
 
-    def take_all(self, arrived: Iterable[Received]) -> None:
-        """Apply everything that has arrived, then judge the fleet once."""
-        for received in arrived:
-            self.take(received)
-        self.settle()
-
     def take(self, received: Received) -> bool:
         """Apply one observation; :meth:`settle` judges what follows from it.
 

@@ -22,7 +22,6 @@ from iveg.adapters.history.tables import (
     commands,
     decisions,
     latency,
-    log,
 )
 from iveg.domain.day import Pose, Seen
 from iveg.domain.errors import HopError
@@ -219,11 +218,6 @@ class Queries:
     async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
         """The newest lines of the log, newest first."""
         return (await self.log(Filter(limit=most))).items
-
-    async def newest_log_id(self) -> int:
-        """The highest number of the log, so that a restart counts on; 0 when empty."""
-        newest = select(func.max(log.c.id))
-        return await self._ask(lambda c: c.scalar(newest) or 0)
 
     async def speed_series(
         self, since: float, until: float, robot: str | None = None

@@ -231,14 +231,6 @@ async def test_the_trail_of_a_command_is_told_in_order(
     assert await queries.command_events("C1") == (first, second)
 
 
-async def test_the_log_counts_on_from_its_newest_number(
-    queries: Queries, database_url: str
-) -> None:
-    assert await queries.newest_log_id() == 0
-    remember(database_url, log_record(id=7), log_record(id=3))
-    assert await queries.newest_log_id() == 7
-
-
 async def test_a_short_series_is_answered_row_by_row(
     queries: Queries, database_url: str
 ) -> None:

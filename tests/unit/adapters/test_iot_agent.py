@@ -11,7 +11,6 @@ from iveg.adapters.iot_agent import (
     IotAgentClient,
     Provisioned,
     provision,
-    remove_robot,
 )
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
@@ -192,22 +191,6 @@ async def test_a_foreign_device_on_the_entity_is_told_and_left_alone(
     told = await site.provision("AGI")
     assert told.mended == ()
     assert told.problems[0].startswith("Device AAA_gps also feeds AGI")
-
-
-async def test_removing_a_robot_removes_its_devices_and_nothing_else(
-    site: Site,
-) -> None:
-    await site.provision("AGI", "AGII")
-    removed = await remove_robot(site.agent, "AGI")
-    left = {one["device_id"] for one in await site.agent.read_devices()}
-    assert len(removed) == len(names.ROBOT_DEVICES)
-    assert left == {
-        "climate",
-        "iveg-canary",
-        *("AGII" + device.suffix for device in names.ROBOT_DEVICES),
-    }
-    assert await site.command_arrives("AGII")
-    assert await remove_robot(site.agent, "AGI") == ()
 
 
 async def test_climate_and_canary_reach_their_entities(site: Site) -> None:

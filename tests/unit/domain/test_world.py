@@ -324,7 +324,6 @@ def test_the_same_message_by_the_other_transport_changes_only_the_count() -> Non
     robot = world.robot("AGI")
     assert robot.safety is not None
     assert robot.safety.holds == (hold(),)
-    assert robot.safety_transport == "direct"
     assert world.counters["SafetyReport.duplicate"] == 1
 
 

@@ -4,7 +4,8 @@ import pytest
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Obstacle, Post
-from iveg.emulator.greenhouse import Body, Scenery, bodies_touch
+from iveg.emulator.greenhouse import Body, Scenery
+from tests.touching import bodies_touch, touches
 
 HOUSE = Greenhouse(
     "shed",
@@ -31,14 +32,14 @@ def robot(x: float, y: float, yaw: float = 0.0, robot_id: str = "AGI") -> Body:
     ],
 )
 def test_a_robot_in_crop_crates_post_or_wall_touches(body: Body) -> None:
-    assert SCENERY.touches(body)
+    assert touches(SCENERY, body)
 
 
 @pytest.mark.parametrize(
     "body", [robot(2.0, 5.0), robot(3.45, 4.0), robot(7.0, 7.5), robot(4.5, 9.0)]
 )
 def test_a_robot_in_the_open_touches_nothing(body: Body) -> None:
-    assert not SCENERY.touches(body)
+    assert not touches(SCENERY, body)
 
 
 def test_crop_and_crates_hide_what_is_behind_them() -> None:

@@ -8,11 +8,11 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS, PERSON
-from iveg.emulator.greenhouse import bodies_touch
 from iveg.emulator.layout import lay_out
 from iveg.emulator.people import RADIUS_M
 from iveg.emulator.scenarios import SCENARIOS, scenario_named
 from iveg.emulator.world import World, climate_at
+from tests.touching import bodies_touch, touches
 
 FLEET = ("AGI", "AGII")
 TEN = tuple(f"R{n}" for n in range(10))
@@ -56,7 +56,7 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
 
     for _ in run(world, 100.0):
         bodies = world.bodies()
-        assert not any(world.scenery.touches(body) for body in bodies)
+        assert not any(touches(world.scenery, body) for body in bodies)
         assert not bodies_touch(bodies)
         for person in world.people:
             gaps = [body.gap_to(person.x, person.y)[0] for body in bodies]
@@ -79,7 +79,7 @@ def test_every_robot_of_any_fleet_drives_in_any_house(
     driven = dict.fromkeys(robots, 0.0)
 
     for _ in run(world, 60.0):
-        assert not any(world.scenery.touches(body) for body in world.bodies())
+        assert not any(touches(world.scenery, body) for body in world.bodies())
         assert not bodies_touch(world.bodies())
         for robot_id, rig in world.rigs.items():
             driven[robot_id] += abs(rig.vehicle.twist.linear_x) * 0.1
