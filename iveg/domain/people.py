@@ -115,7 +115,7 @@ class People:
         placed = [_match_peer(one, observer, world, at) for one in placed]
         placed = [self._doubt(one, frame, observer) for one in placed]
         self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
-        return self._assign(placed, frame.robot_id, at, new_id)
+        return self._assign(placed, observer, at, new_id)
 
     def _suspect(
         self, placed: Sequence[Placed], observer: str, at: Instant
@@ -143,7 +143,7 @@ class People:
         return replace(one, doubtful=(pose, observer.profile.camera_range))
 
     def _assign(
-        self, placed: Sequence[Placed], observer: str, at: Instant, new_id: str
+        self, placed: Sequence[Placed], observer: RobotState, at: Instant, new_id: str
     ) -> list[Placed]:
         """Hand confident detections that are no fleet member to the tracker."""
         out = list(placed)
@@ -226,7 +226,7 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
     return replace(one, peer=nearest[1], peer_residual_m=nearest[0])
 
 
-def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
+def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
     x, y, z = one.position
     reach = 0.0
     if one.doubtful is not None:
@@ -234,7 +234,16 @@ def _sighting(one: Placed, observer: str, at: Instant) -> Sighting:
         x, y = pose.x, pose.y
     said = one.detection
     return Sighting(
-        observer, x, y, z, at, said.class_id, said.probability, one.possible, reach
+        observer.robot_id,
+        x,
+        y,
+        z,
+        at,
+        said.class_id,
+        said.probability,
+        one.possible,
+        reach,
+        recording=observer.recording,
     )
 
 

@@ -27,6 +27,7 @@ class Sighting:
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
         chain: Number of the chain of looks whose newest this is.
+        recording: The map frame of the recording that saw it; None: a robot of today.
     """
 
     observer: str
@@ -39,6 +40,7 @@ class Sighting:
     possible: bool = False
     reach_m: float = 0.0
     chain: int = 0
+    recording: str | None = None
 
     def age_s(self, now: Instant) -> float:
         """Seconds since the look."""

@@ -234,7 +234,7 @@ class Tracker:
         marks = [
             (_distance(person.newest, one.sighting), person.person_id)
             for person in self.known.values()
-            if person.class_ == one.class_ and person.stage(at) == "last_seen"
+            if _is_alike(person, one) and person.stage(at) == "last_seen"
         ]
         distance, track = min(marks, default=(math.inf, ""))
         if distance <= MARK_M:
@@ -272,6 +272,7 @@ class Tracker:
                 abs(other.newest.x - person.newest.x) <= self.merge_m
                 and other is not person
                 and other.class_ == person.class_
+                and other.newest.recording == person.newest.recording
                 and other.person_id not in apart
                 and other.age_s(at) <= LIMITS.seen_s
                 and not other.newest.reach_m
@@ -302,9 +303,15 @@ def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:
     return track
 
 
+def _is_alike(person: Person, one: Seen) -> bool:
+    """Whether they can be one: of a class, and of the same map."""
+    frame = person.newest.recording
+    return person.class_ == one.class_ and frame == one.sighting.recording
+
+
 def _chain_cost(one: Seen, person: Person, look: Sighting, at: Instant) -> float:
     """Distance to the same observer's earlier look (m); inf where it is another's."""
-    if person.class_ != one.class_ or bool(look.reach_m) != bool(one.sighting.reach_m):
+    if not _is_alike(person, one) or bool(look.reach_m) != bool(one.sighting.reach_m):
         return math.inf
     if look.reach_m:
         return 0.0
@@ -318,7 +325,7 @@ def _live_cost(one: Seen, person: Person, at: Instant) -> float:
     Where two robots see one person with noise, a detection that lies far from the one
     look seldom lies far from both.
     """
-    if person.class_ != one.class_ or one.sighting.reach_m:
+    if not _is_alike(person, one) or one.sighting.reach_m:
         return math.inf
     return min(
         (
@@ -335,7 +342,7 @@ def _live_cost(one: Seen, person: Person, at: Instant) -> float:
 def _lost_cost(one: Seen, person: Person, at: Instant) -> float:
     """Distance to the last look (m); inf beyond what is likely."""
     last = person.newest
-    if person.class_ != one.class_ or one.sighting.reach_m or last.reach_m:
+    if not _is_alike(person, one) or one.sighting.reach_m or last.reach_m:
         return math.inf
     distance = _distance(last, one.sighting)
     reach = min(LOST_CAP_M, GATE_M + LOST_SPEED * last.age_s(at))

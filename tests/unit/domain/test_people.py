@@ -196,6 +196,18 @@ def test_a_recording_is_no_peer_of_a_robot_that_is_seen_today() -> None:
     assert placed.peer is None
 
 
+@pytest.mark.parametrize(("replay", "people"), [(None, 2), ("shared", 1)])
+def test_two_recordings_see_one_person_only_where_they_share_a_map(
+    replay: str | None, people: int
+) -> None:
+    scene = Scene(robots=("D1:recording", "D2:recording"), replay=replay)
+    for name in ("D1", "D2"):
+        scene.drive(name, 0.0)
+        scene.look(name, person(4.0))
+
+    assert len(scene.everyone) == people
+
+
 def test_a_robot_is_not_told_of_itself() -> None:
     scene = Scene()
     scene.drive("AGI", 5.0)
