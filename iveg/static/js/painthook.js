@@ -78,7 +78,7 @@ function createPaintHook(tell) {
 }
 
 /** @param {string} topic @returns {Painted["kind"] | null} */
-export function kindOf(topic) {
+function kindOf(topic) {
   const [head, , leaf] = topic.split("/");
   if (head === "detections") return "detection";
   if (head !== "robots") return null;
