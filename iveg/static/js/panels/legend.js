@@ -203,7 +203,7 @@ export const SIGNS = [
     draw: intent.draw,
     scene: oneRobot({
       path: [
-        [-1.6, -0.4],
+        [-1.5, -0.4],
         [0, 0.3],
         [1.4, 0],
       ],
@@ -277,7 +277,7 @@ export const SIGNS = [
     draw: greenhouse.draw,
     scene: house({
       obstacles: [
-        { kind: "crates", xmin: -1.6, xmax: -0.4, ymin: -0.4, ymax: 0.4 },
+        { kind: "crates", xmin: -1.5, xmax: -0.4, ymin: -0.4, ymax: 0.4 },
         { kind: "trolley", xmin: 0.5, xmax: 1.5, ymin: -0.6, ymax: 0.6 },
       ],
     }),
