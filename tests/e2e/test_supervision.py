@@ -230,7 +230,12 @@ def test_an_operator_teaches_a_word_and_a_threshold(
     words.filter(has_text="tractor").locator("button").click()
     page.locator("#class-person").fill("")
     page.locator("#class-save").click()
+    # 13.14: fewer people would count, so it takes a second word and can be undone.
+    expect(page.locator("#guard-says")).to_contain_text("ya no frenaría")
+    expect(page.locator("#rule-version")).to_have_text(str(before + 1))
+    page.locator("#guard-yes").click()
     expect(page.locator("#rule-version")).to_have_text(str(before + 2))
+    expect(page.locator("#rule-undo")).to_contain_text("Deshacer")
     expect(words.filter(has_text="tractor")).to_have_count(0)
 
 
@@ -279,13 +284,13 @@ def test_a_new_rule_is_seen_in_every_browser_at_once(open_page: OpenPage) -> Non
     expect(writer.locator("#rule-new-radius")).not_to_have_value("")
     expect(settings.locator("#rule-new-radius")).not_to_have_value("")
 
-    writer.locator("#rule-new-radius").fill("2.8")
+    writer.locator("#rule-new-radius").fill("3.4")
     writer.locator("#rule-form button").click()
 
     soon = 1000.0
-    expect(settings.locator("#rule-radius")).to_have_text("2,8 m", timeout=soon)
-    expect(settings.locator("#rule-new-radius")).to_have_value("2.8", timeout=soon)
-    expect(about.locator("#about-rule")).to_contain_text("2,8 m", timeout=soon)
+    expect(settings.locator("#rule-radius")).to_have_text("3,4 m", timeout=soon)
+    expect(settings.locator("#rule-new-radius")).to_have_value("3.4", timeout=soon)
+    expect(about.locator("#about-rule")).to_contain_text("3,4 m", timeout=soon)
 
 
 @pytest.mark.parametrize("width", [390, 1440])

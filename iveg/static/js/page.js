@@ -9,6 +9,7 @@ import { createAlertsPanel } from "./panels/alerts.js";
 import { createDecisionPanel } from "./panels/decision.js";
 import { createHealthPanel } from "./panels/health.js";
 import { createSignOut } from "./panels/signout.js";
+import { labelTables } from "./panels/tables.js";
 import { createTone } from "./panels/tone.js";
 import { createWakeLock } from "./wakelock.js";
 
@@ -44,6 +45,7 @@ export async function startPage(app) {
   attempt(() => createSignOut(app));
   attempt(wirePrinting);
   registerWorker();
+  attempt(() => labelTables(app));
   const route = ROUTES[document.body.dataset.route ?? ""];
   if (route) (await route()).start(page);
   if (!document.querySelector("#map")) return;

@@ -8,7 +8,6 @@
  * @typedef {"person" | "robot"} Class
  */
 
-import { sendApi } from "../api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 
 /** @type {readonly Class[]} */
@@ -18,8 +17,9 @@ const WRITERS = new Set(["operator", "admin"]);
 /**
  * @param {import("../store.js").Store} store
  * @param {import("../i18n.js").Words} words
+ * @param {ReturnType<typeof import("./guard.js").createGuard>} guard
  */
-export function createClassForm(store, words) {
+export function createClassForm(store, words, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#class-form"));
   const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
   const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
@@ -34,7 +34,7 @@ export function createClassForm(store, words) {
   /** @param {Rule | null | undefined} rule */
   function take(rule) {
     if (!rule) return;
-    if (!seen || JSON.stringify(typed()) === JSON.stringify(writtenOf(seen))) {
+    if (!seen || !isDirty()) {
       fill(rule);
     } else if (rule.version !== seen.version) say("rule.stale");
   }
@@ -52,6 +52,12 @@ export function createClassForm(store, words) {
     draw();
   }
 
+  /** Whether somebody has typed what is not saved. */
+  function isDirty() {
+    if (!seen) return false;
+    return JSON.stringify(typed()) !== JSON.stringify(writtenOf(seen));
+  }
+
   /** What stands in the form, as the API takes it. */
   function typed() {
     const thresholds = CLASSES.flatMap((name) => {
@@ -67,7 +73,8 @@ export function createClassForm(store, words) {
 
   async function save() {
     const body = { ...typed(), version: Number(seen?.version) };
-    const answer = await sendApi("PUT", "rule", body);
+    const answer = await guard.put(body);
+    if (!answer) return say("lowering.kept");
     if (answer.status === 200 && answer.body) {
       fill(answer.body);
       say("rule.saved", { version: answer.body.version });
@@ -77,6 +84,7 @@ export function createClassForm(store, words) {
       say("rule.stale");
     } else if (answer.status === 0) say("rows.offline");
     else say("rule.refused", { why: String(answer.body?.detail ?? answer.status) });
+    return undefined;
   }
 
   function add() {
@@ -144,7 +152,7 @@ export function createClassForm(store, words) {
   store.subscribe("rule", take);
   words.onChange(draw);
   take(store.get("rule"));
-  return { open };
+  return { open, isDirty };
 }
 
 /** @param {Class} name */

@@ -2,7 +2,6 @@
  * Changing the rule, where the server lets somebody: read, write, say what came of it.
  */
 
-import { sendApi } from "../api.js";
 import { dayAndTime } from "../history/madrid.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 
@@ -13,8 +12,9 @@ const WRITERS = new Set(["operator", "admin"]);
 /**
  * @param {import("../store.js").Store} store
  * @param {import("../i18n.js").Words} words
+ * @param {ReturnType<typeof import("./guard.js").createGuard>} guard
  */
-export function createRuleForm(store, words) {
+export function createRuleForm(store, words, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#rule-form"));
   const [threshold, radius] = /** @type {HTMLInputElement[]} */ (
     ["threshold", "radius"].map((name) => need(`#rule-new-${name}`))
@@ -62,12 +62,14 @@ export function createRuleForm(store, words) {
   }
 
   async function save() {
-    const { status, body } = await sendApi("PUT", "rule", {
+    const answer = await guard.put({
       confidence_threshold: threshold.valueAsNumber / 100,
       radius_m: radius.valueAsNumber,
       // Numbers: the server tells a version that was overtaken by this one.
       version: Number(seen?.version),
     });
+    if (!answer) return say("lowering.kept");
+    const { status, body } = answer;
     if (status === 200 && body) {
       fill(body);
       say("rule.saved", { version: body.version });
@@ -77,6 +79,7 @@ export function createRuleForm(store, words) {
       say("rule.stale");
     } else if (status === 0) say("rows.offline");
     else say("rule.refused", { why: String(body?.detail ?? status) });
+    return undefined;
   }
 
   function draw() {
@@ -97,7 +100,7 @@ export function createRuleForm(store, words) {
   store.subscribe("rule", take);
   words.onChange(draw);
   take(store.get("rule"));
-  return { open };
+  return { open, isDirty: () => seen !== null && !shows(seen) };
 }
 
 /** @param {Rule} rule */

@@ -6,6 +6,7 @@ import { readApi } from "../api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createClassForm } from "./classes.js";
+import { createGuard } from "./guard.js";
 import { createRuleForm } from "./rule.js";
 
 /** @typedef {import("../protocol.js").Rule} Rule */
@@ -15,7 +16,15 @@ export function start({ store, words, tone, wake, installing }) {
   createSoundPanel(words, tone);
   wireWake(wake, words);
   wireInstall(installing, words);
-  const forms = [createRuleForm(store, words), createClassForm(store, words)];
+  const guard = createGuard(store, words);
+  const forms = [
+    createRuleForm(store, words, guard),
+    createClassForm(store, words, guard),
+  ];
+  addEventListener("beforeunload", (event) => {
+    // The browser asks, in its own words, before what was typed is lost.
+    if (forms.some((form) => form.isDirty())) event.preventDefault();
+  });
 
   function draw() {
     /** @type {Rule | null | undefined} */

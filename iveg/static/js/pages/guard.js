@@ -1,0 +1,122 @@
+/**
+ * Between a form and the rule: a change that lowers protection says what it means, waits
+ * for a second word, and can be undone for ten minutes.
+ */
+
+import { readApi, sendApi } from "../api.js";
+import { need, setHidden, setText } from "../panels/dom.js";
+import { loweringsOf, personShare, sightingsLost } from "./lowering.js";
+
+/** @typedef {import("../protocol.js").Rule} Rule */
+/** @typedef {import("./lowering.js").Change} Change */
+/** @typedef {{status: number, body: any}} Answer */
+
+const UNDO_MS = 600_000;
+const KEPT = "iveg_rule_before";
+const TICK_MS = 1000;
+/** As many of today's sightings are asked for. */
+const SIGHTINGS = 1000;
+
+/**
+ * @param {import("../store.js").Store} store
+ * @param {import("../i18n.js").Words} words
+ */
+export function createGuard(store, words) {
+  const box = need("#guard");
+  const undo = /** @type {HTMLButtonElement} */ (need("#rule-undo"));
+  /** @type {(isMeant: boolean) => void} */
+  let answer = () => {};
+
+  /** @param {Change} change @param {Rule} before */
+  async function isMeant(change, before) {
+    const lowerings = loweringsOf(before, change);
+    if (!lowerings.length) return true;
+    const told = lowerings.map(({ key, slots }) => words.t(key, slots));
+    const count = await countSaid(change, before);
+    setText(need("#guard-says"), [...told, count].filter(Boolean).join(" "));
+    setHidden(box, false);
+    need("#guard-no").focus();
+    return new Promise((resolve) => {
+      answer(false);
+      answer = resolve;
+    });
+  }
+
+  /** @param {Change} change @param {Rule} before */
+  async function countSaid(change, before) {
+    const [from, to] = [personShare(before), personShare({ ...before, ...change })];
+    if (to <= from) return "";
+    const day = new Date();
+    day.setHours(0, 0, 0, 0);
+    const query = `class=person&min_probability=${from}&since=${day.toISOString()}&limit=${SIGHTINGS}`;
+    const { status, body } = await readApi(`detections?${query}`);
+    if (status !== 200 || !body?.items.length) return words.t("lowering.uncounted");
+    return words.t("lowering.sightings", sightingsLost(body.items, from, to));
+  }
+
+  /** @param {boolean} isYes */
+  function close(isYes) {
+    setHidden(box, true);
+    answer(isYes);
+    answer = () => {};
+  }
+
+  /**
+   * Makes a change, if it is meant.
+   *
+   * @param {Change & {version: number}} change
+   * @returns {Promise<Answer | null>} null: it is not, and what was typed stays
+   */
+  async function put(change) {
+    /** @type {Rule | undefined} */
+    const before = store.get("rule");
+    if (before && !(await isMeant(change, before))) return null;
+    const found = await sendApi("PUT", "rule", change);
+    if (found.status === 200 && before && loweringsOf(before, change).length) {
+      keep({ before, untilMs: Date.now() + UNDO_MS });
+    }
+    draw();
+    return found;
+  }
+
+  async function takeBack() {
+    const kept = read();
+    if (!kept) return;
+    const { confidence_threshold, radius_m, class_thresholds, aliases } = kept.before;
+    const { status } = await sendApi("PUT", "rule", {
+      ...{ confidence_threshold, radius_m, class_thresholds, aliases },
+      possible_people: kept.before.possible_people === true,
+      version: store.get("rule")?.version,
+    });
+    if (status === 200) keep(null);
+    const said = status === 200 ? "lowering.undone" : "rule.stale";
+    setText(need("#rule-result"), words.t(said));
+    draw();
+  }
+
+  function draw() {
+    const kept = read();
+    const minutes = kept ? Math.ceil((kept.untilMs - Date.now()) / 60_000) : 0;
+    setHidden(undo, minutes <= 0);
+    setText(undo, words.t("lowering.undo", { minutes }));
+  }
+
+  need("#guard-yes").addEventListener("click", () => close(true));
+  need("#guard-no").addEventListener("click", () => close(false));
+  undo.addEventListener("click", takeBack);
+  words.onChange(draw);
+  setInterval(draw, TICK_MS);
+  draw();
+  return { put };
+}
+
+/** @param {{before: Rule, untilMs: number} | null} kept */
+function keep(kept) {
+  sessionStorage.setItem(KEPT, JSON.stringify(kept));
+}
+
+/** @returns {{before: Rule, untilMs: number} | null} */
+function read() {
+  const kept = JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
+  return kept && kept.untilMs > Date.now() ? kept : null;
+}

@@ -1,0 +1,32 @@
+/**
+ * Tables on a phone are cards: each cell carries the head of its column, which the style
+ * writes before it where there is no room for columns.
+ */
+
+import { all } from "./dom.js";
+
+/** @param {import("../main.js").App} app */
+export function labelTables({ words }) {
+  const tables = all("table");
+  const label = () => {
+    for (const table of tables) labelCells(table);
+  };
+  for (const table of tables) {
+    const observer = new MutationObserver(() => labelCells(table));
+    observer.observe(table, { childList: true, subtree: true });
+  }
+  words.onChange(label);
+  label();
+}
+
+/** @param {HTMLElement} table with one row of heads */
+export function labelCells(table) {
+  const heads = all("thead th", table).map(({ textContent }) => textContent ?? "");
+  for (const row of all("tbody tr", table)) {
+    for (const [i, cell] of [...row.children].entries()) {
+      const name = heads[i] ?? "";
+      const has = cell.getAttribute("data-head");
+      if (has !== name) cell.setAttribute("data-head", name);
+    }
+  }
+}

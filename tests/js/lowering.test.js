@@ -1,0 +1,45 @@
+import { loweringsOf, sightingsLost } from "../../iveg/static/js/pages/lowering.js";
+import { equal, test } from "./harness.js";
+
+const rule = /** @type {import("../../iveg/static/js/protocol.js").Rule} */ (
+  /** @type {unknown} */ ({
+    id: "fleet-alert",
+    version: 3,
+    confidence_threshold: 0.8,
+    class_thresholds: {},
+    radius_m: 2,
+    factor: 0.5,
+    aliases: { person: "person", farmer: "person", husky: "robot" },
+    possible_people: true,
+  })
+);
+
+/** @param {import("../../iveg/static/js/pages/lowering.js").Change} change */
+const keys = (change) => loweringsOf(rule, change).map(({ key }) => key);
+
+test("13.14 each way to lower protection is named", () => {
+  equal(keys({ confidence_threshold: 0.9 }), ["lowering.threshold"]);
+  equal(keys({ class_thresholds: { person: 0.9 } }), ["lowering.threshold"]);
+  equal(keys({ radius_m: 1.5 }), ["lowering.radius"]);
+  equal(keys({ aliases: { person: "person", husky: "robot" } }), ["lowering.words"]);
+  equal(keys({ aliases: { ...rule.aliases, farmer: "robot" } }), ["lowering.words"]);
+  equal(keys({ possible_people: false }), ["lowering.possible"]);
+});
+
+test("13.14 what protects as much or more asks for no second word", () => {
+  equal(keys({}), []);
+  equal(keys({ confidence_threshold: 0.7, radius_m: 2.5 }), []);
+  equal(keys({ class_thresholds: { robot: 0.95 } }), []);
+  const more = /** @type {Record<string, "person" | "robot">} */ ({
+    ...rule.aliases,
+    worker: "person",
+  });
+  equal(keys({ aliases: more }), []);
+});
+
+test("13.14 of today's sightings it is told how many would no longer count", () => {
+  const seen = [0.75, 0.8, 0.85, 0.89, 0.9, 0.97].map((probability) => ({
+    probability,
+  }));
+  equal(sightingsLost(seen, 0.8, 0.9), { count: 3, total: 5 });
+});
