@@ -21,6 +21,7 @@ from iveg.adapters.history.series import (
     ConfidenceCount,
     SpeedSeries,
 )
+from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription
 
 _Trace = Mapping[str, object]
@@ -33,13 +34,60 @@ _BIN = 1.0 / CONFIDENCE_BINS
 
 
 def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> bytes:
-    """Speed (m/s) of each robot with its mandated limit as a step line, as JSON.
+    """Speed (m/s) with the mandated limit as a step line, a strip a robot, as JSON.
 
-    The limit is the mandated factor of the robot's greatest speed.  Lines break where
-    nothing was heard for 5 s: a line through silence would be invented.
+    The limit is the mandated factor of the robot's greatest speed; while it is lower
+    the strip is shaded.  Lines break where nothing was heard for 5 s: a line through
+    silence would be invented.
     """
-    traces = [trace for one in series for trace in _speed_traces(one, fleet)]
-    return figure_of(traces, ("time", "speed"), {"yaxis": {"rangemode": "tozero"}})
+    traces: list[_Trace] = []
+    layout: dict[str, object] = {}
+    shapes: list[_Trace] = []
+    for n, one in enumerate(series):
+        number = str(n + 1) if n else ""
+        traces += [
+            {**trace, "yaxis": f"y{number}"} for trace in _speed_traces(one, fleet)
+        ]
+        layout[f"yaxis{number}"] = {
+            "rangemode": "tozero",
+            "domain": _strip(n, len(series)),
+            "title": {"text": f"{one.robot_id} (m/s)"},
+        }
+        layout["xaxis"] = {"anchor": f"y{number}"}
+        shapes += _slow_downs(one, f"y{number}")
+    return figure_of(traces, ("time", "speed"), {**layout, "shapes": shapes})
+
+
+def _strip(n: int, of: int) -> list[float]:
+    """Where the n-th of so many strips lies, from the top down (0–1)."""
+    top = 1.0 - n / of
+    return [round(top - (0.86 if of > 1 else 1.0) / of, 4), round(top, 4)]
+
+
+def _slow_downs(series: SpeedSeries, axis: str) -> Iterator[_Trace]:
+    """A shade for each time in which less than full speed was mandated."""
+    since: float | None = None
+    for at, factor in zip(series.at, series.mandated, strict=True):
+        if factor < FULL_SPEED and since is None:
+            since = at
+        elif factor >= FULL_SPEED and since is not None:
+            yield _shade(since, at, axis)
+            since = None
+    if since is not None:
+        yield _shade(since, series.at[-1], axis)
+
+
+def _shade(since: float, until: float, axis: str) -> _Trace:
+    return {
+        "type": "rect",
+        "name": "slow",
+        "layer": "below",
+        "x0": _ms(since),
+        "x1": _ms(until),
+        "yref": f"{axis} domain",
+        "y0": 0,
+        "y1": 1,
+    }
 
 
 def confidence_figure(

@@ -2,6 +2,7 @@ import csv
 import gzip
 import io
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from pathlib import Path
 
 import httpx
@@ -10,8 +11,10 @@ import pytest
 from fastapi import FastAPI
 
 from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import SpeedSeries
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import NotAllowedError
+from iveg.domain.fleet import FleetDescription
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, ReadingRecord, Record
 from iveg.pipeline.record import Waiting
@@ -496,6 +499,28 @@ async def test_charts_show_the_last_quarter_of_an_hour(
     assert figures["detections"]["layout"]["shapes"][0]["x0"] == 0.8
     [standing] = figures["stops"]["data"]
     assert (standing["name"], standing["y"]) == ("standstill", [412.0])
+
+
+def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
+    slowed = SpeedSeries(
+        "AGI",
+        at=(10.0, 11.0, 12.0, 13.0),
+        linear=(0.8, 0.4, 0.4, 0.8),
+        mandated=(1.0, 0.5, 0.5, 1.0),
+        applied=(1.0, 0.5, 0.5, 1.0),
+        slice_s=0.0,
+    )
+    free = replace(slowed, robot_id="AGII", mandated=(1.0,) * 4)
+    fleet = FleetDescription.undescribed(["AGI", "AGII"])
+
+    figure = orjson.loads(charts.speed_figure([slowed, free], fleet))
+
+    axes = [trace["yaxis"] for trace in figure["data"]]
+    assert axes == ["y", "y", "y2", "y2"]
+    layout = figure["layout"]
+    assert layout["yaxis2"]["domain"][1] < layout["yaxis"]["domain"][0]
+    (slow,) = layout["shapes"]
+    assert (slow["yref"], slow["x0"], slow["x1"]) == ("y domain", 11_000.0, 13_000.0)
 
 
 async def test_charts_of_nothing_are_empty_figures(client: httpx.AsyncClient) -> None:

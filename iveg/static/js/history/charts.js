@@ -162,8 +162,15 @@ export function styled(layout, asked, words) {
   return {
     ...layout,
     xaxis: axis("x"),
-    yaxis: axis("y"),
-    shapes: layout.shapes?.map((/** @type {object} */ shape) => ({ ...shape, line })),
+    yaxis: { ...axis("y"), ...layout.yaxis },
+    ...Object.fromEntries(
+      Object.keys(layout)
+        .filter((key) => /^yaxis\d/.test(key))
+        .map((key) => [key, { ...axis("y"), ...layout[key] }]),
+    ),
+    shapes: layout.shapes?.map((/** @type {Record<string, any>} */ shape) =>
+      shape.name === "slow" ? shaded(shape) : { ...shape, line },
+    ),
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: token("--font"), size: 12, color: token("--text-2") },
@@ -175,6 +182,12 @@ export function styled(layout, asked, words) {
     hovermode: "closest",
     autosize: true,
   };
+}
+
+/** A time in which a robot was to be slow. @param {Record<string, any>} shape */
+function shaded(shape) {
+  const [x0, x1] = [wallText(shape.x0), wallText(shape.x1)];
+  return { ...shape, x0, x1, fillcolor: token("--line"), line: { width: 0 } };
 }
 
 /**
