@@ -1,6 +1,8 @@
 import { hatchAt } from "../../iveg/static/js/layers/coverage.js";
 import { createChoices } from "../../iveg/static/js/layers/memory.js";
+import { createPlaces } from "../../iveg/static/js/layers/places.js";
 import { createWords } from "../../iveg/static/js/layers/words.js";
+import { hiddenSaid } from "../../iveg/static/js/panels/hidden_layers.js";
 import { paintSign, SIGNS } from "../../iveg/static/js/panels/legend.js";
 import { coverageSaid } from "../../iveg/static/js/panels/mapbox.js";
 import { LAYERS } from "../../iveg/static/js/picture.js";
@@ -57,4 +59,33 @@ test("13.21: that nobody is seen is never said when no camera looks", () => {
   });
   const old = { ...told, receivedAtMs: now - 7000, cameras: 1, share: 1 };
   equal(said(old).isBlind, true);
+});
+
+test("13.11 layers that are switched off are named on the map", () => {
+  const words = {
+    t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
+      [key, ...Object.values(slots)].join(" "),
+  };
+  const layers = (/** @type {string[]} */ ...off) =>
+    ["grid", "people", "robots", "costmap"].map((name) => ({
+      name,
+      on: !off.includes(name),
+    }));
+  equal(hiddenSaid(layers(), words), "");
+  equal(hiddenSaid(layers("grid", "costmap"), words), "");
+  equal(
+    hiddenSaid(layers("people", "robots"), words),
+    "map.hidden map.layer.people, map.layer.robots",
+  );
+});
+
+test("13.19 words give way to words that stand there already", () => {
+  const places = createPlaces();
+  const at = (/** @type {number} */ left, /** @type {number} */ top) => ({
+    ...{ left, right: left + 60, top, bottom: top + 20 },
+  });
+  equal(places.claim([at(0, 0)]), 0);
+  equal(places.claim([at(30, 10), at(30, 40)]), 1);
+  equal(places.claim([at(10, 5), at(50, 45)]), null);
+  equal(places.claim([at(70, 0)]), 0);
 });

@@ -18,6 +18,7 @@ import * as intent from "./layers/intent.js";
 import * as links from "./layers/links.js";
 import * as measure from "./layers/measure.js";
 import * as people from "./layers/people.js";
+import { createPlaces } from "./layers/places.js";
 import * as robot from "./layers/robot.js";
 import * as scalebar from "./layers/scalebar.js";
 import * as scan from "./layers/scan.js";
@@ -108,7 +109,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
      *   all are
      */
     draw(what) {
-      const paint = { ...what, ctx };
+      const paint = { ...what, ctx, places: createPlaces() };
       matchPixels(canvas, paint.view);
       const missingMs = ground.update(paint, devicePixelRatio, isOn);
       ctx.setTransform(1, 0, 0, 1, 0, 0);

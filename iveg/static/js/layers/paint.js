@@ -12,7 +12,8 @@
  * @typedef {{
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, words: Words,
  *   followed: string | null, tape: import("./measure.js").Tape,
- * }} Paint
+ *   places?: import("./places.js").Places,
+ * }} Paint `places`: of the words of this frame
  */
 
 /**

@@ -78,7 +78,27 @@ function drawAge(paint, person) {
   const said = isGone ? words.lastSeen(person.ageS) : words.ago(person.ageS);
   const text = isNear ? said : words.age(person.ageS);
   const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
-  label(paint, text, x, y + 20, { size: 11, colour: paint.theme.muted });
+  const dy = placeOfAge(paint, text, x, y);
+  if (dy === null) return;
+  label(paint, text, x, y + dy, { size: 11, colour: paint.theme.muted });
+}
+
+/**
+ * Below the sign, else above; null where other words stand in both places.
+ *
+ * @param {Paint} paint @param {string} text @param {number} x @param {number} y
+ */
+function placeOfAge({ ctx, theme, places }, text, x, y) {
+  const heights = [20, -22];
+  if (!places) return heights[0];
+  ctx.font = `600 11px ${theme.font}`;
+  const half = ctx.measureText(text).width / 2;
+  const rects = heights.map((dy) => {
+    const [top, bottom] = [y + dy - WORDS_ABOVE_PX / 2, y + dy + WORDS_ABOVE_PX / 2];
+    return { left: x - half, right: x + half, top, bottom };
+  });
+  const found = places.claim(rects);
+  return found === null ? null : heights[found];
 }
 
 /** @param {Paint} paint @param {ScenePerson} person */

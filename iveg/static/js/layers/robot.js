@@ -18,6 +18,8 @@ import { circle, isolated, label, pill } from "./paint.js";
 /** A body is never drawn shorter than this (px), however far away the eye is. */
 const SHORTEST_PX = 20;
 const PADLOCK_PX = 12;
+/** From one line of words to the next. */
+const WORDS_PX = 28;
 
 /** @param {Paint} paint */
 export function draw(paint) {
@@ -253,7 +255,7 @@ function drawPadlock({ ctx, theme }, x, y) {
  */
 function drawWords(paint, robot, length) {
   const { ctx, theme } = paint;
-  const y = -(length / 2 + 20);
+  const y = heightOfWords(paint, robot, length);
   const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
   label(paint, robot.id, 0, y, {
     size: 13,
@@ -265,6 +267,33 @@ function drawWords(paint, robot, length) {
   for (const [text, fill] of tagsOf(paint, robot)) {
     x += pill(paint, text, x, y, fill, theme.bg) + 4;
   }
+}
+
+/**
+ * Above the robot, else below, else farther away: where no other words stand.
+ *
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @param {number} length
+ * @returns {number} middle of the words, from the robot's (px)
+ */
+function heightOfWords(paint, robot, length) {
+  const { ctx, view, theme, places } = paint;
+  const near = length / 2 + 20;
+  const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
+  if (!places) return heights[0];
+  ctx.font = `700 13px ${theme.font}`;
+  const half = ctx.measureText(robot.id).width / 2;
+  const tags = tagsOf(paint, robot).map(([text]) => ctx.measureText(text).width + 12);
+  const x = screenX(view, robot.pose.x);
+  const y = screenY(view, robot.pose.y);
+  const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);
+  const right = x + half + tags.reduce((sum, width) => sum + width + 4, 6);
+  const rects = heights.map((dy) => {
+    const [top, bottom] = [y + dy - PADLOCK_PX, y + dy + PADLOCK_PX];
+    return { left, right, top, bottom };
+  });
+  return heights[places.claim(rects) ?? 0];
 }
 
 /**

@@ -11,6 +11,7 @@ import { TRAIL_SPANS_S } from "../layers/trail.js";
 import { createMap } from "../map.js";
 import { installPaintHook } from "../painthook.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { drawHidden } from "./hidden_layers.js";
 import { createLegend } from "./legend.js";
 import { onThemeChange } from "./theme.js";
 
@@ -128,9 +129,12 @@ export function createMapbox(app, decision) {
     setText(need("#climate"), said.join(" · "));
   }
 
+  const showHidden = () => drawHidden(map.layers(), words);
+
   function drawWords() {
     map.setLanguage(words.t);
     drawLayers(app, map, showBeliever);
+    showHidden();
     showBeliever();
     drawFacts();
     drawCostmapAge();
@@ -144,6 +148,7 @@ export function createMapbox(app, decision) {
   canvas.addEventListener("keydown", (event) => {
     if (event.key === "Escape") map.setMeasuring(false);
   });
+  need("#layers").addEventListener("change", showHidden);
   need("#map-fit").addEventListener("click", () => map.fit());
   need("#map-in").addEventListener("click", () => map.zoomBy(1));
   need("#map-out").addEventListener("click", () => map.zoomBy(-1));

@@ -1,0 +1,42 @@
+/**
+ * Where words stand in a frame, so that no others are written over them.
+ *
+ * @typedef {import("../viewport.js").Rect} Rect
+ * @typedef {ReturnType<typeof createPlaces>} Places
+ */
+
+/** Between two words (px). */
+const GAP_PX = 2;
+
+export function createPlaces() {
+  /** @type {Rect[]} */
+  const taken = [];
+
+  /** @param {Rect} rect */
+  const isFree = (rect) => !taken.some((other) => overlap(rect, other));
+
+  return {
+    /**
+     * Takes the first place that is free.
+     *
+     * @param {readonly Rect[]} wished the best first
+     * @returns {number | null} which one; null where all are taken
+     */
+    claim(wished) {
+      const found = wished.findIndex(isFree);
+      if (found < 0) return null;
+      taken.push(wished[found]);
+      return found;
+    },
+  };
+}
+
+/** @param {Rect} one @param {Rect} other */
+function overlap(one, other) {
+  return (
+    one.left < other.right + GAP_PX &&
+    other.left < one.right + GAP_PX &&
+    one.top < other.bottom + GAP_PX &&
+    other.top < one.bottom + GAP_PX
+  );
+}
