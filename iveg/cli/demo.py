@@ -17,7 +17,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from iveg.adapters.fleet_files import load_fleet
-from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link
+from iveg.cli.running import LOOPBACK, run_until_told, tell_link
 from iveg.domain.errors import SettingsError
 from iveg.ros2.names import namespace_of
 from iveg.settings import Settings
@@ -157,7 +157,7 @@ async def _supervise(
             process = await start_part(arguments, environment)
             running.append((arguments[0], process))
             await wait_ready(arguments[0], process)
-        print(f"iVeg: {sign_in_link(settings, settings.sign_in_token)}", flush=True)
+        tell_link(settings, settings.sign_in_token)
         await asyncio.gather(*(_watch(name, process) for name, process in running))
     finally:
         await stop_parts([process for _, process in reversed(running)])

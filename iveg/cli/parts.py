@@ -22,7 +22,7 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.app import Dss, broker_of, create_app
-from iveg.cli.running import LOOPBACK, run_until_told, sign_in_link, tell_ready
+from iveg.cli.running import LOOPBACK, run_until_told, tell_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.fleet import FleetDescription
 from iveg.settings import Settings
@@ -115,7 +115,7 @@ def _database_url(settings: Settings, data: Path) -> str:
 
 
 def _print_link(settings: Settings, dss: Dss) -> None:
-    print(f"iVeg: {sign_in_link(settings, dss.sign_in_token)}", flush=True)
+    tell_link(settings, dss.sign_in_token)
 
 
 # --- FIWARE, robots, recordings ---------------------------------------------------

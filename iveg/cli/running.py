@@ -10,8 +10,9 @@ import os
 import signal
 import sys
 from collections.abc import Coroutine
-from typing import Any
+from typing import Any, TextIO
 
+import segno
 import uvloop
 
 from iveg.settings import Settings
@@ -47,6 +48,15 @@ def sign_in_link(settings: Settings, token: str) -> str:
     """The address that signs a browser in."""
     host = f"[{settings.host}]" if ":" in settings.host else settings.host
     return f"http://{host}:{settings.port}/?token={token}"
+
+
+def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None:
+    """Print the way in; for a person at a terminal also as a code for a phone."""
+    out = out or sys.stdout
+    link = sign_in_link(settings, token)
+    print(f"iVeg: {link}", file=out, flush=True)
+    if out.isatty():
+        segno.make(link, micro=False).terminal(out, compact=True)
 
 
 def tell_ready() -> None:

@@ -178,11 +178,13 @@ class SignInPage:
     """``signin.html``: how to get in.
 
     Attributes:
+        address: Of this server, as the browser reached it.
         wrong: A link was tried and does not sign in.
     """
 
     template: ClassVar[str] = "signin.html"
     frame: Frame
+    address: str
     wrong: bool = False
 
 

@@ -120,7 +120,9 @@ class Pages:
         self, request: Request, status: int = 200, *, wrong: bool = False
     ) -> Response:
         """How to get in."""
-        return self.draw(SignInPage(self.frame(request, "signin"), wrong), status)
+        address = str(request.base_url).rstrip("/")
+        page = SignInPage(self.frame(request, "signin"), address, wrong)
+        return self.draw(page, status)
 
 
 def router(

@@ -1,5 +1,6 @@
 """Words and settings become parts, or one clear sentence and an exit code."""
 
+import io
 import socket
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 from iveg import __version__
 from iveg.cli import UNUSABLE, main
 from iveg.cli.demo import on_free_ports
-from iveg.cli.running import sign_in_link
+from iveg.cli.running import sign_in_link, tell_link
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings, describe
 
@@ -171,3 +172,26 @@ def test_the_demos_fiware_is_on_loopback_alone() -> None:
 )
 def test_the_link_signs_a_browser_in(host: str, link: str) -> None:
     assert sign_in_link(Settings(host=host), "abc") == link
+
+
+class Screen(io.StringIO):
+    """What a person reads, or a log that nobody does."""
+
+    def __init__(self, *, is_terminal: bool) -> None:
+        super().__init__()
+        self._is_terminal = is_terminal
+
+    def isatty(self) -> bool:
+        """Whether somebody sits before it."""
+        return self._is_terminal
+
+
+def test_13_16_a_terminal_shows_the_link_as_a_code_too_and_a_log_does_not() -> None:
+    terminal, log = Screen(is_terminal=True), Screen(is_terminal=False)
+    for out in (terminal, log):
+        tell_link(Settings(), "abc", out)
+
+    assert log.getvalue() == "iVeg: http://127.0.0.1:8000/?token=abc\n"
+    link, *code = terminal.getvalue().splitlines()
+    assert link == log.getvalue().strip()
+    assert len(code) > 10

@@ -193,7 +193,8 @@ async def test_no_page_holds_inline_script_or_style(
 ) -> None:
     html = (await browser.get(path)).text
     assert re.findall(r"<script(?![^>]* src=)|<style|\sstyle=|\son[a-z]+=", html) == []
-    assert "http://" not in html.replace("http://127.0.0.1:8000/?token=", "")
+    # The way in names the address that was asked.
+    assert "http://" not in html.replace("http://iveg", "")
 
 
 async def test_names_from_outside_are_text_and_not_markup(
