@@ -21,7 +21,6 @@ APART_PX = 24
 DESKTOPS = ((1200, 800), (1440, 900), (1500, 900), (1920, 1080))
 OTHERS = ((1024, 768), (844, 390), (667, 375), (768, 1024), (390, 844), (360, 740))
 SIZES = (*DESKTOPS, *OTHERS)
-SECTIONS = 9
 
 
 @dataclass
@@ -93,7 +92,7 @@ def test_13_4_the_navigation_has_every_entry_on_every_desktop(fleet: Fleet) -> N
     for size in DESKTOPS:
         page = fleet.at(size)
         entries = page.locator(".nav a").all()
-        assert len(entries) == SECTIONS
+        assert len(entries) == page.locator(".menu a").count() > 0
         for entry in entries:
             expect(entry).to_be_in_viewport(ratio=1)
 
