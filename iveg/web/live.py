@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocketState
 
 from iveg.domain.errors import UnknownRobotError, UnreadableError
 from iveg.domain.latency.watch import LatencyWatch
@@ -277,10 +278,11 @@ class Ear:
         self._feed = feed
 
     async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
-        """Until the browser goes; then ``others`` end, too."""
+        """Until the browser goes or is sent away; then ``others`` end, too."""
+        line = self._websocket
         try:
-            while True:
-                await self._hear(await self._websocket.receive_text())
+            while line.application_state is WebSocketState.CONNECTED:
+                await self._hear(await line.receive_text())
         except WebSocketDisconnect:
             return
         finally:

@@ -124,7 +124,7 @@ def _age_sessions(stack: Site, seconds: float) -> None:
     """As if that much time had gone by while iVeg was away."""
     path = stack.directory / "sessions.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()]
-    for line in lines:
+    for line in lines[1:]:  # the first says how the file is written
         line["began"] -= seconds
         line["seen"] -= seconds
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+import aiomqtt
+
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.feedback import Feedback, Mandate
 from iveg.domain.observations import (
@@ -56,13 +58,22 @@ class Cloud:
     problems: list[codec.Problem] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        topics = {"/iveg/+/attrs": 1, "/iveg/+/cmdexe": 1}
-        self.link = MqttLink(self.address, "cloud", topics, self._take)
+        self.link = MqttLink(self.address, "cloud")
 
     async def run(self) -> None:
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.link.run())
+            tasks.create_task(self._listen())
             tasks.create_task(self._speak())
+
+    async def _listen(self) -> None:
+        """Every message, also those that a newer one has overtaken."""
+        async with aiomqtt.Client(self.address.host, self.address.port) as client:
+            await client.subscribe("/iveg/+/attrs", qos=1)
+            await client.subscribe("/iveg/+/cmdexe", qos=1)
+            async with asyncio.TaskGroup() as tasks:
+                tasks.create_task(self.link.run())
+                async for message in client.messages:
+                    self._take(message.topic.value, bytes(message.payload))
 
     def of(self, robot_id: str, kind: type[T]) -> list[T]:
         """All that a robot said of one kind."""
