@@ -99,13 +99,14 @@ async def test_robots_publish_all_that_the_contract_names_in_order_and_cleanly(
     tmp_path: Path,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
+    said = ["odom", "lidar2D", "yolox_bounding_boxes", "safety", "nav", "battery"]
+    wanted = {f"{robot_id}_{one}" for robot_id in FLEET for one in said}
     with caplog.at_level(logging.WARNING):
         async with running(emulator(address, tmp_path)):
             await until(lambda: len(cloud.of("AGII", Odometry)) > 45)
             await until(lambda: cloud.newest("AGII", Navigation))
+            await until(lambda: cloud.devices >= wanted)
 
-    suffixes = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety", "_nav")
-    wanted = {robot_id + suffix for robot_id in FLEET for suffix in suffixes}
     counted = [o.origin.seq or 0 for o in cloud.of("AGII", Odometry)]
     scans, looks = cloud.of("AGII", LaserScan), cloud.of("AGII", DetectionFrame)
     assert cloud.devices == wanted | {"climate"}

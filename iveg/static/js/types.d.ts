@@ -565,7 +565,7 @@ export type Robot = {
   /** Of the newest detections. */
   road: string;
   /** That feeds the pose. */
-  transport: "direct" | "fiware";
+  transport: string;
   profile: Profile;
   margin: Margin | null;
   /** The agent's opinion, never believed. */
