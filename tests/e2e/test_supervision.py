@@ -2,6 +2,9 @@
 
 import json
 import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -156,22 +159,6 @@ def test_markup_from_a_robot_is_never_markup_on_a_page(page: Page, stack: Site) 
         assert evaluate(page, "() => window.probed ?? null") is None
 
 
-def test_markup_in_a_note_is_text_on_every_page(
-    open_page: OpenPage, stack: Site
-) -> None:
-    page = open_page(768, 1024, route="/alerts")
-    form = page.locator("#active-alerts form:visible").first
-    form.wait_for(timeout=90_000)
-
-    form.locator("input").fill(PROBE)
-    form.locator("button").click()
-
-    noted = page.locator("#past-rows td", has_text="operator")
-    expect(noted.first).to_be_visible(timeout=15_000)
-    assert page.locator("main img").count() == 0
-    assert evaluate(page, "() => window.probed ?? null") is None
-
-
 def test_the_fleet_page_tells_how_the_fleet_obeys_with_age_and_count(
     open_page: OpenPage,
 ) -> None:
@@ -309,6 +296,24 @@ def test_signing_out_ends_the_session(
     assert answer.status == 401
 
 
+def test_markup_in_a_note_is_text_on_every_page(
+    open_page: OpenPage, stack: Site
+) -> None:
+    page = open_page(768, 1024, route="/alerts")
+    with _frozen(stack, "emulator"):
+        form = page.locator("#active-alerts form:visible").first
+        form.wait_for(timeout=30_000)
+
+        form.locator("input").fill(PROBE)
+        form.locator("button").click()
+
+        page.locator("#active-alerts", has_text=PROBE).wait_for()
+    noted = page.locator("#past-rows td", has_text="operator")
+    expect(noted.first).to_be_visible(timeout=15_000)
+    assert page.locator("main img").count() == 0
+    assert evaluate(page, "() => window.probed ?? null") is None
+
+
 def _serious_in(page: Page, theme: str) -> list[str]:
     script = "([theme]) => { document.documentElement.dataset.theme = theme; }"
     evaluate(page, script, theme)
@@ -338,3 +343,14 @@ def _publish(stack: Site, robot: str, payload: dict[str, Any]) -> None:
     topic = f"/iveg/{robot}_yolox_bounding_boxes/attrs"
     text = json.dumps(payload)
     publish.single(topic, text, qos=1, hostname=broker.host, port=broker.port)
+
+
+@contextmanager
+def _frozen(stack: Site, word: str) -> Iterator[None]:
+    """A program that is there and does nothing."""
+    (program,) = (one for one in stack.programs if one.words[0] == word)
+    program.process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        program.process.send_signal(signal.SIGCONT)
