@@ -132,6 +132,7 @@ def test_i10_a_browser_whose_line_is_dead_shows_itself_stale(
     other.reload()
     control = strip_stop(other, "AGI")
     expect(control).to_have_attribute("data-state", "ready", timeout=WITHIN_MS)
+    expect(card(other, "AGI")).to_have_attribute("data-link", "LIVE")
 
     line.is_dead = True
 

@@ -119,7 +119,7 @@ def test_the_sheet_of_drills_prints_with_the_honest_sentence_and_a_line_to_sign(
     page.goto(f"{stack.url}/commands")
     line = page.locator('[data-drills-of="AGV"]')
     expect(line).to_contain_text(re.compile(r"Fallido: tardó \d[\d.]* ms"))
-    expect(line).to_contain_text("toca simulacro de STOP", timeout=WITHIN_MS)
+    expect(line).to_contain_text("toca simulacro de parada", timeout=WITHIN_MS)
     assert serious(page) == []
 
     page.emulate_media(media="print")
