@@ -6,6 +6,9 @@ person; *storm*: no two looks are alike.  Ages are taken from the robot's stamp 
 animation frame that drew it; both clocks are this machine's.
 
     python -m benchmarks.glass --robots 2,10,20 --scenes calm,storm --seconds 10
+    python -m benchmarks.glass --robots 20 --direct off
+    python -m benchmarks.glass --robots 10 --pages 5
+    python -m benchmarks.glass --robots 50 --hz 10
 
 prints a table and leaves ``test-output/glass.json`` and ``glass.html``.
 """
@@ -35,7 +38,9 @@ from tests.ports import free_ports
 from tests.processes import ROOT, Site, children_of, site, until
 
 SIDES = ("relay", "iveg")
-HZ, SENSORS, WARM_UP_S, LATE_MS = 30.0, 3, 4.0, 100.0
+SENSORS, LATE_MS = 3, 100.0
+WARM_UP_S = 10.0
+"""Orion's copies are throttled once the direct ones have been steady for 5 s."""
 APIKEY = "glass"
 
 WATCH = """() => {
@@ -58,7 +63,9 @@ class Run:
         ages_ms: Of every odometry that was painted, when it was.
         late_share: Of the time, that a robot's next odometry had been sent more than
             100 ms ago and was not painted yet.
-        cpu_per_1k: Processor seconds of the servers for 1,000 messages sent.
+        cpu_per_1k: Processor seconds for 1,000 messages sent, of the servers that
+            count together: the relay with its broker, or ``serve``.
+        fiware_per_1k: The same of ``fiware``, which has the broker; 0 for the relay.
         main_ms_per_s: What the page's main thread was busy.
     """
 
@@ -68,6 +75,7 @@ class Run:
     ages_ms: list[float]
     late_share: float
     cpu_per_1k: float
+    fiware_per_1k: float
     main_ms_per_s: float
     load: float
 
@@ -85,7 +93,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--sides", default=",".join(SIDES))
     parser.add_argument("--out", type=Path, default=ROOT / "test-output")
+    parser.add_argument("--hz", type=float, default=30.0)
+    parser.add_argument("--pages", type=int, default=1, help="open side by side")
+    parser.add_argument("--direct", default="all", help="IVEG_DIRECT_READ")
     asked, _ = parser.parse_known_args()
+    how = How(asked.seconds, asked.hz, asked.pages, asked.direct)
     turns = itertools.product(
         asked.scenes.split(","),
         map(int, asked.robots.split(",")),
@@ -93,8 +105,7 @@ def main() -> None:
     )
     with running_browser() as browser:
         runs = [
-            measure(browser, side, robots, scene, asked.seconds)
-            for scene, robots, side in turns
+            measure(browser, side, robots, scene, how) for scene, robots, side in turns
         ]
     report(runs)
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -107,74 +118,104 @@ def main() -> None:
 
 
 @dataclass(frozen=True, slots=True)
+class How:
+    """What all runs of a call have in common.
+
+    Attributes:
+        seconds: Of measuring.
+        hz: Of each sensor.
+        pages: Open side by side; the first is measured.
+        direct: What iVeg reads straight from the broker.
+    """
+
+    seconds: float
+    hz: float
+    pages: int
+    direct: str
+
+
+@dataclass(frozen=True, slots=True)
 class Place:
     """Where a side listens, and what it costs."""
 
     link: str
     mqtt: int
     servers: list[int]
+    fiware: list[int]
 
 
-def measure(
-    browser: Browser, side: str, robots: int, scene: str, seconds: float
-) -> Run:
+def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> Run:
     """One side, one fleet."""
     serving = _iveg if side == "iveg" else _relay
+    seconds = how.seconds
     with (
         tempfile.TemporaryDirectory() as directory,
-        serving(Path(directory), robots) as place,
-        _fleet(place, robots, scene),
+        serving(Path(directory), robots, how.direct) as place,
+        _fleet(place, robots, scene, how.hz),
     ):
         context = browser.new_context(viewport={"width": 1280, "height": 900})
         page = context.new_page()
         page.goto(place.link)
+        for _ in range(how.pages - 1):
+            context.new_page().goto(page.url)
+        page.bring_to_front()
         page.wait_for_timeout(1000 * WARM_UP_S)
         tools = context.new_cdp_session(page)
         tools.send("Performance.enable")
-        before = _spent(place), _busy_s(tools)
+        before = _spent(place.servers), _spent(place.fiware), _busy_s(tools)
         page.evaluate(WATCH)
         page.wait_for_timeout(1000 * seconds)
         painted = page.evaluate("() => window.painted")
-        after = _spent(place), _busy_s(tools)
+        after = _spent(place.servers), _spent(place.fiware), _busy_s(tools)
         context.close()
-    sent = HZ * SENSORS * robots * seconds
+    spent = [now - then for now, then in zip(after, before, strict=True)]
+    sent = how.hz * SENSORS * robots * seconds
     return Run(
         side,
         robots,
         scene,
         [now - stamp for _, stamp, now in painted],
-        late_share(painted, robots, seconds),
-        1000.0 * (after[0] - before[0]) / sent,
-        1000.0 * (after[1] - before[1]) / seconds,
+        late_share(painted, robots, how),
+        1000.0 * spent[0] / sent,
+        1000.0 * spent[1] / sent,
+        1000.0 * spent[2] / seconds,
         os.getloadavg()[0],
     )
 
 
 def late_share(
-    painted: Sequence[tuple[str, float, float]], robots: int, seconds: float
+    painted: Sequence[tuple[str, float, float]], robots: int, how: How
 ) -> float:
     """The share of time in which a robot's next odometry was late by 100 ms."""
     late_ms = 0.0
     for robot in {one[0] for one in painted}:
         mine = [(stamp, now) for name, stamp, now in painted if name == robot]
         for (stamp, shown), (_, now) in itertools.pairwise(mine):
-            due = stamp + 1000.0 / HZ + LATE_MS
+            due = stamp + 1000.0 / how.hz + LATE_MS
             late_ms += max(0.0, now - max(shown, due))
     unseen = robots - len({one[0] for one in painted})
-    return (late_ms / (1000.0 * seconds) + unseen) / robots
+    return (late_ms / (1000.0 * how.seconds) + unseen) / robots
 
 
 @contextmanager
-def _iveg(directory: Path, robots: int) -> Iterator[Place]:
+def _iveg(directory: Path, robots: int, direct: str) -> Iterator[Place]:
     settings = {
         "IVEG_ROBOTS": ",".join(names(robots)),
         "IVEG_GREENHOUSE": "none",
         "IVEG_APIKEY": APIKEY,
+        "IVEG_DIRECT_READ": direct,
     }
     with site(directory, **settings) as there:
         demo = there.start("demo", "--no-emulator")
         there.wait_until_whole()
-        yield Place(there.sign_in_link, _mqtt_port(there), _family(demo.pid))
+        parts = children_of(demo.pid)
+        fiware = [one for one in parts if "fiware" in _words_of(one)]
+        serve = [one for one in parts if one not in fiware]
+        yield Place(there.sign_in_link, _mqtt_port(there), serve, fiware)
+
+
+def _words_of(pid: int) -> list[str]:
+    return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
 
 
 def _mqtt_port(there: Site) -> int:
@@ -182,7 +223,7 @@ def _mqtt_port(there: Site) -> int:
 
 
 @contextmanager
-def _relay(directory: Path, _: int) -> Iterator[Place]:
+def _relay(directory: Path, _: int, __: str) -> Iterator[Place]:
     mqtt, http = free_ports(2)
     conf = directory / "mosquitto.conf"
     conf.write_text(PLAIN.format(port=mqtt) + "max_queued_messages 0\n")
@@ -195,12 +236,12 @@ def _relay(directory: Path, _: int) -> Iterator[Place]:
     ):
         link = f"http://127.0.0.1:{http}/"
         until(lambda: _answers(link), 20.0, "the relay")
-        yield Place(link, mqtt, [broker, server])
+        yield Place(link, mqtt, [broker, server], [])
 
 
 @contextmanager
-def _fleet(place: Place, robots: int, scene: str) -> Iterator[None]:
-    words = ["--port", str(place.mqtt), "--robots", str(robots), "--hz", str(HZ)]
+def _fleet(place: Place, robots: int, scene: str, hz: float) -> Iterator[None]:
+    words = ["--port", str(place.mqtt), "--robots", str(robots), "--hz", str(hz)]
     words += ["--apikey", APIKEY, "--scene", scene]
     with _program([sys.executable, "-m", "tests.fleet", *words]):
         yield
@@ -226,12 +267,8 @@ def _answers(link: str) -> bool:
         return probe.connect_ex((address.hostname or "", address.port or 0)) == 0
 
 
-def _family(pid: int) -> list[int]:
-    return [pid, *children_of(pid)]
-
-
-def _spent(place: Place) -> float:
-    return sum(Usage.of(one).cpu_s for one in place.servers)
+def _spent(pids: Sequence[int]) -> float:
+    return sum(Usage.of(one).cpu_s for one in pids)
 
 
 def _busy_s(tools: CDPSession) -> float:
@@ -246,8 +283,13 @@ FIGURES = {
     "P95 ms": lambda run: run.age(0.95),
     "late %": lambda run: 100.0 * run.late_share,
     "CPU s/1k": lambda run: run.cpu_per_1k,
+    "fiware s/1k": lambda run: run.fiware_per_1k,
     "main ms/s": lambda run: run.main_ms_per_s,
 }
+
+
+CPUS = 3, 4
+"""Both are compared with what the relay and its broker take."""
 
 
 def report(runs: Sequence[Run]) -> None:
@@ -268,7 +310,9 @@ def report(runs: Sequence[Run]) -> None:
                 [scene, str(robots), side, *(f"{one:.2f}" for one in told[side])]
             )
         if len(told) == len(SIDES):
-            ratios = zip(told["iveg"], told["relay"], strict=True)
+            relay = told["relay"]
+            relay[CPUS[1]] = relay[CPUS[0]]
+            ratios = zip(told["iveg"], relay, strict=True)
             cells = (f"{ours / its:.2f}" if its else "-" for ours, its in ratios)
             rows.append([scene, str(robots), "ratio", *cells])
     head = ["scene", "robots", "page", *FIGURES]
