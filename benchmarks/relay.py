@@ -35,7 +35,7 @@ async def _relay() -> None:
     async with aiomqtt.Client("127.0.0.1", port) as broker:
         await broker.subscribe(f"/{apikey}/+/attrs")
         async for message in broker.messages:
-            said = orjson.loads(bytes(message.payload))  # type: ignore[arg-type]
+            said = orjson.loads(bytes(message.payload))
             told = {"topic": message.topic.value, "data": said}
             for page in list(_pages):
                 with suppress(RuntimeError, WebSocketDisconnect):

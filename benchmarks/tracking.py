@@ -19,10 +19,10 @@ from iveg.adapters.fleet_files import built_in
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.alerts import Rule
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin, Received
 from iveg.domain.people import People
 from iveg.domain.sight import AllClear
-from iveg.domain.tracking.person import SEEN_S
 from iveg.domain.world import World
 from iveg.emulator.camera import DETECTORS, person_target
 from iveg.emulator.layout import lay_out
@@ -138,7 +138,7 @@ class Run:
             rigs = self.emulated.rigs.values()
             if any(rig.part_seen(target, self.emulated) > MOST for rig in rigs):
                 self.viewed[number] = now
-        return {n for n, at in self.viewed.items() if now - at <= SEEN_S}
+        return {n for n, at in self.viewed.items() if now - at <= LIMITS.seen_s}
 
 
 def _gated(distance: float) -> float:
