@@ -154,6 +154,7 @@ def test_a_lost_control_still_sends_and_says_loudly_what_nobody_confirms(
         assert box["width"] > 1300
         first = _numbers(line)
         until(lambda: _numbers(line)["tries"] > first["tries"] + 1, 8.0, "more tries")
+        until(lambda: _numbers(line)["pressed"] > first["pressed"], 3.0, "it ages")
         later = _numbers(line)
         assert later["pressed"] > first["pressed"]
         assert later["heard"] > first["heard"]
