@@ -31,11 +31,6 @@ class Transport:
     one_at_a_time: bool = False
     alias: str = ""
 
-    @property
-    def is_off(self) -> bool:
-        """Whether it carries no order at all."""
-        return not (self.can_stop or self.can_release)
-
     def switched(self, *, on: bool) -> "Transport":
         """The same, or one that carries no order."""
         return self if on else replace(self, can_stop=False, can_release=False)
