@@ -57,7 +57,8 @@ def test_the_commands_page_shows_a_stop_with_the_time_of_each_road(
     expect(row).to_contain_text("AGI")
     expect(row).to_contain_text("program")
     # A program presses no button: nobody knows how long its order was on its way.
-    _, *times = row.locator("td.number").all_inner_texts()
+    on_its_way, *times = row.locator("td.number").all_inner_texts()
+    assert on_its_way == "—"
     # sent and answered on both transports, standing, tries
     assert [text for text in times if not text.strip().isdigit()] == []
     expect(page.locator("#took-standing")).to_contain_text("ms")
