@@ -28,15 +28,15 @@ import orjson
 from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
 from iveg.domain.world import World
 from iveg.ngsi import codec
-from iveg.pipeline.assess import Assessor
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.publish import Hub
 
 BEAMS = 720
@@ -62,7 +62,7 @@ class Sink:
         """Take one."""
         self.last = record
 
-    async def secured(self) -> None:
+    async def flushed(self) -> None:
         """There is nothing to keep."""
 
 
@@ -86,20 +86,20 @@ class Telling:
     async def stop(self, *_: object) -> None:
         """Nobody is stopped here."""
 
-    async def set_level(self, *_: object) -> None:
+    async def set_desired_state(self, *_: object) -> None:
         """Nor held."""
 
 
-def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Assessor:
+def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
     hub, numbers = Hub(), itertools.count()
     start = Instant(0.0, WALL)
-    return Assessor(
+    return Evaluator(
         World(load_fleet(words=robots)),
         load_greenhouse("agroconnect"),
         Rule(),
         fleet,
-        Minutes(hub, Sink(), start),
+        EventLog(hub, Sink(), start),
         hub,
         lambda: f"{next(numbers):026d}",
         codec.format_stamp,
@@ -194,33 +194,33 @@ def read(body: bytes, at: Instant) -> Iterator[Received]:
 def cost(robots: int, seconds: float) -> dict[str, list[float]]:
     """How long each notification took, by kind (ms of CPU), one after the other."""
     names = tuple(f"R{number}" for number in range(robots))
-    assessor = assessor_of(names, Telling())
+    evaluator = assessor_of(names, Telling())
     took: dict[str, list[float]] = {}
     ticked = 0.0
     for one in record(names, seconds):
         now = Instant(one.at, WALL + one.at)
         begin = time.thread_time()
         for received in read(one.body, now):
-            assessor.take(received)
-        assessor.settle()
+            evaluator.take(received)
+        evaluator.settle()
         took.setdefault(one.kind, []).append((time.thread_time() - begin) * 1e3)
         if one.at - ticked >= TICK_S:
             ticked = one.at
             begin = time.thread_time()
-            assessor.tick(now)
+            evaluator.tick(now)
             took.setdefault("(tick)", []).append((time.thread_time() - begin) * 1e3)
     return took
 
 
 async def latency(robots: int, seconds: float) -> list[float]:
-    """From a notification that changed a mandate to the feedback of it (ms).
+    """From a notification that changed a speed limit to the feedback of it (ms).
 
     On the wall clock, with the heartbeat and the costmap beside it as in iVeg.
     """
     names = tuple(f"R{number}" for number in range(robots))
     fleet = Telling()
-    assessor = assessor_of(names, fleet)
-    mapper = Mapper(assessor.world, assessor.greenhouse.bounds)
+    evaluator = assessor_of(names, fleet)
+    mapper = Mapper(evaluator.world, evaluator.greenhouse.bounds)
     drawing = asyncio.create_task(mapper.run(clock.now))
     recorded, took = record(names, seconds), []
     start = time.perf_counter()
@@ -232,14 +232,14 @@ async def latency(robots: int, seconds: float) -> list[float]:
         now = clock.now()
         fleet.taken()
         for received in read(one.body, now):
-            assessor.take(received)
-        assessor.settle()
+            evaluator.take(received)
+        evaluator.settle()
         left = fleet.taken()
         if left is not None:
             took.append((left - start - one.at) * 1e3)
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
-            assessor.tick(now)
+            evaluator.tick(now)
     drawing.cancel()
     await asyncio.gather(drawing, return_exceptions=True)
     return took

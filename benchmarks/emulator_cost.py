@@ -64,9 +64,9 @@ def main() -> None:
     parts_named = "people    drive    laser   camera   core per robot"
     print(f"greenhouse   boxes by   robots   {parts_named}")
     for name, robots, camera in CASES:
-        house = load_greenhouse(name)
-        layout = lay_out(scenario_named("demo"), robots, house)
-        world = World(house, layout, DETECTORS["simulation"], 1, camera)
+        greenhouse = load_greenhouse(name)
+        layout = lay_out(scenario_named("demo"), robots, greenhouse)
+        world = World(greenhouse, layout, DETECTORS["simulation"], 1, camera)
         parts = spent(world)
         each = [one / SECONDS / len(robots) for one in parts.values()]
         shares = "".join(f"{share:9.2%}" for share in each)

@@ -1,6 +1,6 @@
 """How fast the embedded FIWARE carries measures: MQTT publish → notification received.
 
-``python -m benchmarks.fiware_road [--robots 2 20 …] [--seconds 6]``; each robot sends
+``python -m benchmarks.fiware_transport [--robots 2 20 …] [--seconds 6]``; each robot sends
 odometry, a 720-beam scan and two boxes at 30 Hz.  The embedded FIWARE, the robots and
 the receiver are three processes; what each costs is told, so that one sees who was the
 limit.  ``--profile FILE`` writes where the embedded process spends its time.

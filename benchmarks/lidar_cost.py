@@ -43,9 +43,9 @@ def message(rig: Rig, world: World) -> bytes:
 def main() -> None:
     print("greenhouse    robots   sweep   with its message   core per robot at 30 Hz")
     for name, robots in CASES:
-        house = load_greenhouse(name)
-        layout = lay_out(scenario_named("demo"), robots, house)
-        world = World(house, layout, DETECTORS["simulation"], seed=1)
+        greenhouse = load_greenhouse(name)
+        layout = lay_out(scenario_named("demo"), robots, greenhouse)
+        world = World(greenhouse, layout, DETECTORS["simulation"], seed=1)
         rig = world.rigs[robots[0]]
         sweep = cost(partial(rig.scan, world))
         both = cost(partial(message, rig, world))

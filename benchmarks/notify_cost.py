@@ -134,7 +134,7 @@ async def whole_way(dss: Dss, line: Line, bodies: list[bytes]) -> float:
         await line.post(one)
     spent = (time.process_time() - began) / len(bodies) * 1000
     for received in dss.ingest.drain():
-        dss.assessor.world.apply(received)
+        dss.evaluator.world.apply(received)
     return spent
 
 

@@ -77,7 +77,7 @@ def _told(
 def cost(count: int, batch: int, *, storm: bool) -> float:
     """CPU seconds per 1,000 messages."""
     robots = tuple(f"R{number:02d}" for number in range(count))
-    assessor = assessor_of(robots, Telling())
+    evaluator = assessor_of(robots, Telling())
     everything = list(story(robots, storm=storm))
     ticked = 0.0
     began = time.process_time()
@@ -85,11 +85,11 @@ def cost(count: int, batch: int, *, storm: bool) -> float:
         part = everything[start : start + batch]
         now = part[-1].at
         for received in part:
-            assessor.take(received)
-        assessor.settle()
+            evaluator.take(received)
+        evaluator.settle()
         if now.mono - ticked >= TICK_S:
             ticked = now.mono
-            assessor.tick(now)
+            evaluator.tick(now)
     return (time.process_time() - began) / len(everything) * 1000
 
 

@@ -227,7 +227,7 @@ async def run(stops: int, broker: str) -> None:
             tempfile.TemporaryDirectory(prefix="iveg-bench-") as folder,
             ExitStack() as parts,
         ):
-            rows += await measure_road(road, stops, Path(folder), broker, parts)
+            rows += await measure_transport(road, stops, Path(folder), broker, parts)
     title = f"Press to latched over {broker} ({machine()})"
     print_table(title, HEAD, [row.cells() for row in rows])
     first, second = (sorted(row.took) for row in rows[:2])
@@ -238,7 +238,7 @@ async def run(stops: int, broker: str) -> None:
     print(f"confirmed: {confirmed} of {sum(len(row.took) for row in rows)}")
 
 
-async def measure_road(
+async def measure_transport(
     road: str, stops: int, folder: Path, broker: str, parts: ExitStack
 ) -> list[Row]:
     """One road, idle and under the load."""

@@ -17,12 +17,12 @@ import numpy as np
 
 from iveg.adapters.fleet_files import built_in
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin, Received
-from iveg.domain.people import People
-from iveg.domain.sight import AllClear
+from iveg.domain.tracking.people import People
+from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from iveg.emulator.camera import DETECTORS, person_target
 from iveg.emulator.layout import lay_out
@@ -64,12 +64,12 @@ class Run:
     profile: str
 
     def __post_init__(self) -> None:
-        self.house: Greenhouse = load_greenhouse("mvsim-20x20")
-        layout = lay_out(scenario_named(self.scenario), ROBOTS, self.house)
+        self.greenhouse: Greenhouse = load_greenhouse("mvsim-20x20")
+        layout = lay_out(scenario_named(self.scenario), ROBOTS, self.greenhouse)
         detector = DETECTORS[layout.detector or self.profile]
-        self.emulated = Emulated(self.house, layout, detector, self.seed)
+        self.emulated = Emulated(self.greenhouse, layout, detector, self.seed)
         self.world, self.rule = World(built_in()), Rule()
-        self.people = People(self.house.bounds)
+        self.people = People(self.greenhouse.bounds)
         self.all_clear, self.truth = AllClear(), Truth()
         self.score = motmetrics.MOTAccumulator(auto_id=True)
         self.seq = 0
@@ -89,7 +89,7 @@ class Run:
                 if step % LOOK_EVERY == place % LOOK_EVERY:
                     self._look(rig, now)
             if step % LOOK_EVERY == 0:
-                self.all_clear.sweep(self.people, self.world, self.house, _at(now))
+                self.all_clear.sweep(self.people, self.world, self.greenhouse, _at(now))
                 self.people.forget(_at(now))
                 self._judge(now)
 

@@ -17,7 +17,7 @@ from starlette.staticfiles import StaticFiles
 from ulid import ULID
 
 from iveg import __version__
-from iveg.adapters import clock, floods
+from iveg.adapters import clock, log_filter
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
@@ -32,7 +32,7 @@ from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.adapters.transports import MqttTransport, OrionTransport
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.latency.hops import WINDOW_S
@@ -43,14 +43,15 @@ from iveg.domain.transports import DIRECT, FIWARE
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
-from iveg.pipeline.build import Choices, Doors, build
-from iveg.pipeline.earlier import remember
+from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.coverage import Watch
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.restore import remember
 from iveg.pipeline.rules import Rules
-from iveg.pipeline.watching import Watch
 from iveg.settings import Settings
-from iveg.web import (
+from iveg.web import notifications, problems
+from iveg.web.api import (
     alerts,
     commands,
     costmap,
@@ -58,23 +59,23 @@ from iveg.web import (
     day,
     health,
     history,
-    installed,
     latency,
-    limits,
-    live,
     metrics,
-    notifications,
-    openapi,
-    pages,
-    problems,
     robots,
     rule,
-    security,
     stop_records,
 )
-from iveg.web.auth import Door, NotifySecret, Principal, require
-from iveg.web.contexts import Site
-from iveg.web.signin import SignInLink
+from iveg.web.live import socket
+from iveg.web.pages import openapi, routes, service_worker
+from iveg.web.pages.contexts import Site
+from iveg.web.security import headers, rate_limits
+from iveg.web.security.authentication import (
+    Authenticator,
+    NotifySecret,
+    Principal,
+    require,
+)
+from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
@@ -155,7 +156,7 @@ class Dss:
         parts = build(
             self.fleet,
             load_greenhouse(settings.greenhouse),
-            Doors(
+            Ports(
                 mqtt,
                 {
                     DIRECT.switched(on=settings.stop_direct): mqtt,
@@ -175,16 +176,20 @@ class Dss:
                 self._boot,
             ),
         )
-        self.hub, self.minutes, self.chain = parts.hub, parts.minutes, parts.chain
+        self.hub, self.event_log, self.health_monitor = (
+            parts.hub,
+            parts.event_log,
+            parts.health_monitor,
+        )
         self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
-        self.assessor, self.commander = parts.assessor, parts.commander
+        self.evaluator, self.commander = parts.evaluator, parts.commander
         world = parts.world
-        self.rules = Rules(self.assessor, rule_store, self.minutes, versions)
+        self.rules = Rules(self.evaluator, rule_store, self.event_log, versions)
         self.provisioner = Provisioner(
             self.orion,
             self.agent,
             self.link,
-            self.chain,
+            self.health_monitor,
             self.ingest,
             world.feeds,
             robots=self.fleet.ids,
@@ -196,13 +201,17 @@ class Dss:
             read_clock=clock.now,
         )
         self.provisioner.throttle.allowed = settings.orion_throttle
-        self.mapper = Mapper(world, self.assessor.greenhouse.bounds)
-        self.watch = Watch(world, self.assessor.greenhouse)
+        self.mapper = Mapper(world, self.evaluator.greenhouse.bounds)
+        self.watch = Watch(world, self.evaluator.greenhouse)
         self.views = Views(
-            self.assessor, self.commander, self.minutes, self.chain, self.counters
+            self.evaluator,
+            self.commander,
+            self.event_log,
+            self.health_monitor,
+            self.counters,
         )
         self.sessions = FileSessions(directory / "sessions.jsonl")
-        self.door = Door(
+        self.authenticator = Authenticator(
             sign_in_token=self.sign_in_token,
             api_token=settings.api_token,
             clock=clock.now,
@@ -222,7 +231,7 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
-            self.assessor.leave(clock.now())
+            self.evaluator.leave(clock.now())
             await self.commander.close()
             await self.recorder.close()
             await self.orion.close()
@@ -248,9 +257,9 @@ class Dss:
         await remember(
             self.queries,
             self.commander,
-            self.assessor,
-            self.minutes,
-            self.chain,
+            self.evaluator,
+            self.event_log,
+            self.health_monitor,
             clock.now,
         )
         with contextlib.suppress(HopError):
@@ -267,27 +276,27 @@ class Dss:
             self.on_failure()
 
     def _broker_back(self) -> None:
-        self.chain.mqtt_connected = True
+        self.health_monitor.mqtt_connected = True
         self.commander.broker_back()
 
     def _broker_lost(self) -> None:
-        self.chain.mqtt_connected = False
+        self.health_monitor.mqtt_connected = False
 
     def _rejected(self, source: str, reason: str) -> None:
         event = LogEvent("system", "log.rejected", {"source": source, "reason": reason})
-        self.minutes.log(event, clock.now())
+        self.event_log.log(event, clock.now())
 
     # --- what the web asks --------------------------------------------------------
 
     def counters(self) -> Counter[str]:
         """Everything that is counted."""
         total = Counter(self.ingest.counters)
-        total.update(self.assessor.world.counters)
+        total.update(self.evaluator.world.counters)
         total.update(self.commander.counters)
         total.update(self.recorder.counters)
-        total.update(floods.counted)
+        total.update(log_filter.counted)
         total["live.browsers"] = self.hub.watchers
-        total["nlos.protected"] = self.assessor.protected_unseen
+        total["nlos.protected"] = self.evaluator.protected_unseen
         return total
 
     def queues(self) -> metrics.Queues:
@@ -340,12 +349,12 @@ class Dss:
 
     def notified(self, at: Instant) -> None:
         """A notification of Orion's came in."""
-        self.chain.notified_at = at.mono
+        self.health_monitor.notified_at = at.mono
 
     def site(self) -> Site:
         """What every page says of this server."""
         return Site(
-            self.assessor.greenhouse.name,
+            self.evaluator.greenhouse.name,
             self.fleet.ids,
             __version__,
             self._demo,
@@ -363,9 +372,9 @@ def create_app(dss: Dss) -> FastAPI:
         redoc_url=None,
         openapi_url=None,
     )
-    app.state.door = dss.door
-    drawn = pages.Pages(dss.site())
-    encoder = live.Encoder(dss.views, dss.hub, clock.now)
+    app.state.authenticator = dss.authenticator
+    drawn = routes.Pages(dss.site())
+    encoder = socket.Encoder(dss.views, dss.hub, clock.now)
     settings = dss.settings
     tenant = settings.fiware_service, settings.fiware_servicepath
     orion = notifications.NotificationEndpoint(
@@ -380,41 +389,41 @@ def create_app(dss: Dss) -> FastAPI:
     app.router.routes.append(orion.route())
     watch = dss.latency.watch
     app.include_router(
-        live.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop, watch)
+        socket.router(dss.hub, encoder, dss.snapshot, clock.now, dss.stop, watch)
     )
     # Before the routes that would take ``latency`` for the name of a command.
     app.include_router(
         stop_records.router(dss.queries, clock.now, dss.views.find_command)
     )
     app.include_router(robots.router(dss.views, clock.now))
-    app.include_router(costmap.router(dss.mapper, dss.assessor, clock.now))
+    app.include_router(costmap.router(dss.mapper, dss.evaluator, clock.now))
     app.include_router(coverage.router(dss.watch, clock.now))
-    days = day.Days(dss.queries, dss.assessor.greenhouse, settings.drill_days)
+    days = day.Days(dss.queries, dss.evaluator.greenhouse, settings.drill_days)
     app.include_router(day.router(days, drawn, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))
-    app.include_router(alerts.router(dss.assessor, clock.now))
+    app.include_router(alerts.router(dss.evaluator, clock.now))
     app.include_router(rule.router(dss.rules, clock.now))
     app.include_router(
         history.router(
             dss.queries,
             reader=require("read"),
-            threshold=lambda: dss.assessor.rule.threshold,
-            present=lambda name: dss.assessor.decision_record(name, clock.now()),
+            threshold=lambda: dss.evaluator.rule.threshold,
+            present=lambda name: dss.evaluator.decision_record(name, clock.now()),
             flood=dss.views.flood,
             fleet=dss.fleet,
         )
     )
     app.include_router(latency.router(watch, clock.now))
-    app.include_router(installed.router())
+    app.include_router(service_worker.router())
     app.include_router(health.router(clock.now, dss.views.health))
     app.include_router(metrics.router(clock.now, dss.views.health, watch, dss.queues))
     app.include_router(
-        pages.router(
+        routes.router(
             drawn,
             reader=require("read"),
             anyone=require("open"),
             document=cache(lambda: openapi.describe_api(app)),
-            rule=lambda: dss.assessor.rule,
+            rule=lambda: dss.evaluator.rule,
         )
     )
 
@@ -425,11 +434,15 @@ def create_app(dss: Dss) -> FastAPI:
 
     app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
     problems.install(app, drawn.problem)
-    app.add_middleware(security.BodyLimit)
-    app.add_middleware(limits.SocketLimits, identify=dss.door.identify, clock=clock.now)
-    app.add_middleware(SignInLink, door=dss.door, refusal=drawn.refused_link)
+    app.add_middleware(headers.BodyLimit)
+    app.add_middleware(
+        rate_limits.SocketLimits, identify=dss.authenticator.identify, clock=clock.now
+    )
+    app.add_middleware(
+        SignInLink, authenticator=dss.authenticator, refusal=drawn.refused_link
+    )
     # Last is outermost: a refusal carries the headers, too.
-    app.add_middleware(security.SecurityHeaders)
+    app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(notifications.NotificationsFirst, endpoint=orion)
     return app
 

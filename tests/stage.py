@@ -44,7 +44,7 @@ class Faults:
 
     Attributes:
         mute: Nothing that it says arrives.
-        deaf: It drives as it likes whatever iVeg mandates; holds still bite.
+        deaf: It drives as it likes whatever iVeg speed limits; holds still bite.
         clock_offset_s: Its wall clock is this far ahead (s).
     """
 
@@ -138,16 +138,18 @@ class Stage:
         profile: str = "perfect",
         seed: int = 3,
     ) -> None:
-        house = load_greenhouse(scenario_named(scenario).house)
-        layout = lay_out(scenario_named(scenario), robots, house)
-        self._world = World(house, layout, DETECTORS[layout.detector or profile], seed)
+        greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
+        layout = lay_out(scenario_named(scenario), robots, greenhouse)
+        self._world = World(
+            greenhouse, layout, DETECTORS[layout.detector or profile], seed
+        )
         self._incidents = [(one.at_s, one.order) for one in layout.incidents]
-        self._desk = Desk(robots, house)
+        self._desk = Desk(robots, greenhouse)
         self._views = Views(
-            self._desk.assessor,
+            self._desk.evaluator,
             self._desk.commander,
-            self._desk.minutes,
-            self._desk.chain,
+            self._desk.event_log,
+            self._desk.health_monitor,
             Counter,
         )
         self._robots = {
@@ -256,7 +258,7 @@ class Stage:
 
     def log(self, robot_id: str | None, key: str) -> list[Json]:
         """Lines whose key begins so, oldest first; of one robot or of all."""
-        told = self._views.log(list(self._desk.minutes.lines))
+        told = self._views.log(list(self._desk.event_log.lines))
         lines: list[Json] = [one.model_dump() for one in told]
         return [
             line

@@ -1,4 +1,4 @@
-"""The door to DDS, the network of ROS 2: raw payloads in and out, and who is there.
+"""The adapter for DDS, the network of ROS 2: raw payloads in and out, and who is there.
 
 Speaks through Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else
 imports it.  Payloads stay bytes here: DDS checks them against the type, and

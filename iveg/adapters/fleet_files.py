@@ -1,4 +1,4 @@
-"""The door to fleet files: TOML and short words in, a checked fleet out.
+"""The adapter for fleet files: TOML and short words in, a checked fleet out.
 
 Who is in the fleet: the words of ``IVEG_ROBOTS``, or else every robot of the file of
 ``IVEG_FLEET``, or else every robot that iVeg itself describes.  What each one is: the
@@ -24,7 +24,7 @@ from pydantic import (
     model_validator,
 )
 
-from iveg.adapters.toml_places import place_of
+from iveg.adapters.toml_positions import place_of
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import (
     CAUTIOUS,

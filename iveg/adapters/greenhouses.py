@@ -1,7 +1,7 @@
-"""The door to greenhouse files: TOML in, a checked ``Greenhouse`` out.
+"""The adapter for greenhouse files: TOML in, a checked ``Greenhouse`` out.
 
 A file that cannot be used is refused with its line, its field and the reason, so that
-a grower who measured a house can mend the file without reading this code.
+a grower who measured a greenhouse can mend the file without reading this code.
 """
 
 import re
@@ -59,7 +59,7 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
     page = _Page(file, text)
     _refuse_unknown(page, raw, "", 0, ("name", "bounds", *_LISTS))
     root = _Fields(page, raw, "", 0)
-    house = Greenhouse(
+    greenhouse = Greenhouse(
         root.text("name"),
         root.table("bounds").rectangle(),
         _items(page, raw, "lanes", _lane, ("label", *_SIDES)),
@@ -68,8 +68,8 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
         _items(page, raw, "obstacles", _obstacle, ("kind", *_SIDES)),
         _items(page, raw, "starts", _start, ("x", "y", "yaw")),
     )
-    _check_inside(page, house)
-    return house
+    _check_inside(page, greenhouse)
+    return greenhouse
 
 
 def _syntax_error(message: str, text: str) -> tuple[str, str]:
@@ -213,18 +213,18 @@ def _refuse_unknown(
             raise page.refuse(name, index, reason)
 
 
-def _check_inside(page: _Page, house: Greenhouse) -> None:
+def _check_inside(page: _Page, greenhouse: Greenhouse) -> None:
     """Everything stands within the outer wall; a typing slip seldom does."""
     corners: dict[str, list[tuple[tuple[float, float], ...]]] = {
-        "lanes": [_corners(lane.area) for lane in house.lanes],
-        "rows": [_corners(row) for row in house.rows],
-        "posts": [((post.x, post.y),) for post in house.posts],
-        "obstacles": [_corners(thing.area) for thing in house.obstacles],
-        "starts": [((start.x, start.y),) for start in house.starts],
+        "lanes": [_corners(lane.area) for lane in greenhouse.lanes],
+        "rows": [_corners(row) for row in greenhouse.rows],
+        "posts": [((post.x, post.y),) for post in greenhouse.posts],
+        "obstacles": [_corners(thing.area) for thing in greenhouse.obstacles],
+        "starts": [((start.x, start.y),) for start in greenhouse.starts],
     }
     for name, places in corners.items():
         for index, points in enumerate(places):
-            if not all(house.bounds.contains(x, y) for x, y in points):
+            if not all(greenhouse.bounds.contains(x, y) for x, y in points):
                 raise page.refuse(name, index, "lies outside bounds.")
 
 

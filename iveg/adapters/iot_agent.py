@@ -1,4 +1,4 @@
-"""The door to the IoT Agent's north port, and provisioning a fleet through it.
+"""The adapter for the IoT Agent's north port, and provisioning a fleet through it.
 
 Provisioning looks first and changes only what is not as it should be, so it can run at
 every start.  It leaves commands a way to the robot: the traps are in fiware.md §4.
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from iveg.adapters.orion import PROBE_TIMEOUT_S, Document, FiwareHttp
-from iveg.adapters.strays import Entities, remove_strays
+from iveg.adapters.orphan_entities import Entities, remove_strays
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -175,7 +175,7 @@ async def provision(
         mended += await _ensure_robot(agent, orion, known, robot_id, apikey)
         problems += _thieves(known.values(), robot_id)
     # Last, so that the probe's return says that all the others are there again.
-    mended += await _ensure_device(agent, known, _canary_device(apikey))
+    mended += await _ensure_device(agent, known, _heartbeat_device(apikey))
     mended += await _remove_doctor(agent, known)
     mended += await remove_strays(orion, known, robots)
     return Provisioned(tuple(mended), tuple(problems))
@@ -349,11 +349,11 @@ def _climate_device(apikey: str) -> Document:
     )
 
 
-def _canary_device(apikey: str) -> Document:
+def _heartbeat_device(apikey: str) -> Document:
     return _device(
-        names.CANARY_ID,
-        names.CANARY_ID,
-        names.CANARY_TYPE,
+        names.HEARTBEAT_ID,
+        names.HEARTBEAT_ID,
+        names.HEARTBEAT_TYPE,
         (("probe", "object"),),
         apikey,
     )

@@ -1,4 +1,4 @@
-"""The door to MQTT: one connection that comes back by itself.
+"""The adapter for MQTT: one connection that comes back by itself.
 
 ``run`` connects, subscribes and hands every message on; when the broker goes it tries
 again with a growing, jittered pause.  ``publish`` waits for the broker's word (QoS 1)
@@ -16,7 +16,7 @@ from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
-from iveg.adapters.floods import quiet
+from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_inbox import Inbox
 from iveg.adapters.mqtt_outbox import PromptClient
 from iveg.domain.errors import HopError

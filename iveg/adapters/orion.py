@@ -1,4 +1,4 @@
-"""The door to Orion, for commands and for reading once after a gap.
+"""The adapter for Orion, for commands and for reading once after a gap.
 
 Orion's 204 to a command proves nothing: it also answers so when the command went
 nowhere (fiware.md §4).  Who wants to know waits for the robot's own answer.
@@ -251,8 +251,8 @@ class OrionClient:
         """
         response = await self.http.ask(
             "GET",
-            f"/v2/entities/{names.CANARY_ID}",
-            query={"type": names.CANARY_TYPE, "attrs": "probe"},
+            f"/v2/entities/{names.HEARTBEAT_ID}",
+            query={"type": names.HEARTBEAT_TYPE, "attrs": "probe"},
             timeout_s=PROBE_TIMEOUT_S,
             also=(404,),
         )
@@ -272,9 +272,9 @@ class OrionClient:
         """
         response = await self.http.ask(
             "GET",
-            f"/v2/entities/{names.CANARY_ID}",
+            f"/v2/entities/{names.HEARTBEAT_ID}",
             query={
-                "type": names.CANARY_TYPE,
+                "type": names.HEARTBEAT_TYPE,
                 "attrs": "probe",
                 "metadata": "dateModified",
             },

@@ -21,7 +21,7 @@ from iveg.adapters.subscriptions import Ensured, ensure_subscriptions, wanted_fo
 from iveg.adapters.throttle import Throttle
 from iveg.domain.errors import HopError, NoAnswerError
 from iveg.domain.feeds import Feeds
-from iveg.domain.observations import Canary, Instant, Origin, Received
+from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
@@ -52,7 +52,7 @@ class Provisioner:
         orion: OrionClient,
         agent: IotAgentClient,
         link: MqttLink,
-        chain: HealthMonitor,
+        health_monitor: HealthMonitor,
         ingest: Ingest,
         feeds: Feeds,
         *,
@@ -67,7 +67,7 @@ class Provisioner:
         self._orion = orion
         self._agent = agent
         self._link = link
-        self._chain = chain
+        self._health_monitor = health_monitor
         self._ingest = ingest
         self._robots = robots
         self._apikey = apikey
@@ -110,25 +110,25 @@ class Provisioner:
 
     async def _send_probes(self) -> None:
         """At QoS 1: a broker that is there and does nothing says nothing either."""
-        topic = names.measure_topic(self._apikey, names.CANARY_ID)
+        topic = names.measure_topic(self._apikey, names.HEARTBEAT_ID)
         while True:
             if not self._link.connected:
-                self._chain.mqtt_error = ""
+                self._health_monitor.mqtt_error = ""
                 await asyncio.sleep(0.1)
                 continue
             self._probe_seq += 1
             now = self._clock()
             stamp = codec.format_stamp(now.wall)
             origin = Origin(self._boot, self._probe_seq, stamp)
-            self._chain.sent(origin, now)
-            self._chain.mqtt_error = await self._publish(topic, origin)
+            self._health_monitor.sent(origin, now)
+            self._health_monitor.mqtt_error = await self._publish(topic, origin)
             spent = self._clock().mono - now.mono
             await asyncio.sleep(max(0.1, PROBE_PERIOD_S - spent))
 
     async def _publish(self, topic: str, origin: Origin) -> str:
         """What the broker says to a probe; empty when it takes it."""
         try:
-            await self._link.publish(topic, codec.write_canary(origin))
+            await self._link.publish(topic, codec.write_heartbeat(origin))
         except HopError:
             return "takes messages and does not confirm them"
         return ""
@@ -151,16 +151,16 @@ class Provisioner:
         try:
             entity = await self._orion.read_probe()
         except HopError as error:
-            self._chain.orion_error = error.detail
+            self._health_monitor.orion_error = error.detail
             return self._tell("orion", error)
         at = self._clock()
-        self._chain.orion_ok_at = at.mono
-        self._chain.orion_slow = self._slow("orion", at.mono - before.mono)
+        self._health_monitor.orion_ok_at = at.mono
+        self._health_monitor.orion_slow = self._slow("orion", at.mono - before.mono)
         for observation in codec.read_entity(entity).observations if entity else ():
-            if isinstance(observation, Canary):
-                self._chain.stored(observation.origin)
-        if self._chain.orion_error:
-            self._chain.orion_error = ""
+            if isinstance(observation, HeartbeatProbe):
+                self._health_monitor.stored(observation.origin)
+        if self._health_monitor.orion_error:
+            self._health_monitor.orion_error = ""
             self._gap.set()
         return self._tell("orion", None)
 
@@ -169,22 +169,28 @@ class Provisioner:
         try:
             await self._agent.version()
         except NoAnswerError as error:
-            self._chain.agent_silent, self._chain.agent_error = error.detail, ""
+            self._health_monitor.agent_silent, self._health_monitor.agent_error = (
+                error.detail,
+                "",
+            )
             return self._tell("iot_agent", error)
         except HopError as error:
-            self._chain.agent_error, self._chain.agent_silent = error.detail, ""
+            self._health_monitor.agent_error, self._health_monitor.agent_silent = (
+                error.detail,
+                "",
+            )
             return self._tell("iot_agent", error)
         spent = self._clock().mono - before.mono
-        self._chain.agent_slow = self._slow("iot_agent", spent)
+        self._health_monitor.agent_slow = self._slow("iot_agent", spent)
         if self._agent_trouble:
-            self._chain.agent_error = self._chain.agent_silent = ""
+            self._health_monitor.agent_error = self._health_monitor.agent_silent = ""
             self._devices_wait_s = self._devices_at = 0.0
             self._gap.set()
         return self._tell("iot_agent", None)
 
     @property
     def _agent_trouble(self) -> str:
-        return self._chain.agent_error or self._chain.agent_silent
+        return self._health_monitor.agent_error or self._health_monitor.agent_silent
 
     def _slow(self, hop: str, spent_s: float) -> str:
         if spent_s <= SLOW_S:
@@ -212,9 +218,9 @@ class Provisioner:
 
     def _devices_are_due(self, rounds: int, now: Instant) -> bool:
         """Never while the agent falls behind: the questions would queue there too."""
-        if self._chain.is_overloaded(now) or now.mono < self._devices_at:
+        if self._health_monitor.is_overloaded(now) or now.mono < self._devices_at:
             return False
-        return rounds % _DEVICES_EVERY == 0 or not self._chain.whole(now)
+        return rounds % _DEVICES_EVERY == 0 or not self._health_monitor.whole(now)
 
     async def _rest(self, seconds: float) -> None:
         """Sleep, unless a neighbour comes back meanwhile."""
@@ -229,7 +235,7 @@ class Provisioner:
 
         Orion sends nothing when a subscription is made, so the read comes last.
         """
-        if self._chain.orion_error:
+        if self._health_monitor.orion_error:
             return False
         whole = True
         if devices and not self._agent_trouble:
@@ -248,7 +254,7 @@ class Provisioner:
         try:
             done: Provisioned = await _made_sense("iot_agent", work)
         except HopError as error:
-            self._chain.agent_warning = error.detail
+            self._health_monitor.agent_warning = error.detail
             if isinstance(error, NoAnswerError):
                 self._wait_longer()
             return await self._blame("devices", error)
@@ -274,16 +280,16 @@ class Provisioner:
         try:
             done: Ensured = await _made_sense("orion", work)
         except HopError as error:
-            self._chain.notify_error = error.detail
+            self._health_monitor.notify_error = error.detail
             return await self._blame("subscriptions", error)
         first = not self._subscription_ids
         self._subscription_ids = done.ids
         self.throttle.found(done.copies, switches)
         self._explain(done.mended)
-        self._chain.notify_detail = done.failing
+        self._health_monitor.notify_detail = done.failing
         # What is made at the start was never missed.
         missed = "" if first else _in_short(done.mended)
-        self._chain.notify_error = missed
+        self._health_monitor.notify_error = missed
         trouble = HopError("notifications", missed) if missed else None
         return self._tell("subscriptions", trouble)
 
@@ -316,7 +322,7 @@ class Provisioner:
 
     def _warn(self, problems: Sequence[str]) -> None:
         """What only a person can put right: on the health page while it lasts."""
-        self._chain.agent_warning = _in_short(problems)
+        self._health_monitor.agent_warning = _in_short(problems)
         for sentence in problems:
             if sentence not in self._warned:
                 _log.warning("%s", sentence)

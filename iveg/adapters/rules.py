@@ -14,7 +14,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.files import Form, read_lines, write_lines
-from iveg.domain.alerts import ALIASES, Class, Rule
+from iveg.domain.detection_rule import ALIASES, Class, Rule
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant

@@ -98,7 +98,7 @@ WANTED_OF_ALL = (
     ),
     Wanted(
         "canary",
-        (("id", names.CANARY_ID), ("type", names.CANARY_TYPE)),
+        (("id", names.HEARTBEAT_ID), ("type", names.HEARTBEAT_TYPE)),
         ("probe",),
     ),
 )

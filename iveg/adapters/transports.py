@@ -46,10 +46,10 @@ class MqttTransport:
         topic = names.command_topic(self._apikey, robot_id)
         await self._link.publish(topic, codec.write_command(value), qos=0)
 
-    async def set_level(
+    async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
     ) -> None:
-        """Publish the retained level that a reconnecting robot finds."""
+        """Publish the retained desired state that a reconnecting robot finds."""
         topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
         payload = codec.write_desired(desired, ids)
         await self._link.publish(topic, payload, qos=1, retain=True)

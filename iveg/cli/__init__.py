@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from iveg import __version__
-from iveg.cli.words import (
-    add_experiment_words,
-    add_network_words,
-    add_robot_words,
+from iveg.cli.arguments import (
+    add_experiment_arguments,
+    add_network_arguments,
+    add_robot_arguments,
 )
 from iveg.domain.errors import DataFileError, IvegError, SettingsError
 from iveg.domain.fleet import is_robot_id
@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
     emulator.add_argument(
         "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
     )
-    add_network_words(emulator)
+    add_network_arguments(emulator)
     replay = commands.add_parser("replay", help="recorded logs as robots")
     replay.add_argument("files", nargs="+", type=Path, metavar="FILE")
     replay.add_argument(
@@ -188,8 +188,8 @@ def _parser() -> argparse.ArgumentParser:
         part.add_argument(
             "--until-eof", action="store_true", help="end when the input closes"
         )
-    add_robot_words(commands)
-    add_experiment_words(commands)
+    add_robot_arguments(commands)
+    add_experiment_arguments(commands)
     commands.add_parser("provision", help="make devices and subscriptions")
     commands.add_parser("doctor", help="try every hop once and say what is broken")
     commands.add_parser("settings", help="print docs/settings.md")

@@ -24,10 +24,10 @@ from iveg.domain.errors import HopError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment import compare
 from iveg.experiment.notebook import Notebook, directory_of
+from iveg.experiment.observer import injections, slowdowns_of, watch
 from iveg.experiment.outcome import outcome_of, read_json, read_truth
 from iveg.experiment.plan import PLANS, Step
 from iveg.experiment.scoring import tally
-from iveg.experiment.watching import injections, slowdowns_of, watch
 from iveg.settings import Settings
 
 _STARTS_S = 6.0

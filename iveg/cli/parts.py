@@ -26,7 +26,7 @@ from iveg.cli.running import LOOPBACK, run_until_told, tell_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.fleet import FleetDescription
 from iveg.settings import Settings
-from iveg.web.bounded import BoundedSocket
+from iveg.web.live.bounded import BoundedSocket
 
 if TYPE_CHECKING:
     from iveg.adapters.dds import Dds
@@ -136,7 +136,7 @@ async def fiware(settings: Settings) -> None:
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     """Robots, people and air that are not there."""
     from iveg.emulator.fleet import run_emulator
-    from iveg.emulator.orders import read_words
+    from iveg.emulator.orders import read_translations
 
     fleet = load_fleet(settings.fleet, settings.robots)
     robots = [one.robot_id for one in fleet.members.values() if one.kind == "live"]
@@ -163,7 +163,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 state_directory=Path(directory),
                 held=options.held,
                 rate_hz=options.hz,
-                faults=read_words(options.fault, robots),
+                faults=read_translations(options.fault, robots),
                 fault_port=options.fault_port,
                 network=network,
                 description=fleet,

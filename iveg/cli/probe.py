@@ -13,7 +13,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
-PROBE_ID, PROBE_TYPE = names.DOCTOR_ID, names.CANARY_TYPE
+PROBE_ID, PROBE_TYPE = names.DOCTOR_ID, names.HEARTBEAT_TYPE
 DESCRIPTION = "iveg doctor"
 """Of the subscription.  Not ``iVeg: …``: a running iVeg removes such strangers."""
 _ENTITY = f"/v2/entities/{PROBE_ID}"

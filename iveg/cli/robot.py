@@ -32,8 +32,8 @@ from iveg.ngsi import names
 from iveg.robot.node import RobotNode
 from iveg.robot.ros2.checking import Heard, judge, lines
 from iveg.robot.ros2.config import RobotConfig, read_classes, read_config
+from iveg.robot.ros2.inputs import PICTURES, TOPICS, listened
 from iveg.robot.ros2.rig import Network, Ros2Robot
-from iveg.robot.ros2.senses import PICTURES, TOPICS, listened
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from iveg.domain.greenhouse import Greenhouse, Lane
 from iveg.domain.observations import Instant
-from iveg.domain.sight import looks_from
+from iveg.domain.tracking.sight import looks_from
 from iveg.domain.world import RobotState
 
 CELL_M = 1.0
 MOST_CELLS = 4000
-"""A larger house gets coarser cells, so that no house costs more than this."""
+"""A larger greenhouse gets coarser cells, so that no greenhouse costs more than this."""
 RECENT_S = 10.0
 """A look that is younger counts as seen now: a ring is remembered as long."""
 
@@ -53,7 +53,7 @@ class LaneCells:
 
 
 class Coverage:
-    """Remembers the newest look at each cell of a house."""
+    """Remembers the newest look at each cell of a greenhouse."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse

@@ -58,29 +58,29 @@ class Passing:
 
 
 def worked_minutes(
-    poses: Iterable[Pose], house: Greenhouse
+    poses: Iterable[Pose], greenhouse: Greenhouse
 ) -> dict[str, dict[str, float]]:
     """Aisle → robot → minutes that it drove there."""
     seconds: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
     for pose in poses:
-        lane = house.lane_at(pose.x, pose.y)
+        lane = greenhouse.lane_at(pose.x, pose.y)
         if lane is not None and abs(pose.speed) >= LIMITS.standing_speed:
             seconds[lane][pose.robot_id] += 1
     return {
         lane.label: {robot: n / 60.0 for robot, n in seconds[lane.label].items()}
-        for lane in house.lanes
+        for lane in greenhouse.lanes
         if lane.label in seconds
     }
 
 
 def slowed_minutes(
-    decisions: Iterable[DecisionRecord], house: Greenhouse, until: float
+    decisions: Iterable[DecisionRecord], greenhouse: Greenhouse, until: float
 ) -> dict[tuple[str, str | None], float]:
     """(cause, aisle of the cause) → minutes of a robot slowed; each counted once.
 
     Args:
         decisions: Of the day.
-        house: Its aisles.
+        greenhouse: Its aisles.
         until: When a slow-down that goes on is cut off (Unix s).
     """
     spans: dict[tuple[str, str | None, str], list[tuple[float, float]]] = {}
@@ -88,7 +88,7 @@ def slowed_minutes(
         if one.kind != "mandate":
             continue
         known = one.x is not None and one.y is not None
-        lane = house.lane_at(one.x or 0.0, one.y or 0.0) if known else None
+        lane = greenhouse.lane_at(one.x or 0.0, one.y or 0.0) if known else None
         key = one.reason or "", lane, one.robot_id
         end = until if one.ended_at is None else min(one.ended_at, until)
         spans.setdefault(key, []).append((one.started_at, end))
@@ -108,7 +108,7 @@ def _length(spans: list[tuple[float, float]]) -> float:
 
 
 def closest_passes(
-    poses: Sequence[Pose], seen: Iterable[Seen], house: Greenhouse
+    poses: Sequence[Pose], seen: Iterable[Seen], greenhouse: Greenhouse
 ) -> list[Passing]:
     """The nearest that a moving robot came to somebody, nearest first."""
     by_second: dict[int, list[Pose]] = defaultdict(list)
@@ -116,7 +116,9 @@ def closest_passes(
         if abs(pose.speed) >= LIMITS.standing_speed:
             by_second[pose.second].append(pose)
     near = [
-        _passing(pose, one, house) for one in seen for pose in by_second[one.second]
+        _passing(pose, one, greenhouse)
+        for one in seen
+        for pose in by_second[one.second]
     ]
     chosen: list[Passing] = []
     for one in sorted(near, key=lambda it: it.distance_m):
@@ -127,7 +129,7 @@ def closest_passes(
     return chosen
 
 
-def _passing(pose: Pose, one: Seen, house: Greenhouse) -> Passing:
+def _passing(pose: Pose, one: Seen, greenhouse: Greenhouse) -> Passing:
     return Passing(
         at=float(pose.second),
         robot_id=pose.robot_id,
@@ -135,7 +137,7 @@ def _passing(pose: Pose, one: Seen, house: Greenhouse) -> Passing:
         speed=abs(pose.speed),
         robot=(pose.x, pose.y),
         person=(one.x, one.y),
-        lane=house.lane_at(one.x, one.y),
+        lane=greenhouse.lane_at(one.x, one.y),
     )
 
 

@@ -1,7 +1,7 @@
 """The decision record: from who was seen to the observed slow-down, link by link.
 
 One ``Decision`` opens when a robot enters a ring and closes when it is let go.  Every
-link has a time and a verdict; a link that does not come in time is itself an alarm
+link has a time and a verdict; a link that does not come in time is itself an alert
 (product.md §6)::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
@@ -14,10 +14,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.mandates import Crossing
 from iveg.domain.observations import Instant, SafetyReport
+from iveg.domain.rule.speed_limits import Crossing
 
 LinkVerdict = Literal["ok", "late", "missing", "n/a", "open", "unknown"]
 LinkName = Literal[
@@ -63,7 +63,7 @@ class Decision:
     """Why one robot was slowed once.
 
     Attributes:
-        feedback: When the mandate was first published; ``applied`` when the robot
+        feedback: When the speed limit was first published; ``applied`` when the robot
             said so; ``observed`` when its odometry showed it.
         speed_after: Speed at ``observed`` (m/s).
         waited_out: Whether every link has come or is missing.
@@ -110,7 +110,7 @@ class Decision:
         return crossing.speed_before > JUDGED_ABOVE and not hidden
 
     def published(self, at: Instant) -> "Decision":
-        """The mandate went out."""
+        """The speed limit went out."""
         return self if self.feedback is not None else replace(self, feedback=at)
 
     def reported(self, report: SafetyReport, at: Instant) -> "Decision":
@@ -151,7 +151,7 @@ class Decision:
     def links(self, now: Instant) -> tuple[Link, ...]:
         """The chain as it stands."""
         crossing, rule = self.crossing, self.rule
-        sighting = crossing.hazard.sighting
+        sighting = crossing.zone.sighting
         entered = crossing.entered.wall
         seen = (
             Link("detection", "n/a", None, "odometry")

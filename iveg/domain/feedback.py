@@ -1,7 +1,7 @@
 """What iVeg tells the fleet (Algorithm 2) and every robot reads (Algorithm 3).
 
 One ``Feedback`` goes out for each robot that observes; it carries the alerts that are
-alive and the mandates of the whole fleet (interfaces.md §4).
+alive and the speed limits of the whole fleet (interfaces.md §4).
 """
 
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ class FeedbackAlert:
 
 
 @dataclass(frozen=True, slots=True)
-class Mandate:
+class SpeedLimit:
     """The speed factor that one robot is told to keep, and why.
 
     Attributes:
@@ -54,7 +54,7 @@ class Mandate:
     decision_id: str | None = None
 
 
-CLEAR = Mandate()
+CLEAR = SpeedLimit()
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,6 @@ class Feedback:
     pose: Pose2D | None = None
     twist: Twist2D | None = None
     pose_stamp: str | None = None
-    mandates: Mapping[str, Mandate] = field(default_factory=dict)
+    speed_limits: Mapping[str, SpeedLimit] = field(default_factory=dict)
     seen: Mapping[str, int] = field(default_factory=dict)
     backlog_s: float | None = None

@@ -1,4 +1,4 @@
-"""The house that robots drive in: one description for emulator, occlusion and map."""
+"""The greenhouse that robots drive in: one description for emulator, occlusion and map."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Obstacle:
 
 @dataclass(frozen=True, slots=True)
 class Greenhouse:
-    """Everything in the house that does not move, in ``map`` (m).
+    """Everything in the greenhouse that does not move, in ``map`` (m).
 
     Attributes:
         bounds: The outer wall.

@@ -140,7 +140,7 @@ class LeastMargins:
             if one.odometry is not None and age is not None:
                 self._robots.append(one)
                 facts.append(_facts(one.profile, one.odometry, age))
-        self._looks = [
+        self._detections = [
             (person, look)
             for person in people
             for look in person.sightings
@@ -148,14 +148,14 @@ class LeastMargins:
         ]
         self._row = {one.robot_id: row for row, one in enumerate(self._robots)}
         self._columns: dict[str, list[int]] = {}
-        for column, (person, _) in enumerate(self._looks):
+        for column, (person, _) in enumerate(self._detections):
             self._columns.setdefault(person.person_id, []).append(column)
-        self._margins = _all_pairs(facts, [look for _, look in self._looks], now)
+        self._margins = _all_pairs(facts, [look for _, look in self._detections], now)
 
     def of_robot(self, robot_id: str) -> Margin | None:
         """To whomever it has the least margin."""
         row = self._row.get(robot_id)
-        if row is None or not self._looks:
+        if row is None or not self._detections:
             return None
         return self._pair(row, int(np.argmin(self._margins[row])))
 
@@ -169,7 +169,7 @@ class LeastMargins:
         return self._pair(int(row), columns[int(column)])
 
     def _pair(self, row: int, column: int) -> Margin | None:
-        return _to_look(self._robots[row], *self._looks[column], self._now)
+        return _to_look(self._robots[row], *self._detections[column], self._now)
 
 
 def _all_pairs(

@@ -47,7 +47,7 @@ class Origin:
         stamp: The robot's clock, exactly as sent; for display and clock offset only.
         stamp_s: The same as Unix seconds; None where it cannot be read.
         mono: The robot's monotonic seconds since this boot, one axis for all topics.
-        echoes: The sender tells what it has heard; its age can be proven.
+        acknowledgements: The sender tells what it has heard; its age can be proven.
         heard: The newest feedback that it had heard; None before the first.
         replay: A recording is played: the name of the map frame that it is in, so that
             only recordings of one frame meet.  None: a live robot says this.
@@ -58,7 +58,7 @@ class Origin:
     stamp: str | None = None
     stamp_s: float | None = None
     mono: float | None = None
-    echoes: bool = False
+    acknowledgements: bool = False
     heard: FeedbackRef | None = None
     replay: str | None = None
 
@@ -291,7 +291,7 @@ class Climate:
 
 
 @dataclass(frozen=True, slots=True)
-class Canary:
+class HeartbeatProbe:
     """iVeg's own probe, come back through the whole chain."""
 
     origin: Origin
@@ -319,7 +319,7 @@ Observation = (
     | CommandStatus
     | CommandAnswer
     | Climate
-    | Canary
+    | HeartbeatProbe
     | Battery
     | Overtaken
 )

@@ -12,15 +12,15 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionRecord:
-    """Why one alert or mandate came to be and what it led to (product.md section 6).
+    """Why one alert or speed limit came to be and what it led to (product.md section 6).
 
     Attributes:
-        kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
+        kind: ``alert`` (somebody was confirmed) or ``speed_limit`` (a robot was told).
         robot_id: The robot that was told; for an alert its observer.
         class_: Canonical (``person``, ``robot``); ``class_id`` as the detector said.
         confidence: 0 to 1.
         distance_m: From the robot to the centre of the ring (m).
-        speed_factor: What was mandated: 0, 0.5 or 1.
+        speed_factor: What was limited to: 0, 0.5 or 1.
         rule_parameters: JSON text of the rule's parameters at that moment.
         in_sight: Whether the robot itself could see the cause; None when unknown.
         started_at: When the rule fired; ``ended_at`` when it let go.
@@ -131,7 +131,7 @@ class CommandEventRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AlertRecord:
-    """One notice to people, through its life (ISA-18.2).
+    """One alert to people, through its life (ISA-18.2).
 
     Attributes:
         priority: ``P1``, ``P2`` or ``P3``.
@@ -181,7 +181,7 @@ class OdometryRecord:
 
     Attributes:
         linear: (m/s); ``angular`` (rad/s).
-        mandated_factor: What iVeg mandated; ``applied_factor`` what the robot reported.
+        mandated_factor: What iVeg limited to; ``applied_factor`` what the robot reported.
         link: ``LIVE``, ``LATE`` or ``LOST``.
     """
 

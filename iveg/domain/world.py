@@ -19,11 +19,11 @@ from iveg.domain.fleet import FleetDescription, RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
-    Canary,
     Climate,
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    HeartbeatProbe,
     Instant,
     LaserScan,
     Navigation,
@@ -250,7 +250,7 @@ class World:
         }
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
-        self.canary_at: float | None = None
+        self.heartbeat_at: float | None = None
         self.counters: Counter[str] = Counter()
         self.feeds = Feeds()
 
@@ -282,7 +282,7 @@ class World:
             UnknownRobotError: from a robot that is not in the fleet.
         """
         observation, at = received.observation, received.at
-        if isinstance(observation, Climate | Canary):
+        if isinstance(observation, Climate | HeartbeatProbe):
             self._note(observation, at)
             return "new"
         robot = self.robot(observation.robot_id)
@@ -315,12 +315,12 @@ class World:
             _update(robot, received, self._measured_at(origin, received, likely))
         return verdict
 
-    def _note(self, observation: Climate | Canary, at: Instant) -> None:
+    def _note(self, observation: Climate | HeartbeatProbe, at: Instant) -> None:
         """What no robot says."""
         if isinstance(observation, Climate):
             self.climate, self.climate_received = observation, at
         else:
-            self.canary_at = at.mono
+            self.heartbeat_at = at.mono
 
     def refuses(self, received: Received) -> bool:
         """Whether a message calls itself a replay while its robot is live.
@@ -356,7 +356,7 @@ class World:
         """
         now = received.at.mono
         moment = None if likely is None else now - likely
-        if origin.echoes:
+        if origin.acknowledgements:
             moment = self.ledger.composed_at(origin.heard)
         if moment is None:
             return None
@@ -470,7 +470,9 @@ def _drive(
     moment = _not_before(robot.pose_at, before, origin, moment)
     robot.pose_at = moment
     robot.unproven_since = _since(robot.unproven_since, at, holds=moment is None)
-    robot.estimated_since = _since(robot.estimated_since, at, holds=not origin.echoes)
+    robot.estimated_since = _since(
+        robot.estimated_since, at, holds=not origin.acknowledgements
+    )
     robot.odometry, robot.odometry_received = odometry, at
     if before is not None and before.origin.boot != origin.boot:
         robot.forget_poses()  # another boot counts its seconds anew

@@ -16,7 +16,7 @@ from typing import Any
 
 from amqtt.broker import Broker
 
-from iveg.adapters.floods import quiet
+from iveg.adapters.log_filter import quiet
 from iveg.embedded.loopback import require_loopback
 from iveg.embedded.mqtt_telemetry import BoundedWriter, TelemetryReader, publish_packet
 

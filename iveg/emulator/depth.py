@@ -202,10 +202,12 @@ Span = tuple[Floats, Floats]
 def _background(rays: _Rays, sensor: Pose2D, scenery: Scenery) -> Floats:
     """Depth of floor, wall and crop."""
     bounds = scenery.bounds
-    house = _box_span(
+    greenhouse = _box_span(
         rays.across, sensor, (bounds.xmin, bounds.ymin, bounds.xmax, bounds.ymax)
     )
-    depth = np.minimum(house[1][None, :], _height_span(rays, 0.0, math.inf)[1][:, None])
+    depth = np.minimum(
+        greenhouse[1][None, :], _height_span(rays, 0.0, math.inf)[1][:, None]
+    )
     for xmin, ymin, xmax, ymax in scenery.rectangles:
         centre = Pose2D((xmin + xmax) / 2, (ymin + ymax) / 2, 0.0)
         crop = Body("crop", centre, xmax - xmin, ymax - ymin)

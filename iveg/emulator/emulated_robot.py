@@ -144,8 +144,8 @@ class EmulatedRobot:
         if not self._is_odometry_frozen:
             node.sense(self._rig.odometry())
         navigation = self._rig.navigation()
-        task, told_at = self._told
-        if navigation.task != task or now - told_at >= _NAVIGATION_EVERY_S:
+        task, published_at = self._told
+        if navigation.task != task or now - published_at >= _NAVIGATION_EVERY_S:
             self._told = (navigation.task, now)
             node.sense(navigation)
         if now - self._battery_told >= _BATTERY_EVERY_S:

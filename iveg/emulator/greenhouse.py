@@ -82,13 +82,13 @@ class Scenery:
     screens: tuple[Rectangle, ...]
 
     @classmethod
-    def of(cls, house: Greenhouse) -> "Scenery":
+    def of(cls, greenhouse: Greenhouse) -> "Scenery":
         """Lay a greenhouse out."""
-        screens = house.rows + tuple(thing.area for thing in house.obstacles)
+        screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
         sides = [(area.xmin, area.ymin, area.xmax, area.ymax) for area in screens]
-        posts = [(post.x, post.y, post.radius) for post in house.posts]
+        posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
         return cls(
-            house.bounds,
+            greenhouse.bounds,
             np.array(sides, float).reshape(-1, 4),
             np.array(posts, float).reshape(-1, 3),
             screens,

@@ -1,7 +1,7 @@
-"""Fits a scenario to a fleet and a house.
+"""Fits a scenario to a fleet and a greenhouse.
 
 In the testbed, AGI and AGII drive their scripts and any other fleet shares one round.
-In another house each robot drives up and down a lane of its own and people walk beside
+In another greenhouse each robot drives up and down a lane of its own and people walk beside
 it; in an open field each drives a square.
 """
 
@@ -26,7 +26,7 @@ _MOST_ON_THE_RING = 20
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A scenario laid out for one fleet in one house."""
+    """A scenario laid out for one fleet in one greenhouse."""
 
     robots: Mapping[str, RobotScript]
     profiles: Mapping[str, RobotProfile]
@@ -38,37 +38,37 @@ class Layout:
 def lay_out(
     scenario: Scenario,
     robots: Sequence[str],
-    house: Greenhouse,
+    greenhouse: Greenhouse,
     fleet: FleetDescription | None = None,
 ) -> Layout:
-    """Fit a scenario to a fleet and a house.
+    """Fit a scenario to a fleet and a greenhouse.
 
     Args:
         scenario: What happens.
         robots: Who drives.
-        house: Where.
+        greenhouse: Where.
         fleet: What each robot is; None: iVeg's own.
 
     Raises:
-        DataFileError: the house has no room for so many robots, or is not the one that
+        DataFileError: the greenhouse has no room for so many robots, or is not the one that
             the scenario is about.
     """
     extra = scenario.incidents, scenario.detector
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
-    if scenario.house not in (TESTBED, house.name):
-        reason = f"is about {scenario.house}, not {house.name}: see IVEG_GREENHOUSE."
+    if scenario.greenhouse not in (TESTBED, greenhouse.name):
+        reason = f"is about {scenario.greenhouse}, not {greenhouse.name}: see IVEG_GREENHOUSE."
         raise DataFileError(f"scenario {scenario.name!r}", "", reason)
-    if house.name == scenario.house and set(robots) <= set(scenario.robots):
+    if greenhouse.name == scenario.greenhouse and set(robots) <= set(scenario.robots):
         scripts = {robot_id: scenario.robots[robot_id] for robot_id in robots}
         return Layout(scripts, profiles, scenario.people, *extra)
-    if house.name == TESTBED:
+    if greenhouse.name == TESTBED:
         return Layout(_on_the_ring(robots), profiles, scenario.people, *extra)
-    if not house.lanes:
+    if not greenhouse.lanes:
         people = _around_the_field(robots)
         return Layout(_in_a_field(robots), profiles, people, *extra)
-    lanes = _lanes_for(profiles, house)
+    lanes = _lanes_for(profiles, greenhouse)
     scripts = {
-        robot_id: _up_and_down(lane.area, house)
+        robot_id: _up_and_down(lane.area, greenhouse)
         for robot_id, lane in zip(robots, lanes, strict=True)
     }
     people = tuple(_beside(lane.area) for lane in lanes[:4])
@@ -123,17 +123,19 @@ def _around_the_field(robots: Sequence[str]) -> tuple[tuple[Stop, ...], ...]:
     )
 
 
-def _lanes_for(robots: Mapping[str, RobotProfile], house: Greenhouse) -> list[Lane]:
+def _lanes_for(
+    robots: Mapping[str, RobotProfile], greenhouse: Greenhouse
+) -> list[Lane]:
     """A lane each: the one its start lies in, else the longest that is left.
 
     Who needs most room to turn chooses first.
     """
-    lanes = sorted(house.lanes, key=lambda lane: -_long(lane.area))
+    lanes = sorted(greenhouse.lanes, key=lambda lane: -_long(lane.area))
     if len(robots) > len(lanes):
         reason = f"has {len(lanes)} lanes, too few for {len(robots)} robots."
-        raise DataFileError(f"greenhouse {house.name!r}", "", reason)
+        raise DataFileError(f"greenhouse {greenhouse.name!r}", "", reason)
     chosen: dict[str, Lane] = {}
-    for robot_id, start in zip(robots, house.starts, strict=False):
+    for robot_id, start in zip(robots, greenhouse.starts, strict=False):
         here = [lane for lane in lanes if lane.area.contains(start.x, start.y)]
         if here:
             chosen[robot_id] = here[0]
@@ -159,23 +161,23 @@ def _ends(area: Rectangle, aside: float) -> tuple[tuple[float, float], ...]:
     return ((x, area.ymin + inset), (x, area.ymax - inset))
 
 
-def _up_and_down(area: Rectangle, house: Greenhouse) -> RobotScript:
-    (ax, ay), (bx, by) = _free_stretch(_ends(area, 0.0), house)
+def _up_and_down(area: Rectangle, greenhouse: Greenhouse) -> RobotScript:
+    (ax, ay), (bx, by) = _free_stretch(_ends(area, 0.0), greenhouse)
     start = Pose2D(ax, ay, math.atan2(by - ay, bx - ax))
     return RobotScript(start, ((ax, ay), (bx, by)), 0.0, "patrol", closed=False)
 
 
 def _free_stretch(
-    ends: tuple[tuple[float, float], ...], house: Greenhouse
+    ends: tuple[tuple[float, float], ...], greenhouse: Greenhouse
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """The longest part of a line that keeps off crates, trolleys and posts."""
     line = route_of(ends, 0.0, False).points
     best, run = (0, 0), 0
     for index, (x, y) in enumerate(line):
-        things = (thing.area for thing in house.obstacles)
+        things = (thing.area for thing in greenhouse.obstacles)
         blocked = any(area.contains(x, y, _KEEP_OFF_M) for area in things) or any(
             math.hypot(post.x - x, post.y - y) < post.radius + _KEEP_OFF_M
-            for post in house.posts
+            for post in greenhouse.posts
         )
         run = index + 1 if blocked else run
         if index - run > best[1] - best[0]:

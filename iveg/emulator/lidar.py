@@ -1,4 +1,4 @@
-"""A planar laser: 720 rays against everything in the house, at once.
+"""A planar laser: 720 rays against everything in the greenhouse, at once.
 
 Ray casting by the slab method for rectangles and by the quadratic for discs, all rays
 of a sweep in a few NumPy calls (``benchmarks/lidar_cost.py`` says what it costs).

@@ -96,7 +96,7 @@ def read_order(body: bytes) -> Order:
     return _validated(PersonOrder if "person" in value else FaultOrder, value)
 
 
-def read_words(words: Sequence[str], robots: Sequence[str]) -> list[FaultOrder]:
+def read_translations(words: Sequence[str], robots: Sequence[str]) -> list[FaultOrder]:
     """The orders of a command line: ``field=value``, or ``robot:field=value`` for one.
 
     Args:

@@ -9,7 +9,7 @@ from iveg.emulator.people import Stop
 from iveg.emulator.routes import Route, Station, route_of
 
 TESTBED = "mvsim-20x20"
-"""The house that most scenarios are written for."""
+"""The greenhouse that most scenarios are written for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Scenario:
         robots: Scripts by robot id; a fleet with others drives ``many``'s round.
         people: The round of each person.
         detector: Takes the place of the profile that was asked for.
-        house: The greenhouse that it is written for.
+        greenhouse: The greenhouse that it is written for.
     """
 
     name: str
@@ -70,4 +70,4 @@ class Scenario:
     people: tuple[tuple[Stop, ...], ...] = ()
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
-    house: str = TESTBED
+    greenhouse: str = TESTBED

@@ -162,7 +162,7 @@ class World:
     """Scenery, robots and people.
 
     Args:
-        house: Where.
+        greenhouse: Where.
         layout: Who, and on which ways.
         detector: How good the robots' detectors are.
         seed: The same seed gives the same people and the same noise.
@@ -171,7 +171,7 @@ class World:
 
     def __init__(
         self,
-        house: Greenhouse,
+        greenhouse: Greenhouse,
         layout: Layout,
         detector: DetectorModel,
         seed: int,
@@ -181,7 +181,7 @@ class World:
             len(layout.robots) + len(layout.people)
         )
         generators = [np.random.default_rng(stream) for stream in streams]
-        self.scenery = Scenery.of(house)
+        self.scenery = Scenery.of(greenhouse)
         self.rigs: Mapping[str, Rig] = {
             robot_id: Rig(
                 robot_id, layout.profiles[robot_id], script, detector, rng, camera

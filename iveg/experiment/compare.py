@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from iveg.experiment.printed import CLASSES
+from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]

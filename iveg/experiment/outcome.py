@@ -11,8 +11,8 @@ import orjson
 
 from iveg import __version__
 from iveg.domain.errors import DataFileError
+from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.plan import Plan, Step
-from iveg.experiment.printed import CLASSES
 from iveg.experiment.scoring import Picture, Score, Seen, Tally, score
 from iveg.experiment.statistics import wilson
 

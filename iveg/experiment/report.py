@@ -9,13 +9,13 @@ import orjson
 
 from iveg.domain.latency.hops import DATA
 from iveg.domain.latency.paper import PAPER
-from iveg.experiment.printed import (
+from iveg.experiment.paper_tables import (
     CLASSES,
     COMPLETION_RATE,
     PRINTED,
     disagreements,
 )
-from iveg.web.charts import library
+from iveg.web.pages.charts import library
 
 Result = Mapping[str, Any]
 _STYLE = """

@@ -4,7 +4,7 @@ from typing import cast
 
 from pydantic import Field, JsonValue
 
-from iveg.domain import alarms, flood
+from iveg.domain.alerts import alert_book, flood
 from iveg.domain.records import AlertRecord, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
@@ -14,7 +14,7 @@ from iveg.models.remembered import read_objects, read_slots, read_stamp
 class Occurrence(Model):
     """One time that an alert was raised."""
 
-    priority: alarms.Priority
+    priority: alert_book.Priority
     raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
@@ -22,7 +22,7 @@ class Occurrence(Model):
     note: str | None
 
     @classmethod
-    def of(cls, one: alarms.Occurrence) -> "Occurrence":
+    def of(cls, one: alert_book.Occurrence) -> "Occurrence":
         """One that is in memory."""
         return cls(
             priority=one.priority,
@@ -38,7 +38,7 @@ class Occurrence(Model):
         """One that is remembered."""
         by, note = one.get("acknowledged_by"), one.get("note")
         return cls(
-            priority=cast("alarms.Priority", one.get("priority")),
+            priority=cast("alert_book.Priority", one.get("priority")),
             raised_at=read_stamp(one.get("raised_at")) or "",
             cleared_at=read_stamp(one.get("cleared_at")),
             acknowledged_at=read_stamp(one.get("acknowledged_at")),
@@ -48,10 +48,10 @@ class Occurrence(Model):
 
 
 class Alert(Model):
-    """A notice to people: all occurrences of one kind and subject as one."""
+    """A alert to people: all occurrences of one kind and subject as one."""
 
     alert_id: str
-    priority: alarms.Priority
+    priority: alert_book.Priority
     key: str
     slots: Slots
     robot_id: str | None
@@ -67,23 +67,23 @@ class Alert(Model):
     """The newest occurrences, oldest first."""
 
     @classmethod
-    def of(cls, alarm: alarms.Alarm) -> "Alert":
+    def of(cls, alert: alert_book.Alert) -> "Alert":
         """One alert with its newest occurrences."""
-        condition, last = alarm.condition, alarm.last
+        condition, last = alert.condition, alert.last
         return cls(
-            alert_id=alarm.alert_id,
-            priority=alarm.priority,
+            alert_id=alert.alert_id,
+            priority=alert.priority,
             key=condition.key,
             slots=dict(condition.slots),
             robot_id=condition.robot_id,
-            raised_at=format_stamp(alarm.raised.wall),
+            raised_at=format_stamp(alert.raised.wall),
             last_raised_at=format_stamp(last.raised.wall),
             cleared_at=moment(last.cleared),
             acknowledged_at=moment(last.acknowledged),
             acknowledged_by=last.acknowledged_by,
             note=last.note or None,
-            count=alarm.count,
-            members=[Occurrence.of(one) for one in alarm.members],
+            count=alert.count,
+            members=[Occurrence.of(one) for one in alert.members],
         )
 
     @classmethod
@@ -91,7 +91,7 @@ class Alert(Model):
         """One alert as it is remembered."""
         return cls(
             alert_id=record.alert_id,
-            priority=cast("alarms.Priority", record.priority),
+            priority=cast("alert_book.Priority", record.priority),
             key=record.key,
             slots=read_slots(record.slots),
             robot_id=record.robot_id,

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from iveg.domain.echoes import ECHO_S, WINDOW_S, Echoes
+from iveg.domain.acknowledgements import ECHO_S, WINDOW_S, Acknowledgements
 from iveg.domain.exposure import Exposure
 from iveg.domain.observations import Instant
 from iveg.models.base import Model, moment, rounded
@@ -33,7 +33,7 @@ class AlertLatency(Model):
     age_s: float | None
 
 
-class NotEchoed(Model):
+class NotAcknowledged(Model):
     """Alerts that a robot did not answer in time, of those that it should have."""
 
     count: int
@@ -68,28 +68,30 @@ class Safety(Model):
     """How soon the fleet obeys and how close it comes to people; never "safe"."""
 
     alert_latency: AlertLatency
-    not_echoed: NotEchoed
+    not_echoed: NotAcknowledged
     negative_margin: NegativeMargin
     worst_margin: WorstMargin
 
     @classmethod
-    def of(cls, echoes: Echoes, exposure: Exposure | None, now: Instant) -> "Safety":
+    def of(
+        cls, acknowledgements: Acknowledgements, exposure: Exposure | None, now: Instant
+    ) -> "Safety":
         """As it stands now; ``exposure`` None: nobody has looked today."""
         return cls(
             alert_latency=AlertLatency(
-                p50_ms=_ms(echoes.p50_s),
-                p95_ms=_ms(echoes.p95_s),
-                p99_ms=_ms(echoes.p99_s),
-                count=echoes.timed,
+                p50_ms=_ms(acknowledgements.p50_s),
+                p95_ms=_ms(acknowledgements.p95_s),
+                p99_ms=_ms(acknowledgements.p99_s),
+                count=acknowledgements.timed,
                 window_s=WINDOW_S,
-                age_s=rounded(echoes.echo_age_s, 1),
+                age_s=rounded(acknowledgements.echo_age_s, 1),
             ),
-            not_echoed=NotEchoed(
-                count=echoes.missed,
-                of=echoes.asked,
+            not_echoed=NotAcknowledged(
+                count=acknowledgements.missed,
+                of=acknowledgements.asked,
                 within_s=ECHO_S,
                 window_s=WINDOW_S,
-                age_s=rounded(echoes.asked_age_s, 1),
+                age_s=rounded(acknowledgements.asked_age_s, 1),
             ),
             negative_margin=_negative(exposure, now),
             worst_margin=_worst(exposure, now),

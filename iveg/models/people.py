@@ -2,11 +2,11 @@
 
 from pydantic import Field, ValidationError
 
-from iveg.domain.alerts import Class
+from iveg.domain.detection_rule import Class
 from iveg.domain.geometry import Box3D
-from iveg.domain.people import Placed
 from iveg.domain.records import DetectionRecord
 from iveg.domain.stamps import format_stamp
+from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
 from iveg.models.base import Model
 from iveg.models.margin import Margin

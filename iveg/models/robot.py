@@ -3,7 +3,7 @@
 from typing import Any, Literal
 
 from iveg.domain import observations
-from iveg.domain.feedback import Mandate
+from iveg.domain.feedback import SpeedLimit
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold as DomainHold
@@ -101,7 +101,7 @@ class SpeedLimit(Model):
     decision_id: str | None
 
     @classmethod
-    def of(cls, mandate: Mandate) -> "SpeedLimit":
+    def of(cls, mandate: SpeedLimit) -> "SpeedLimit":
         """What is in force."""
         return cls(
             speed_factor=mandate.speed_factor,

@@ -1,7 +1,7 @@
 """The detection rule: when somebody counts, and how wide the ring is."""
 
-from iveg.domain import alerts
-from iveg.domain.alerts import Class
+from iveg.domain import detection_rule
+from iveg.domain.detection_rule import Class
 from iveg.domain.feedback import HALF_SPEED
 from iveg.models.base import Model, stamp
 
@@ -23,7 +23,7 @@ class Rule(Model):
     since: str | None
 
     @classmethod
-    def of(cls, rule: alerts.Rule) -> "Rule":
+    def of(cls, rule: detection_rule.Rule) -> "Rule":
         """One version."""
         return cls(
             id=rule.id,

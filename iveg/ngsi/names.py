@@ -7,7 +7,7 @@ from iveg.ngsi.sensors import SENSORS
 
 ROBOT_TYPE = "Robot"
 CLIMATE_ID, CLIMATE_TYPE = "greenhouse-climate", "IndoorEnvironmentObserved"
-CANARY_ID, CANARY_TYPE = "iveg-canary", "Probe"
+HEARTBEAT_ID, HEARTBEAT_TYPE = "iveg-canary", "Probe"
 CLIMATE_DEVICE = "climate"
 
 ODOMETRY = "base_pose_ground_truth"
@@ -27,7 +27,7 @@ DESIRED_TOPIC = "/{robot_id}/iveg/desired"
 _ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 DOCTOR_ID = "iveg-doctor"
 """Device and entity of ``iveg doctor``, while it looks."""
-_RESERVED = frozenset({CLIMATE_DEVICE, CANARY_ID, DOCTOR_ID})
+_RESERVED = frozenset({CLIMATE_DEVICE, HEARTBEAT_ID, DOCTOR_ID})
 
 
 @dataclass(frozen=True, slots=True)

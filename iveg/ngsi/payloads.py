@@ -42,7 +42,7 @@ class Wire(BaseModel):
 Count = Annotated[int, Field(ge=0, le=2**53)]
 
 
-class HeardValue(Wire):
+class FeedbackRefValue(Wire):
     """The newest feedback of iVeg that a robot has heard."""
 
     boot: Text
@@ -56,7 +56,7 @@ class OriginFields(Wire):
     seq: Count | None = None
     stamp: Text | None = None
     mono: Annotated[float, Field(ge=0, le=1e12)] | None = None
-    heard: HeardValue | None = None
+    heard: FeedbackRefValue | None = None
     replay: Text | None = None
 
 
@@ -193,8 +193,8 @@ class AlertValue(Wire):
     observer: Text | None = None
 
 
-class MandateValue(Wire):
-    """One mandate inside the feedback."""
+class SpeedLimitValue(Wire):
+    """One speed limit inside the feedback."""
 
     speed_factor: Annotated[float, Field(ge=0, le=1)]
     reason: Text = "clear"
@@ -221,7 +221,7 @@ class FeedbackValue(OriginFields):
     alert: AlertValue | None = None
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
-    mandates: dict[str, MandateValue] = {}
+    speed_limits: dict[str, SpeedLimitValue] = {}
     seen: dict[str, int] = {}
     backlog: Any = None
 

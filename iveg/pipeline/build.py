@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
@@ -11,20 +11,20 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
-from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import CommandPort, Fleet, Journal
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 
 
 @dataclass(frozen=True, slots=True)
-class Doors:
+class Ports:
     """What the pipeline reaches of the outside.
 
     Attributes:
@@ -72,66 +72,74 @@ class Pipeline:
     """The parts, each by its name; nothing runs until ``loop.run()``."""
 
     hub: Hub
-    minutes: Minutes
-    chain: HealthMonitor
+    event_log: EventLog
+    health_monitor: HealthMonitor
     world: World
     latency: LatencyMonitor
     ingest: Ingest
-    assessor: Assessor
+    evaluator: Evaluator
     commander: Commander
     loop: RuleLoop
 
 
 def build(
-    fleet: FleetDescription, house: Greenhouse, doors: Doors, choices: Choices
+    fleet: FleetDescription, greenhouse: Greenhouse, ports: Ports, choices: Choices
 ) -> Pipeline:
     """All parts, wired."""
-    start, hub = doors.clock(), Hub()
-    minutes = Minutes(hub, doors.sink, start)
-    chain = HealthMonitor(start)
-    world = World(fleet, chain.probe)
+    start, hub = ports.clock(), Hub()
+    event_log = EventLog(hub, ports.sink, start)
+    health_monitor = HealthMonitor(start)
+    world = World(fleet, health_monitor.probe)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
-    latency = LatencyMonitor(watch, doors.sink, minutes)
+    latency = LatencyMonitor(watch, ports.sink, event_log)
     ingest = Ingest(
-        world.robots.__contains__, doors.rejected, world.is_past, watch.arrived
+        world.robots.__contains__, ports.rejected, world.is_past, watch.arrived
     )
-    assessor = Assessor(
+    evaluator = Evaluator(
         world,
-        house,
+        greenhouse,
         choices.rule,
-        doors.fleet,
-        minutes,
+        ports.fleet,
+        event_log,
         hub,
-        doors.new_id,
-        doors.stamp,
+        ports.new_id,
+        ports.stamp,
         choices.boot,
-        chain.probe.lag,
+        health_monitor.probe.lag,
     )
-    fiware_is_cut = doors.fiware_is_cut or chain.is_cut
+    fiware_is_cut = ports.fiware_is_cut or health_monitor.is_cut
     commander = Commander(
         fleet.ids,
-        doors.transports,
-        doors.fleet,
-        doors.journal,
-        minutes,
+        ports.transports,
+        ports.fleet,
+        ports.journal,
+        event_log,
         hub,
-        doors.new_id,
-        doors.clock,
+        ports.new_id,
+        ports.clock,
         drills=choices.drills,
-        agent_lag_s=doors.agent_lag_s or chain.probe.lag,
+        agent_lag_s=ports.agent_lag_s or health_monitor.probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and fiware_is_cut(at),
     )
     loop = RuleLoop(
         ingest,
-        assessor,
+        evaluator,
         commander,
-        chain,
-        minutes,
+        health_monitor,
+        event_log,
         hub,
-        doors.clock,
-        doors.history_state,
+        ports.clock,
+        ports.history_state,
         latency,
     )
     return Pipeline(
-        hub, minutes, chain, world, latency, ingest, assessor, commander, loop
+        hub,
+        event_log,
+        health_monitor,
+        world,
+        latency,
+        ingest,
+        evaluator,
+        commander,
+        loop,
     )

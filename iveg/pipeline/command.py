@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from iveg.domain.alarms import Condition
+from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import (
@@ -31,7 +31,7 @@ from iveg.domain.stop import (
     Press,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
     StopMachine,
     Wanted,
 )
@@ -39,7 +39,7 @@ from iveg.domain.stop import conditions as stop_conditions
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import Transport
 from iveg.pipeline import topics
-from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock, CommandPort, Fleet, Ids, Journal
 from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
@@ -67,7 +67,7 @@ class Commander:
         ports: The transports that carry orders, each with its way out.
         fleet: Keeps the desired state of each robot.
         journal: Outlives a crash.
-        minutes: Tells people and the history.
+        event_log: Tells people and the history.
         hub: Tells browsers.
         new_id: Makes ULIDs.
         clock: Reads both clocks.
@@ -82,7 +82,7 @@ class Commander:
         ports: Mapping[Transport, CommandPort],
         fleet: Fleet,
         journal: Journal,
-        minutes: Minutes,
+        event_log: EventLog,
         hub: Hub,
         new_id: Ids,
         clock: Clock,
@@ -102,11 +102,11 @@ class Commander:
         self._presses = Presses()
         by_id = {transport.id: port for transport, port in ports.items()}
         self._sender = Sender(
-            by_id, fleet, journal, minutes, clock, self._came_back, is_cut
+            by_id, fleet, journal, event_log, clock, self._came_back, is_cut
         )
         self._agent_lag_s = agent_lag_s
         self._journal = journal
-        self._minutes = minutes
+        self._event_log = event_log
         self._hub = hub
         self._new_id = new_id
 
@@ -158,7 +158,7 @@ class Commander:
         await asyncio.sleep(0)
         stands = [one for one in pressed if self.machine(one.robot_id).follows(one)]
         await asyncio.gather(
-            self._minutes.secured(),
+            self._event_log.flushed(),
             *(
                 self._journal.wanted(one.robot_id, "stopped", one.hold_id, by, at)
                 for one in stands
@@ -275,8 +275,8 @@ class Commander:
             stood = row.kind == "stop" and row.state != "READY"
             if machine is not None and machine.wants_stop and stood:
                 heir = None if machine.stop is None else machine.stop.command_id
-            self._minutes.left_over(row, heir, now)
-        self._sender.start(self._minutes.secured(), "audit-earlier")
+            self._event_log.left_over(row, heir, now)
+        self._sender.start(self._event_log.flushed(), "audit-earlier")
 
     def broker_back(self) -> None:
         """The broker is there (again): it must hold every level."""
@@ -303,16 +303,16 @@ class Commander:
                 case SendOnce():
                     machine.note_lag(self._agent_lag_s(at))
                     self._sender.send(machine, effect)
-                case SetLevel():
+                case SetDesiredState():
                     self._sender.send(machine, effect)
                 case Changed():
                     self._tell(machine, effect, at)
                     self._sender.start(
-                        self._minutes.secured(), f"audit-{machine.robot_id}"
+                        self._event_log.flushed(), f"audit-{machine.robot_id}"
                     )
                 case Closed():
                     self.commands[effect.command.command_id] = effect.command
-                    self._minutes.closed(effect, at)
+                    self._event_log.closed(effect, at)
                 case OffTable():
                     self._note_mistake(effect)
         for command in _open(machine):
@@ -344,7 +344,7 @@ class Commander:
             del self.commands[next(iter(self.commands))]
         command = self.commands.get(changed.command_id)
         if command is not None:
-            self._minutes.command(command, changed, at)
+            self._event_log.command(command, changed, at)
             if command.drill and changed.key == "standing":
                 self.drills.passed(command.robot_id, command.times.requested.wall)
             if changed.key in ("ready", "running"):
@@ -366,7 +366,7 @@ class Commander:
         for earlier in reversed(self.commands.values()):
             if earlier.robot_id == command.robot_id and earlier.kind == "stop":
                 if earlier is not command:
-                    self._minutes.command(earlier, None, at)
+                    self._event_log.command(earlier, None, at)
                 return
 
     def _log_line(
@@ -385,7 +385,7 @@ class Commander:
                 took = 1000.0 * (at.mono - command.times.requested.mono)
             if took is not None:
                 slots["ms"] = round(took)
-        self._minutes.log(
+        self._event_log.log(
             LogEvent("command", f"log.stop.{changed.key}", slots, machine.robot_id), at
         )
 

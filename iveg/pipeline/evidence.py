@@ -4,41 +4,41 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 
-from iveg.domain.alerts import Rule
 from iveg.domain.decisions import Decision, Link, Place
+from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.hazards import Hazard
-from iveg.domain.mandates import Crossing
 from iveg.domain.observations import Instant
 from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.zones import Zone
 from iveg.domain.world import World
 
 
 def record_of(decision: Decision, now: Instant) -> DecisionRecord:
     """The whole chain as it stands at ``now``; open links may yet come."""
     crossing = decision.crossing
-    hazard, sighting = crossing.hazard, crossing.hazard.sighting
+    zone, sighting = crossing.zone, crossing.zone.sighting
     return DecisionRecord(
         decision_id=decision.decision_id,
         kind="mandate",
         robot_id=crossing.robot_id,
         started_at=crossing.entered.wall,
-        person_id=hazard.cause,
-        observer=hazard.observer,
-        class_=hazard.reason,
+        person_id=zone.cause,
+        observer=zone.observer,
+        class_=zone.reason,
         class_id=None if sighting is None else sighting.class_id,
         confidence=None if sighting is None else sighting.confidence,
-        x=hazard.x,
-        y=hazard.y,
+        x=zone.x,
+        y=zone.y,
         z=None if sighting is None else sighting.z,
         distance_m=crossing.entered_m,
         speed_factor=HALF_SPEED,
-        reason=hazard.reason,
+        reason=zone.reason,
         rule_id=decision.rule.id,
         rule_version=str(decision.rule.version),
         rule_parameters=json.dumps(
             {
-                **_parameters(decision.rule, hazard),
+                **_parameters(decision.rule, zone),
                 "places": [asdict(one) for one in decision.places],
             }
         ),
@@ -55,7 +55,7 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
 
 def places_of(crossing: Crossing, world: World) -> Iterator[Place]:
     """Where the robot that is slowed and the observer are now, as far as is known."""
-    for robot_id in dict.fromkeys((crossing.robot_id, crossing.hazard.observer)):
+    for robot_id in dict.fromkeys((crossing.robot_id, crossing.zone.observer)):
         robot = world.robots.get(robot_id or "")
         if robot is not None and robot.odometry is not None:
             pose = robot.odometry.pose
@@ -88,13 +88,13 @@ def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
     return replace(record, cleared_at=found, members=text)
 
 
-def _parameters(rule: Rule, hazard: Hazard) -> dict[str, object]:
+def _parameters(rule: Rule, zone: Zone) -> dict[str, object]:
     return {
-        "threshold": rule.threshold_of(hazard.reason),
+        "threshold": rule.threshold_of(zone.reason),
         "radius_m": rule.radius_m,
-        "ring_m": round(hazard.radius_m, 3),
+        "ring_m": round(zone.radius_m, 3),
         "author": rule.author,
-        "possible": hazard.sighting is not None and hazard.sighting.possible,
+        "possible": zone.sighting is not None and zone.sighting.possible,
     }
 
 

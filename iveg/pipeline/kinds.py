@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from iveg.domain.alarms import Condition
+from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.events import Slot
 from iveg.domain.observations import (
     Battery,
-    Canary,
     Climate,
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    HeartbeatProbe,
     LaserScan,
     Navigation,
     Observation,
@@ -98,7 +98,7 @@ KINDS = (
     Kind(CommandStatus, ordered="by arrival", lands="command_status"),
     Kind(CommandAnswer, may_drop=False, lands="commander", direct="safety", qos=1),
     Kind(Climate, ordered="by arrival", lands="climate", touches=(topics.CLIMATE,)),
-    Kind(Canary, ordered="by arrival", lands="canary_at"),
+    Kind(HeartbeatProbe, ordered="by arrival", lands="canary_at"),
     Kind(
         Battery,
         touches=(topics.ROBOT,),

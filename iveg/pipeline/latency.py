@@ -10,7 +10,7 @@ from iveg.domain.latency.sketch import Sketch, merged, read_bins, write_bins
 from iveg.domain.latency.watch import LatencyWatch, Measured
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import LatencyRecord
-from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.record import RecordSink
 
 _QUIET_S = 10.0
@@ -20,10 +20,12 @@ _QUIET_S = 10.0
 class LatencyMonitor:
     """Hands messages to the watch, and what it found to the history and the log."""
 
-    def __init__(self, watch: LatencyWatch, sink: RecordSink, minutes: Minutes) -> None:
+    def __init__(
+        self, watch: LatencyWatch, sink: RecordSink, minutes: EventLog
+    ) -> None:
         self.watch = watch
         self._sink = sink
-        self._minutes = minutes
+        self._event_log = minutes
         self._told: dict[str, float] = {}
 
     def decided(self, taken: Iterable[Received], now: Instant) -> None:
@@ -57,7 +59,7 @@ class LatencyMonitor:
                 remark.slots,
                 None if robot is None else str(robot),
             )
-            self._minutes.log(event, now)
+            self._event_log.log(event, now)
 
 
 def hours_of(kept: Sequence[LatencyRecord]) -> list[Measured]:

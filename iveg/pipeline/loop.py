@@ -7,14 +7,14 @@ import asyncio
 from collections.abc import Callable, Iterable
 
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Canary, CommandAnswer, Instant, Received
+from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Instant, Received
 from iveg.pipeline import topics
-from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, Hop, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
-from iveg.pipeline.minutes import Minutes
 from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub
 
@@ -30,25 +30,25 @@ class RuleLoop:
     def __init__(
         self,
         ingest: Ingest,
-        assessor: Assessor,
+        evaluator: Evaluator,
         commander: Commander,
-        chain: HealthMonitor,
-        minutes: Minutes,
+        health_monitor: HealthMonitor,
+        event_log: EventLog,
         hub: Hub,
         clock: Clock,
         database_state: Callable[[], HopState],
         latency: LatencyMonitor,
     ) -> None:
         self._ingest = ingest
-        self._assessor = assessor
+        self._evaluator = evaluator
         self._commander = commander
-        self._chain = chain
-        self._minutes = minutes
+        self._health_monitor = health_monitor
+        self._event_log = event_log
         self._hub = hub
         self._clock = clock
         self._database_state = database_state
         self._latency = latency
-        self._apart_s = APART_S * len(assessor.world.robots)
+        self._apart_s = APART_S * len(evaluator.world.robots)
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._states: dict[str, HopState] = {}
@@ -71,31 +71,31 @@ class RuleLoop:
         """Take everything that arrived, then let time pass if it is due."""
         taken = []
         for received in arrived:
-            fresh = self._assessor.take(received)
+            fresh = self._evaluator.take(received)
             if fresh:
                 taken.append(received)
-            if isinstance(received.observation, Canary):
-                self._chain.received(received.observation.origin, received.at)
-            if received.asked or self._assessor.world.refuses(received):
+            if isinstance(received.observation, HeartbeatProbe):
+                self._health_monitor.received(received.observation.origin, received.at)
+            if received.asked or self._evaluator.world.refuses(received):
                 continue
             # The second transport's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
-                self._commander.take(received, self._assessor.world.age_then(received))
-        self._assessor.settle()
+                self._commander.take(received, self._evaluator.world.age_then(received))
+        self._evaluator.settle()
         if taken:
             self._latency.decided(taken, self._clock())
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)
-            self._assessor.tick(now, self._commander.conditions(now))
+            self._evaluator.tick(now, self._commander.conditions(now))
             self._watch_chain(now)
             self._latency.tick(now)
 
     def _watch_chain(self, now: Instant) -> None:
-        self._chain.received_at = self._assessor.world.canary_at
-        self._chain.database = self._database_state()
+        self._health_monitor.received_at = self._evaluator.world.heartbeat_at
+        self._health_monitor.database = self._database_state()
         changed = False
-        for hop in self._chain.hops(now):
+        for hop in self._health_monitor.hops(now):
             if hop.state == self._states.get(hop.name):
                 continue
             self._states[hop.name] = hop.state
@@ -116,4 +116,4 @@ class RuleLoop:
         else:
             return
         slots = {"hop": hop.name, "detail": hop.detail}
-        self._minutes.log(LogEvent("system", key, slots), now)
+        self._event_log.log(LogEvent("system", key, slots), now)

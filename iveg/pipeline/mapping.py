@@ -18,22 +18,22 @@ from iveg.domain.costmap import (
     window_round,
 )
 from iveg.domain.geometry import Rectangle
-from iveg.domain.hazards import Hazard
 from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.rule.zones import Zone
 from iveg.domain.world import RobotState, World
 from iveg.pipeline.ports import Clock
 
 TICK_S = 0.05
 _PERIOD_S = 0.25
 _WIDEST_M = 1000.0
-"""Longer than any house: an open field, mapped in a window round the robots."""
+"""Longer than any greenhouse: an open field, mapped in a window round the robots."""
 
 
 class Mapper:
     """One grid that the fleet shares, and one a robot.
 
     Args:
-        bounds: The outer wall of the house.
+        bounds: The outer wall of the greenhouse.
     """
 
     def __init__(self, world: World, bounds: Rectangle) -> None:
@@ -58,9 +58,9 @@ class Mapper:
         if due:
             self._draw(min(due, key=self._last_drawn), now)
 
-    def shared(self, hazards: Iterable[Hazard], now: Instant) -> Costmap | None:
+    def shared(self, zones: Iterable[Zone], now: Instant) -> Costmap | None:
         """What the fleet knows together; None while nobody has swept."""
-        return _costs(self._shared, hazards, now)
+        return _costs(self._shared, zones, now)
 
     def age_s(self, robot_id: str | None, now: Instant) -> float | None:
         """Since the newest scan of one robot, or of any, was drawn (s); None: never."""
@@ -69,11 +69,9 @@ class Mapper:
         drawn = [at for at in found if at is not None]
         return now.mono - max(drawn) if drawn else None
 
-    def of(
-        self, robot_id: str, hazards: Iterable[Hazard], now: Instant
-    ) -> Costmap | None:
+    def of(self, robot_id: str, zones: Iterable[Zone], now: Instant) -> Costmap | None:
         """What one robot believes: its own scans, and whom feedback told it of."""
-        others = [hazard for hazard in hazards if hazard.cause != robot_id]
+        others = [zone for zone in zones if zone.cause != robot_id]
         return _costs(self._own.get(robot_id), others, now)
 
     def _is_due(self, robot: RobotState, now: Instant) -> bool:
@@ -117,13 +115,11 @@ def _added(
 
 
 def _costs(
-    occupancy: Occupancy | None, hazards: Iterable[Hazard], now: Instant
+    occupancy: Occupancy | None, zones: Iterable[Zone], now: Instant
 ) -> Costmap | None:
     if occupancy is None:
         return None
     occupancy.fade(now.mono)
     return occupancy.costs(
-        Ring(hazard.x, hazard.y, hazard.radius_m)
-        for hazard in hazards
-        if hazard.recording is None
+        Ring(zone.x, zone.y, zone.radius_m) for zone in zones if zone.recording is None
     )

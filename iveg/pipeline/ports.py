@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant
 
@@ -44,10 +44,10 @@ class Fleet(Protocol):
     def tell(self, feedback: Feedback) -> None:
         """Offer feedback to the fleet; the newest of each topic counts."""
 
-    async def set_level(
+    async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
     ) -> None:
-        """Publish the retained level.
+        """Publish the retained desired state.
 
         Raises:
             HopError: the broker did not take it.

@@ -21,7 +21,7 @@ class RecordSink(Protocol):
     def offer(self, record: Record) -> None:
         """Remember a record in a while; never blocks and never fails."""
 
-    async def secured(self) -> None:
+    async def flushed(self) -> None:
         """Return when every command and audit row so far would outlive a crash."""
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import OutdatedError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
-from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import RuleStore
 
 
@@ -27,11 +27,11 @@ class Rules:
     """
 
     def __init__(
-        self, judge: Judge, store: RuleStore, minutes: Minutes, past: Iterable[Rule]
+        self, judge: Judge, store: RuleStore, event_log: EventLog, past: Iterable[Rule]
     ) -> None:
         self._judge = judge
         self._store = store
-        self._minutes = minutes
+        self._event_log = event_log
         self._one_by_one = asyncio.Lock()
         self.versions = [*past] or [judge.rule]
 
@@ -69,7 +69,7 @@ class Rules:
             await self._store.append(rule)
             self._judge.rule = rule
             self.versions.append(rule)
-        self._minutes.rule(_line(before, rule), at)
+        self._event_log.rule(_line(before, rule), at)
         return rule
 
 

@@ -15,11 +15,11 @@ from iveg.domain.stop import (
     Effect,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
     StopMachine,
 )
 from iveg.domain.transports import TransportId
-from iveg.pipeline.minutes import Minutes
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock, CommandPort, Fleet, Journal
 
 _log = logging.getLogger(__name__)
@@ -34,7 +34,7 @@ class Sender:
         ports: The way out of each transport.
         fleet: Keeps the desired state of each robot.
         journal: Knows what a release names before it goes.
-        minutes: Holds the audit row of a release before it goes.
+        event_log: Holds the audit row of a release before it goes.
         clock: Reads both clocks.
         came_back: Told how each send went.
         is_cut: Whether what lies behind a transport is known to pass nothing on.
@@ -45,7 +45,7 @@ class Sender:
         ports: Mapping[TransportId, CommandPort],
         fleet: Fleet,
         journal: Journal,
-        minutes: Minutes,
+        event_log: EventLog,
         clock: Clock,
         came_back: CameBack,
         is_cut: IsCut,
@@ -53,15 +53,15 @@ class Sender:
         self._ports = ports
         self._fleet = fleet
         self._journal = journal
-        self._minutes = minutes
+        self._event_log = event_log
         self._clock = clock
         self._came_back = came_back
         self._is_cut = is_cut
-        self._levels: dict[str, SetLevel] = {}
+        self._desired_states: dict[str, SetDesiredState] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     def send(
-        self, machine: StopMachine, effect: SendStop | SendOnce | SetLevel
+        self, machine: StopMachine, effect: SendStop | SendOnce | SetDesiredState
     ) -> None:
         """Begin to send; how it went comes back later."""
         match effect:
@@ -71,14 +71,14 @@ class Sender:
             case SendOnce():
                 name = f"{effect.kind}-{effect.robot_id}"
                 self.start(self._send_once(machine, effect), name)
-            case SetLevel():
-                self._levels[effect.robot_id] = effect
-                self._start_level(effect)
+            case SetDesiredState():
+                self._desired_states[effect.robot_id] = effect
+                self._start_desired_state(effect)
 
     def levels_again(self) -> None:
         """The broker is there (again): it must hold every level."""
-        for level in self._levels.values():
-            self._start_level(level)
+        for level in self._desired_states.values():
+            self._start_desired_state(level)
 
     def start(self, work: Coroutine[Any, Any, None], name: str) -> None:
         """Do this without waiting for it; a failure is logged."""
@@ -108,7 +108,9 @@ class Sender:
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
         """Once, and never without a trace: the audit row is on disk before it goes."""
-        await asyncio.gather(self._minutes.secured(), self._note_named(machine, effect))
+        await asyncio.gather(
+            self._event_log.flushed(), self._note_named(machine, effect)
+        )
         if machine.once is None or machine.once.command_id != effect.command_id:
             # The disk took so long that a STOP has come, or taken its place.
             return
@@ -165,12 +167,14 @@ class Sender:
             )
             self._came_back(machine, effects, at)
 
-    def _start_level(self, level: SetLevel) -> None:
-        self.start(self._set_level(level), f"level-{level.robot_id}")
+    def _start_desired_state(self, level: SetDesiredState) -> None:
+        self.start(self._set_desired_state(level), f"level-{level.robot_id}")
 
-    async def _set_level(self, level: SetLevel) -> None:
+    async def _set_desired_state(self, level: SetDesiredState) -> None:
         try:
-            await self._fleet.set_level(level.robot_id, level.desired, level.ids)
+            await self._fleet.set_desired_state(
+                level.robot_id, level.desired, level.ids
+            )
         except HopError as error:
             # Published again when the broker is back (``levels_again``).
             _log.info("level of %s not set: %s", level.robot_id, error)

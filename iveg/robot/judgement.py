@@ -12,7 +12,7 @@ from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.robot.caps import FREE, Applied, Cap, lowest
-from iveg.robot.hearsay import Hearsay
+from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 
 _REST = Twist2D(0.0, 0.0)
@@ -60,7 +60,7 @@ class Judgement:
     def __init__(self, robot_id: str, boot_at: float, limits: Limits) -> None:
         self._id = robot_id
         self._limits = limits
-        self._hearsay = Hearsay(robot_id)
+        self._peer_feedback = PeerFeedback(robot_id)
         self._motion: Motion | None = None
         self._applied = Applied(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
@@ -106,7 +106,7 @@ class Judgement:
 
     def told(self, topic: str, feedback: Feedback, now: float) -> None:
         """Take a message of ``/{topic}/mqtt_feedback``."""
-        if self._hearsay.take(topic, feedback, self._own(now), now):
+        if self._peer_feedback.take(topic, feedback, self._own(now), now):
             self.watchdog.heard(feedback.seen.get(self._id), now)
 
     def settle(self, now: float) -> None:
@@ -118,7 +118,7 @@ class Judgement:
                 self.local,
                 self._pose_cap(now),
                 self._silence_cap(now),
-                *self._hearsay.caps(self._own(now), slowed, now),
+                *self._peer_feedback.caps(self._own(now), slowed, now),
             )
         )
         self._applied = self._applied.settle(raw, now)

@@ -66,7 +66,7 @@ def read_order(payload: bytes) -> Order:
     return _release_or_resume(message)
 
 
-def read_level(payload: bytes) -> tuple[str, ...] | None:
+def read_desired_state(payload: bytes) -> tuple[str, ...] | None:
     """Read ``/{robot}/iveg/desired``.
 
     Returns:

@@ -13,7 +13,7 @@ r"""The safety machine of one robot, pure: facts and times in, frozen effects ou
              feedback was fresh for 2.0 s, three times a minute, if no other hold came
 
 The state is never stored: it follows from the holds, the measured speed and whether
-somebody resumed.  Algorithm 3 of the paper is in ``hearsay``; here silence is added,
+somebody resumed.  Algorithm 3 of the paper is in ``peer_feedback``; here silence is added,
 which the paper takes for permission and iVeg does not.
 """
 
@@ -29,7 +29,7 @@ from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Repor
 from iveg.robot.gate import Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
-from iveg.robot.orders import Release, Resume, Stop, read_level, read_order
+from iveg.robot.orders import Release, Resume, Stop, read_desired_state, read_order
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
@@ -159,8 +159,8 @@ class SafetyMachine:
         return self._effects(now, answer)
 
     def desired(self, payload: bytes, now: float) -> tuple[Effect, ...]:
-        """The retained level came; ``run`` releases nothing."""
-        level = read_level(payload)
+        """The retained desired state came; ``run`` releases nothing."""
+        level = read_desired_state(payload)
         if level is not None:
             for hold_id in level or (None,):
                 self._stop(hold_id, now)

@@ -163,7 +163,7 @@ class Uplink:
             codec.format_stamp(at.wall),
             at.wall,
             at.mono,
-            echoes=echo is not None,
+            acknowledgements=echo is not None,
             heard=None if echo is None else echo.heard,
             replay=self._replay,
         )

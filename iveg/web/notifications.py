@@ -16,9 +16,9 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
 from iveg.pipeline.ingest import Ingest
-from iveg.web.auth import Action, NotifySecret
 from iveg.web.problems import Problem, problem_of
-from iveg.web.security import MAX_BODY, NOTIFICATIONS_PATH
+from iveg.web.security.authentication import Action, NotifySecret
+from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH
 
 _TAKEN = (
     {"type": "http.response.start", "status": 204, "headers": []},

@@ -35,25 +35,25 @@ from iveg.domain.errors import (
 _MOST_COMPLAINTS = 20
 
 
-class DoorError(IvegError):
+class AccessError(IvegError):
     """Root of what the door refuses before anybody inside is asked."""
 
 
-class NotSignedInError(DoorError):
+class NotSignedInError(AccessError):
     """Nobody is known behind this request."""
 
     def __init__(self) -> None:
         super().__init__("Sign in with the link that iVeg printed, or send a token.")
 
 
-class ForeignOriginError(DoorError):
+class ForeignOriginError(AccessError):
     """A browser sent this from another site, or without iVeg's own header."""
 
     def __init__(self, missing: str) -> None:
         super().__init__(f"This did not come from iVeg's own page: {missing}.")
 
 
-class NotJsonError(DoorError):
+class NotJsonError(AccessError):
     """A body that is not declared as JSON."""
 
     def __init__(self) -> None:

@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain import margins as margins_
-from iveg.domain.echoes import echoes_of
+from iveg.domain.acknowledgements import acknowledgements_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.mandates import Crossing
 from iveg.domain.margins import LeastMargins, least, margins_of
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
+from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
@@ -43,11 +43,11 @@ from iveg.models.robot import (
 )
 from iveg.models.rule import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
-from iveg.pipeline.assess import Assessor
 from iveg.pipeline.command import Commander
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.health_monitor import Hop as ChainHop
-from iveg.pipeline.minutes import Minutes
 
 _FIRST_LINES = 200
 
@@ -57,26 +57,26 @@ class Views:
 
     def __init__(
         self,
-        assessor: Assessor,
+        evaluator: Evaluator,
         commander: Commander,
-        minutes: Minutes,
-        chain: HealthMonitor,
+        event_log: EventLog,
+        health_monitor: HealthMonitor,
         counters: Callable[[], Counter[str]],
     ) -> None:
-        self._assessor = assessor
+        self._evaluator = evaluator
         self._commander = commander
-        self._minutes = minutes
-        self._chain = chain
+        self._event_log = event_log
+        self._health_monitor = health_monitor
         self._counters = counters
 
     @property
     def _world(self) -> World:
-        return self._assessor.world
+        return self._evaluator.world
 
     @property
     def greenhouse(self) -> Greenhouse:
-        """The house that is shown."""
-        return self._assessor.greenhouse
+        """The greenhouse that is shown."""
+        return self._evaluator.greenhouse
 
     # --- robots -------------------------------------------------------------------
 
@@ -107,7 +107,7 @@ class Views:
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
-            mandate=SpeedLimit.of(self._assessor.mandates[robot_id]),
+            speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
             holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,
@@ -135,7 +135,7 @@ class Views:
         That a STOP is wanted is in ``stop_state``: here a robot stands by its own word
         alone, and not by an old one.
         """
-        factor = self._assessor.mandates[robot.robot_id].speed_factor
+        factor = self._evaluator.speed_limits[robot.robot_id].speed_factor
         report, received = robot.safety, robot.safety_received
         is_fresh = (
             received is not None and now.mono - received.mono <= LIMITS.report_stale_s
@@ -189,17 +189,17 @@ class Views:
         margins = margins or self.margins(now)
         return [
             self._person(one, margins, now)
-            for one in self._assessor.people.known.values()
+            for one in self._evaluator.people.known.values()
         ]
 
     def _person(
         self, person: Person, margins: LeastMargins, now: Instant
     ) -> PersonModel:
-        newest, rule = person.newest, self._assessor.rule
+        newest, rule = person.newest, self._evaluator.rule
         crossings = [
             one
-            for one in self._assessor.crossings
-            if one.hazard.cause == person.person_id
+            for one in self._evaluator.crossings
+            if one.zone.cause == person.person_id
         ]
         rings = person.rings(rule, now)
         return PersonModel(
@@ -223,7 +223,7 @@ class Views:
         )
 
     def _people(self) -> list[Person]:
-        return list(self._assessor.people.known.values())
+        return list(self._evaluator.people.known.values())
 
     def _fleet(self) -> list[RobotState]:
         return list(self._world.live_robots())
@@ -241,7 +241,7 @@ class Views:
             age_s=round(now.mono - robot.detections_at, 3),
             items=[
                 Detection.of(one, robot_id, stamp, road)
-                for one in self._assessor.placed.get(robot_id, [])
+                for one in self._evaluator.placed.get(robot_id, [])
             ],
         )
 
@@ -272,13 +272,13 @@ class Views:
 
     def alerts(self) -> list[Alert]:
         """All that is for people to see now, gravest first."""
-        waiting = self._assessor.alarms.waiting
+        waiting = self._evaluator.alerts.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
         return [Alert.of(one) for one in waiting]
 
     def flood(self) -> Flood:
-        """How fast alarms come."""
-        return Flood.of(self._assessor.alarms.flood)
+        """How fast alerts come."""
+        return Flood.of(self._evaluator.alerts.flood)
 
     def log(self, lines: Iterable[LogRecord]) -> list[LogEntry]:
         """Lines of the log."""
@@ -286,23 +286,23 @@ class Views:
 
     def newest_log(self) -> list[LogEntry]:
         """The lines that a page begins with, oldest first."""
-        return self.log(list(self._minutes.lines)[-_FIRST_LINES:])
+        return self.log(list(self._event_log.lines)[-_FIRST_LINES:])
 
     def health(self, now: Instant) -> Health:
         """Every hop with its state and age, all counters, and how the fleet is told."""
-        hops = [_hop(one) for one in self._chain.hops(now)]
+        hops = [_hop(one) for one in self._health_monitor.hops(now)]
         return Health(
             ok=all(hop.state == "ok" for hop in hops),
             hops=hops,
             counters=dict(sorted(self._counters().items())),
             safety=self.safety(now),
-            earlier=self._chain.earlier(now),
+            earlier=self._health_monitor.earlier(now),
         )
 
     def safety(self, now: Instant) -> Safety:
         """How soon the fleet obeys, and how close it comes to people."""
-        echoes = echoes_of(self._assessor.live_decisions(), now)
-        return Safety.of(echoes, self._assessor.exposure, now)
+        acknowledgements = acknowledgements_of(self._evaluator.live_decisions(), now)
+        return Safety.of(acknowledgements, self._evaluator.exposure, now)
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""
@@ -317,7 +317,7 @@ class Views:
 
     def rule(self) -> Rule:
         """The version of the rule that is in force."""
-        return Rule.of(self._assessor.rule)
+        return Rule.of(self._evaluator.rule)
 
 
 def _hop(hop: ChainHop) -> Hop:

@@ -39,7 +39,7 @@ def test_every_measure_topic_is_in_the_contract(device: names.Device) -> None:
     "topic",
     [
         names.measure_topic("{apikey}", names.CLIMATE_DEVICE),
-        names.measure_topic("{apikey}", names.CANARY_ID),
+        names.measure_topic("{apikey}", names.HEARTBEAT_ID),
         names.command_topic("{apikey}", "{robot}"),
         names.answer_topic("{apikey}", "{robot}"),
         names.FEEDBACK_TOPIC.format(robot_id="{robot}"),

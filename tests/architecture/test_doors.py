@@ -8,7 +8,7 @@ from fastapi.routing import iter_route_contexts
 
 from iveg.app import Dss, create_app
 from iveg.settings import Settings
-from iveg.web.auth import Action, declared_action, undeclared
+from iveg.web.security.authentication import Action, declared_action, undeclared
 from tests.processes import ROOT
 
 INTERFACES = (ROOT / "docs/interfaces.md").read_text()

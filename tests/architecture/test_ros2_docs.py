@@ -7,9 +7,9 @@ from dataclasses import fields
 
 import pytest
 
-from iveg.cli.words import add_robot_words
+from iveg.cli.arguments import add_robot_arguments
 from iveg.robot.ros2.config import RobotConfig, Topics, read_config
-from iveg.robot.ros2.senses import TOPICS
+from iveg.robot.ros2.inputs import TOPICS
 from tests.processes import ROOT
 
 ROBOTS = (ROOT / "docs/robots.md").read_text()
@@ -45,7 +45,7 @@ def test_every_type_that_is_read_is_in_the_contract(message: str) -> None:
 
 def test_every_word_of_the_command_line_is_in_the_contract() -> None:
     parser = argparse.ArgumentParser()
-    add_robot_words(parser.add_subparsers())
+    add_robot_arguments(parser.add_subparsers())
 
     usage = parser.parse_args(["robot", "--id", "AGI"])
     words = {f"--{name.replace('_', '-')}" for name in vars(usage) if name != "action"}

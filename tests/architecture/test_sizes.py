@@ -31,7 +31,7 @@ LARGE_FILES = {
     "iveg/domain/world.py": "to be divided: one robot and all of them",
     "iveg/domain/stop/machine.py": "one machine, read in call order to its table",
     "iveg/embedded/context_broker.py": "to be divided: entities and subscriptions",
-    "iveg/robot/ros2/senses.py": TABLE,
+    "iveg/robot/ros2/inputs.py": TABLE,
     "iveg/ros2/messages.py": TABLE,
 }
 LARGE_FUNCTIONS = {
@@ -41,19 +41,19 @@ LARGE_FUNCTIONS = {
     "iveg/emulator/fleet.py run_emulator": LIST,
     "iveg/emulator/replay.py run_replay": LIST,
     "iveg/robot/node.py RobotNode.__init__": LIST,
-    "iveg/static/js/i18n.js createWords": STATE,
-    "iveg/static/js/map.js createMap": STATE,
+    "iveg/static/js/core/i18n.js createWords": STATE,
+    "iveg/static/js/map/map.js createMap": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
-    "iveg/static/js/socket.js connect": STATE,
-    "iveg/static/js/store.js createStore": STATE,
+    "iveg/static/js/core/socket.js connect": STATE,
+    "iveg/static/js/core/store.js createStore": STATE,
     "iveg/web/views.py Views.robot": TABLE,
 }
 LARGE_CLOSURES = {
-    "iveg/static/js/map.js createMap": STATE,
+    "iveg/static/js/map/map.js createMap": STATE,
     "iveg/static/js/panels/robots.js createCard": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
-    "iveg/static/js/socket.js connect": STATE,
-    "iveg/static/js/store.js createStore": STATE,
+    "iveg/static/js/core/socket.js connect": STATE,
+    "iveg/static/js/core/store.js createStore": STATE,
 }
 
 

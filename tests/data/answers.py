@@ -19,16 +19,16 @@ import orjson
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
-from iveg.domain.alarms import Condition
+from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.observations import Climate, Instant, Navigation, RobotFault
 from iveg.domain.records import Record
 from iveg.models.base import write_json
 from iveg.pipeline.publish import Subscriber
 from iveg.pipeline.record import Waiting
-from iveg.web import history, stop_records
-from iveg.web.auth import Principal, require
-from iveg.web.feed import TelemetryFeed
-from iveg.web.painting import Painting
+from iveg.web.api import history, stop_records
+from iveg.web.live.feed import TelemetryFeed
+from iveg.web.live.painting import Painting
+from iveg.web.security.authentication import Principal, require
 from tests.builders import detection, detection_frame, hold, safety_report, scan
 from tests.fakes.records import (
     NOON,
@@ -122,7 +122,7 @@ async def _world() -> WebDesk:
     )
     await desk.wait(0.1)
     lost = Condition("P2", "alert.robot_lost", "AGIII", "AGIII", {"robot": "AGIII"})
-    desk.assessor.alarms.sync([lost], desk.clock())
+    desk.evaluator.alerts.sync([lost], desk.clock())
     return desk
 
 

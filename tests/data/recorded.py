@@ -36,9 +36,9 @@ def real_log(name: str) -> Path:
 
 def emulated_logs(folder: Path, seconds: float = 20.0) -> tuple[Path, ...]:
     """What each robot of the demo records of its first seconds, a file for each."""
-    house = load_greenhouse("mvsim-20x20")
-    layout = lay_out(scenario_named("demo"), ROBOTS, house)
-    world = World(house, layout, DETECTORS["perfect"], seed=1)
+    greenhouse = load_greenhouse("mvsim-20x20")
+    layout = lay_out(scenario_named("demo"), ROBOTS, greenhouse)
+    world = World(greenhouse, layout, DETECTORS["perfect"], seed=1)
     lines: dict[str, list[str]] = {robot_id: [] for robot_id in ROBOTS}
     for now in _drive(world, seconds):
         for robot_id, rig in world.rigs.items():

@@ -1,4 +1,4 @@
-"""A house whose clock stands still: one snapshot of a fleet over one history.
+"""A greenhouse whose clock stands still: one snapshot of a fleet over one history.
 
 Pages of a real ``iveg serve`` show it, without robots, brokers or chance: for pictures,
 and for where things stand on a page.

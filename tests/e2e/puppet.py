@@ -140,7 +140,7 @@ class Puppet:
                 self._seq,
                 format_stamp(now.wall),
                 mono=now.mono - self._started,
-                echoes=True,
+                acknowledgements=True,
                 heard=self._echo.heard,
             )
         )

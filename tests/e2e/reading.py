@@ -53,7 +53,7 @@ def serious(page: Page, *rules: str) -> list[str]:
 
 
 def visit(page: Page, route: str) -> None:
-    """Another page of the same house, until it hears the server."""
+    """Another page of the same greenhouse, until it hears the server."""
     page.goto(re.sub(r"(://[^/]+).*", rf"\1{route}", page.url))
     page.wait_for_selector('#mark[data-state="open"]', state="attached")
 

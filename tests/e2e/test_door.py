@@ -8,7 +8,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from iveg.web.security import CONTENT_SECURITY_POLICY, MAX_BODY
+from iveg.web.security.headers import CONTENT_SECURITY_POLICY, MAX_BODY
 from tests.processes import Site
 
 pytestmark = pytest.mark.e2e

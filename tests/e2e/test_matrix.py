@@ -88,7 +88,7 @@ def test_the_log_can_be_reached(live: Page, width: int) -> None:
     live.reload()
 
 
-def test_a_key_follows_a_robot_and_another_fits_the_house(live: Page) -> None:
+def test_a_key_follows_a_robot_and_another_fits_the_greenhouse(live: Page) -> None:
     live.keyboard.press("1")
     expect(live.locator("#following")).to_contain_text("AGI")
 
@@ -302,8 +302,8 @@ _THUMBNAIL = """(canvas) => {
 }"""
 _ON_SCREEN = """async ([rings, robots]) => {
   const {createViewport, fitTo, screenX, screenY} =
-    await import('/static/js/viewport.js');
-  const {coverOf} = await import('/static/js/layers/scalebar.js');
+    await import('/static/js/map/viewport.js');
+  const {coverOf} = await import('/static/js/map/layers/scalebar.js');
   const {bounds} = await (await fetch('/api/v1/map')).json();
   const {left, top, width, height} =
     document.querySelector('#map').getBoundingClientRect();

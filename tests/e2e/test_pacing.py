@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from iveg.web.pacing import FRAMES
+from iveg.web.live.pacing import FRAMES
 from tests.chaos.radio import Radio, Weather
 from tests.e2e.reading import evaluate
 from tests.fleet import names

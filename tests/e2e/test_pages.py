@@ -26,7 +26,7 @@ STANDING = re.compile(r"PARADO")
 
 @pytest.fixture(scope="module")
 def shown(stack: Site) -> Site:
-    """A house in which something has happened: AGI was stopped once."""
+    """A greenhouse in which something has happened: AGI was stopped once."""
     with stack.api() as api:
         command_id = api.post("robots/AGI/stop").json()["command_id"]
 
@@ -103,7 +103,9 @@ def test_the_fleet_page_draws_the_whole_chain_and_each_device(
     expect(lidar).to_contain_text("hace 0,")
 
 
-def test_the_climate_page_shows_what_the_house_measures(open_page: OpenPage) -> None:
+def test_the_climate_page_shows_what_the_greenhouse_measures(
+    open_page: OpenPage,
+) -> None:
     page = open_page(route="/climate")
 
     expect(page.locator("#climate-temperature")).to_have_text(

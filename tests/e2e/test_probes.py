@@ -1,6 +1,6 @@
 """Names that are markup: refused at the door, or text on every page, never more.
 
-The house has a lane of such a name, and its detectors, robots and people try the rest.
+The greenhouse has a lane of such a name, and its detectors, robots and people try the rest.
 """
 
 import json
@@ -26,10 +26,10 @@ ROUTES = ("/", "/alerts", "/commands", "/history", "/fleet", "/climate", "/setti
 
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A house whose middle lane is named in markup, with robots that drive."""
+    """A greenhouse whose middle lane is named in markup, with robots that drive."""
     place = tmp_path_factory.mktemp("probed")
-    house = Path(iveg.__file__).parent / "data/greenhouses/mvsim-20x20.toml"
-    named = house.read_text().replace('"Pasillo 3"', f'"{PROBE}"')
+    greenhouse = Path(iveg.__file__).parent / "data/greenhouses/mvsim-20x20.toml"
+    named = greenhouse.read_text().replace('"Pasillo 3"', f'"{PROBE}"')
     assert PROBE in named
     (place / "house.toml").write_text(named)
     with site(place, IVEG_GREENHOUSE=str(place / "house.toml")) as probed:

@@ -77,7 +77,7 @@ def test_filters_of_the_log_are_remembered_and_never_hide_in_silence(
     page.locator('[data-filter="kind:speed"]').click()
     page.reload()
 
-    # No slow-down is an alarm, so these two hide everything, and say so.
+    # No slow-down is an alert, so these two hide everything, and say so.
     expect(page.locator("#log-empty")).to_contain_text("Velocidad · P3 aviso")
     expect(priority).to_have_attribute("aria-pressed", "true")
     expect(page.locator("#log li")).to_have_count(0)

@@ -50,7 +50,7 @@ class FakeFleet:
         self.orders.append((challenge, attempt))
         await self._answer()
 
-    async def set_level(
+    async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
     ) -> None:
         self.levels.append((robot_id, desired, tuple(ids)))

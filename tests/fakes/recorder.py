@@ -22,7 +22,7 @@ class FakeRecorder:
     def offer(self, record: Record) -> None:
         self.records.append(record)
 
-    async def secured(self) -> None:
+    async def flushed(self) -> None:
         now = list(self.records)
         await self.opened.wait()
         if len(now) > len(self.durable):

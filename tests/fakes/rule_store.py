@@ -1,6 +1,6 @@
 """A store of rule versions in memory, whose disk may be full."""
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import HopError
 
 

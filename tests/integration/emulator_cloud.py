@@ -12,7 +12,7 @@ from typing import TypeVar
 import aiomqtt
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.feedback import Feedback, SpeedLimit
 from iveg.domain.observations import (
     CommandAnswer,
     Observation,
@@ -49,7 +49,7 @@ class Cloud:
 
     address: BrokerAddress
     speaks: bool = True
-    mandates: dict[str, Mandate] = field(default_factory=dict)
+    speed_limits: dict[str, SpeedLimit] = field(default_factory=dict)
     heard: dict[str, list[Observation]] = field(
         default_factory=lambda: defaultdict(list)
     )
@@ -120,7 +120,7 @@ class Cloud:
                 feedback = Feedback(
                     robot_id,
                     Origin("cloud", seq),
-                    mandates=dict(self.mandates),
+                    speed_limits=dict(self.speed_limits),
                     seen=seen,
                 )
                 self.link.offer(

@@ -16,7 +16,7 @@ WATCHED_S = 90.0
 
 
 def mandated(api: httpx.Client) -> str | None:
-    """The decision behind a mandate that is in force."""
+    """The decision behind a speed limit that is in force."""
     robots = api.get("robots").json()["items"]
     found = (robot["mandate"]["decision_id"] for robot in robots)
     return next((one for one in found if one is not None), None)

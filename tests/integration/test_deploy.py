@@ -191,7 +191,7 @@ PROBES = {
     "/iveg/iveg-doctor/cmdexe",
     "/iveg/iveg-doctor/echo",
 }
-CANARY = {"/iveg/iveg-canary/attrs"}
+HEARTBEAT = {"/iveg/iveg-canary/attrs"}
 ELSEWHERE = {
     "/1234/AGI/attrs",
     "/other/AGI/attrs",
@@ -210,7 +210,7 @@ TOPICS = sorted(
     | FEEDBACK
     | DESIRED
     | PROBES
-    | CANARY
+    | HEARTBEAT
     | ELSEWHERE
 )
 MAY_WRITE = {
@@ -218,7 +218,7 @@ MAY_WRITE = {
     "AGII": of_robot("AGII"),
     "climate": AIR,
     "iot_agent": COMMANDS | {"/iveg/iveg-doctor/cmd"},
-    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | PROBES | CANARY,
+    "iveg_dss": COMMANDS | FEEDBACK | DESIRED | PROBES | HEARTBEAT,
     "iveg_emulator": of_robot("AGI") | of_robot("AGII") | AIR,
     "iveg_health": set(),
 }
@@ -519,22 +519,22 @@ def end_children(pid: int) -> None:
 
 
 async def sing(up: Running) -> None:
-    """One canary reaches Orion."""
+    """One heartbeat probe reaches Orion."""
     async with OrionClient(up.orion_url, "agroconnect", "/greenhouse") as orion:
         await orion.http.ask(
             "POST",
             "/v2/entities",
             query={"options": "upsert"},
             body={
-                "id": names.CANARY_ID,
-                "type": names.CANARY_TYPE,
+                "id": names.HEARTBEAT_ID,
+                "type": names.HEARTBEAT_TYPE,
                 "probe": {"type": "object", "value": {"seq": 1}},
             },
         )
 
 
 async def first_deaf_look(patient: Patient) -> None:
-    """Check until the canary is too old."""
+    """Check until the heartbeat probe is too old."""
     async with asyncio.timeout(30):
         while await patient.check() == 0:
             pass
@@ -548,7 +548,9 @@ async def test_an_agent_that_hears_is_healthy(up: Running, patient: Patient) -> 
     assert patient.said == ""
 
 
-async def test_before_the_first_canary_nobody_is_called_deaf(patient: Patient) -> None:
+async def test_before_the_first_heartbeat_nobody_is_called_deaf(
+    patient: Patient,
+) -> None:
     assert await patient.check() == 0
 
 
@@ -583,7 +585,7 @@ async def test_an_agent_that_hears_again_starts_with_a_clean_slate(
     assert not patient.counts()
 
 
-async def test_a_hung_agent_is_unhealthy_whatever_the_canary_says(
+async def test_a_hung_agent_is_unhealthy_whatever_the_heartbeat_says(
     up: Running, patient: Patient
 ) -> None:
     await sing(up)

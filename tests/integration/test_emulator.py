@@ -14,7 +14,7 @@ from iveg.adapters import clock
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError, SettingsError
-from iveg.domain.feedback import Mandate
+from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
@@ -117,13 +117,13 @@ async def test_robots_publish_all_that_the_contract_names_in_order_and_cleanly(
     assert caplog.records == []
 
 
-async def test_the_crew_releases_at_start_and_the_robot_obeys_a_mandate(
+async def test_the_crew_releases_at_start_and_the_robot_obeys_a_speed_limit(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
     async with running(emulator(address, tmp_path)):
         await until(lambda: cloud.speed("AGII") > 0.7)
 
-        cloud.mandates["AGII"] = Mandate(0.5, "person", "someone", 1.2)
+        cloud.speed_limits["AGII"] = SpeedLimit(0.5, "person", "someone", 1.2)
         await until(lambda: 0.2 < cloud.speed("AGII") < 0.45)
 
         assert cloud.report("AGII").speed_factor == 0.5
@@ -222,7 +222,7 @@ async def test_a_deaf_robot_drives_on_whatever_its_gate_says_and_holds_still_bit
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
     port = FaultPort()
-    cloud.mandates["AGII"] = Mandate(0.5, "person", "someone", 1.0)
+    cloud.speed_limits["AGII"] = SpeedLimit(0.5, "person", "someone", 1.0)
     async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.speed("AGII") > 0.3)
         await port.post({"robot": "AGII", "deaf": True})

@@ -263,7 +263,7 @@ def test_f7_a_slow_orion_is_called_slow_and_delays_no_stop(stack: Stack) -> None
     stack.drives_again("AGII")
 
 
-def test_f4_a_deaf_agent_is_found_by_the_canary_and_a_stop_passes_it_by(
+def test_f4_a_deaf_agent_is_found_by_the_heartbeat_and_a_stop_passes_it_by(
     stack: Stack,
 ) -> None:
     stack.tell_agent(deaf=True)

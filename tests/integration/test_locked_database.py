@@ -80,9 +80,9 @@ async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
                 read = await browser.get("/api/v1/robots")
                 pressed = await press(browser)
                 dss.ingest.offer(Received(odometry("AGI", 3.0), clock.now()))
-                robot = dss.assessor.world.robot("AGI")
+                robot = dss.evaluator.world.robot("AGI")
                 await so(lambda: robot.odometry is not None)
-                judged = dss.assessor.mandates["AGI"]
+                judged = dss.evaluator.speed_limits["AGI"]
 
             written = dss.recorder.counters["history_written"]
             stack.close()  # an end that waits for the database is another matter

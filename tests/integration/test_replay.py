@@ -11,7 +11,7 @@ import pytest
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
-from iveg.domain.feedback import Mandate
+from iveg.domain.feedback import SpeedLimit
 from iveg.domain.observations import (
     DetectionFrame,
     LaserScan,
@@ -120,10 +120,10 @@ async def test_a_stop_pauses_the_log_and_the_robot_reports_standing(
         await until(lambda: cloud.of("AGI", Odometry)[-1].pose.x > stood.x + 0.3)
 
 
-async def test_a_mandate_of_a_half_plays_at_half_the_pace(
+async def test_a_speed_limit_of_a_half_plays_at_half_the_pace(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
-    cloud.mandates["AGI"] = Mandate(0.5, "person", "someone", 1.0)
+    cloud.speed_limits["AGI"] = SpeedLimit(0.5, "person", "someone", 1.0)
     async with running(replay(address, tmp_path)):
         await until(lambda: farthest(cloud) > 2.0)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.feedback import Feedback, SpeedLimit
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
@@ -58,7 +58,7 @@ class Cloud:
     reports: list[SafetyReport] = field(default_factory=list)
     topics: Counter[str] = field(default_factory=Counter)
     speaks: bool = True
-    mandate: Mandate | None = None
+    speed_limit: SpeedLimit | None = None
     backlog_s: float | None = None
     seq: int = 0
     boot: str = "cloud"
@@ -86,11 +86,13 @@ class Cloud:
             if self.speaks and self.link.connected and self.reports:
                 self.seq += 1
                 newest = self.reports[-1].origin.seq or 0
-                mandates = {} if self.mandate is None else {"AGI": self.mandate}
+                speed_limits = (
+                    {} if self.speed_limit is None else {"AGI": self.speed_limit}
+                )
                 feedback = Feedback(
                     "AGII",
                     Origin(self.boot, self.seq),
-                    mandates=mandates,
+                    speed_limits=speed_limits,
                     seen={"AGI": newest},
                     backlog_s=self.backlog_s,
                 )
@@ -224,14 +226,14 @@ async def test_a_stop_survives_a_restart_of_the_robot(
     assert "01STOP" in {hold.id for hold in again.node.holds}
 
 
-async def test_a_crew_at_the_robot_lets_it_drive_and_a_mandate_halves_it(
+async def test_a_crew_at_the_robot_lets_it_drive_and_a_speed_limit_halves_it(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
     cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
     robot.node.release_locally()
     async with running(robot, cloud):
         await until(lambda: robot.speed > 0.9)
-        cloud.mandate = Mandate(0.5, "person", "person-1", 1.4, "d-1")
+        cloud.speed_limit = SpeedLimit(0.5, "person", "person-1", 1.4, "d-1")
         await until(lambda: robot.speed == 0.5)
         await until(lambda: cloud.reports[-1].reason == "person")
         assert cloud.reports[-1].cause == "person-1"

@@ -1,13 +1,13 @@
 /**
  * Live messages with defaults; a test overrides what matters to it.
  *
- * @typedef {import("../../iveg/static/js/protocol.js").Robot} Robot
- * @typedef {import("../../iveg/static/js/protocol.js").Person} Person
- * @typedef {import("../../iveg/static/js/protocol.js").Detection} Detection
- * @typedef {import("../../iveg/static/js/protocol.js").Command} Command
- * @typedef {import("../../iveg/static/js/protocol.js").Entry} Entry
- * @typedef {import("../../iveg/static/js/protocol.js").GreenhouseMap} GreenhouseMap
- * @typedef {import("../../iveg/static/js/protocol.js").Snapshot} Snapshot
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Robot} Robot
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Person} Person
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Detection} Detection
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Command} Command
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Entry} Entry
+ * @typedef {import("../../iveg/static/js/core/protocol.js").GreenhouseMap} GreenhouseMap
+ * @typedef {import("../../iveg/static/js/core/protocol.js").Snapshot} Snapshot
  */
 
 export const STAMP = "2026-11-20T09:00:00.000Z";
@@ -151,7 +151,7 @@ export function entry(id) {
 }
 
 /** @param {Partial<GreenhouseMap>} [changes] @returns {GreenhouseMap} */
-export function house(changes = {}) {
+export function greenhouse(changes = {}) {
   return {
     name: "test",
     bounds: { xmin: 0, ymin: 0, xmax: 20, ymax: 10 },
@@ -170,7 +170,7 @@ export function snapshot(changes = {}) {
     server: { boot: "b1", version: "0", demo: false, wall: 0 },
     user: { name: "ana", role: "operator" },
     rule: /** @type {any} */ (null),
-    map: house(),
+    map: greenhouse(),
     robots: [robot()],
     people: [],
     detections: {},

@@ -3,7 +3,7 @@ import { equal, test } from "./harness.js";
 
 /** @param {object} differs */
 const rule = (differs) =>
-  /** @type {import("../../iveg/static/js/protocol.js").Rule} */ ({
+  /** @type {import("../../iveg/static/js/core/protocol.js").Rule} */ ({
     id: "ring",
     version: 3,
     confidence_threshold: 0.8,

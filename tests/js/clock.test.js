@@ -3,7 +3,7 @@ import {
   ageOf,
   createServerClock,
   linkOf,
-} from "../../iveg/static/js/clock.js";
+} from "../../iveg/static/js/core/clock.js";
 import { equal, near, test } from "./harness.js";
 
 test("an age is what the server said plus the wait since it arrived", () => {

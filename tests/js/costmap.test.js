@@ -1,4 +1,4 @@
-import { writeAlpha } from "../../iveg/static/js/layers/costmap.js";
+import { writeAlpha } from "../../iveg/static/js/map/layers/costmap.js";
 import { equal, test } from "./harness.js";
 
 test("a grid's first row is the picture's lowest, and dear cells are dark", () => {

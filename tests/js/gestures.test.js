@@ -1,4 +1,4 @@
-import { createTouch, wheelFactor } from "../../iveg/static/js/gestures.js";
+import { createTouch, wheelFactor } from "../../iveg/static/js/map/gestures.js";
 import { equal, near, test } from "./harness.js";
 
 /** A touch whose meanings are written down. */

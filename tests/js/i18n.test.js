@@ -1,5 +1,5 @@
-import { createWords, translate } from "../../iveg/static/js/i18n.js";
-import { laneName } from "../../iveg/static/js/lanes.js";
+import { createI18n, translate } from "../../iveg/static/js/core/i18n.js";
+import { laneName } from "../../iveg/static/js/core/lanes.js";
 import { equal, test } from "./harness.js";
 
 const BLOCKS = {
@@ -17,7 +17,7 @@ const BLOCKS = {
 
 /** @param {"es" | "en"} language */
 async function words(language) {
-  const loaded = createWords(async (wanted) => BLOCKS[wanted]);
+  const loaded = createI18n(async (wanted) => BLOCKS[wanted]);
   await loaded.use(language);
   return loaded;
 }
@@ -55,7 +55,7 @@ test("a block answers for itself and for names that it lacks", async () => {
 });
 
 test("a person's number never reads as a priority", async () => {
-  const loaded = createWords(async () => ({
+  const loaded = createI18n(async () => ({
     who: "{person:person}",
     class: { person: "persona", track: { P: "persona {n}", R: "robot {n}" } },
   }));
@@ -127,7 +127,7 @@ test("a name that a grower gave stays as it is", () => {
 });
 
 test("13.9 a share below a threshold is never written as the threshold", async () => {
-  const loaded = createWords(async () => ({ share: "{value:percent}" }));
+  const loaded = createI18n(async () => ({ share: "{value:percent}" }));
   await loaded.use("en");
   const said = [0.7953, 0.7999, 0.8, 0.29, 1].map((value) =>
     loaded.t("share", { value }),
@@ -136,7 +136,7 @@ test("13.9 a share below a threshold is never written as the threshold", async (
 });
 
 test("13.20 a time is written in minutes as soon as it has any", async () => {
-  const loaded = createWords(async () => ({ age: "{value:span}" }));
+  const loaded = createI18n(async () => ({ age: "{value:span}" }));
   await loaded.use("es");
   const said = [42.4, 222, 7500].map((value) => loaded.t("age", { value }));
   equal(said, ["42 s", "3 min 42 s", "2 h 5 min"]);

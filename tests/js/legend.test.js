@@ -1,11 +1,11 @@
-import { hatchAt } from "../../iveg/static/js/layers/coverage.js";
-import { createChoices } from "../../iveg/static/js/layers/memory.js";
-import { createPlaces } from "../../iveg/static/js/layers/places.js";
-import { createWords } from "../../iveg/static/js/layers/words.js";
+import { hatchAt } from "../../iveg/static/js/map/layers/coverage.js";
+import { createLabels } from "../../iveg/static/js/map/layers/labels.js";
+import { createChoices } from "../../iveg/static/js/map/layers/memory.js";
+import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
+import { LAYERS } from "../../iveg/static/js/map/picture.js";
 import { hiddenSaid } from "../../iveg/static/js/panels/hidden_layers.js";
 import { paintSign, SIGNS } from "../../iveg/static/js/panels/legend.js";
 import { coverageSaid } from "../../iveg/static/js/panels/mapbox.js";
-import { LAYERS } from "../../iveg/static/js/picture.js";
 import { equal, test } from "./harness.js";
 
 const words = /** @type {any} */ ({ t: (/** @type {string} */ key) => key });
@@ -25,7 +25,7 @@ test("13.3: each sign is drawn by its layer", () => {
   const blank = SIGNS.filter((sign) => {
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = [88, 56];
-    paintSign(canvas, sign, createWords(words.t, "en"));
+    paintSign(canvas, sign, createLabels(words.t, "en"));
     const { data } = /** @type {CanvasRenderingContext2D} */ (
       canvas.getContext("2d")
     ).getImageData(0, 0, 88, 56);

@@ -1,4 +1,4 @@
-import { LIMITS, ringRadius } from "../../iveg/static/js/limits.js";
+import { LIMITS, ringRadius } from "../../iveg/static/js/core/limits.js";
 import { equal, near, test } from "./harness.js";
 
 const RINGS = await (await fetch("/tests/data/rings.json")).json();

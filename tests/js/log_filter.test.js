@@ -5,7 +5,7 @@ import { memory } from "./memory.js";
 
 /** @param {object} [differs] */
 const entry = (differs = {}) =>
-  /** @type {import("../../iveg/static/js/protocol.js").Entry} */ ({
+  /** @type {import("../../iveg/static/js/core/protocol.js").Entry} */ ({
     id: 1,
     at: "2026-11-20T12:00:00.000Z",
     kind: "speed",
@@ -28,7 +28,7 @@ test("a slow-down names the rule that fired, whether or not it was seen", () => 
   equal(facetsOf(entry({ key: "log.speed_up" })).rule, null);
 });
 
-test("an alarm names its priority, and no rule", () => {
+test("an alert names its priority, and no rule", () => {
   equal([facetsOf(P1).priority, facetsOf(P1).rule], ["P1", null]);
 });
 
@@ -65,7 +65,7 @@ test("a memory that is no memory of ours filters nothing", () => {
 });
 
 test("13.9 a slow-down far from anybody says that the ring had grown", () => {
-  const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+  const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
     /** @type {unknown} */ ({ t: (/** @type {string} */ key) => key })
   );
   const slots = { reason: "person", distance: 5.2 };

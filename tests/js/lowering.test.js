@@ -1,7 +1,7 @@
 import { loweringsOf, sightingsLost } from "../../iveg/static/js/pages/lowering.js";
 import { equal, test } from "./harness.js";
 
-const rule = /** @type {import("../../iveg/static/js/protocol.js").Rule} */ (
+const rule = /** @type {import("../../iveg/static/js/core/protocol.js").Rule} */ (
   /** @type {unknown} */ ({
     id: "fleet-alert",
     version: 3,

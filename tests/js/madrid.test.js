@@ -3,7 +3,7 @@ import {
   momentOf,
   offsetAt,
   wallText,
-} from "../../iveg/static/js/history/madrid.js";
+} from "../../iveg/static/js/pages/history/local_time.js";
 import { equal, test } from "./harness.js";
 
 const HOUR = 3_600_000;

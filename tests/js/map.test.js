@@ -1,8 +1,8 @@
-import { coverOf } from "../../iveg/static/js/layers/scalebar.js";
-import { createMap } from "../../iveg/static/js/map.js";
-import { installPaintHook } from "../../iveg/static/js/painthook.js";
-import { createStore } from "../../iveg/static/js/store.js";
-import { screenX, screenY } from "../../iveg/static/js/viewport.js";
+import { installPaintHook } from "../../iveg/static/js/core/painthook.js";
+import { createStore } from "../../iveg/static/js/core/store.js";
+import { coverOf } from "../../iveg/static/js/map/layers/scalebar.js";
+import { createMap } from "../../iveg/static/js/map/map.js";
+import { screenX, screenY } from "../../iveg/static/js/map/viewport.js";
 import { detection, person, robot, STAMP, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
@@ -151,7 +151,7 @@ test("a stamp that was painted is not told again", async () => {
   map.destroy();
 });
 
-test("a map opens with the whole house in view, above the bar of its scale", async () => {
+test("a map opens with the whole greenhouse in view, above the bar of its scale", async () => {
   const { store, map } = mapOnPage();
   store.apply("snapshot", snapshot());
   await frame();
@@ -163,7 +163,7 @@ test("a map opens with the whole house in view, above the bar of its scale", asy
   map.destroy();
 });
 
-test("the house lies beside tools that grow, until it is moved", async () => {
+test("the greenhouse lies beside tools that grow, until it is moved", async () => {
   const { canvas, store, map } = mapOnPage();
   map.destroy();
   const tools = document.createElement("div");
@@ -292,7 +292,7 @@ test("a pinch on a followed robot zooms without letting it go", async () => {
   map.destroy();
 });
 
-test("keys fit the house, follow a robot and show the fleet", async () => {
+test("keys fit the greenhouse, follow a robot and show the fleet", async () => {
   const { store, map } = mapOnPage();
   const far = robot({ robot_id: "AGII", pose: { x: 18, y: 9, yaw: 0 } });
   store.apply("snapshot", snapshot({ robots: [robot(), far] }));

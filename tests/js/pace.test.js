@@ -1,4 +1,4 @@
-import { createPace } from "../../iveg/static/js/pace.js";
+import { createPace } from "../../iveg/static/js/core/pace.js";
 import { equal, test } from "./harness.js";
 
 /** A pace whose screen paints when the test says so. */

@@ -1,4 +1,8 @@
-import { judgeChain, ORDER, sentenceOf } from "../../iveg/static/js/pages/chain.js";
+import {
+  judgeChain,
+  ORDER,
+  sentenceOf,
+} from "../../iveg/static/js/pages/health_sentence.js";
 import {
   endSaid,
   statOf,
@@ -12,7 +16,7 @@ import { equal, test } from "./harness.js";
 const hops = (states) =>
   ORDER.map((hop) => ({ hop, state: states[hop] ?? /** @type {const} */ ("ok") }));
 
-/** @param {Partial<import("../../iveg/static/js/protocol.js").Command>} [differs] */
+/** @param {Partial<import("../../iveg/static/js/core/protocol.js").Command>} [differs] */
 const order = (differs = {}) =>
   command({
     command_id: "1",

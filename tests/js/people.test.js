@@ -1,9 +1,9 @@
-import { worded } from "../../iveg/static/js/layers/people.js";
+import { worded } from "../../iveg/static/js/map/layers/people.js";
 import { equal, test } from "./harness.js";
 
 /** @param {object[]} people @param {number} [scale] */
 const paint = (people, scale = 30) =>
-  /** @type {import("../../iveg/static/js/layers/paint.js").Paint} */ (
+  /** @type {import("../../iveg/static/js/map/layers/paint.js").Paint} */ (
     /** @type {unknown} */ ({ scene: { people }, view: { scale } })
   );
 const who = (

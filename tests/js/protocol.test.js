@@ -4,7 +4,7 @@ import {
   readScan,
   readText,
   writeStop,
-} from "../../iveg/static/js/protocol.js";
+} from "../../iveg/static/js/core/protocol.js";
 import { scanFrame } from "./builders.js";
 import { equal, test, throws } from "./harness.js";
 

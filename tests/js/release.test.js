@@ -81,7 +81,7 @@ test("a robot that runs has nothing to resume", () => {
   equal(whyNotResume(facts({ robot: running, command: undefined })), "not_ready");
 });
 
-/** Keys of what is said of a release. @param {Partial<import("../../iveg/static/js/protocol.js").Command>} changes */
+/** Keys of what is said of a release. @param {Partial<import("../../iveg/static/js/core/protocol.js").Command>} changes */
 function said(changes) {
   return saidOfOrder(command({ kind: "release", ...changes })).map(({ key }) => key);
 }

@@ -4,10 +4,10 @@ import {
   modeSaid,
   taskSaid,
   whySaid,
-} from "../../iveg/static/js/panels/robot_words.js";
+} from "../../iveg/static/js/panels/robot_texts.js";
 import { equal, test } from "./harness.js";
 
-const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
   /** @type {unknown} */ ({
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
@@ -17,7 +17,7 @@ const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
 
 /** A robot that drives on a clear way. @param {object} [differs] */
 function robot(differs = {}) {
-  return /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+  return /** @type {import("../../iveg/static/js/core/protocol.js").Robot} */ (
     /** @type {unknown} */ ({
       robot_id: "AGI",
       mode: "RUNNING",
@@ -53,7 +53,7 @@ test("13.8 a robot at 0.00 m/s is waiting, and its way is not said to be clear",
 });
 
 test("13.8 a margin that nobody knows has no number", () => {
-  const margin = /** @type {import("../../iveg/static/js/protocol.js").Margin} */ (
+  const margin = /** @type {import("../../iveg/static/js/core/protocol.js").Margin} */ (
     /** @type {unknown} */ ({ margin_m: -20.2, band: "unknown", person_id: "P1" })
   );
   equal(marginSaid(margin, words), "robot.margin_band.unknown");

@@ -1,6 +1,6 @@
-import { isSeenHeld } from "../../iveg/static/js/layers/robot.js";
-import { marked, readPerson, readScene } from "../../iveg/static/js/scene.js";
-import { createStore } from "../../iveg/static/js/store.js";
+import { createStore } from "../../iveg/static/js/core/store.js";
+import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
+import { marked, readPerson, readScene } from "../../iveg/static/js/map/scene.js";
 import { command, detection, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 

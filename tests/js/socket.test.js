@@ -1,4 +1,4 @@
-import { createPresses, retryDelay } from "../../iveg/static/js/socket.js";
+import { createPresses, retryDelay } from "../../iveg/static/js/core/socket.js";
 import { equal, test } from "./harness.js";
 
 const PRESS = { robotId: null, pressId: "a", pressedAt: 1 };

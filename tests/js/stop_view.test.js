@@ -1,5 +1,5 @@
-import { linkOf } from "../../iveg/static/js/clock.js";
-import { LIMITS } from "../../iveg/static/js/limits.js";
+import { linkOf } from "../../iveg/static/js/core/clock.js";
+import { LIMITS } from "../../iveg/static/js/core/limits.js";
 import { transportsSaid } from "../../iveg/static/js/panels/stop_loud.js";
 import {
   doubtOf,

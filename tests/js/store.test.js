@@ -1,6 +1,10 @@
-import { ageOf } from "../../iveg/static/js/clock.js";
-import { matches } from "../../iveg/static/js/hub.js";
-import { COMMANDS_SIZE, createStore, LOG_SIZE } from "../../iveg/static/js/store.js";
+import { ageOf } from "../../iveg/static/js/core/clock.js";
+import { matches } from "../../iveg/static/js/core/hub.js";
+import {
+  COMMANDS_SIZE,
+  createStore,
+  LOG_SIZE,
+} from "../../iveg/static/js/core/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 

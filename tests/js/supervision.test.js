@@ -1,14 +1,14 @@
-import { believedBy, hears } from "../../iveg/static/js/layers/belief.js";
-import { laidTo, lengthOf } from "../../iveg/static/js/layers/measure.js";
+import { createStore } from "../../iveg/static/js/core/store.js";
+import { createWakeLock } from "../../iveg/static/js/core/wakelock.js";
+import { believedBy, hears } from "../../iveg/static/js/map/layers/belief.js";
+import { laidTo, lengthOf } from "../../iveg/static/js/map/layers/measure.js";
 import { soon } from "../../iveg/static/js/pages/rows.js";
 import { tilesOf } from "../../iveg/static/js/pages/tiles.js";
 import { createAlertList } from "../../iveg/static/js/panels/alert_list.js";
 import { floodSaid } from "../../iveg/static/js/panels/alert_members.js";
 import { createAlertsPanel } from "../../iveg/static/js/panels/alerts.js";
-import { faultsSaid } from "../../iveg/static/js/panels/robot_words.js";
+import { faultsSaid } from "../../iveg/static/js/panels/robot_texts.js";
 import { createTone } from "../../iveg/static/js/panels/tone.js";
-import { createStore } from "../../iveg/static/js/store.js";
-import { createWakeLock } from "../../iveg/static/js/wakelock.js";
 import { equal, near, test } from "./harness.js";
 
 const PROBE = "<img src=x onerror=window.probed=true>";
@@ -27,8 +27,8 @@ function memory() {
 }
 
 /** @param {object} [differs] */
-function alarm(differs = {}) {
-  return /** @type {import("../../iveg/static/js/protocol.js").Alert} */ ({
+function alert(differs = {}) {
+  return /** @type {import("../../iveg/static/js/core/protocol.js").Alert} */ ({
     alert_id: "a",
     priority: "P1",
     key: "robot_lost",
@@ -46,7 +46,7 @@ function alarm(differs = {}) {
   });
 }
 
-const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
+const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
   /** @type {unknown} */ ({
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
@@ -55,7 +55,7 @@ const words = /** @type {import("../../iveg/static/js/i18n.js").Words} */ (
 );
 
 test("a robot's card says what the robot finds wrong with its own data", () => {
-  const robot = /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+  const robot = /** @type {import("../../iveg/static/js/core/protocol.js").Robot} */ (
     /** @type {unknown} */ ({
       applied: {
         faults: [
@@ -81,7 +81,7 @@ test("a tape is laid with two taps, and a third begins anew", () => {
   equal(laidTo(second, { x: 9, y: 9 }).points, [{ x: 9, y: 9 }]);
 });
 
-const SCENE = /** @type {import("../../iveg/static/js/scene.js").Scene} */ (
+const SCENE = /** @type {import("../../iveg/static/js/map/scene.js").Scene} */ (
   /** @type {unknown} */ ({
     robots: [{ id: "AGI" }, { id: "AGII" }],
     scans: [{ robotId: "AGI" }, { robotId: "AGII" }],
@@ -104,7 +104,7 @@ test("a robot that hears no server counts on its own eyes alone", () => {
 
 test("whether a robot hears is what it says of its newest feedback", () => {
   const robot = (/** @type {number | null} */ feedback_age_s) =>
-    /** @type {import("../../iveg/static/js/protocol.js").Robot} */ (
+    /** @type {import("../../iveg/static/js/core/protocol.js").Robot} */ (
       /** @type {unknown} */ ({ applied: { feedback_age_s } })
     );
   equal(
@@ -175,10 +175,10 @@ test("a browser that refuses the lock is asked again, not complained of", async 
   equal([asked, lock.isHeld()], [2, false]);
 });
 
-test("notes and names in alarms are text, whatever they hold", () => {
+test("notes and names in alerts are text, whatever they hold", () => {
   const list = document.createElement("ul");
   const draw = createAlertList(list, words).draw;
-  draw([alarm({ note: PROBE, acknowledged_by: PROBE, slots: { robot: PROBE } })]);
+  draw([alert({ note: PROBE, acknowledged_by: PROBE, slots: { robot: PROBE } })]);
   equal(list.querySelectorAll("img").length, 0);
   equal(list.textContent?.includes(PROBE), true);
 });
@@ -187,10 +187,10 @@ test("only who may acknowledge is asked to", () => {
   const list = document.createElement("ul");
   const { draw } = createAlertList(list, words);
   document.body.dataset.role = "viewer";
-  draw([alarm()]);
+  draw([alert()]);
   equal(list.querySelector("form")?.hidden, true);
   document.body.dataset.role = "operator";
-  draw([alarm()]);
+  draw([alert()]);
   equal(list.querySelector("form")?.hidden, false);
 });
 
@@ -198,18 +198,18 @@ test("an alert that did not change is not drawn again when another did", () => {
   let told = 0;
   const counting = { ...words, t: (/** @type {string} */ key) => `${key}${told++}` };
   const { draw } = createAlertList(document.createElement("ul"), counting);
-  draw([alarm({ alert_id: "a" })]);
+  draw([alert({ alert_id: "a" })]);
   const once = told;
-  draw([alarm({ alert_id: "a" })]);
+  draw([alert({ alert_id: "a" })]);
   equal(told, once);
-  draw([alarm({ alert_id: "a", count: 2 })]);
+  draw([alert({ alert_id: "a", count: 2 })]);
   equal(told > once, true);
 });
 
 test("an acknowledgement that failed says so and can be tried again", async () => {
   document.body.dataset.role = "operator";
   const list = document.body.appendChild(document.createElement("ul"));
-  createAlertList(list, words, async () => 503).draw([alarm()]);
+  createAlertList(list, words, async () => 503).draw([alert()]);
   list.querySelector("form")?.requestSubmit();
   // The list redraws a microtask or two after the answer.
   for (let i = 0; i < 5; i += 1) await Promise.resolve();
@@ -221,9 +221,9 @@ test("an acknowledgement that failed says so and can be tried again", async () =
 test("13.10 the gravest stands first, of these the oldest", () => {
   const list = document.createElement("ul");
   createAlertList(list, words).draw([
-    alarm({ alert_id: "p2", priority: "P2", key: "late" }),
-    alarm({ alert_id: "p1", key: "young", raised_at: "2026-11-20T12:05:00Z" }),
-    alarm({ alert_id: "over", key: "old", cleared_at: "2026-11-20T12:01:00Z" }),
+    alert({ alert_id: "p2", priority: "P2", key: "late" }),
+    alert({ alert_id: "p1", key: "young", raised_at: "2026-11-20T12:05:00Z" }),
+    alert({ alert_id: "over", key: "old", cleared_at: "2026-11-20T12:01:00Z" }),
   ]);
   const shown = [...list.children].map((item) => item.getAttribute("data-alert"));
   equal(shown, ["old", "young", "late"]);
@@ -233,11 +233,11 @@ test("13.10 after an acknowledgement nothing slides under the finger", async () 
   document.body.dataset.role = "operator";
   const list = document.createElement("ul");
   document.body.append(list);
-  const both = [alarm({ alert_id: "a" }), alarm({ alert_id: "b", priority: "P2" })];
+  const both = [alert({ alert_id: "a" }), alert({ alert_id: "b", priority: "P2" })];
   const { draw } = createAlertList(list, words, async () => 200, 150);
   draw(both);
   list.querySelector("button")?.click();
-  draw([both[1], alarm({ alert_id: "c" })]);
+  draw([both[1], alert({ alert_id: "c" })]);
   const ids = () =>
     [...list.children].map((item) => item.querySelector("b")?.textContent);
   equal(ids().length, 2);
@@ -264,13 +264,13 @@ function occurrence(at, differs = {}) {
   };
 }
 
-test("an alarm that repeats is one row that tells each time", () => {
+test("an alert that repeats is one row that tells each time", () => {
   const list = document.createElement("ul");
   const members = [
     occurrence("2026-11-20T12:00:00Z", { note: PROBE }),
     occurrence("2026-11-20T12:07:00Z"),
   ];
-  createAlertList(list, words).draw([alarm({ count: 2, members })]);
+  createAlertList(list, words).draw([alert({ count: 2, members })]);
   const said = [...list.querySelectorAll(".members li")].map((one) => one.textContent);
   equal(list.children.length, 1);
   equal(
@@ -286,11 +286,11 @@ test("whoever reads the occurrences keeps reading while more come", () => {
     occurrence("2026-11-20T12:00:00Z"),
     occurrence("2026-11-20T12:07:00Z"),
   ];
-  draw([alarm({ count: 2, members })]);
+  draw([alert({ count: 2, members })]);
   const details = /** @type {HTMLDetailsElement} */ (list.querySelector("details"));
   details.open = true;
   draw([
-    alarm({ count: 3, members: [...members, occurrence("2026-11-20T12:09:00Z")] }),
+    alert({ count: 3, members: [...members, occurrence("2026-11-20T12:09:00Z")] }),
   ]);
   equal([list.contains(details), details.open], [true, true]);
   equal(details.querySelectorAll("li").length, 3);
@@ -298,7 +298,7 @@ test("whoever reads the occurrences keeps reading while more come", () => {
 
 test("what happened once has nothing to open", () => {
   const list = document.createElement("ul");
-  createAlertList(list, words).draw([alarm()]);
+  createAlertList(list, words).draw([alert()]);
   equal(list.querySelector("details")?.hidden, true);
 });
 
@@ -355,9 +355,9 @@ function bell() {
 test("each time that a group repeats it chimes, and once", () => {
   const { tell, heard } = bell();
   tell([]);
-  tell([alarm({ priority: "P2" })]);
-  tell([alarm({ priority: "P2" })]);
-  tell([alarm({ priority: "P2", count: 2 })]);
+  tell([alert({ priority: "P2" })]);
+  tell([alert({ priority: "P2" })]);
+  tell([alert({ priority: "P2", count: 2 })]);
   equal(
     heard.filter((one) => one === "chime"),
     ["chime", "chime"],
@@ -366,8 +366,8 @@ test("each time that a group repeats it chimes, and once", () => {
 
 test("a group that holds a P1 sounds, whatever it began as", () => {
   const { tell, heard } = bell();
-  tell([alarm({ priority: "P3" })]);
-  tell([alarm({ priority: "P1", count: 2 })]);
+  tell([alert({ priority: "P3" })]);
+  tell([alert({ priority: "P1", count: 2 })]);
   equal(heard.at(-1), "loud");
   equal(document.querySelector("#alerts-button")?.getAttribute("data-worst"), "P1");
   document.body.replaceChildren();
@@ -376,7 +376,7 @@ test("a group that holds a P1 sounds, whatever it began as", () => {
 /** Nothing measured yet. */
 function nothing() {
   const none = { count: 0, age_s: null, since: null };
-  return /** @type {import("../../iveg/static/js/protocol.js").Safety} */ ({
+  return /** @type {import("../../iveg/static/js/core/protocol.js").Safety} */ ({
     alert_latency: { ...none, p50_ms: null, p95_ms: null, p99_ms: null, window_s: 300 },
     not_echoed: { ...none, of: 0, within_s: 1, window_s: 300 },
     negative_margin: { ...none, share: null, known_s: 0, unknown_s: 0 },

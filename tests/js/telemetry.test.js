@@ -2,8 +2,8 @@ import {
   ProtocolError,
   readFrame,
   writePainted,
-} from "../../iveg/static/js/protocol.js";
-import { pointsOf } from "../../iveg/static/js/telemetry.js";
+} from "../../iveg/static/js/core/protocol.js";
+import { pointsOf } from "../../iveg/static/js/core/telemetry.js";
 import { telemetryFrame } from "./builders.js";
 import { equal, near, test, throws } from "./harness.js";
 
@@ -22,7 +22,7 @@ const SWEEP = {
   count: 3,
 };
 
-/** @param {ArrayBuffer} bytes @returns {import("../../iveg/static/js/telemetry.js").Telemetry} */
+/** @param {ArrayBuffer} bytes @returns {import("../../iveg/static/js/core/telemetry.js").Telemetry} */
 const read = (bytes) => /** @type {any} */ (readFrame(bytes).data);
 
 test("a frame tells states before moves, so that no state makes a move older", () => {

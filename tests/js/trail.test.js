@@ -1,4 +1,4 @@
-import { createTrails, thinned } from "../../iveg/static/js/layers/trail.js";
+import { createTrails, thinned } from "../../iveg/static/js/map/layers/trail.js";
 import { equal, test } from "./harness.js";
 
 test("a robot that stands leaves one crumb", () => {

@@ -1,5 +1,5 @@
-import { barLength } from "../../iveg/static/js/layers/scalebar.js";
-import * as viewport from "../../iveg/static/js/viewport.js";
+import { barLength } from "../../iveg/static/js/map/layers/scalebar.js";
+import * as viewport from "../../iveg/static/js/map/viewport.js";
 import { equal, near, test } from "./harness.js";
 
 const view = { ...viewport.createViewport(800, 600), x: 3, y: -2, scale: 37 };
@@ -33,7 +33,7 @@ test("panning moves the world with the finger", () => {
   near(viewport.screenY(moved, 1), viewport.screenY(view, 1) - 30);
 });
 
-test("a fitted house is whole, centred and as large as fits", () => {
+test("a fitted greenhouse is whole, centred and as large as fits", () => {
   const box = { xmin: -10, ymin: 0, xmax: 30, ymax: 10 };
   const fitted = viewport.fitTo(view, box, 20);
   const seen = viewport.visible(fitted);
@@ -47,14 +47,14 @@ const PHONE = { ...viewport.createViewport(390, 430) };
 const TOOLS = { left: 334, top: 10, right: 380, bottom: 234 };
 const CHIPS = { left: 10, top: 10, right: 310, bottom: 74 };
 const BAR = { left: 0, top: 392, right: 146, bottom: 430 };
-const HOUSE = { xmin: 0, ymin: 0, xmax: 20, ymax: 20 };
+const GREENHOUSE = { xmin: 0, ymin: 0, xmax: 20, ymax: 20 };
 
-/** @param {viewport.Viewport} fitted where the house is (px) */
+/** @param {viewport.Viewport} fitted where the greenhouse is (px) */
 const placeOf = (fitted) => ({
-  left: viewport.screenX(fitted, HOUSE.xmin),
-  top: viewport.screenY(fitted, HOUSE.ymax),
-  right: viewport.screenX(fitted, HOUSE.xmax),
-  bottom: viewport.screenY(fitted, HOUSE.ymin),
+  left: viewport.screenX(fitted, GREENHOUSE.xmin),
+  top: viewport.screenY(fitted, GREENHOUSE.ymax),
+  right: viewport.screenX(fitted, GREENHOUSE.xmax),
+  bottom: viewport.screenY(fitted, GREENHOUSE.ymin),
 });
 
 /** @param {viewport.Rect} a @param {viewport.Rect} b */
@@ -63,7 +63,7 @@ const meet = (a, b) =>
 
 test("nothing that lies over the map lies over a fitted house", () => {
   const covers = [TOOLS, CHIPS, BAR];
-  const place = placeOf(viewport.fitTo(PHONE, HOUSE, 28, covers));
+  const place = placeOf(viewport.fitTo(PHONE, GREENHOUSE, 28, covers));
   equal(
     covers.map((cover) => meet(place, cover)),
     [false, false, false],
@@ -72,20 +72,20 @@ test("nothing that lies over the map lies over a fitted house", () => {
 });
 
 test("without what lies over the map the tools would cover the house", () => {
-  equal(meet(placeOf(viewport.fitTo(PHONE, HOUSE, 28)), TOOLS), true);
+  equal(meet(placeOf(viewport.fitTo(PHONE, GREENHOUSE, 28)), TOOLS), true);
 });
 
-test("a cover in a corner is passed where the house stays larger", () => {
+test("a cover in a corner is passed where the greenhouse stays larger", () => {
   const wide = { ...PHONE, width: 1000 };
-  const fitted = viewport.fitTo(wide, HOUSE, 28, [BAR]);
+  const fitted = viewport.fitTo(wide, GREENHOUSE, 28, [BAR]);
   near(fitted.scale, (430 - 56) / 20);
   equal(placeOf(fitted).left > BAR.right, true);
 });
 
 test("a cover that leaves too little room is looked through", () => {
   const all = { left: 0, top: 0, right: 390, bottom: 430 };
-  const fitted = viewport.fitTo(PHONE, HOUSE, 28, [all, TOOLS]);
-  equal(fitted, viewport.fitTo(PHONE, HOUSE, 28, [TOOLS]));
+  const fitted = viewport.fitTo(PHONE, GREENHOUSE, 28, [all, TOOLS]);
+  equal(fitted, viewport.fitTo(PHONE, GREENHOUSE, 28, [TOOLS]));
 });
 
 test("bounds leave out what is no number, and nothing has no bounds", () => {

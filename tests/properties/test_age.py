@@ -15,15 +15,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.mandates import Mandates
 from iveg.domain.observations import Instant, Odometry, Origin, Received
-from iveg.domain.people import People
 from iveg.domain.probe import ProbeLag
+from iveg.domain.rule.speed_limits import SpeedLimits
+from iveg.domain.tracking.people import People
 from iveg.domain.transports import TransportId
 from iveg.domain.world import World
 from iveg.robot.echo import Echo
@@ -102,7 +102,7 @@ class Rig:
         measured: When each odometry was measured (s), by boot and seq.
     """
 
-    echoes: bool = True
+    acknowledgements: bool = True
     transports: tuple[TransportId, ...] = ("direct", "fiware")
     now: float = 0.0
     robot_clock: float = 0.0
@@ -116,7 +116,7 @@ class Rig:
         self.probe = ProbeLag()
         self.world = World(["AGI"], self.probe)
         self.robot = self.world.robot("AGI")
-        self.mandates = Mandates(FIELD)
+        self.speed_limits = SpeedLimits(FIELD)
         self.people = People()
         self._way: list[tuple[float, int, Parcel]] = []
         self._number = itertools.count()
@@ -148,8 +148,8 @@ class Rig:
         said = replace(
             origin(seq, boot=boot, wall=wall),
             mono=self.now - self.booted,
-            echoes=self.echoes,
-            heard=self.echo.heard if self.echoes else None,
+            acknowledgements=self.acknowledgements,
+            heard=self.echo.heard if self.acknowledgements else None,
         )
         self.measured[boot, seq] = self.now
         for transport in self.transports:
@@ -205,9 +205,9 @@ class Rig:
         return self.now - self.measured[newest.origin.boot, newest.origin.seq]
 
     def is_clear(self) -> bool:
-        """Whether the robot would be mandated full speed; the fleet's eyes are open."""
+        """Whether the robot would be limited to full speed; the fleet's eyes are open."""
         self.robot.detections_at = self.at().mono
-        found, _ = self.mandates.evaluate(
+        found, _ = self.speed_limits.evaluate(
             self.world, self.people, Rule(), self.at(), "d"
         )
         return found["AGI"].speed_factor >= FULL_SPEED
@@ -270,7 +270,7 @@ def backlog(seconds: float, grows_s: float, most_s: float) -> Iterator[float]:
 def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_pose(
     grows_s: float, steps: list[float], seed: int
 ) -> None:
-    rig = Rig(echoes=False, transports=("fiware",))
+    rig = Rig(acknowledgements=False, transports=("fiware",))
     rnd = Random(seed)  # noqa: S311 - repeatable on purpose
     for number, late in enumerate(backlog(40, grows_s, 25.0)):
         step = steps[number // 15] if number % 15 == 14 else 0.0
@@ -282,7 +282,7 @@ def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_po
 
 
 def test_a_healthy_robot_that_does_not_echo_is_live_by_its_estimate() -> None:
-    rig, rnd = Rig(echoes=False, transports=("fiware",)), Random(1)  # noqa: S311
+    rig, rnd = Rig(acknowledgements=False, transports=("fiware",)), Random(1)  # noqa: S311
     links = [rig.robot.link(rig.at()) for _ in rig.drive(quiet(5), rnd)]
 
     assert set(links[20:]) == {"LIVE"}

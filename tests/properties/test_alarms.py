@@ -5,7 +5,13 @@ from dataclasses import dataclass, field
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.alarms import MEMBERS_KEPT, Alarm, AlarmBook, Condition, Priority
+from iveg.domain.alerts.alert_book import (
+    MEMBERS_KEPT,
+    Alert,
+    AlertBook,
+    Condition,
+    Priority,
+)
 from tests.builders import at
 
 priorities = st.sampled_from(["P1", "P2", "P3"])
@@ -19,11 +25,11 @@ lives = st.lists(st.tuples(wrongs, st.booleans()), min_size=1, max_size=80)
 class Person:
     """Somebody who looks at the list after every moment, and hears."""
 
-    book: AlarmBook = field(default_factory=AlarmBook)
+    book: AlertBook = field(default_factory=AlertBook)
     unseen: set[Priority] = field(default_factory=set)
     now: float = 0.0
 
-    def live(self, wrong: Priority | None) -> list[Alarm]:
+    def live(self, wrong: Priority | None) -> list[Alert]:
         """One second passes; returns what was raised or cleared."""
         self.now += 1.0
         conditions = [] if wrong is None else [Condition(wrong, "alert.x", "AGI")]
@@ -44,10 +50,10 @@ def test_a_group_is_never_shown_below_the_gravest_that_nobody_saw(
     person = Person()
     for wrong, sees in life:
         person.live(wrong)
-        for alarm in person.book.waiting:
-            assert alarm.priority == min({alarm.condition.priority} | person.unseen)
-            assert (alarm.unseen is None) == (not person.unseen)
-            assert (alarm.last.acknowledged is None) >= (alarm.unseen is not None)
+        for alert in person.book.waiting:
+            assert alert.priority == min({alert.condition.priority} | person.unseen)
+            assert (alert.unseen is None) == (not person.unseen)
+            assert (alert.last.acknowledged is None) >= (alert.unseen is not None)
         for _ in range(sees):
             person.acknowledge()
 
@@ -73,7 +79,7 @@ def test_every_occurrence_is_counted_and_the_newest_are_told(
     person, raised = Person(), 0
     for wrong, _ in life:
         raised += sum(one.cleared is None for one in person.live(wrong))
-        for alarm in person.book.waiting:
-            assert alarm.count == raised
-            assert len(alarm.members) == min(raised, MEMBERS_KEPT)
-            assert alarm.raised.mono <= alarm.members[0].raised.mono
+        for alert in person.book.waiting:
+            assert alert.count == raised
+            assert len(alert.members) == min(raised, MEMBERS_KEPT)
+            assert alert.raised.mono <= alert.members[0].raised.mono

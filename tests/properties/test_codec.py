@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
-    Canary,
     Climate,
     CommandAnswer,
     Detection,
     DetectionFrame,
     FeedbackRef,
+    HeartbeatProbe,
     Hold,
     LaserScan,
     Navigation,
@@ -50,9 +50,14 @@ heard = st.none() | st.builds(FeedbackRef, texts, st.integers(0, 2**53))
 
 @given(origins, told_monos, st.booleans(), heard)
 def test_what_proves_an_age_survives_the_wire(
-    origin: Origin, mono: float | None, echoes: bool, told: FeedbackRef | None
+    origin: Origin, mono: float | None, acknowledgements: bool, told: FeedbackRef | None
 ) -> None:
-    said = replace(origin, mono=mono, echoes=echoes, heard=told if echoes else None)
+    said = replace(
+        origin,
+        mono=mono,
+        acknowledgements=acknowledgements,
+        heard=told if acknowledgements else None,
+    )
     one = Odometry("AGI", said, Pose2D(0.0, 0.0, 0.0), Twist2D(0.0, 0.0))
 
     (read,) = codec.read_measure("AGI_odom", codec.write_odometry(one)).observations
@@ -82,8 +87,13 @@ detections = st.builds(
 frames = st.builds(
     DetectionFrame, st.just("AGI"), origins, st.lists(detections).map(tuple)
 )
-mandates = st.builds(
-    Mandate, st.sampled_from([0.0, 0.5, 1.0]), texts, maybe, thousandths(0, 99), maybe
+speed_limits = st.builds(
+    SpeedLimit,
+    st.sampled_from([0.0, 0.5, 1.0]),
+    texts,
+    maybe,
+    thousandths(0, 99),
+    maybe,
 )
 alerts = st.builds(
     FeedbackAlert,
@@ -211,11 +221,11 @@ def test_climate_comes_back_as_it_went(
 
 
 @given(origins)
-def test_the_canary_comes_back_as_it_went(origin: Origin) -> None:
-    attributes = orjson.loads(codec.write_canary(origin))
+def test_the_heartbeat_comes_back_as_it_went(origin: Origin) -> None:
+    attributes = orjson.loads(codec.write_heartbeat(origin))
 
-    entity = {"id": names.CANARY_ID, "type": names.CANARY_TYPE, **attributes}
-    assert codec.read_entity(entity) == codec.Reading((Canary(origin),))
+    entity = {"id": names.HEARTBEAT_ID, "type": names.HEARTBEAT_TYPE, **attributes}
+    assert codec.read_entity(entity) == codec.Reading((HeartbeatProbe(origin),))
 
 
 @given(
@@ -228,7 +238,7 @@ def test_the_canary_comes_back_as_it_went(origin: Origin) -> None:
         poses,
         twists,
         maybe,
-        st.dictionaries(texts, mandates, max_size=4),
+        st.dictionaries(texts, speed_limits, max_size=4),
         st.dictionaries(texts, st.integers(0, 2**53), max_size=4),
     )
 )

@@ -1,4 +1,4 @@
-"""Near by arrays is near one by one: the same mandates, names and order of all."""
+"""Near by arrays is near one by one: the same speed limits, names and order of all."""
 
 from collections.abc import Iterable
 
@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain import hazards
-from iveg.domain.mandates import Change
+from iveg.domain.rule import zones
+from iveg.domain.rule.speed_limits import Change
 from tests.unit.domain.scene import Scene, person
 
 FLEET = tuple(f"R{number}" for number in range(6))
@@ -31,7 +31,7 @@ def named(changes: Iterable[Change]) -> list[tuple[object, ...]]:
             one.began,
             one.crossing.decision_id,
             one.crossing.robot_id,
-            one.crossing.hazard,
+            one.crossing.zone,
         )
         for one in changes
     ]
@@ -54,9 +54,9 @@ def test_arrays_find_what_looking_at_each_finds(
     steps: list[tuple[float, str, tuple[int, int], list[tuple[int, int]]]],
 ) -> None:
     with pytest.MonkeyPatch.context() as one_by_one:
-        one_by_one.setattr(hazards, "_FEW_PAIRS", 10**9)
+        one_by_one.setattr(zones, "_FEW_PAIRS", 10**9)
         expected = play(steps)
     with pytest.MonkeyPatch.context() as arrays:
-        arrays.setattr(hazards, "_FEW_PAIRS", -1)
+        arrays.setattr(zones, "_FEW_PAIRS", -1)
         found = play(steps)
     assert found == expected

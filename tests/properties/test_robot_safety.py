@@ -8,13 +8,13 @@ import orjson
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from iveg.domain.feedback import CLEAR, FeedbackAlert, Mandate
+from iveg.domain.feedback import CLEAR, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.robot.caps import Cap, lowest
 from iveg.robot.effects import Drive
-from iveg.robot.hearsay import Hearsay
+from iveg.robot.peer_feedback import PeerFeedback
 from tests.unit.robot.hostile import (
     EVENTS,
     JUNK,
@@ -226,13 +226,13 @@ def test_R6_another_topic_never_raises_the_factor(
     )
     for mandated, x in told:
         for rig in (one, two):
-            rig.mandates = {"AGI": Mandate(mandated, "person")}
+            rig.speed_limits = {"AGI": SpeedLimit(mandated, "person")}
             rig.alerts = () if x is None else (person(x),)
         two.hear(
             two.feedback(
                 robot_id="AGIII",
                 alerts=more,
-                mandates={"AGI": Mandate(factor, "robot")},
+                speed_limits={"AGI": SpeedLimit(factor, "robot")},
                 seen={},
             ),
             "AGIII",
@@ -424,7 +424,7 @@ def test_the_order_of_effects_is_zero_disk_answer_report(events: list[Event]) ->
 @given(EVENTS)
 def test_L2_nobody_is_locked_out_for_ever(events: list[Event]) -> None:
     world = played(events)
-    world.alerts, world.mandates = (), {"AGI": CLEAR}
+    world.alerts, world.speed_limits = (), {"AGI": CLEAR}
     world.full_speed()
     world.wait(3.4)
     world.full_speed()
@@ -453,7 +453,7 @@ def test_no_wish_exceeds_the_drive_times_the_factor(
     linear: float, angular: float, factor: float
 ) -> None:
     rig = Rig().drive_on()
-    rig.mandates = {"AGI": Mandate(factor, "person")}
+    rig.speed_limits = {"AGI": SpeedLimit(factor, "person")}
     rig.wished = Twist2D(linear, angular)
     rig.run(0.3)
     for _ in range(40):
@@ -466,12 +466,12 @@ def test_no_wish_exceeds_the_drive_times_the_factor(
 def test_feedback_counts_forward_only_within_a_boot_and_boots_never_return(
     order: list[tuple[str, int]],
 ) -> None:
-    rig, hearsay = Rig(), Hearsay("AGI")
+    rig, peer_feedback = Rig(), PeerFeedback("AGI")
     met: list[str] = []
     last: dict[str, int] = {}
     for boot, seq in order:
         feedback = rig.feedback(origin=Origin(boot, seq))
-        counts = hearsay.take("T", feedback, None, rig.now)
+        counts = peer_feedback.take("T", feedback, None, rig.now)
         newest = bool(met) and met[-1] == boot
         assert counts == (boot not in met or (newest and seq > last[boot]))
         if counts:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.feedback import Mandate
+from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Twist2D
 from iveg.emulator.ros2_base import TIMEOUT_S, Base
 from iveg.robot.caps import Cap
@@ -20,8 +20,8 @@ from iveg.robot.effects import Drive as Told
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, REST
 from iveg.robot.ros2.config import Drive
 from iveg.robot.ros2.drive import DriveTopics
+from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist
-from iveg.robot.ros2.trouble import Troubles
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.rig import STEP_S, Rig, person, release, resume, stop
@@ -66,7 +66,7 @@ class Gate:
 
     def __post_init__(self) -> None:
         self.topics = DriveTopics(
-            Drive(stamped_in=True, stamped_out=True), "/in", "base_link", Troubles()
+            Drive(stamped_in=True, stamped_out=True), "/in", "base_link", InputFaults()
         )
         self.seen = 0
 
@@ -106,8 +106,8 @@ class Gate:
             self.rig.command(release(ids, self.rig.machine.challenge))
         self.rig.command(resume(self.rig.machine.challenge))
 
-    def on_mandate(self, factor: float) -> None:
-        self.rig.mandates = {"AGI": Mandate(factor, "person")}
+    def on_speed_limit(self, factor: float) -> None:
+        self.rig.speed_limits = {"AGI": SpeedLimit(factor, "person")}
 
     def on_person(self, x: float) -> None:
         self.rig.alerts = (person(x),)

@@ -35,7 +35,7 @@ from iveg.domain.stop import (
     OffTable,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
     StopMachine,
     Wanted,
 )
@@ -163,7 +163,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
                 )
             elif isinstance(effect, SendOnce):
                 self._send_once(effect)
-            elif isinstance(effect, SetLevel):
+            elif isinstance(effect, SetDesiredState):
                 self.level = effect.ids
             elif isinstance(effect, Closed):
                 self._keep(effect.command)

@@ -170,7 +170,7 @@ async def live(life: Life, rnd: Random) -> None:
 def told(life: Life) -> Counter[tuple[float, str]]:
     """What people saw happen: when, and what."""
     lines = (
-        (line.at, line.key.removeprefix("log.stop.")) for line in life.minutes.lines
+        (line.at, line.key.removeprefix("log.stop.")) for line in life.event_log.lines
     )
     return Counter((at, key) for at, key in lines if key in TOLD)
 

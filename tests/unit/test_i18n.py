@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from iveg.web.words import Words, preferred_language, read_words
+from iveg.web.pages.translations import (
+    Translations,
+    preferred_language,
+    read_translations,
+)
 
 ROOT = Path(__file__).parents[2]
 STATIC = ROOT / "iveg/static"
@@ -17,7 +21,7 @@ _IN_TEMPLATES = re.compile(r"""(?:say|t)\("([a-z][\w.]*\.\w+)"\s*[),]""")
 _IN_LABELS = re.compile(r"""label\("[\w-]+", "([\w.]+)"\s*[),]""")
 _IN_PYTHON = re.compile(r"""f?"((?:log|alert|health)\.[a-z_.]+)(?<!\.)["{]""")
 
-ES, EN = read_words("es"), read_words("en")
+ES, EN = read_translations("es"), read_translations("en")
 _BLOCKS = "|".join(sorted({key.partition(".")[0] for key in ES.sentences}))
 _IN_SCRIPTS = re.compile(rf"""["`]((?:{_BLOCKS})\.[\w.]*)(["`]|\$)""")
 
@@ -151,9 +155,15 @@ def test_no_control_is_called_an_emergency_stop() -> None:
 
 
 def test_numbers_are_written_as_the_reader_writes_them() -> None:
-    words = {"n": "{value:1} m, {share:percent}"}
-    assert Words("es", words).say("n", value=1.43, share=0.94) == "1,4 m, 94\u00a0%"
-    assert Words("en", words).say("n", value=1.43, share=0.94) == "1.4 m, 94%"
+    translations = {"n": "{value:1} m, {share:percent}"}
+    assert (
+        Translations("es", translations).say("n", value=1.43, share=0.94)
+        == "1,4 m, 94\u00a0%"
+    )
+    assert (
+        Translations("en", translations).say("n", value=1.43, share=0.94)
+        == "1.4 m, 94%"
+    )
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from websockets.http11 import Request, Response
 from websockets.sync.server import Server, ServerConnection, serve
 from websockets.typing import Subprotocol
 
-from iveg.web.pacing import SUBPROTOCOL
+from iveg.web.live.pacing import SUBPROTOCOL
 from tests.browsers import running_browser
 from tests.processes import until
 from tests.unit.test_js_modules import Files
@@ -32,8 +32,8 @@ _ROOT = Path(__file__).parents[2]
 _RECOVERY_MS = 3000
 _CONNECT = """async ([url]) => {
     const {snapshot} = await import('/tests/js/builders.js');
-    const {connect} = await import('/iveg/static/js/socket.js');
-    const {createStore} = await import('/iveg/static/js/store.js');
+    const {connect} = await import('/iveg/static/js/core/socket.js');
+    const {createStore} = await import('/iveg/static/js/core/store.js');
     const store = createStore();
     const sight = Object.assign(new EventTarget(), {hidden: false});
     const line = connect({url, store, page: sight});
@@ -223,7 +223,7 @@ def test_an_idle_line_that_answers_pings_stays_open(
     assert live.attempts == 1
 
 
-def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alarm(
+def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alert(
     page: Page, live: LiveServer
 ) -> None:
     page.evaluate(
@@ -347,7 +347,7 @@ def test_what_was_long_on_its_way_is_late_although_the_server_says_it_is_fresh(
 ) -> None:
     page.evaluate(
         """async () => {
-            const {linkOfRobot} = await import('/iveg/static/js/clock.js');
+            const {linkOfRobot} = await import('/iveg/static/js/core/clock.js');
             window.links = [];
             window.store.watch((robot) => window.links.push(linkOfRobot(robot)));
         }"""

@@ -174,7 +174,7 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
 
 def record_of(kind: type[R], row: RowMapping) -> R:
     """A row as the record that was offered."""
-    columns = tables.SHELVES[kind].table.c
+    columns = tables.TABLE_MAPPINGS[kind].table.c
     values = {field.name: row[columns[field.name]] for field in fields(kind)}
     return kind(**values)
 

@@ -6,7 +6,7 @@ that may not be lost go to the journal and telemetry waits its turn in the queue
     offer ──> queue ──> batch ──> database
                 └─ away ─> journal ─┘  on its return, and at the next start
 
-What was commanded does not wait for a batch: ``secured`` puts it into the journal at
+What was commanded does not wait for a batch: ``flushed`` puts it into the journal at
 once, and what is then written twice is stored once.
 """
 
@@ -73,7 +73,7 @@ class Recorder:
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
-        self._unsecured: list[Waiting] = []
+        self._unflushed: list[Waiting] = []
         self._securing = asyncio.Lock()
         self._awake, self._full = asyncio.Event(), asyncio.Event()
         self._caught_up = asyncio.Event()
@@ -93,10 +93,10 @@ class Recorder:
         """Remember a record in a while; never blocks, never awaits, never fails."""
         waiting = self._stamp(record)
         if isinstance(record, CommandRecord | CommandEventRecord):
-            self._unsecured.append(waiting)
+            self._unflushed.append(waiting)
         self._take(waiting)
 
-    async def secured(self) -> None:
+    async def flushed(self) -> None:
         """Return when every command and audit row so far is in the journal.
 
         For a STOP, which must survive a crash of the next millisecond.  Those who ask
@@ -104,7 +104,7 @@ class Recorder:
         like any other, and is seen in ``health``.
         """
         async with self._securing:
-            rows, self._unsecured = self._unsecured, []
+            rows, self._unflushed = self._unflushed, []
             if rows:
                 await self._append(rows)
 

@@ -37,7 +37,7 @@ class SpeedSeries:
     Attributes:
         at: Unix seconds, rising; the others have its length.
         linear: (m/s), mean of a slice.
-        mandated: Strictest factor that iVeg mandated in a slice.
+        limited to: Strictest factor that iVeg limited to in a slice.
         applied: Strictest factor that the robot reported; None where it was silent.
         slice_s: Length of a slice (s); 0 where each point is one row.
     """

@@ -21,14 +21,14 @@ from sqlalchemy.exc import (
 
 from iveg.adapters.history.engine import writing_engine
 from iveg.adapters.history.migrate import reason_of, upgrade
-from iveg.adapters.history.tables import SHELVES, Shelf
+from iveg.adapters.history.tables import TABLE_MAPPINGS, TableMapping
 from iveg.domain.errors import HopError
 from iveg.domain.records import CommandEventRecord, CommandRecord, Record
 from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
 _Row = dict[str, object]
-_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in SHELVES}
+_FIELDS = {kind: tuple(f.name for f in fields(kind)) for kind in TABLE_MAPPINGS}
 _VALUE_ERRORS = (ValueError, TypeError, OverflowError)
 
 
@@ -119,12 +119,12 @@ def _choose_durability(connection: Connection, rows: Sequence[Waiting]) -> None:
 
 
 def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
-    for kind, shelf in SHELVES.items():
-        values = _values([row for row in rows if type(row.record) is kind], shelf)
+    for kind, mapping in TABLE_MAPPINGS.items():
+        values = _values([row for row in rows if type(row.record) is kind], mapping)
         if values:
-            connection.execute(_statement(shelf, connection.dialect.name), values)
-            if shelf.keep_s is not None:
-                _forget(connection, shelf.table, values, shelf.keep_s)
+            connection.execute(_statement(mapping, connection.dialect.name), values)
+            if mapping.keep_s is not None:
+                _forget(connection, mapping.table, values, mapping.keep_s)
 
 
 def _forget(
@@ -135,14 +135,14 @@ def _forget(
     connection.execute(delete(table).where(table.c.at < newest - keep_s))
 
 
-def _values(rows: Iterable[Waiting], shelf: Shelf) -> list[_Row]:
+def _values(rows: Iterable[Waiting], mapping: TableMapping) -> list[_Row]:
     """Rows as columns; of several states of one thing only the newest."""
-    if not shelf.changes:
+    if not mapping.changes:
         return [_columns(row.record) for row in rows]
     newest: dict[tuple[object, ...], _Row] = {}
     for row in sorted(rows, key=lambda row: row.revision):
         values = _columns(row.record) | {"revision": row.revision}
-        newest[tuple(values[name] for name in shelf.identity)] = values
+        newest[tuple(values[name] for name in mapping.identity)] = values
     return list(newest.values())
 
 
@@ -150,18 +150,18 @@ def _columns(record: Record) -> _Row:
     return {name: getattr(record, name) for name in _FIELDS[type(record)]}
 
 
-def _statement(shelf: Shelf, dialect: str) -> Insert:
+def _statement(mapping: TableMapping, dialect: str) -> Insert:
     make = postgresql.insert if dialect == "postgresql" else sqlite.insert
-    statement = make(shelf.table)
-    if not shelf.identity:
+    statement = make(mapping.table)
+    if not mapping.identity:
         return statement
-    names = [shelf.table.c[key] for key in shelf.identity]
-    if not shelf.changes:
+    names = [mapping.table.c[key] for key in mapping.identity]
+    if not mapping.changes:
         return statement.on_conflict_do_nothing(index_elements=names)
     return statement.on_conflict_do_update(
         index_elements=names,
-        set_={c: statement.excluded[c.key] for c in shelf.table.c if c not in names},
-        where=shelf.table.c.revision <= statement.excluded.revision,
+        set_={c: statement.excluded[c.key] for c in mapping.table.c if c not in names},
+        where=mapping.table.c.revision <= statement.excluded.revision,
     )
 
 

@@ -262,7 +262,7 @@ readings = Table(
 
 
 @dataclass(frozen=True, slots=True)
-class Shelf:
+class TableMapping:
     """Where one kind of record is kept.
 
     Attributes:
@@ -277,15 +277,17 @@ class Shelf:
     keep_s: float | None = None
 
 
-SHELVES: dict[type, Shelf] = {
-    CommandRecord: Shelf(commands, ("command_id",), changes=True),
-    CommandEventRecord: Shelf(command_events, ("command_id", "at", "state", "why")),
-    DecisionRecord: Shelf(decisions, ("decision_id",), changes=True),
-    AlertRecord: Shelf(alerts, ("alert_id",), changes=True),
-    LogRecord: Shelf(log, ("id", "at")),
-    DetectionRecord: Shelf(detections),
-    OdometryRecord: Shelf(odometry),
-    ClimateRecord: Shelf(climate),
-    LatencyRecord: Shelf(latency, keep_s=86400.0),
-    ReadingRecord: Shelf(readings),
+TABLE_MAPPINGS: dict[type, TableMapping] = {
+    CommandRecord: TableMapping(commands, ("command_id",), changes=True),
+    CommandEventRecord: TableMapping(
+        command_events, ("command_id", "at", "state", "why")
+    ),
+    DecisionRecord: TableMapping(decisions, ("decision_id",), changes=True),
+    AlertRecord: TableMapping(alerts, ("alert_id",), changes=True),
+    LogRecord: TableMapping(log, ("id", "at")),
+    DetectionRecord: TableMapping(detections),
+    OdometryRecord: TableMapping(odometry),
+    ClimateRecord: TableMapping(climate),
+    LatencyRecord: TableMapping(latency, keep_s=86400.0),
+    ReadingRecord: TableMapping(readings),
 }

@@ -17,7 +17,7 @@ from iveg.domain.stop.effects import (
     OffTable,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
 )
 from iveg.domain.stop.machine import STEPS, Step, StopMachine
 from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
@@ -38,7 +38,7 @@ __all__ = [
     "Press",
     "SendOnce",
     "SendStop",
-    "SetLevel",
+    "SetDesiredState",
     "State",
     "Step",
     "StopMachine",

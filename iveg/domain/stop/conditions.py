@@ -2,17 +2,17 @@
 
 from collections.abc import Iterable
 
-from iveg.domain.alarms import Condition
+from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.events import Slot
 from iveg.domain.observations import Instant
 from iveg.domain.stop.effects import OffTable
 from iveg.domain.stop.machine import StopMachine
 
-_ALARMS = {
+_ALERTS = {
     "UNCONFIRMED": "alert.stop_unconfirmed",
     "STILL_MOVING": "alert.stop_still_moving",
 }
-_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALARMS}
+_NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALERTS}
 """A STOP in one of these has not been seen to stand, not even once."""
 
 
@@ -40,7 +40,7 @@ def _of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
         return
     age = round(now.mono - stop.times.requested.mono, 1)
     slots: dict[str, Slot] = {"robot": robot_id, "age": age}
-    key = _ALARMS.get(machine.state)
+    key = _ALERTS.get(machine.state)
     if key is not None:
         yield Condition("P1", key, robot_id, robot_id, slots)
     if stop.reason == "moved" and machine.state in _NOT_AT_REST:

@@ -6,7 +6,7 @@ first drill, and from then on silence is a fact.
 
 from collections.abc import Iterable, Mapping
 
-from iveg.domain.alarms import Condition
+from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.events import Slot
 from iveg.domain.observations import Instant
 

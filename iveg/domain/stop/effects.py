@@ -81,7 +81,7 @@ class SendOnce:
 
 
 @dataclass(frozen=True, slots=True)
-class SetLevel:
+class SetDesiredState:
     """Publish the retained desired state that a reconnecting robot finds."""
 
     robot_id: str
@@ -132,4 +132,4 @@ class OffTable:
     key: Key
 
 
-Effect = SendStop | SendOnce | SetLevel | Changed | Closed | OffTable
+Effect = SendStop | SendOnce | SetDesiredState | Changed | Closed | OffTable

@@ -38,7 +38,7 @@ from iveg.domain.stop.effects import (
     OffTable,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
 )
 from iveg.domain.stop.evidence import Evidence, stands
 from iveg.domain.stop.sends import Progress, Sends
@@ -471,7 +471,7 @@ class StopMachine(Evidence):
         self._standstill.forget()
         self._deadline = event.at.mono + LIMITS.unconfirmed_after_s
         self._sends.begin()
-        level = SetLevel(self.robot_id, "stopped", (event.kept or event.new_id,))
+        level = SetDesiredState(self.robot_id, "stopped", (event.kept or event.new_id,))
         return [*self._send_now(event.at), level, *closed]
 
     def _adopt(self, event: Event) -> list[Effect]:
@@ -483,7 +483,7 @@ class StopMachine(Evidence):
         self._sends.begin()
         self._sends.now(event.at)
         self._deadline = event.at.mono + LIMITS.braking_most_s
-        return [SetLevel(self.robot_id, "stopped", (event.new_id,)), *closed]
+        return [SetDesiredState(self.robot_id, "stopped", (event.new_id,)), *closed]
 
     def _close(self, key: Key) -> list[Closed]:
         """What is followed no more says so in its own row."""
@@ -540,7 +540,7 @@ class StopMachine(Evidence):
         return []
 
     def _let_go(self, _: Event) -> list[Effect]:
-        return [SetLevel(self.robot_id, "run", ())]
+        return [SetDesiredState(self.robot_id, "run", ())]
 
     def _nothing(self, _: Event) -> list[Effect]:
         return []

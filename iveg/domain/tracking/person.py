@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.alerts import Class, Rule
+from iveg.domain.detection_rule import Class, Rule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 

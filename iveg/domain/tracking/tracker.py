@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from iveg.domain.alerts import Class
+from iveg.domain.detection_rule import Class
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign

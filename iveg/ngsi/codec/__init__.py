@@ -12,7 +12,6 @@ from iveg.ngsi.codec.commands import (
     write_resume,
     write_stop,
 )
-from iveg.ngsi.codec.door import MAX_DEPTH, Problem, Reading, load_json
 from iveg.ngsi.codec.feedback import FeedbackWriter, read_feedback, write_feedback
 from iveg.ngsi.codec.incoming import (
     read_answer,
@@ -22,9 +21,9 @@ from iveg.ngsi.codec.incoming import (
 )
 from iveg.ngsi.codec.reports import (
     write_answer,
-    write_canary,
     write_climate,
     write_detections,
+    write_heartbeat,
     write_navigation,
     write_odometry,
     write_safety,
@@ -32,6 +31,7 @@ from iveg.ngsi.codec.reports import (
     write_sensed,
     write_unplaced,
 )
+from iveg.ngsi.codec.untrusted import MAX_DEPTH, Problem, Reading, load_json
 
 __all__ = [
     "MAX_DEPTH",
@@ -48,12 +48,12 @@ __all__ = [
     "read_measure",
     "read_notification",
     "write_answer",
-    "write_canary",
     "write_climate",
     "write_command",
     "write_desired",
     "write_detections",
     "write_feedback",
+    "write_heartbeat",
     "write_navigation",
     "write_odometry",
     "write_release",

@@ -11,12 +11,12 @@ from pydantic import TypeAdapter, ValidationError
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import (
-    Canary,
     Climate,
     CommandAnswer,
     CommandStatus,
     Detection,
     DetectionFrame,
+    HeartbeatProbe,
     LaserScan,
     Navigation,
     Observation,
@@ -27,8 +27,8 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import names, payloads
-from iveg.ngsi.codec.door import Reading, first_complaint, merge, unread
 from iveg.ngsi.codec.fields import read_holds, read_origin
+from iveg.ngsi.codec.untrusted import Reading, first_complaint, merge, unread
 from iveg.ngsi.sensors import SENSORS, Sensor
 
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
@@ -342,13 +342,13 @@ _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan], str]] = {
 
 
 def climate(_: str, attributes: Mapping[str, Any]) -> Climate:
-    """What the house measures."""
+    """What the greenhouse measures."""
     value = payloads.ClimateValue.model_validate(dict(attributes))
     return Climate(value.temperature, value.relativeHumidity, value.co2)
 
 
-def canary(_: str, attributes: Mapping[str, Any]) -> Canary:
+def heartbeat(_: str, attributes: Mapping[str, Any]) -> HeartbeatProbe:
     """The probe that iVeg sends through the whole chain."""
-    return Canary(
+    return HeartbeatProbe(
         read_origin(payloads.OriginFields.model_validate(attributes["probe"]))
     )

@@ -1,4 +1,4 @@
-"""What iVeg asks of one robot: a command, or the retained level."""
+"""What iVeg asks of one robot: a command, or the retained desired state."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
@@ -42,5 +42,5 @@ def write_command(value: Mapping[str, Any]) -> bytes:
 
 
 def write_desired(desired: Literal["stopped", "run"], ids: Iterable[str]) -> bytes:
-    """The retained level on ``/{robot}/iveg/desired``."""
+    """The retained desired state on ``/{robot}/iveg/desired``."""
     return orjson.dumps({"desired": desired, "ids": list(ids)})

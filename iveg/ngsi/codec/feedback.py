@@ -11,12 +11,12 @@ from iveg.domain.feedback import (
     LONGEST_BACKLOG_S,
     Feedback,
     FeedbackAlert,
-    Mandate,
+    SpeedLimit,
 )
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.ngsi import payloads
-from iveg.ngsi.codec.door import first_complaint, load_json
 from iveg.ngsi.codec.fields import read_origin, rounded, without_none, write_origin
+from iveg.ngsi.codec.untrusted import first_complaint, load_json
 
 
 def read_feedback(payload: bytes) -> Feedback:
@@ -39,14 +39,14 @@ def read_feedback(payload: bytes) -> Feedback:
         None if pose is None else Twist2D(pose.linear_velocity, pose.angular_velocity),
         None if pose is None else pose.stamp,
         {
-            robot_id: Mandate(
-                mandate.speed_factor,
-                mandate.reason,
-                mandate.cause,
-                mandate.distance_m,
-                mandate.decision_id,
+            robot_id: SpeedLimit(
+                speed_limit.speed_factor,
+                speed_limit.reason,
+                speed_limit.cause,
+                speed_limit.distance_m,
+                speed_limit.decision_id,
             )
-            for robot_id, mandate in value.mandates.items()
+            for robot_id, speed_limit in value.speed_limits.items()
         },
         value.seen,
         _backlog(value.backlog),
@@ -84,7 +84,7 @@ class FeedbackWriter:
 
     def write(self, feedback: Feedback) -> bytes:
         """The bytes of ``/{robot}/mqtt_feedback``."""
-        shared = feedback.alerts, feedback.mandates, feedback.seen
+        shared = feedback.alerts, feedback.speed_limits, feedback.seen
         if not _are_same(shared, self._shared):
             self._shared = shared
             self._written = {
@@ -131,14 +131,14 @@ def _write_shared(feedback: Feedback) -> dict[str, Any]:
         "mandates": {
             robot_id: without_none(
                 {
-                    "speed_factor": mandate.speed_factor,
-                    "reason": mandate.reason,
-                    "cause": mandate.cause,
-                    "distance_m": rounded(mandate.distance_m),
-                    "decision_id": mandate.decision_id,
+                    "speed_factor": speed_limit.speed_factor,
+                    "reason": speed_limit.reason,
+                    "cause": speed_limit.cause,
+                    "distance_m": rounded(speed_limit.distance_m),
+                    "decision_id": speed_limit.decision_id,
                 }
             )
-            for robot_id, mandate in feedback.mandates.items()
+            for robot_id, speed_limit in feedback.speed_limits.items()
         },
         "seen": dict(feedback.seen),
     }

@@ -22,7 +22,7 @@ def read_origin(value: payloads.OriginFields) -> Origin:
         stamp_s,
         value.mono,
         # A robot that has heard nothing yet says so with ``null``.
-        echoes="heard" in value.model_fields_set,
+        acknowledgements="heard" in value.model_fields_set,
         heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
         replay=value.replay,
     )
@@ -37,7 +37,7 @@ def write_origin(origin: Origin) -> dict[str, Any]:
     }
     if origin.mono is not None:
         fields["mono"] = round(origin.mono, 6)
-    if origin.echoes:
+    if origin.acknowledgements:
         heard = origin.heard
         fields["heard"] = (
             None if heard is None else {"boot": heard.boot, "seq": heard.seq}

@@ -13,13 +13,13 @@ from iveg.domain.errors import UnreadableError
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
     IsPast,
-    canary,
     climate,
     command_answer,
+    heartbeat,
     read_attributes,
     read_one,
 )
-from iveg.ngsi.codec.door import Reading, first_complaint, load_json, merge, unread
+from iveg.ngsi.codec.untrusted import Reading, first_complaint, load_json, merge, unread
 
 
 def read_notification(
@@ -62,8 +62,8 @@ def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> Rea
         return read_attributes(entity_id, attributes, is_past)
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
-    if (entity_id, entity_type) == (names.CANARY_ID, names.CANARY_TYPE):
-        return read_one(entity_id, canary, attributes)
+    if (entity_id, entity_type) == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
+        return read_one(entity_id, heartbeat, attributes)
     return unread(
         payloads.clean_text(entity_id),
         "foreign_entity",

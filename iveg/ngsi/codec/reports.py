@@ -201,7 +201,7 @@ def write_climate(value: Climate, stamp: str) -> bytes:
     )
 
 
-def write_canary(origin: Origin) -> bytes:
+def write_heartbeat(origin: Origin) -> bytes:
     """The bytes of ``/{apikey}/iveg-canary/attrs``."""
     return _measure(origin, {"probe": write_origin(origin)})
 

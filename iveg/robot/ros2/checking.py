@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import message_of
+from iveg.robot.ros2.inputs import listened
 from iveg.robot.ros2.rig import Known
-from iveg.robot.ros2.senses import listened
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2.names import Qos
 from iveg.ros2.schema import Message

@@ -8,8 +8,8 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Twist2D
 from iveg.robot.gate import REST
 from iveg.robot.ros2.config import Drive
+from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.robot.ros2.trouble import Troubles
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -27,16 +27,16 @@ class DriveTopics:
         drive: Which of the two types each has.
         topic: Full name of ``cmd_vel_in``, for troubles.
         base_link: Frame of stamped twists.
-        troubles: Where what is wrong is noted.
+        input_faults: Where what is wrong is noted.
     """
 
     def __init__(
-        self, drive: Drive, topic: str, base_link: str, troubles: Troubles
+        self, drive: Drive, topic: str, base_link: str, input_faults: InputFaults
     ) -> None:
         self._drive = drive
         self._topic = topic
         self._base_link = base_link
-        self._troubles = troubles
+        self._input_faults = input_faults
         self._newest = 0.0
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
@@ -47,7 +47,7 @@ class DriveTopics:
             stamped = cdr.read(m.TwistStamped, payload)
             return None if self._is_old(stamped, now) else read_twist(stamped.twist)
         except UnreadableError as error:
-            self._troubles.note(error.reason, self._topic, now)
+            self._input_faults.note(error.reason, self._topic, now)
             return REST
 
     def _is_old(self, stamped: m.TwistStamped, now: float) -> bool:
@@ -56,7 +56,7 @@ class DriveTopics:
             return False
         # A clock that was set back by more than a wish lives is believed again.
         if self._newest - 1.0 < stamp <= self._newest:
-            self._troubles.note("time_back", self._topic, now)
+            self._input_faults.note("time_back", self._topic, now)
             return True
         self._newest = stamp
         return False

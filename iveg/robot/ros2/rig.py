@@ -22,7 +22,7 @@ from iveg.robot.node import RobotNode
 from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
-from iveg.robot.ros2.senses import PICTURES, Payload, Senses, listened
+from iveg.robot.ros2.inputs import PICTURES, Payload, SensorInputs, listened
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
@@ -148,13 +148,13 @@ class Ros2Robot:
         self._id = robot_id
         self._config, self._names = config, config.full_topics
         self._network = network
-        self.senses = Senses(config, classes, sim_time=sim_time)
-        self._troubles = self.senses.troubles
+        self.inputs = SensorInputs(config, classes, sim_time=sim_time)
+        self._input_faults = self.inputs.input_faults
         self._topics = DriveTopics(
             config.drive,
             self._names.cmd_vel_in,
             config.frames.base_link,
-            self._troubles,
+            self._input_faults,
         )
         self._neighbours = neighbours.Neighbours(robot_id)
         self._said: frozenset[tuple[str, str]] = frozenset()
@@ -225,14 +225,14 @@ class Ros2Robot:
     def _sense(self) -> None:
         now = clock.now()
         for topic, one in self._ins.items():
-            self.senses.hear(topic, one.reader.take(), now.mono, one.most)
-        for observation in self.senses.tick(now):
+            self.inputs.hear(topic, one.reader.take(), now.mono, one.most)
+        for observation in self.inputs.tick(now):
             self.node.sense(observation)
         self._judge(now.mono)
 
     def _judge(self, now: float) -> None:
-        faults = self._troubles.faults(now)
-        factor, cause = self._troubles.factor(now)
+        faults = self._input_faults.faults(now)
+        factor, cause = self._input_faults.factor(now)
         self.node.limit(factor, cause)
         self.node.tell_faults(faults)
         self._log(faults)
@@ -250,7 +250,7 @@ class Ros2Robot:
         now = clock.now().mono
         waited = self._wishes.reader.take()
         if len(waited) >= self._wishes.most:
-            self._troubles.note("flood", self._names.cmd_vel_in, now)
+            self._input_faults.note("flood", self._names.cmd_vel_in, now)
         if not waited:
             return
         wish = self._topics.read(waited[-1].payload, now)
@@ -262,14 +262,14 @@ class Ros2Robot:
         now, out = clock.now().mono, self._names.cmd_vel_out
         others = [one for one in self._network.endpoints() if not one.own]
         if any(one.writes and one.topic == out for one in others):
-            self._troubles.note("second_publisher", out, now)
+            self._input_faults.note("second_publisher", out, now)
         if others:
             self._alone_since = now
         elif now - self._alone_since > _MET_WITHIN_S:
-            self._troubles.note("nobody_there", f"DDS {self._config.domain}", now)
+            self._input_faults.note("nobody_there", f"DDS {self._config.domain}", now)
         first = self._first_feedback
         if not self._known and first is not None and now - first > _KNOWN_WITHIN_S:
-            self._troubles.note("unknown_to_iveg", self._id, now)
+            self._input_faults.note("unknown_to_iveg", self._id, now)
 
     def _on_feedback(self, peer: str, feedback: Feedback) -> None:
         now = clock.now().mono
@@ -288,10 +288,10 @@ class Ros2Robot:
             # Nothing arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
             out = self._names.cmd_vel_out
-            self._troubles.note("drive_refused", out, now.mono)
+            self._input_faults.note("drive_refused", out, now.mono)
 
     def _tell_neighbours(self) -> None:
-        place = self.senses.place
+        place = self.inputs.place
         cloud, drawing = _heard(self._cloud), _heard(self._markers)
         if place is None or (cloud is None and drawing is None):
             return

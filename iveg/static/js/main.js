@@ -5,21 +5,21 @@
  * STOP controls along.
  */
 
-import { loadWords, switchLanguage } from "./i18n.js";
+import { loadI18n, switchLanguage } from "./core/i18n.js";
+import { connect } from "./core/socket.js";
+import { createStore } from "./core/store.js";
 import { createBanner } from "./panels/banner.js";
 import { createDialogs } from "./panels/dialogs.js";
 import { all, setAttribute } from "./panels/dom.js";
 import { createStopPanel } from "./panels/stop.js";
 import { createThemePanel } from "./panels/theme.js";
-import { connect } from "./socket.js";
-import { createStore } from "./store.js";
 
 /**
  * What panels are given.
  *
  * @typedef {{
- *   store: import("./store.js").Store,
- *   words: import("./i18n.js").Words,
+ *   store: import("./core/store.js").Store,
+ *   i18n: import("./core/i18n.js").I18n,
  *   line: ReturnType<typeof connect>,
  *   dialogs: import("./panels/dialogs.js").Dialogs,
  *   stops: ReturnType<typeof createStopPanel>,
@@ -30,15 +30,15 @@ async function start() {
   const dialogs = createDialogs();
   createThemePanel();
   wireLanguage();
-  const words = await loadWords();
+  const i18n = await loadI18n();
   if (!document.querySelector("#stops")) return;
   const store = createStore();
   const draws = document.querySelector("#map") !== null;
   const line = connect({ url: liveUrl(), store, draws });
-  const app = /** @type {App} */ ({ store, words, line, dialogs });
+  const app = /** @type {App} */ ({ store, i18n, line, dialogs });
   app.stops = createStopPanel(app);
   createBanner(app);
-  const { startPage } = await import("./page.js");
+  const { startPage } = await import("./core/page.js");
   await startPage(app);
 }
 

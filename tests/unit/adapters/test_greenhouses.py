@@ -35,50 +35,50 @@ def test_every_built_in_greenhouse_loads_under_its_own_name(name: str) -> None:
 
 
 def test_the_testbed_of_the_paper_has_five_corridors_four_metres_apart() -> None:
-    house = load_greenhouse("mvsim-20x20")
-    corridors = [lane for lane in house.lanes if lane.label.startswith("Pasillo")]
+    greenhouse = load_greenhouse("mvsim-20x20")
+    corridors = [lane for lane in greenhouse.lanes if lane.label.startswith("Pasillo")]
     middles = [round((c.area.xmin + c.area.xmax) / 2) for c in corridors]
 
     assert middles == [2, 6, 10, 14, 18]
-    assert house.lane_at(10.0, 10.0) == "Pasillo 3"
+    assert greenhouse.lane_at(10.0, 10.0) == "Pasillo 3"
 
 
 def test_agroconnect_has_the_papers_aisles_and_its_1850_square_metres() -> None:
-    house = load_greenhouse("agroconnect")
+    greenhouse = load_greenhouse("agroconnect")
     sizes = sorted(
         (round(lane.area.xmax - lane.area.xmin, 2), lane.area.ymax - lane.area.ymin)
-        for lane in house.lanes
+        for lane in greenhouse.lanes
     )
-    bounds = house.bounds
+    bounds = greenhouse.bounds
 
     assert sizes == [(2.0, 12.5)] * 11 + [(2.0, 22.5)] * 11 + [(50.0, 2.0)]
     assert (bounds.xmax - bounds.xmin) * (bounds.ymax - bounds.ymin) == 1850.0
 
 
 def test_crop_hides_one_corridor_from_the_next() -> None:
-    house = load_greenhouse("mvsim-20x20")
+    greenhouse = load_greenhouse("mvsim-20x20")
 
-    assert not house.in_sight(10.0, 10.0, 14.0, 10.0)
-    assert house.in_sight(10.0, 5.0, 10.0, 15.0)
+    assert not greenhouse.in_sight(10.0, 10.0, 14.0, 10.0)
+    assert greenhouse.in_sight(10.0, 5.0, 10.0, 15.0)
 
 
 def test_an_open_field_holds_every_position_of_the_wire_and_nothing_else() -> None:
-    house = load_greenhouse("none")
+    greenhouse = load_greenhouse("none")
 
-    assert house.bounds.contains(-1e6, 1e6)
-    assert house.rows == ()
-    assert house.lanes == ()
+    assert greenhouse.bounds.contains(-1e6, 1e6)
+    assert greenhouse.rows == ()
+    assert greenhouse.lanes == ()
 
 
 def test_a_users_file_is_read_from_disk(tmp_path: Path) -> None:
     file = tmp_path / "shed.toml"
     file.write_text(SMALL, "utf-8")
 
-    house = load_greenhouse(str(file))
+    greenhouse = load_greenhouse(str(file))
 
-    assert house.name == "shed"
-    assert len(house.rows) == 2
-    assert house.lanes[0].label == "Pasillo 1"
+    assert greenhouse.name == "shed"
+    assert len(greenhouse.rows) == 2
+    assert greenhouse.lanes[0].label == "Pasillo 1"
 
 
 def test_a_missing_file_is_refused_with_the_names_that_exist() -> None:
@@ -168,15 +168,15 @@ def test_rows_that_are_no_list_are_refused() -> None:
     assert said == "shed.toml, line 4, posts: must be a list of tables."
 
 
-def test_posts_and_starts_of_a_users_house_are_read() -> None:
+def test_posts_and_starts_of_a_users_greenhouse_are_read() -> None:
     more = (
         "\n[[posts]]\nx = 1\ny = 2.5\nradius = 0.1\n[[starts]]\nx = 1\ny = 2\nyaw = 0\n"
     )
 
-    house = read_greenhouse(SMALL + more, "shed.toml")
+    greenhouse = read_greenhouse(SMALL + more, "shed.toml")
 
-    assert (house.posts[0].x, house.posts[0].radius) == (1.0, 0.1)
-    assert house.starts[0].y == 2.0
+    assert (greenhouse.posts[0].x, greenhouse.posts[0].radius) == (1.0, 0.1)
+    assert greenhouse.starts[0].y == 2.0
 
 
 def test_an_unknown_key_is_named_whatever_is_in_it() -> None:

@@ -253,7 +253,7 @@ async def test_what_a_crashed_run_left_in_its_journal_is_stored_at_the_next_star
 ) -> None:
     crashed = Recorder(database_url, tmp_path / "journal")
     crashed.offer(command_record(state="REQUESTED"))
-    await crashed.secured()
+    await crashed.flushed()
 
     upgrade(database_url)
     assert scalar(database_url, "SELECT count(*) FROM commands") == 0
@@ -272,7 +272,7 @@ async def test_it_has_caught_up_when_the_database_holds_what_a_crash_left(
 ) -> None:
     crashed = Recorder(database_url, tmp_path / "journal")
     crashed.offer(command_record(state="REQUESTED"))
-    await crashed.secured()
+    await crashed.flushed()
 
     recorder = Recorder(database_url, tmp_path / "journal")
     task = asyncio.create_task(recorder.run())
@@ -291,7 +291,7 @@ async def test_an_old_state_in_a_journal_never_overwrites_a_newer_one(
     journal = tmp_path / "journal"
     first = Recorder(database_url, journal)
     first.offer(command_record(state="REQUESTED"))
-    await first.secured()
+    await first.flushed()
     old = journal.read_bytes()
     first.offer(command_record(state="STANDING"))
     await first.close()
@@ -314,7 +314,7 @@ async def test_replaying_the_audit_trail_twice_writes_it_once(
     for _ in range(2):
         recorder = Recorder(database_url, journal)
         recorder.offer(command_event_record())
-        await recorder.secured()
+        await recorder.flushed()
         await recorder.close()
 
     assert scalar(database_url, "SELECT count(*) FROM command_events") == 1
@@ -411,7 +411,7 @@ async def test_securing_a_stop_returns_when_the_journal_holds_it(
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
     recorder.offer(command_record())
-    await recorder.secured()
+    await recorder.flushed()
 
     assert b'"C1"' in (tmp_path / "journal").read_bytes()
     await recorder.close()
@@ -423,7 +423,7 @@ async def test_whoever_secures_at_the_same_time_waits_for_the_same_write(
     recorder = Recorder(sqlite_url, tmp_path / "journal")
     recorder.offer(command_record())
 
-    await asyncio.gather(*(recorder.secured() for _ in range(3)))
+    await asyncio.gather(*(recorder.flushed() for _ in range(3)))
 
     assert recorder.counters["history_journalled"] == 1
     await recorder.close()
@@ -436,7 +436,7 @@ async def test_what_the_disk_did_not_take_waits_for_the_database(
     recorder = Recorder(sqlite_url, tmp_path / "journal")
 
     recorder.offer(command_record())
-    await recorder.secured()
+    await recorder.flushed()
 
     (tmp_path / "journal").rmdir()
     await recorder.close()

@@ -193,14 +193,14 @@ async def test_a_foreign_device_on_the_entity_is_told_and_left_alone(
     assert told.problems[0].startswith("Device AAA_gps also feeds AGI")
 
 
-async def test_climate_and_canary_reach_their_entities(site: Site) -> None:
+async def test_climate_and_heartbeat_reach_their_entities(site: Site) -> None:
     await site.provision("AGI")
     async with aiomqtt.Client("127.0.0.1", site.up.mqtt_port) as mqtt:
         await mqtt.publish("/iveg/climate/attrs", b'{"temperature": 21.5}', qos=1)
         await mqtt.publish("/iveg/iveg-canary/attrs", b'{"probe": {"seq": 1}}', qos=1)
-    probes = await read_soon(site.orion, names.CANARY_TYPE, "probe")
+    probes = await read_soon(site.orion, names.HEARTBEAT_TYPE, "probe")
     climates = await site.orion.read_entities(names.CLIMATE_TYPE, ["temperature"])
-    assert [one["id"] for one in probes] == [names.CANARY_ID]
+    assert [one["id"] for one in probes] == [names.HEARTBEAT_ID]
     assert [one["temperature"]["value"] for one in climates] == [21.5]
 
 

@@ -200,7 +200,7 @@ async def test_the_direct_transport_speaks_as_the_contract_says() -> None:
         async with running(heard.link):
             await until(lambda: heard.link.connected)
             await transport.stop("AGI", "01A", "x")
-            await transport.set_level("AGI", "stopped", ["01A"])
+            await transport.set_desired_state("AGI", "stopped", ["01A"])
             transport.tell(Feedback("AGI", Origin("b", 1, "t")))
             await until(lambda: len(heard.messages) == 3)
 
@@ -217,7 +217,7 @@ async def test_a_robot_that_reconnects_finds_the_level_and_no_old_command() -> N
         transport = MqttTransport(iveg.link, "iveg")
         async with running(iveg.link):
             await until(lambda: iveg.link.connected)
-            await transport.set_level("AGI", "stopped", ["01A"])
+            await transport.set_desired_state("AGI", "stopped", ["01A"])
             await transport.stop("AGI", "01A", "x")
             robot = Heard(port, "/iveg/AGI/cmd", "/AGI/iveg/desired")
             async with running(robot.link):

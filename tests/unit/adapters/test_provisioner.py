@@ -44,21 +44,21 @@ class Site:
         self, fiware: Running, *, orion_url: str = "", agent_url: str = ""
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
-        self.chain = HealthMonitor(clock.now())
+        self.health_monitor = HealthMonitor(clock.now())
         self.ingest = Ingest({"AGI"}.__contains__)
         self.orion = OrionClient(orion_url or fiware.orion_url, *SERVICE)
         self.agent = IotAgentClient(agent_url or fiware.iota_url, *SERVICE)
         self.link = MqttLink(
             BrokerAddress("127.0.0.1", fiware.mqtt_port),
             "test",
-            {names.measure_topic("iveg", names.CANARY_ID): 0},
+            {names.measure_topic("iveg", names.HEARTBEAT_ID): 0},
             lambda topic, payload: self.heard.append((topic, payload)),
         )
         self.provisioner = Provisioner(
             self.orion,
             self.agent,
             self.link,
-            self.chain,
+            self.health_monitor,
             self.ingest,
             Feeds(),
             robots=["AGI"],
@@ -98,8 +98,8 @@ async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -
         kept = await site.orion.read_subscriptions()
 
     assert {one["id"] for one in kept} == site.provisioner.subscription_ids
-    assert site.chain.agent_error == ""
-    assert site.chain.orion_ok_at is not None
+    assert site.health_monitor.agent_error == ""
+    assert site.health_monitor.orion_ok_at is not None
 
 
 async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:
@@ -137,15 +137,15 @@ async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
 ) -> None:
     down = Site(fiware, orion_url="http://127.0.0.1:9")
     async with down.running() as site:
-        await until(lambda: site.chain.orion_error)
+        await until(lambda: site.health_monitor.orion_error)
         await until(lambda: len(_warnings(caplog)) >= 1)
-        before = site.chain.orion_error
-        site.chain.orion_error = ""
-        await until(lambda: site.chain.orion_error == before)
+        before = site.health_monitor.orion_error
+        site.health_monitor.orion_error = ""
+        await until(lambda: site.health_monitor.orion_error == before)
 
     told = [line for line in _warnings(caplog) if line.startswith("orion: ")]
     assert len(told) == 1
-    assert "cannot be reached" in site.chain.orion_error
+    assert "cannot be reached" in site.health_monitor.orion_error
 
 
 async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
@@ -155,8 +155,8 @@ async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
         await until(lambda: site.provisioner.subscription_ids)
         lost = next(iter(site.provisioner.subscription_ids))
         await site.orion.delete_subscription(lost)
-        await until(lambda: site.chain.notify_error)
-        await until(lambda: not site.chain.notify_error)
+        await until(lambda: site.health_monitor.notify_error)
+        await until(lambda: not site.health_monitor.notify_error)
         kept = await site.orion.read_subscriptions()
 
     assert {one["id"] for one in kept} == site.provisioner.subscription_ids
@@ -179,7 +179,7 @@ async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
 
 async def test_a_probe_that_reached_orion_is_found_there(fiware: Running) -> None:
     async with Site(fiware).running() as site:
-        await until(lambda: site.chain.stored_at is not None)
+        await until(lambda: site.health_monitor.stored_at is not None)
 
 
 async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
@@ -194,9 +194,9 @@ async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
     async with Site(fiware).running() as site:
         await until(lambda: site.provisioner.subscription_ids)
         await site.agent.create_device(device)
-        await until(lambda: site.chain.agent_warning, within_s=20.0)
+        await until(lambda: site.health_monitor.agent_warning, within_s=20.0)
         await site.agent.delete_device("AAA_gps")
-        await until(lambda: not site.chain.agent_warning, within_s=20.0)
+        await until(lambda: not site.health_monitor.agent_warning, within_s=20.0)
 
     told = [line for line in _warnings(caplog) if line.startswith("Device AAA_gps")]
     assert len(told) == 1
@@ -215,9 +215,9 @@ async def test_an_agent_that_falls_behind_is_asked_nothing_more(
         behind = Site(fiware, agent_url=f"http://127.0.0.1:{port}")
         now = clock.now()
         for seq, (left, back) in enumerate(((-14.0, -12.0), (-8.0, 0.0))):
-            behind.chain.sent(Origin("b", seq), now.later(left))
-            behind.chain.received(Origin("b", seq), now.later(back))
-        behind.chain.received_at = now.mono
+            behind.health_monitor.sent(Origin("b", seq), now.later(left))
+            behind.health_monitor.received(Origin("b", seq), now.later(back))
+        behind.health_monitor.received_at = now.mono
         async with behind.running() as site:
             await first_ids(site)
 
@@ -245,9 +245,9 @@ async def test_json_that_nobody_can_use_is_orions_fault_and_kills_nothing(
     async with http_server(answer, "127.0.0.1", 0) as port:
         mad = Site(fiware, orion_url=f"http://127.0.0.1:{port}")
         async with mad.running() as site:
-            await until(lambda: site.chain.notify_error)
+            await until(lambda: site.health_monitor.notify_error)
 
-    assert site.chain.notify_error == "answered JSON that means nothing here"
+    assert site.health_monitor.notify_error == "answered JSON that means nothing here"
 
 
 def _warnings(caplog: pytest.LogCaptureFixture) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.rules import FileRules
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import DataFileError, HopError
 from tests.builders import START
 

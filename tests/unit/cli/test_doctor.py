@@ -27,9 +27,9 @@ STACK = Stack(
 )
 
 
-def found(**troubles: str | None) -> dict[Hop, Finding]:
+def found(**input_faults: str | None) -> dict[Hop, Finding]:
     """Every hop well, but for those that are named with what was said."""
-    named = {Hop[name]: said for name, said in troubles.items()}
+    named = {Hop[name]: said for name, said in input_faults.items()}
     return {hop: Finding(hop, 0.012, named.get(hop)) for hop in Hop}
 
 

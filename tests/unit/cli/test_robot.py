@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from iveg.cli import main
+from iveg.cli.arguments import add_robot_arguments
 from iveg.cli.robot import load_config, refuse_second_gate, run_robot
-from iveg.cli.words import add_robot_words
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.ros2 import messages as m
 from iveg.settings import Settings
@@ -18,7 +18,7 @@ from tests.fakes.ros2_network import Endpoint, FakeNetwork
 
 def options(*words: str) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
-    add_robot_words(parser.add_subparsers())
+    add_robot_arguments(parser.add_subparsers())
     return parser.parse_args(["robot", "--id", "AGI", *words])
 
 

@@ -10,7 +10,7 @@ from iveg.domain.stop import (
     Effect,
     SendOnce,
     SendStop,
-    SetLevel,
+    SetDesiredState,
     StopMachine,
 )
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
@@ -173,7 +173,7 @@ def once(effects: list[Effect]) -> list[SendOnce]:
 
 
 def levels(effects: list[Effect]) -> list[str]:
-    return [one.desired for one in effects if isinstance(one, SetLevel)]
+    return [one.desired for one in effects if isinstance(one, SetDesiredState)]
 
 
 def _pressed() -> Bench:

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass, field, replace
 
-from iveg.domain.alerts import Rule
-from iveg.domain.feedback import Mandate
+from iveg.domain.detection_rule import Rule
+from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.mandates import Change, Mandates
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
@@ -14,9 +13,10 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
-from iveg.domain.people import People, Placed
-from iveg.domain.sight import AllClear
+from iveg.domain.rule.speed_limits import Change, SpeedLimits
+from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import Person
+from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from tests.builders import (
     at,
@@ -37,7 +37,7 @@ HEDGE = Greenhouse(
 
 @dataclass
 class Scene:
-    """World, people and mandates on one clock.
+    """World, people and speed limits on one clock.
 
     Attributes:
         robots: As ``IVEG_ROBOTS`` names them, recordings included.
@@ -46,7 +46,7 @@ class Scene:
     """
 
     robots: tuple[str, ...] = ("AGI", "AGII")
-    house: Greenhouse = FIELD
+    greenhouse: Greenhouse = FIELD
     rule: Rule = field(default_factory=Rule)
     now: float = 0.0
     replay: str | None = None
@@ -55,7 +55,7 @@ class Scene:
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))
         self.people = People()
-        self.mandates = Mandates(self.house)
+        self.speed_limits = SpeedLimits(self.greenhouse)
         self.all_clear = AllClear()
         self._seq = 0
 
@@ -117,15 +117,17 @@ class Scene:
 
     # --- what is judged -----------------------------------------------------------
 
-    def judge(self) -> dict[str, Mandate]:
-        mandates, changes = self.mandates.evaluate(
+    def judge(self) -> dict[str, SpeedLimit]:
+        speed_limits, changes = self.speed_limits.evaluate(
             self.world, self.people, self.rule, at(self.now), f"d{self.now}"
         )
         self.changes += changes
-        return mandates
+        return speed_limits
 
     def sweep(self) -> list[Person]:
-        return self.all_clear.sweep(self.people, self.world, self.house, at(self.now))
+        return self.all_clear.sweep(
+            self.people, self.world, self.greenhouse, at(self.now)
+        )
 
     @property
     def everyone(self) -> list[Person]:

@@ -43,11 +43,11 @@ def cost(costmap: Costmap, x: float, y: float) -> int:
     return int(costmap.data[costmap.grid.index(x, y)])
 
 
-def test_a_house_is_covered_in_cells_of_a_tenth_of_a_metre() -> None:
+def test_a_greenhouse_is_covered_in_cells_of_a_tenth_of_a_metre() -> None:
     assert (ROOM.width, ROOM.height, ROOM.resolution) == (200, 100, 0.1)
 
 
-def test_a_large_house_gets_coarser_cells_and_no_more_of_them() -> None:
+def test_a_large_greenhouse_gets_coarser_cells_and_no_more_of_them() -> None:
     grid = Grid.over(Rectangle(0, 0, 300, 100))
 
     assert grid.width * grid.height <= MAX_CELLS

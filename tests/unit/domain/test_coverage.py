@@ -10,7 +10,7 @@ AISLES = (
     Lane("1", Rectangle(0.0, -0.5, 12.0, 0.5)),
     Lane("2", Rectangle(0.0, 1.5, 12.0, 2.5)),
 )
-HOUSE = Greenhouse(
+GREENHOUSE = Greenhouse(
     "two aisles",
     Rectangle(0.0, -3.0, 12.0, 3.0),
     lanes=AISLES,
@@ -20,7 +20,7 @@ HOUSE = Greenhouse(
 
 def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
     """AGI stands in the middle of aisle 1 and looks east."""
-    scene, coverage = Scene(house=HOUSE), Coverage(HOUSE)
+    scene, coverage = Scene(greenhouse=GREENHOUSE), Coverage(GREENHOUSE)
     scene.drive("AGI", 4.0, linear=0.0)
     scene.look("AGI")
     coverage.look(scene.world.live_robots(), at(seconds))
@@ -28,7 +28,7 @@ def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
 
 
 def test_what_no_camera_ever_looked_at_is_never() -> None:
-    coverage = Coverage(HOUSE)
+    coverage = Coverage(GREENHOUSE)
 
     assert coverage.ages(at(5)) == [[None] * 12, [None] * 12]
     assert coverage.share(at(5)) == 0.0
@@ -64,10 +64,10 @@ def test_an_open_field_has_no_aisles_to_look_at() -> None:
     assert Coverage(field).share(at(0)) is None
 
 
-def test_no_house_costs_more_than_a_bound() -> None:
+def test_no_greenhouse_costs_more_than_a_bound() -> None:
     vast = Lane("1", Rectangle(0, 0, 500, 500))
-    house = Greenhouse("vast", vast.area, lanes=(vast,))
+    greenhouse = Greenhouse("vast", vast.area, lanes=(vast,))
 
-    (cells,) = Coverage(house).lanes
+    (cells,) = Coverage(greenhouse).lanes
 
     assert cells.count <= 1.1 * MOST_CELLS

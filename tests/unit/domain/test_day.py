@@ -14,7 +14,7 @@ from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane
 from tests.fakes.records import NOON, decision_record
 
-HOUSE = Greenhouse(
+GREENHOUSE = Greenhouse(
     "two aisles",
     Rectangle(0, 0, 20, 10),
     lanes=(Lane("1", Rectangle(0, 0, 20, 4)), Lane("2", Rectangle(0, 6, 20, 10))),
@@ -29,7 +29,7 @@ def test_an_aisle_is_worked_while_a_robot_drives_in_it() -> None:
     driven = [pose(n) for n in range(90)]
     elsewhere = [pose(100, y=5.0), pose(101, y=7.0, speed=0.0)]
 
-    assert worked_minutes([*driven, *elsewhere], HOUSE) == {"1": {"AGI": 1.5}}
+    assert worked_minutes([*driven, *elsewhere], GREENHOUSE) == {"1": {"AGI": 1.5}}
 
 
 def test_a_robot_slowed_twice_at_once_is_slowed_once() -> None:
@@ -45,7 +45,7 @@ def test_a_robot_slowed_twice_at_once_is_slowed_once() -> None:
         for start in (0.0, 30.0)
     ]
 
-    minutes = slowed_minutes(overlapping, HOUSE, NOON + 1000.0)
+    minutes = slowed_minutes(overlapping, GREENHOUSE, NOON + 1000.0)
 
     assert minutes == {("person", "2"): pytest.approx(1.5)}
 
@@ -53,14 +53,14 @@ def test_a_robot_slowed_twice_at_once_is_slowed_once() -> None:
 def test_a_slow_down_that_goes_on_counts_until_now() -> None:
     open_ = decision_record(x=1.0, y=1.0, reason="person", started_at=NOON)
 
-    assert slowed_minutes([open_], HOUSE, NOON + 30.0) == {("person", "1"): 0.5}
+    assert slowed_minutes([open_], GREENHOUSE, NOON + 30.0) == {("person", "1"): 0.5}
 
 
 def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() -> None:
     poses = [pose(10), pose(11, x=1.5), pose(200, x=4.0), pose(400, speed=0.0)]
     seen = [Seen(second, 2.0, 2.0, "AGII") for second in (10, 11, 200, 400)]
 
-    found = closest_passes(poses, seen, HOUSE)
+    found = closest_passes(poses, seen, GREENHOUSE)
 
     assert [(one.at, one.distance_m) for one in found] == [(11.0, 0.5), (200.0, 2.0)]
     assert found[0].lane == "1"

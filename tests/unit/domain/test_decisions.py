@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.alerts import Rule
-from iveg.domain.conditions import of_decision, of_robot
+from iveg.domain.alerts.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
-from iveg.domain.hazards import Hazard
-from iveg.domain.mandates import Crossing
+from iveg.domain.detection_rule import Rule
 from iveg.domain.observations import FeedbackRef, SafetyReport
+from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.world import RobotState, World
 from tests.builders import (
@@ -32,13 +32,13 @@ def crossing(
     speeding_up: bool = False,
     sighting: Sighting | None = LOOK,
 ) -> Crossing:
-    hazard = Hazard("person", "P1", "AGI", 1.0, 0.0, 2.0, sighting)
+    zone = Zone("person", "P1", "AGI", 1.0, 0.0, 2.0, sighting)
     if sighting is None:
-        hazard = Hazard("robot", "AGI", "AGI", 1.0, 0.0, 2.0)
+        zone = Zone("robot", "AGI", "AGI", 1.0, 0.0, 2.0)
     return Crossing(
         "d-1",
         "AGII",
-        hazard,
+        zone,
         entered=START,
         entered_m=1.43,
         speed_before=speed,
@@ -164,7 +164,7 @@ def keys(one: Decision, after: float) -> list[tuple[str, str]]:
     return [(wrong.priority, wrong.key) for wrong in of_decision(one, at(after))]
 
 
-def test_a_slow_down_that_is_obeyed_is_no_alarm() -> None:
+def test_a_slow_down_that_is_obeyed_is_no_alert() -> None:
     assert keys(obeyed(decision()), 5.0) == []
 
 
@@ -236,7 +236,7 @@ def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
     world = World(["AGI"])
     world.ledger.composed("iveg", 1, 1, at(composed).mono)
     heard = FeedbackRef("iveg", 1)
-    late = replace(origin(1, after=-10.0), echoes=True, heard=heard)
+    late = replace(origin(1, after=-10.0), acknowledgements=True, heard=heard)
     world.apply(received(odometry(origin=late), transport="direct"))
 
     found = robot_keys(world.robot("AGI"), 0.1)

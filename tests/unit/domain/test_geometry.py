@@ -76,17 +76,17 @@ def test_a_rectangle_holds_its_edges_and_a_margin(
 
 
 def test_a_lane_is_known_by_its_label() -> None:
-    house = Greenhouse("h", Rectangle(0, 0, 9, 9), lanes=(Lane("Pasillo 7", BOX),))
+    greenhouse = Greenhouse("h", Rectangle(0, 0, 9, 9), lanes=(Lane("Pasillo 7", BOX),))
 
-    assert house.lane_at(1.5, 2.0) == "Pasillo 7"
-    assert house.lane_at(5.0, 5.0) is None
+    assert greenhouse.lane_at(1.5, 2.0) == "Pasillo 7"
+    assert greenhouse.lane_at(5.0, 5.0) is None
 
 
 def test_crop_hides_what_is_behind_it() -> None:
-    house = Greenhouse("h", Rectangle(0, 0, 9, 9), rows=(BOX,))
+    greenhouse = Greenhouse("h", Rectangle(0, 0, 9, 9), rows=(BOX,))
 
-    assert not house.in_sight(0, 2, 5, 2)
-    assert house.in_sight(0, 5, 5, 5)
+    assert not greenhouse.in_sight(0, 2, 5, 2)
+    assert greenhouse.in_sight(0, 5, 5, 5)
 
 
 def test_a_scan_keeps_the_returns_that_count_and_turns_with_its_mount() -> None:

@@ -24,7 +24,7 @@ class Talker:
     ahead_s: float = 0.0
     up_s: float = 0.002
     down_s: float = 0.002
-    echoes: bool = True
+    acknowledgements: bool = True
     now: float = 0.0
 
     def talk(self, clock: ClockOffset, seconds: float) -> Iterator[float | str]:
@@ -33,7 +33,7 @@ class Talker:
             self.now += 1 / 30
             stamp = round(START.wall + self.now + self.ahead_s, 3)
             heard = (self.now - self.down_s) // 0.1 * 0.1
-            composed = START.mono + heard if self.echoes else None
+            composed = START.mono + heard if self.acknowledgements else None
             yield clock.take(stamp, at(self.now + self.up_s), composed)
 
 
@@ -102,7 +102,7 @@ def test_one_stamp_that_is_wrong_is_no_jump() -> None:
 def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
     clock = ClockOffset()
 
-    found = said(Talker(echoes=False, up_s=0.030), clock, 2.0)
+    found = said(Talker(acknowledgements=False, up_s=0.030), clock, 2.0)
 
     assert found[-1] == pytest.approx(0.030, abs=STAMP_ROUNDING_S)
     assert clock.state == "assumed"
@@ -112,7 +112,7 @@ def test_a_robot_that_does_not_echo_is_taken_at_its_word_and_marked() -> None:
 def test_a_future_that_nothing_explains_gives_no_number() -> None:
     clock = ClockOffset()
 
-    found = said(Talker(echoes=False, ahead_s=0.3), clock, 2.0)
+    found = said(Talker(acknowledgements=False, ahead_s=0.3), clock, 2.0)
 
     assert numbers(found) == []
     assert clock.state == "untrusted"
@@ -121,7 +121,7 @@ def test_a_future_that_nothing_explains_gives_no_number() -> None:
 def test_an_hour_in_the_past_that_nothing_explains_gives_no_number() -> None:
     clock = ClockOffset()
 
-    found = said(Talker(echoes=False, ahead_s=-3600.0), clock, 2.0)
+    found = said(Talker(acknowledgements=False, ahead_s=-3600.0), clock, 2.0)
 
     assert set(found) == {"stale_stamp"}
     assert clock.state == "untrusted"

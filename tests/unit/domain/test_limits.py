@@ -7,7 +7,7 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.limits import LIMITS, Row, ring_radius, rows
 from iveg.robot.judgement import Limits
 from iveg.settings import Settings

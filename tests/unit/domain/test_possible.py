@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import pytest
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.observations import Instant
-from iveg.domain.people import People
+from iveg.domain.tracking.people import People
 from tests.builders import detection
 from tests.unit.domain.scene import Scene, person
 
@@ -93,7 +93,7 @@ def test_a_possible_person_slows_like_any_other() -> None:
 
 @dataclass
 class Walled(Scene):
-    """A house of 20 × 20 m."""
+    """A greenhouse of 20 × 20 m."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -117,10 +117,10 @@ def test_the_zone_of_a_doubtful_person_lies_round_who_saw_them() -> None:
     scene = Walled()
     scene.look("AGI", person(40.0, 10.0))
 
-    mandates = scene.judge()
+    speed_limits = scene.judge()
 
-    assert mandates["AGI"].reason == "person"
-    assert mandates["AGII"].reason == "person"
+    assert speed_limits["AGI"].reason == "person"
+    assert speed_limits["AGII"].reason == "person"
     ((look, radius),) = scene.everyone[0].rings(scene.rule, look_now(scene))
     assert (look.x, look.y, radius) == (10.0, 10.0, 8.0)
 

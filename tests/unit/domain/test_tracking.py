@@ -5,7 +5,7 @@ from itertools import permutations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
 from iveg.domain.tracking.person import Sighting

@@ -4,24 +4,24 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.fleet import RobotDescription
 from iveg.domain.geometry import Pose2D
-from iveg.domain.hazards import hazards_of
 from iveg.domain.observations import (
-    Canary,
     Climate,
     CommandAnswer,
     CommandStatus,
     FeedbackRef,
+    HeartbeatProbe,
     Navigation,
     Observation,
     Origin,
     Received,
 )
-from iveg.domain.people import People
 from iveg.domain.probe import ProbeLag
+from iveg.domain.rule.zones import zones_of
+from iveg.domain.tracking.people import People
 from iveg.domain.world import RobotState, World
 from tests.builders import (
     START,
@@ -108,7 +108,7 @@ def test_a_robot_stands_below_two_centimetres_a_second(
 def echoing(seq: int, heard: int | None, boot: str = "boot-a") -> Origin:
     """Of a robot that tells which feedback of ``iveg`` it had heard, if any."""
     ref = None if heard is None else FeedbackRef("iveg", heard)
-    return replace(origin(seq, boot=boot), echoes=True, heard=ref)
+    return replace(origin(seq, boot=boot), acknowledgements=True, heard=ref)
 
 
 def world_that_told(*moments: float) -> World:
@@ -178,9 +178,9 @@ def test_a_robot_that_moves_is_a_hazard_though_nobody_knows_how_old_its_pose_is(
     world = world_that_told(0.0)
     world.apply(received(odometry("AGII", 1.0, origin=echoing(1, heard=None))))
 
-    found = hazards_of(world, People(), Rule(), at(0.5))
+    found = zones_of(world, People(), Rule(), at(0.5))
 
-    assert [hazard.cause for hazard in found] == ["AGII"]
+    assert [zone.cause for zone in found] == ["AGII"]
 
 
 def test_an_old_look_makes_an_old_sighting_even_when_it_is_late() -> None:
@@ -338,12 +338,12 @@ def test_a_robot_outside_the_fleet_is_refused() -> None:
         world_with(odometry("AGX"))
 
 
-def test_climate_and_canary_belong_to_no_robot() -> None:
-    world = world_with(Climate(21.5), Canary(origin()))
+def test_climate_and_heartbeat_belong_to_no_robot() -> None:
+    world = world_with(Climate(21.5), HeartbeatProbe(origin()))
 
     assert world.climate == Climate(21.5)
     assert world.climate_received == START
-    assert world.canary_at == START.mono
+    assert world.heartbeat_at == START.mono
 
 
 def test_an_unreadable_detection_is_remembered_with_its_moment() -> None:

@@ -207,9 +207,9 @@ def test_who_is_behind_crop_or_behind_the_camera_has_no_segment() -> None:
 
 def test_a_post_and_a_row_stand_in_the_picture() -> None:
     post = Post(3.0, 0.0, 0.1)
-    house = Greenhouse("h", BOUNDS, (), (Rectangle(5.0, -3.0, 6.0, 3.0),), (post,))
+    greenhouse = Greenhouse("h", BOUNDS, (), (Rectangle(5.0, -3.0, 6.0, 3.0),), (post,))
 
-    depth = view(scenery=Scenery.of(house)).depth.depth
+    depth = view(scenery=Scenery.of(greenhouse)).depth.depth
 
     assert depth[HORIZON, MIDDLE] == pytest.approx(2.9, abs=1e-3)
     assert depth[HORIZON, MIDDLE + 60] == pytest.approx(5.0)

@@ -7,14 +7,14 @@ from iveg.domain.greenhouse import Greenhouse, Obstacle, Post
 from iveg.emulator.greenhouse import Body, Scenery
 from tests.touching import bodies_touch, touches
 
-HOUSE = Greenhouse(
+GREENHOUSE = Greenhouse(
     "shed",
     Rectangle(0.0, 0.0, 10.0, 10.0),
     rows=(Rectangle(4.0, 0.0, 5.0, 8.0),),
     posts=(Post(7.0, 7.0, 0.1),),
     obstacles=(Obstacle("crates", Rectangle(8.0, 1.0, 9.0, 2.0)),),
 )
-SCENERY = Scenery.of(HOUSE)
+SCENERY = Scenery.of(GREENHOUSE)
 
 
 def robot(x: float, y: float, yaw: float = 0.0, robot_id: str = "AGI") -> Body:

@@ -24,12 +24,12 @@ from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.world import World
 from tests.builders import AGI
 
-HOUSE = Greenhouse(
+GREENHOUSE = Greenhouse(
     "house",
     Rectangle(-20.0, -20.0, 20.0, 20.0),
     rows=(Rectangle(-19.0, 1.5, 19.0, 2.5),),
 )
-CROP = Scenery.of(HOUSE)
+CROP = Scenery.of(GREENHOUSE)
 HERE = Pose2D(0.0, 0.0, 0.0)
 
 
@@ -100,10 +100,10 @@ def test_the_detector_tells_who_has_no_place_until_the_next_look() -> None:
 
 
 def test_both_cameras_find_the_same_people_in_nearly_the_same_places() -> None:
-    house = load_greenhouse("mvsim-20x20")
-    layout = lay_out(scenario_named("demo"), ("AGI", "AGII"), house)
+    greenhouse = load_greenhouse("mvsim-20x20")
+    layout = lay_out(scenario_named("demo"), ("AGI", "AGII"), greenhouse)
     drawn, grounded = (
-        World(house, layout, DETECTORS["perfect"], 1, kind)
+        World(greenhouse, layout, DETECTORS["perfect"], 1, kind)
         for kind in ("boxes", "grounding")
     )
     pairs = 0

@@ -20,13 +20,13 @@ FIELD = load_greenhouse("none")
 
 def swept(
     sensor: Pose2D,
-    house: Greenhouse = ROOM,
+    greenhouse: Greenhouse = ROOM,
     *,
     people: Sequence[Disc] = (),
     others: Sequence[Body] = (),
     model: LaserModel = EXACT,
 ) -> NDArray[np.float32]:
-    scenery = Scenery.of(house)
+    scenery = Scenery.of(greenhouse)
     return sweep(sensor, model, scenery, people, others, np.random.default_rng(1))
 
 
@@ -54,9 +54,9 @@ def test_turning_the_sensor_turns_the_beams() -> None:
 
 def test_a_row_of_crop_is_nearer_than_the_wall_behind_it() -> None:
     row = Rectangle(4.0, -2.0, 5.0, 2.0)
-    house = Greenhouse("room", ROOM.bounds, rows=(row,))
+    greenhouse = Greenhouse("room", ROOM.bounds, rows=(row,))
 
-    ranges = swept(Pose2D(0.0, 0.0, 0.0), house)
+    ranges = swept(Pose2D(0.0, 0.0, 0.0), greenhouse)
 
     assert ranges[towards(0.0)] == pytest.approx(4.0)
     assert ranges[towards(math.radians(26.0))] == pytest.approx(
@@ -66,9 +66,9 @@ def test_a_row_of_crop_is_nearer_than_the_wall_behind_it() -> None:
 
 
 def test_a_person_and_a_post_are_round() -> None:
-    house = Greenhouse("room", ROOM.bounds, posts=(Post(-3.0, 0.0, 0.1),))
+    greenhouse = Greenhouse("room", ROOM.bounds, posts=(Post(-3.0, 0.0, 0.1),))
 
-    ranges = swept(Pose2D(0.0, 0.0, 0.0), house, people=[Disc(3.0, 0.0, 0.25)])
+    ranges = swept(Pose2D(0.0, 0.0, 0.0), greenhouse, people=[Disc(3.0, 0.0, 0.25)])
 
     assert ranges[towards(0.0)] == pytest.approx(2.75)
     assert ranges[towards(-math.pi)] == pytest.approx(2.9)

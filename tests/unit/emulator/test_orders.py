@@ -3,7 +3,13 @@ import json
 import pytest
 
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.emulator.orders import FaultOrder, PersonOrder, Place, read_order, read_words
+from iveg.emulator.orders import (
+    FaultOrder,
+    PersonOrder,
+    Place,
+    read_order,
+    read_translations,
+)
 
 FLEET = ("AGI", "AGII")
 
@@ -67,7 +73,7 @@ def test_words_of_a_command_line_are_the_same_orders() -> None:
         "drop_percent=10",
     ]
 
-    assert read_words(words, FLEET) == [
+    assert read_translations(words, FLEET) == [
         FaultOrder(robot="AGII", freeze_odometry="repeat"),
         FaultOrder(robot="AGI", false_person=Place(x=1.0, y=2.0)),
         FaultOrder(robot="AGI", drop_percent=10.0),
@@ -90,4 +96,4 @@ def test_a_word_that_is_no_order_is_refused_with_one_sentence(
     word: str, why: str
 ) -> None:
     with pytest.raises(DataFileError, match=f"^--fault, {word}: {why}"):
-        read_words([word], FLEET)
+        read_translations([word], FLEET)

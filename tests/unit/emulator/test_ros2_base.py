@@ -17,7 +17,7 @@ from iveg.emulator.ros2_base import Navigation as Nav
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.world import REST, World
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.senses import TOPICS, Senses
+from iveg.robot.ros2.inputs import TOPICS, SensorInputs
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import messages as m
 from tests.fakes.ros2_network import Arrived, FakeNetwork
@@ -64,9 +64,9 @@ class Emulated:
     """AGII of the demo on a network in memory."""
 
     def __init__(self) -> None:
-        house = load_greenhouse("mvsim-20x20")
-        layout = lay_out(scenario_named("demo"), ["AGI", "AGII"], house)
-        self.world = World(house, layout, DETECTORS["perfect"], 1)
+        greenhouse = load_greenhouse("mvsim-20x20")
+        layout = lay_out(scenario_named("demo"), ["AGI", "AGII"], greenhouse)
+        self.world = World(greenhouse, layout, DETECTORS["perfect"], 1)
         self.rig = self.world.rigs["AGII"]
         self.network = FakeNetwork()
         self.config = RobotConfig(namespace="/agii")
@@ -74,7 +74,7 @@ class Emulated:
 
     def sensed(self) -> list[Sensed]:
         """What Algorithm 1 makes of everything that was published."""
-        senses = Senses(self.config)
+        senses = SensorInputs(self.config)
         now = clock.now()
         for topic in TOPICS:
             writer = self.network.writers.get(getattr(self.config.full_topics, topic))

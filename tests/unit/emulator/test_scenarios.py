@@ -96,10 +96,10 @@ async def test_a_robot_that_is_not_heard_is_late_then_lost_and_has_stopped_itsel
     await stage.until(lambda: stage.speed("AGII") > 0.2, "it drives on")
 
 
-async def test_a_deaf_robot_raises_an_alarm_within_two_seconds() -> None:
+async def test_a_deaf_robot_raises_an_alert_within_two_seconds() -> None:
     stage = Stage("deaf")
 
-    alarm = await stage.first(
+    alert = await stage.first(
         lambda: [a for a in stage.alerts() if a["key"] == "alert.person_not_slowing"],
         "iVeg notices that AGII does not slow",
     )
@@ -107,10 +107,10 @@ async def test_a_deaf_robot_raises_an_alarm_within_two_seconds() -> None:
     [ignored] = [
         one
         for one in stage.decisions("AGII", "person")
-        if one.decision_id == alarm["slots"]["decision"]
+        if one.decision_id == alert["slots"]["decision"]
     ]
     waited = stage.now.wall - ignored.started_at
-    assert (alarm["priority"], alarm["robot_id"]) == ("P1", "AGII")
+    assert (alert["priority"], alert["robot_id"]) == ("P1", "AGII")
     assert 2.0 <= waited <= 3.0
     assert ignored.observed_at is None
 

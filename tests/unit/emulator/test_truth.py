@@ -15,9 +15,9 @@ BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0
 
 
 def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> None:
-    house = load_greenhouse(scenario_named("together").house)
-    layout = lay_out(scenario_named("together"), ("AGI", "AGII"), house)
-    world = World(house, layout, BLIND, seed=1)
+    greenhouse = load_greenhouse(scenario_named("together").greenhouse)
+    layout = lay_out(scenario_named("together"), ("AGI", "AGII"), greenhouse)
+    world = World(greenhouse, layout, BLIND, seed=1)
     rig = world.rigs["AGI"]
 
     with closing(TruthLog(tmp_path / "truth.jsonl")) as log:

@@ -22,13 +22,13 @@ TESTBED = load_greenhouse("mvsim-20x20")
 def world_of(
     scenario: str,
     robots: tuple[str, ...] = FLEET,
-    house: Greenhouse = TESTBED,
+    greenhouse: Greenhouse = TESTBED,
     *,
     seed: int = 1,
     detector: str = "perfect",
 ) -> World:
-    layout = lay_out(scenario_named(scenario), robots, house)
-    return World(house, layout, DETECTORS[detector], seed)
+    layout = lay_out(scenario_named(scenario), robots, greenhouse)
+    return World(greenhouse, layout, DETECTORS[detector], seed)
 
 
 def run(world: World, seconds: float, dt: float = 0.1) -> Iterator[float]:
@@ -51,8 +51,8 @@ def nearest_person(world: World, robot_id: str) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
-    house = load_greenhouse(scenario_named(scenario).house)
-    world = world_of(scenario, house=house)
+    greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
+    world = world_of(scenario, greenhouse=greenhouse)
 
     for _ in run(world, 100.0):
         bodies = world.bodies()
@@ -72,10 +72,10 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
         (("AGI", "AGII"), "none"),
     ],
 )
-def test_every_robot_of_any_fleet_drives_in_any_house(
-    robots: tuple[str, ...], house: str
+def test_every_robot_of_any_fleet_drives_in_any_greenhouse(
+    robots: tuple[str, ...], greenhouse: str
 ) -> None:
-    world = world_of("demo", robots, load_greenhouse(house))
+    world = world_of("demo", robots, load_greenhouse(greenhouse))
     driven = dict.fromkeys(robots, 0.0)
 
     for _ in run(world, 60.0):
@@ -101,14 +101,14 @@ def test_both_robots_of_the_demo_meet_people_in_the_first_minute_and_again() -> 
 
 @pytest.mark.parametrize("scenario", ["demo", "nlos", "nlos-field"])
 def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
-    house = load_greenhouse(scenario_named(scenario).house)
-    world = world_of(scenario, house=house)
+    greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
+    world = world_of(scenario, greenhouse=greenhouse)
     unseen = 0
 
     for now in run(world, 60.0):
         pose = world.rigs["AGII"].vehicle.pose
         close = [p for p in world.people if pose.distance_to(p.x, p.y) <= 2.0]
-        hidden = [p for p in close if not house.in_sight(pose.x, pose.y, p.x, p.y)]
+        hidden = [p for p in close if not greenhouse.in_sight(pose.x, pose.y, p.x, p.y)]
         seen_by_agi = [
             detection
             for detection in world.rigs["AGI"].look(now, world).detections
@@ -120,7 +120,7 @@ def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
 
 
 def test_agii_of_the_field_test_never_looks_at_the_grower() -> None:
-    world = world_of("nlos-field", house=load_greenhouse("agroconnect"))
+    world = world_of("nlos-field", greenhouse=load_greenhouse("agroconnect"))
     rig = world.rigs["AGII"]
     passed = 0
 
@@ -131,7 +131,7 @@ def test_agii_of_the_field_test_never_looks_at_the_grower() -> None:
     assert passed > 20
 
 
-def test_a_scenario_about_one_house_is_refused_in_another() -> None:
+def test_a_scenario_about_one_greenhouse_is_refused_in_another() -> None:
     with pytest.raises(DataFileError, match="is about agroconnect, not mvsim-20x20"):
         world_of("nlos-field")
 
@@ -245,7 +245,7 @@ def test_an_unknown_scenario_is_refused_with_the_known_ones() -> None:
         scenario_named("nothing")
 
 
-def test_a_house_without_room_for_the_fleet_is_refused() -> None:
+def test_a_greenhouse_without_room_for_the_fleet_is_refused() -> None:
     crowd = tuple(f"R{n}" for n in range(30))
 
     with pytest.raises(DataFileError, match="has room for 20 robots"):
@@ -254,14 +254,16 @@ def test_a_house_without_room_for_the_fleet_is_refused() -> None:
         world_of("many", crowd, load_greenhouse("agroconnect"))
 
 
-def test_a_start_of_the_house_says_in_which_lane_a_robot_drives() -> None:
-    house = load_greenhouse("agroconnect")
-    world = world_of("demo", FLEET, house)
+def test_a_start_of_the_greenhouse_says_in_which_lane_a_robot_drives() -> None:
+    greenhouse = load_greenhouse("agroconnect")
+    world = world_of("demo", FLEET, greenhouse)
     lanes = set()
 
     for _ in run(world, 30.0):
         agi, agii = (world.rigs[robot_id].vehicle.pose for robot_id in FLEET)
-        lanes.add((house.lane_at(agi.x, agi.y), house.lane_at(agii.x, agii.y)))
+        lanes.add(
+            (greenhouse.lane_at(agi.x, agi.y), greenhouse.lane_at(agii.x, agii.y))
+        )
 
     assert lanes == {("Pasillo 6 sur", "Pasillo central")}
 

@@ -10,6 +10,7 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.experiment.compare import write_comparison
 from iveg.experiment.notebook import Notebook, directory_of
+from iveg.experiment.observer import injections, picture_of, slowdowns_of
 from iveg.experiment.outcome import (
     outcome_of,
     read_json,
@@ -20,7 +21,6 @@ from iveg.experiment.outcome import (
 from iveg.experiment.plan import FAMILIES, PLANS, Step
 from iveg.experiment.report import write_report
 from iveg.experiment.scoring import Tally
-from iveg.experiment.watching import injections, picture_of, slowdowns_of
 
 HOP = {"count": 100, "mean_ms": 5.0, "p95_ms": 9.0}
 AXES = {"meta": {"x": "a", "y": "b"}}

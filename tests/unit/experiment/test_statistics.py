@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.experiment.printed import disagreements
+from iveg.experiment.paper_tables import disagreements
 from iveg.experiment.statistics import Interval, difference, verdict, wilson
 
 

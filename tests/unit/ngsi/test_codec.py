@@ -6,14 +6,14 @@ import numpy as np
 import orjson
 import pytest
 
-from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
-    Canary,
     Climate,
     CommandAnswer,
     CommandStatus,
     DetectionFrame,
+    HeartbeatProbe,
     LaserScan,
     Navigation,
     Odometry,
@@ -109,17 +109,21 @@ def test_the_agents_opinion_and_the_robots_answer_are_told_apart() -> None:
     assert answer == CommandAnswer("AGI", Origin("b", 1), "01A", "LATCHED")
 
 
-def test_climate_and_canary_are_read() -> None:
+def test_climate_and_heartbeat_are_read() -> None:
     air = {
         "id": names.CLIMATE_ID,
         "type": names.CLIMATE_TYPE,
         "temperature": {"type": "Number", "value": 21.5},
         "relativeHumidity": 0.6,
     }
-    probe = {"id": names.CANARY_ID, "type": names.CANARY_TYPE, "probe": {"seq": 3}}
+    probe = {
+        "id": names.HEARTBEAT_ID,
+        "type": names.HEARTBEAT_TYPE,
+        "probe": {"seq": 3},
+    }
 
     assert codec.read_entity(air).observations == (Climate(21.5, 0.6, None),)
-    assert codec.read_entity(probe).observations == (Canary(Origin(None, 3)),)
+    assert codec.read_entity(probe).observations == (HeartbeatProbe(Origin(None, 3)),)
 
 
 def test_a_foreign_entity_is_counted_by_its_kind() -> None:
@@ -269,7 +273,7 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         Pose2D(1.0, 2.0, 0.1),
         Twist2D(0.5, 0.0),
         "t",
-        {"AGII": Mandate(0.5, "person", None, 1.43, "d-1")},
+        {"AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
         {"AGII": 8731},
     )
 
@@ -346,7 +350,7 @@ def test_a_backlog_is_told_in_seconds_up_to_a_minute(lag: float, told: float) ->
         (None, None),
     ],
 )
-def test_a_backlog_that_cannot_be_read_costs_no_mandate(
+def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
     told: object, read: float | None
 ) -> None:
     feedback = codec.read_feedback(
@@ -360,7 +364,7 @@ def test_a_backlog_that_cannot_be_read_costs_no_mandate(
     )
 
     assert feedback.backlog_s == read
-    assert feedback.mandates["AGI"].speed_factor == 0.5
+    assert feedback.speed_limits["AGI"].speed_factor == 0.5
 
 
 def test_another_object_is_told_as_a_stamp_alone() -> None:
@@ -411,12 +415,12 @@ def test_navigation_is_read_with_goal_and_path() -> None:
 
 def test_what_robots_are_told_alike_is_written_once_and_reads_the_same() -> None:
     alert = FeedbackAlert("d1", "t", "person", "farmer", 0.9, (1.0, 2.0, 0.9), 2.0, "A")
-    told = (alert,), {"AGI": Mandate(0.5, "person", "P1", 1.0, "d1")}, {"AGI": 7}
+    told = (alert,), {"AGI": SpeedLimit(0.5, "person", "P1", 1.0, "d1")}, {"AGI": 7}
     writer = codec.FeedbackWriter()
-    for alerts, mandates, seen in (told, told, ((), {}, {"AGI": 8}), told):
+    for alerts, speed_limits, seen in (told, told, ((), {}, {"AGI": 8}), told):
         for robot_id in ("AGI", "AGII"):
             one = Feedback(
-                robot_id, Origin(), alerts=alerts, mandates=mandates, seen=seen
+                robot_id, Origin(), alerts=alerts, speed_limits=speed_limits, seen=seen
             )
             written = writer.write(one)
             assert orjson.loads(written) == orjson.loads(codec.write_feedback(one))

@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.domain.stop import Command
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
 from iveg.ngsi.codec import format_stamp
-from iveg.pipeline.build import Choices, Doors, build
+from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.ports import CommandPort
 from tests.builders import (
     detection_frame,
@@ -44,7 +44,7 @@ class Desk:
     def __init__(
         self,
         robots: tuple[str, ...] = ("AGI", "AGII"),
-        house: Greenhouse = FIELD,
+        greenhouse: Greenhouse = FIELD,
         *,
         direct: bool = True,
         also: Mapping[Transport, CommandPort] | None = None,
@@ -61,8 +61,8 @@ class Desk:
         self.description = fleet_of(*robots)
         parts = build(
             self.description,
-            house,
-            Doors(
+            greenhouse,
+            Ports(
                 self.fleet,
                 {
                     DIRECT.switched(on=direct): self.fleet,
@@ -80,9 +80,13 @@ class Desk:
             ),
             Choices(),
         )
-        self.hub, self.minutes, self.chain = parts.hub, parts.minutes, parts.chain
+        self.hub, self.event_log, self.health_monitor = (
+            parts.hub,
+            parts.event_log,
+            parts.health_monitor,
+        )
         self.latency, self.ingest, self.loop = parts.latency, parts.ingest, parts.loop
-        self.assessor, self.commander = parts.assessor, parts.commander
+        self.evaluator, self.commander = parts.evaluator, parts.commander
         self.world = parts.world
         self.seq = 0
 
@@ -168,7 +172,7 @@ class Desk:
 
     def sentences(self) -> list[str]:
         """The sentences of the log, in order."""
-        return [line.key for line in self.minutes.lines]
+        return [line.key for line in self.event_log.lines]
 
     def records(self, kind: type[OneRecord]) -> list[OneRecord]:
         return [one for one in self.sink.records if isinstance(one, kind)]
@@ -182,4 +186,4 @@ async def settle() -> None:
 
 def conditions_of(desk: Desk) -> Iterable[str]:
     """What is wrong, by key."""
-    return [one.condition.key for one in desk.assessor.alarms.waiting]
+    return [one.condition.key for one in desk.evaluator.alerts.waiting]

@@ -47,7 +47,7 @@ class Robot:
         told = self.desk.fleet.told[-1].origin if self.desk.fleet.told else Origin()
         heard = FeedbackRef(told.boot or "", told.seq or 0)
         said = origin(self._seqs[topic], after=now + self.clock_off)
-        return replace(said, mono=5.0 + now, echoes=True, heard=heard)
+        return replace(said, mono=5.0 + now, acknowledgements=True, heard=heard)
 
     def live(self, *, orion_alone: bool = False) -> None:
         """One moment: odometry through Orion, a report straight from MQTT."""
@@ -197,7 +197,7 @@ async def test_robots_whose_age_is_estimated_are_named_in_one_notice() -> None:
         desk.drive("AGII", 50.0)
         await desk.wait(0.1)
 
-    (notice,) = desk.assessor.alarms.waiting
+    (notice,) = desk.evaluator.alerts.waiting
     condition = notice.condition
     assert (condition.priority, condition.key) == ("P3", "alert.age_estimated")
     assert condition.slots == {"robots": "AGI, AGII"}
@@ -238,7 +238,7 @@ async def test_a_slow_agent_beside_fast_direct_messages_warns_of_no_clock() -> N
             desk.hear(late.pop(0)[1], "orion")
         await desk.wait(0.05)
 
-    raised = [one.condition.key for one in desk.assessor.alarms.waiting]
+    raised = [one.condition.key for one in desk.evaluator.alerts.waiting]
     assert "alert.clock_offset" not in raised
     assert desk.world.robot("AGI").clock.offset_s(desk.clock()) == pytest.approx(
         0.0, abs=1e-6
@@ -248,7 +248,9 @@ async def test_a_slow_agent_beside_fast_direct_messages_warns_of_no_clock() -> N
 async def test_a_link_that_nothing_proves_is_told_as_lost_and_said_why() -> None:
     desk = Desk(("AGI",))
     for number in range(40):
-        silent = replace(origin(number + 1, after=desk.clock.now), echoes=True)
+        silent = replace(
+            origin(number + 1, after=desk.clock.now), acknowledgements=True
+        )
         desk.hear(odometry(origin=silent))
         await desk.wait(0.1)
 
@@ -274,4 +276,4 @@ async def test_what_the_agent_brings_late_shows_no_ghosts(late_s: float) -> None
             desk.hear(late.pop(0)[1], "orion")
         await desk.wait(0.1)
 
-    assert len(desk.assessor.people.known) == 1
+    assert len(desk.evaluator.people.known) == 1

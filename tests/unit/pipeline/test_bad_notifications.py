@@ -58,7 +58,7 @@ def play(told: list[tuple[float, Observation]]) -> Desk:
 
 def events(desk: Desk) -> Counter[tuple[str, str | None, str | None]]:
     return Counter(
-        (line.key, line.robot_id, line.decision_id) for line in desk.minutes.lines
+        (line.key, line.robot_id, line.decision_id) for line in desk.event_log.lines
     )
 
 
@@ -75,15 +75,17 @@ def test_f9_the_state_is_right_at_the_end_and_no_event_is_told_twice(
         assert found.frame == robot.frame
         assert found.safety == robot.safety
     assert {
-        robot_id: (mandate.speed_factor, mandate.reason)
-        for robot_id, mandate in bad.assessor.mandates.items()
+        robot_id: (speed_limit.speed_factor, speed_limit.reason)
+        for robot_id, speed_limit in bad.evaluator.speed_limits.items()
     } == {
-        robot_id: (mandate.speed_factor, mandate.reason)
-        for robot_id, mandate in clean.assessor.mandates.items()
+        robot_id: (speed_limit.speed_factor, speed_limit.reason)
+        for robot_id, speed_limit in clean.evaluator.speed_limits.items()
     }
-    assert len(bad.assessor.people.known) == len(clean.assessor.people.known) == 1
+    assert len(bad.evaluator.people.known) == len(clean.evaluator.people.known) == 1
     # Nothing more than on a good network; of the start's speeds some pass unheard.
     missed = events(clean) - events(bad)
     assert not events(bad) - events(clean)
     assert {key.split(".")[1] for key, *_ in missed} <= {"speed_up", "speed_down"}
-    assert len(list(bad.assessor.crossings)) == len(list(clean.assessor.crossings)) == 1
+    assert (
+        len(list(bad.evaluator.crossings)) == len(list(clean.evaluator.crossings)) == 1
+    )

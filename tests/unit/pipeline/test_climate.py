@@ -1,4 +1,4 @@
-"""The air of the house: told each time, kept once a minute."""
+"""The air of the greenhouse: told each time, kept once a minute."""
 
 from iveg.domain.observations import Climate
 from iveg.domain.records import ClimateRecord

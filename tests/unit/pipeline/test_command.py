@@ -223,7 +223,7 @@ async def test_odometry_that_moves_stops_a_standing_robot_again() -> None:
     ("word", "key"),
     [(None, "alert.stop_unconfirmed"), ("LATCHED", "alert.stop_still_moving")],
 )
-async def test_a_stop_that_does_not_come_true_is_a_grave_alarm(
+async def test_a_stop_that_does_not_come_true_is_a_grave_alert(
     word: str | None, key: str
 ) -> None:
     desk = Desk()
@@ -236,14 +236,14 @@ async def test_a_stop_that_does_not_come_true_is_a_grave_alarm(
     assert key in conditions_of(desk)
 
 
-async def test_a_held_robot_that_moves_is_a_grave_alarm_until_it_stands_again() -> None:
+async def test_a_held_robot_that_moves_is_a_grave_alert_until_it_stands_again() -> None:
     desk = Desk()
     await press(desk)
     await desk.stand()
     for _ in range(3):
         desk.drive("AGI", linear=0.4)
     await desk.wait(0.1)
-    told = [one.condition for one in desk.assessor.alarms.waiting]
+    told = [one.condition for one in desk.evaluator.alerts.waiting]
     moved = [one for one in told if one.key == "alert.stop_moved"]
     assert [(one.priority, one.subject) for one in moved] == [("P1", "AGI")]
 
@@ -251,12 +251,12 @@ async def test_a_held_robot_that_moves_is_a_grave_alarm_until_it_stands_again() 
     await desk.stand()
     await desk.wait(0.1)
 
-    (alarm,) = (
+    (alert,) = (
         one
-        for one in desk.assessor.alarms.waiting
+        for one in desk.evaluator.alerts.waiting
         if one.condition.key == "alert.stop_moved"
     )
-    assert alarm.cleared is not None
+    assert alert.cleared is not None
 
 
 async def test_a_robot_that_was_merely_stopped_is_not_said_to_have_moved() -> None:
@@ -466,7 +466,7 @@ async def test_a_refused_release_is_told_with_its_reason() -> None:
     desk.report("AGI", held, challenge="another")
 
     assert desk.sentences()[-1] == "log.stop.refused"
-    assert '"why": "challenge"' in desk.minutes.lines[-1].slots
+    assert '"why": "challenge"' in desk.event_log.lines[-1].slots
 
 
 async def test_a_release_of_a_moving_robot_is_refused() -> None:
@@ -692,7 +692,7 @@ async def test_delivered_is_told_with_the_time_it_took() -> None:
     desk.clock.now = 0.08
     desk.answer("LATCHED")
 
-    (line,) = (one for one in desk.minutes.lines if one.key == "log.stop.delivered")
+    (line,) = (one for one in desk.event_log.lines if one.key == "log.stop.delivered")
     assert '"ms": 80' in line.slots
 
 

@@ -28,80 +28,80 @@ def ingest() -> Ingest:
 
 
 def test_what_arrives_leaves_in_the_same_order() -> None:
-    door = ingest()
+    queue = ingest()
     for seq in range(5):
-        door.offer(received(odometry(origin=origin(seq))))
+        queue.offer(received(odometry(origin=origin(seq))))
 
-    left = [one.observation for one in door.drain()]
+    left = [one.observation for one in queue.drain()]
 
     assert left == [odometry(origin=origin(seq)) for seq in range(5)]
-    assert list(door.drain()) == []
+    assert list(queue.drain()) == []
 
 
 def test_the_queue_is_bounded_and_the_oldest_telemetry_gives_way() -> None:
-    door = ingest()
+    queue = ingest()
     for seq in range(MAX_QUEUED + 10):
-        door.offer(received(odometry(x=float(seq))))
+        queue.offer(received(odometry(x=float(seq))))
 
-    left = [one.observation for one in door.drain()]
+    left = [one.observation for one in queue.drain()]
 
     assert len(left) == MAX_QUEUED
     assert left[0] == odometry(x=10.0)
-    assert door.counters["dropped.Odometry"] == 10
+    assert queue.counters["dropped.Odometry"] == 10
 
 
 def test_safety_reports_answers_and_looks_never_give_way() -> None:
-    door = ingest()
+    queue = ingest()
     answer = CommandAnswer("AGI", Origin(), "id", "LATCHED")
     precious: list[Observation] = [safety_report(), answer, detection_frame()]
     for one in precious:
-        door.offer(received(one))
+        queue.offer(received(one))
     for _ in range(MAX_QUEUED + 100):
-        door.offer(received(scan()))
+        queue.offer(received(scan()))
 
-    left = [one.observation for one in door.drain()]
+    left = [one.observation for one in queue.drain()]
 
     assert left[:3] == precious
 
 
 def test_f24_a_flood_of_telemetry_holds_back_no_safety_report() -> None:
-    door = ingest()
+    queue = ingest()
     for number in range(5000):
-        door.offer(received(odometry()))
+        queue.offer(received(odometry()))
         for _ in range(number % 100 == 0):
-            door.offer(received(safety_report()))
+            queue.offer(received(safety_report()))
 
-    kept = [isinstance(one.observation, SafetyReport) for one in door.drain()]
+    kept = [isinstance(one.observation, SafetyReport) for one in queue.drain()]
     assert kept.count(True) == 50
 
 
 def test_a_queue_of_nothing_but_safety_grows_rather_than_losing_one() -> None:
-    door = ingest()
+    queue = ingest()
     for _ in range(MAX_QUEUED + 5):
-        door.offer(received(safety_report()))
+        queue.offer(received(safety_report()))
 
-    assert len(list(door.drain())) == MAX_QUEUED + 5
+    assert len(list(queue.drain())) == MAX_QUEUED + 5
 
 
 def test_what_comes_is_counted_by_transport_and_kind() -> None:
-    door = ingest()
-    door.offer(received(odometry()))
-    door.offer(received(safety_report(), transport="direct"))
+    queue = ingest()
+    queue.offer(received(odometry()))
+    queue.offer(received(safety_report(), transport="direct"))
 
-    assert door.counters["orion.Odometry"] == 1
-    assert door.counters["mqtt.SafetyReport"] == 1
+    assert queue.counters["orion.Odometry"] == 1
+    assert queue.counters["mqtt.SafetyReport"] == 1
 
 
 def test_an_unknown_robot_is_counted_each_time_and_logged_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     told: list[tuple[str, str]] = []
-    door = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
+    queue = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
     for _ in range(10):
-        door.offer(received(odometry("AGX")))
+        queue.offer(received(odometry("AGX")))
 
-    assert list(door.drain()) == []
-    assert door.counters["rejected.unknown_robot"] == 10
+    assert list(queue.drain()) == []
+    assert queue.counters["rejected.unknown_robot"] == 10
     assert told == [("AGX", "unknown_robot")]
     assert len(caplog.records) == 1
 
@@ -111,28 +111,28 @@ def test_no_flood_of_strange_names_fills_the_memory(
 ) -> None:
     caplog.set_level(logging.ERROR)
     told: list[tuple[str, str]] = []
-    door = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
+    queue = Ingest({"AGI"}.__contains__, lambda *one: told.append(one))
     for number in range(2000):
-        door.reject(f"stranger-{number}", "bad_robot_id")
+        queue.reject(f"stranger-{number}", "bad_robot_id")
 
-    assert door.counters["rejected.bad_robot_id"] == 2000
+    assert queue.counters["rejected.bad_robot_id"] == 2000
     assert len(told) == 500
 
 
 def test_what_belongs_to_no_robot_comes_in() -> None:
-    door = ingest()
-    door.offer(received(Climate(20.0)))
+    queue = ingest()
+    queue.offer(received(Climate(20.0)))
 
-    assert len(list(door.drain())) == 1
+    assert len(list(queue.drain())) == 1
 
 
 async def test_who_waits_is_woken_by_what_arrives() -> None:
-    door = ingest()
-    door.offer(received(odometry()))
+    queue = ingest()
+    queue.offer(received(odometry()))
 
-    await door.wait(timeout_s=60.0)
+    await queue.wait(timeout_s=60.0)
 
-    assert len(list(door.drain())) == 1
+    assert len(list(queue.drain())) == 1
 
 
 async def test_who_waits_in_vain_goes_on_after_a_while() -> None:
@@ -149,27 +149,27 @@ def test_what_was_asked_for_is_counted_apart_from_what_was_sent() -> None:
 
 
 def test_a_robot_that_floods_drops_its_own_telemetry_and_no_other_robots() -> None:
-    door = ingest()
+    queue = ingest()
     quiet = [odometry("AGII", float(x)) for x in range(3)]
     for one in quiet:
-        door.offer(received(one))
+        queue.offer(received(one))
     for _ in range(MAX_QUEUED + 50):
-        door.offer(received(odometry("AGI")))
-    door.offer(received(safety_report("AGI")))
+        queue.offer(received(odometry("AGI")))
+    queue.offer(received(safety_report("AGI")))
 
-    left = [one.observation for one in door.drain()]
+    left = [one.observation for one in queue.drain()]
 
     assert [one for one in left if one in quiet] == quiet
     assert isinstance(left[-1], SafetyReport)
-    assert door.counters["dropped.Odometry"] == 54
+    assert queue.counters["dropped.Odometry"] == 54
 
 
 def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
-    door = ingest()
+    queue = ingest()
     for _ in range(MAX_QUEUED):
-        door.offer(received(safety_report()))
+        queue.offer(received(safety_report()))
 
-    door.offer(received(odometry()))
+    queue.offer(received(odometry()))
 
-    assert len(list(door.drain())) == MAX_QUEUED
-    assert door.counters["dropped.Odometry"] == 1
+    assert len(list(queue.drain())) == MAX_QUEUED
+    assert queue.counters["dropped.Odometry"] == 1

@@ -9,7 +9,7 @@ from tests.unit.pipeline.desk import Desk
 
 def alerts(desk: Desk) -> list[tuple[str, str, object]]:
     """Priority, key and who is named of all that wait."""
-    found = [one.condition for one in desk.assessor.alarms.waiting]
+    found = [one.condition for one in desk.evaluator.alerts.waiting]
     return [
         (one.priority, one.key, one.slots.get("robots", one.robot_id)) for one in found
     ]

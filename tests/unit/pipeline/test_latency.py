@@ -10,7 +10,7 @@ from iveg.domain.observations import Received
 from iveg.domain.records import LatencyRecord
 from iveg.domain.transports import TransportId
 from iveg.pipeline.latency import hours_of
-from iveg.web.words import read_words
+from iveg.web.pages.translations import read_translations
 from tests.builders import odometry
 from tests.unit.pipeline.desk import Desk
 
@@ -107,7 +107,7 @@ def test_every_remark_has_a_sentence_on_the_page_and_in_the_log(
 ) -> None:
     hops = ["uplink", "fiware"]
     hops += ["iveg", "screen"] if what in ("behind", "growing") else []
-    sentences = read_words(language).sentences
+    sentences = read_translations(language).sentences
 
     asked = {f"latency.{what}.{hop}" for hop in hops}
     asked |= {f"log.{what}.{hop}" for hop in hops if what != "growing"}

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from iveg.domain.observations import Canary, CommandAnswer, Origin, Received
+from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Origin, Received
 from iveg.pipeline.publish import MAX_PENDING
 from tests.builders import odometry, origin
 from tests.unit.pipeline.desk import Desk, settle
@@ -46,25 +46,25 @@ async def test_the_second_transports_copy_of_an_answer_keeps_its_time() -> None:
     assert desk.now(command).times.answered["fiware"] == desk.clock()
 
 
-def test_the_canary_that_came_back_is_evidence_for_the_chain() -> None:
+def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:
     desk = Desk()
     desk.clock.now = 1.0
 
-    desk.hear(Canary(origin()))
+    desk.hear(HeartbeatProbe(origin()))
 
-    assert desk.chain.received_at == desk.clock().mono
+    assert desk.health_monitor.received_at == desk.clock().mono
 
 
 async def test_a_hop_that_breaks_and_mends_is_told_once_each_time() -> None:
     desk = Desk()
-    desk.chain.mqtt_connected = True
+    desk.health_monitor.mqtt_connected = True
     await desk.wait(0.1)
-    desk.chain.mqtt_connected = False
+    desk.health_monitor.mqtt_connected = False
     await desk.wait(1.0)
-    desk.chain.mqtt_connected = True
+    desk.health_monitor.mqtt_connected = True
     await desk.wait(1.0)
 
-    hops = [line.key for line in desk.minutes.lines if line.key.startswith("log.hop")]
+    hops = [line.key for line in desk.event_log.lines if line.key.startswith("log.hop")]
     assert hops == ["log.hop.down", "log.hop.back"]
 
 
@@ -117,7 +117,7 @@ def test_who_has_gone_gets_nothing() -> None:
 def test_log_numbers_grow_also_over_a_restart() -> None:
     first, later = Desk(), Desk()
     first.drive("AGI")
-    later.minutes._next_id = int(1000 * (first.clock().wall + 10))
+    later.event_log._next_id = int(1000 * (first.clock().wall + 10))
     later.drive("AGI")
 
-    assert later.minutes.lines[0].id > first.minutes.lines[-1].id
+    assert later.event_log.lines[0].id > first.event_log.lines[-1].id

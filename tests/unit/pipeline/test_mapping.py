@@ -4,14 +4,14 @@ import math
 
 from iveg.domain.costmap import Costmap
 from iveg.domain.geometry import Pose2D, Rectangle
-from iveg.domain.hazards import Hazard
+from iveg.domain.rule.zones import Zone
 from iveg.pipeline.mapping import Mapper
 from tests.builders import at, scan
 from tests.unit.domain.scene import Scene
 
 ROOM = Rectangle(0, 0, 20, 20)
 OPEN_FIELD = Rectangle(-1e6, -1e6, 1e6, 1e6)
-PERSON = Hazard("person", "P1", "AGI", 15.0, 15.0, 2.0)
+PERSON = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0)
 
 
 class Field(Scene):
@@ -36,13 +36,13 @@ class Field(Scene):
     def tick(self) -> None:
         self.mapper.tick(at(self.now))
 
-    def shared(self, *hazards: Hazard) -> Costmap:
-        found = self.mapper.shared(hazards, at(self.now))
+    def shared(self, *zones: Zone) -> Costmap:
+        found = self.mapper.shared(zones, at(self.now))
         assert found is not None
         return found
 
-    def of(self, robot_id: str, *hazards: Hazard) -> Costmap:
-        found = self.mapper.of(robot_id, hazards, at(self.now))
+    def of(self, robot_id: str, *zones: Zone) -> Costmap:
+        found = self.mapper.of(robot_id, zones, at(self.now))
         assert found is not None
         return found
 
@@ -84,7 +84,7 @@ def test_a_robot_believes_what_it_was_told_of_others_and_is_none_to_itself() -> 
     field = Field()
     field.sweep_from("AGI", 5.0)
     field.tick()
-    itself = Hazard("robot", "AGI", "AGI", 12.0, 12.0, 2.0)
+    itself = Zone("robot", "AGI", "AGI", 12.0, 12.0, 2.0)
 
     believed = field.of("AGI", PERSON, itself)
 
@@ -97,7 +97,7 @@ def test_whom_a_recording_saw_is_not_laid_over_today() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)
     field.tick()
-    recorded = Hazard("person", "P1", "AGI", 15.0, 15.0, 2.0, recording="D1")
+    recorded = Zone("person", "P1", "AGI", 15.0, 15.0, 2.0, recording="D1")
 
     assert not knows(field.shared(recorded), 15.0, 15.0)
 

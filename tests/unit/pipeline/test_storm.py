@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.observations import Observation, Received
-from iveg.pipeline.telling import MOST_ALERTS
+from iveg.pipeline.feedback import MOST_ALERTS
 from tests.builders import START, detection, detection_frame, odometry
 from tests.unit.pipeline.desk import Desk, conditions_of
 
@@ -44,7 +44,7 @@ def test_what_arrives_together_is_judged_and_told_once() -> None:
         detection_frame("AGII", somebody, origin=desk.next_origin()),
     )
     assert len(desk.fleet.told) - before == len(desk.world.robots)
-    assert {one.speed_factor for one in desk.assessor.mandates.values()} == {0.5}
+    assert {one.speed_factor for one in desk.evaluator.speed_limits.values()} == {0.5}
 
 
 def test_who_must_slow_down_is_told_at_once_and_the_rest_thirty_times_a_second() -> (
@@ -57,7 +57,7 @@ def test_who_must_slow_down_is_told_at_once_and_the_rest_thirty_times_a_second()
         before = len(desk.fleet.told)
         desk.look("AGI", detection(x=0.5 + 0.004 * tick, y=100.0 * (tick % 2)))
         told.append(len(desk.fleet.told) > before)
-    slowed_at = next(one.entered.mono for one in desk.assessor.crossings)
+    slowed_at = next(one.entered.mono for one in desk.evaluator.crossings)
     assert slowed_at == pytest.approx(START.mono + 0.1)
     assert told[0]
     assert sum(told) <= 8 + 31
@@ -66,8 +66,11 @@ def test_who_must_slow_down_is_told_at_once_and_the_rest_thirty_times_a_second()
 async def test_a_storm_slows_who_is_near_raises_one_alert_and_is_counted() -> None:
     desk = stormed()
     await desk.wait(0.05)
-    assert [one.speed_factor for one in desk.assessor.mandates.values()] == [0.5, 0.5]
-    assert desk.assessor.mandates["AGII"].cause == "AGI"
+    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
+        0.5,
+        0.5,
+    ]
+    assert desk.evaluator.speed_limits["AGII"].cause == "AGI"
     assert list(conditions_of(desk)).count(ALERT) == 1
     assert desk.world.counters["pictures.not_judged"] >= 40
 
@@ -79,7 +82,10 @@ async def test_it_is_over_when_a_picture_was_judged_whole() -> None:
         desk.drive(robot_id, x)
         desk.look(robot_id)
     await desk.wait(0.05)
-    assert [one.speed_factor for one in desk.assessor.mandates.values()] == [1.0, 1.0]
+    assert [one.speed_factor for one in desk.evaluator.speed_limits.values()] == [
+        1.0,
+        1.0,
+    ]
     assert ALERT in conditions_of(desk)
     await desk.wait(10.0)
     assert ALERT not in conditions_of(desk)
@@ -95,7 +101,7 @@ async def test_nobody_who_is_known_is_dropped_and_robots_can_read_what_they_hear
         crowd = (detection(x=3.0 * n, y=10.0 + 7.0 * turn) for n in range(20))
         desk.look("AGII", *crowd)
     await desk.wait(0.1)
-    known = desk.assessor.people.known
+    known = desk.evaluator.people.known
     assert next(iter(known)) == "P1"
     assert desk.world.counters["people.turned_away"] > 0
     assert len(desk.fleet.told[-1].alerts) <= MOST_ALERTS

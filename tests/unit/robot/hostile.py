@@ -11,7 +11,7 @@ from typing import Literal
 import orjson
 from hypothesis import strategies as st
 
-from iveg.domain.feedback import Feedback, Mandate
+from iveg.domain.feedback import Feedback, SpeedLimit
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Hold
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
@@ -199,7 +199,7 @@ class World(Rig):
         for feedback in self.feedbacks[which % max(1, len(self.feedbacks)) :][:1]:
             self.hear(feedback)
 
-    def keep_level(self, desired: str, ids: list[str]) -> None:
+    def keep_desired_state(self, desired: str, ids: list[str]) -> None:
         payload = orjson.dumps({"desired": desired, "ids": ids})
         self.watched(lambda: self.machine.desired(payload, self.now))
 
@@ -229,8 +229,8 @@ class World(Rig):
     def meet(self, x: float | None) -> None:
         self.alerts = () if x is None else (person(x),)
 
-    def mandate(self, factor: float) -> None:
-        self.mandates = {"AGI": Mandate(factor, "person")}
+    def speed_limit(self, factor: float) -> None:
+        self.speed_limits = {"AGI": SpeedLimit(factor, "person")}
 
     def reboot(self) -> None:
         """Power goes and comes; what was not on the disk is gone."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import orjson
 
-from iveg.domain.feedback import Feedback, FeedbackAlert, Mandate
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
 from iveg.ngsi import codec
@@ -66,7 +66,7 @@ class Rig:
     obeys: bool = True
     odometry: bool = True
     speaks: bool = True
-    mandates: Mapping[str, Mandate] = field(default_factory=dict)
+    speed_limits: Mapping[str, SpeedLimit] = field(default_factory=dict)
     alerts: tuple[FeedbackAlert, ...] = ()
     log: list[tuple[float, Effect]] = field(default_factory=list)
     report_seq: int = 500
@@ -131,7 +131,7 @@ class Rig:
             "robot_id": "AGII",
             "origin": Origin("cloud", self.feedback_seq),
             "alerts": self.alerts,
-            "mandates": self.mandates,
+            "mandates": self.speed_limits,
             "seen": {"AGI": self.report_seq},
         }
         return Feedback(**(values | parts))  # type: ignore[arg-type]

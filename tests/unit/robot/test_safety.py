@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from iveg.domain.feedback import CLEAR, Mandate
+from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold
 from iveg.robot.attempts import ATTEMPTS_KEPT
@@ -498,7 +498,7 @@ def test_a_crew_that_releases_a_running_robot_does_not_halt_it() -> None:
     assert rig.twist == AHEAD
 
 
-# --- the retained level -------------------------------------------------------------
+# --- the retained desired state -------------------------------------------------------------
 
 
 def test_a_retained_stopped_holds_and_run_releases_nothing() -> None:
@@ -702,12 +702,12 @@ def test_odometry_that_is_no_number_is_no_odometry() -> None:
     assert rig.factor == 0.0
 
 
-# --- mandates and rings -------------------------------------------------------------
+# --- speed limits and rings -------------------------------------------------------------
 
 
-def test_a_mandate_for_me_halves_forward_reverse_and_turning() -> None:
+def test_a_speed_limit_for_me_halves_forward_reverse_and_turning() -> None:
     rig = moving()
-    rig.mandates = {"AGI": Mandate(0.5, "person", "p1", 1.4, "d-9")}
+    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person", "p1", 1.4, "d-9")}
     rig.run(0.3)
     assert rig.twist == Twist2D(0.5, 0.2)
     report = rig.reports[-1]
@@ -717,9 +717,9 @@ def test_a_mandate_for_me_halves_forward_reverse_and_turning() -> None:
     assert rig.twist == Twist2D(-0.5, -0.2)
 
 
-def test_a_mandate_for_somebody_else_changes_nothing() -> None:
+def test_a_speed_limit_for_somebody_else_changes_nothing() -> None:
     rig = moving()
-    rig.mandates = {"AGII": Mandate(0.5, "person")}
+    rig.speed_limits = {"AGII": SpeedLimit(0.5, "person")}
     rig.run(1.0)
     assert rig.factor == 1.0
 
@@ -727,18 +727,18 @@ def test_a_mandate_for_somebody_else_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("told", "applied"), [(0.0, 0.0), (0.3, 0.0), (0.7, 0.5), (1.0, 1.0)]
 )
-def test_a_mandate_between_the_steps_counts_as_the_lower_one(
+def test_a_speed_limit_between_the_steps_counts_as_the_lower_one(
     told: float, applied: float
 ) -> None:
     rig = moving()
-    rig.mandates = {"AGI": Mandate(told, "person")}
+    rig.speed_limits = {"AGI": SpeedLimit(told, "person")}
     rig.run(0.5)
     assert rig.factor == applied
 
 
 def test_two_reasons_halve_once() -> None:
     rig = moving()
-    rig.mandates = {"AGI": Mandate(0.5, "person")}
+    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person")}
     rig.alerts = (person(1.0), person(0.5, class_="robot", decision_id="d-2"))
     rig.hear(rig.feedback(robot_id="AGIII"), "AGIII")
     rig.run(1.0)
@@ -747,18 +747,18 @@ def test_two_reasons_halve_once() -> None:
 
 def test_the_slowest_of_several_topics_counts() -> None:
     rig = moving()
-    slow = {"AGI": Mandate(0.5, "robot")}
-    rig.hear(rig.feedback(robot_id="AGIII", mandates=slow), "AGIII")
-    rig.mandates = {"AGI": CLEAR}
+    slow = {"AGI": SpeedLimit(0.5, "robot")}
+    rig.hear(rig.feedback(robot_id="AGIII", speed_limits=slow), "AGIII")
+    rig.speed_limits = {"AGI": CLEAR}
     rig.run(5.0)
     assert (rig.factor, rig.reason) == (0.5, "robot")
 
 
 def test_raising_the_factor_takes_a_second_of_good_news() -> None:
     rig = moving()
-    rig.mandates = {"AGI": Mandate(0.5, "person")}
+    rig.speed_limits = {"AGI": SpeedLimit(0.5, "person")}
     rig.run(1.0)
-    rig.mandates = {}
+    rig.speed_limits = {}
     rig.run(0.9)
     early = rig.factor
     rig.run(0.5)

@@ -140,9 +140,9 @@ def test_every_message_tells_what_had_been_heard_when_it_was_measured(
 
     first, *others = [one.origin for one in wire.read() if hasattr(one, "origin")]
 
-    assert (first.echoes, first.heard, first.mono) == (True, None, AT.mono)
+    assert (first.acknowledgements, first.heard, first.mono) == (True, None, AT.mono)
     assert len(others) == 3
-    assert {(one.echoes, one.heard) for one in others} == {
+    assert {(one.acknowledgements, one.heard) for one in others} == {
         (True, FeedbackRef("iveg", 41))
     }
 
@@ -166,7 +166,7 @@ def test_a_recording_proves_nothing() -> None:
 
     (said,) = wire.read()
     assert isinstance(said, Odometry)
-    assert not said.origin.echoes
+    assert not said.origin.acknowledgements
 
 
 def test_counters_tell_what_left() -> None:

@@ -17,22 +17,26 @@ from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.rules import Rules
-from iveg.web import (
+from iveg.web import notifications, problems
+from iveg.web.api import (
     alerts,
     commands,
     costmap,
     health,
     latency,
-    live,
     metrics,
-    notifications,
-    problems,
     robots,
     rule,
-    security,
 )
-from iveg.web.auth import Door, NotifySecret, Principal, Role
-from iveg.web.bounded import BoundedSocket
+from iveg.web.live import socket
+from iveg.web.live.bounded import BoundedSocket
+from iveg.web.security import headers
+from iveg.web.security.authentication import (
+    Authenticator,
+    NotifySecret,
+    Principal,
+    Role,
+)
 from iveg.web.views import Views
 from tests.fakes.rule_store import FakeRuleStore
 from tests.unit.pipeline.desk import Desk
@@ -50,28 +54,28 @@ class WebDesk(Desk):
         super().__init__(robots_)
         self.heard: list[Instant] = []
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
-        self.door = Door(
+        self.authenticator = Authenticator(
             sign_in_token="cd" * 32,
             api_token=API_TOKEN,
             clock=self.clock,
         )
-        self.mapper = Mapper(self.world, self.assessor.greenhouse.bounds)
+        self.mapper = Mapper(self.world, self.evaluator.greenhouse.bounds)
         self.rule_store = FakeRuleStore()
-        self.rules = Rules(self.assessor, self.rule_store, self.minutes, [])
+        self.rules = Rules(self.evaluator, self.rule_store, self.event_log, [])
         self.views = Views(
-            self.assessor,
+            self.evaluator,
             self.commander,
-            self.minutes,
-            self.chain,
+            self.event_log,
+            self.health_monitor,
             lambda: Counter({"some": 1}),
         )
-        self.encoder = live.Encoder(self.views, self.hub, self.clock)
+        self.encoder = socket.Encoder(self.views, self.hub, self.clock)
         self.app = FastAPI()
-        self.app.state.door = self.door
+        self.app.state.authenticator = self.authenticator
         for router in self._routers():
             self.app.include_router(router)
         problems.install(self.app)
-        self.app.add_middleware(security.BodyLimit)
+        self.app.add_middleware(headers.BodyLimit)
         orion = notifications.NotificationEndpoint(
             self.ingest,
             NotifySecret(SECRET),
@@ -86,7 +90,7 @@ class WebDesk(Desk):
 
     def _routers(self) -> list[Any]:
         return [
-            live.router(
+            socket.router(
                 self.hub,
                 self.encoder,
                 self.snapshot,
@@ -95,9 +99,9 @@ class WebDesk(Desk):
                 self.latency.watch,
             ),
             robots.router(self.views, self.clock),
-            costmap.router(self.mapper, self.assessor, self.clock),
+            costmap.router(self.mapper, self.evaluator, self.clock),
             commands.router(self.commander, self.clock),
-            alerts.router(self.assessor, self.clock),
+            alerts.router(self.evaluator, self.clock),
             rule.router(self.rules, self.clock),
             health.router(self.clock, self.views.health),
             latency.router(self.latency.watch, self.clock),
@@ -127,7 +131,7 @@ class WebDesk(Desk):
 
     def cookie(self, role: Role = "operator", name: str = "ana") -> dict[str, str]:
         """The header of a browser in which somebody is signed in."""
-        return {"Cookie": f"iveg={self.door.sessions.open(name, role)}"}
+        return {"Cookie": f"iveg={self.authenticator.sessions.open(name, role)}"}
 
     def browser(self, role: Role = "operator") -> httpx.AsyncClient:
         """The page of somebody of this role."""

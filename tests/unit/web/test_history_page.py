@@ -16,16 +16,18 @@ from starlette.websockets import WebSocketDisconnect
 import iveg
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
-from iveg.domain.alerts import Rule
+from iveg.domain.detection_rule import Rule
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
-from iveg.web import history, installed, problems
-from iveg.web.auth import Door, Principal
-from iveg.web.contexts import Site
-from iveg.web.openapi import describe_api
-from iveg.web.pacing import SUBPROTOCOL
-from iveg.web.pages import Pages, router
-from iveg.web.security import SecurityHeaders
+from iveg.web import problems
+from iveg.web.api import history
+from iveg.web.live.pacing import SUBPROTOCOL
+from iveg.web.pages import service_worker
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.openapi import describe_api
+from iveg.web.pages.routes import Pages, router
+from iveg.web.security.authentication import Authenticator, Principal
+from iveg.web.security.headers import SecurityHeaders
 from tests.browsers import running_browser
 from tests.builders import START
 from tests.fakes.records import (
@@ -59,10 +61,10 @@ class Server:
 
     def _app(self) -> SecurityHeaders:
         app = FastAPI(docs_url=None)
-        app.state.door = Door(
+        app.state.authenticator = Authenticator(
             sign_in_token="cd" * 32, api_token="", clock=lambda: START
         )
-        app.include_router(installed.router())
+        app.include_router(service_worker.router())
         app.include_router(history.router(self._queries, reader=lambda: None))
         app.include_router(
             router(

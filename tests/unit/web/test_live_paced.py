@@ -10,7 +10,7 @@ import orjson
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from iveg.web.pacing import BYTES, FRAMES, SUBPROTOCOL
+from iveg.web.live.pacing import BYTES, FRAMES, SUBPROTOCOL
 from tests.builders import detection, scan
 from tests.unit.pipeline.desk import settle
 from tests.unit.web.desk import WebDesk
@@ -94,7 +94,7 @@ async def drive_on(desk: WebDesk, numbers: range) -> None:
 async def test_a_page_that_never_answers_gets_one_window_and_everything_else() -> None:
     desk = WebDesk()
     async with desk.serving() as address, looking(desk, address) as page:
-        before = len(desk.minutes.lines)
+        before = len(desk.event_log.lines)
         for number in range(FRAMES):
             await drive_on(desk, range(number, number + 1))
             await page.read_frame()
@@ -107,7 +107,7 @@ async def test_a_page_that_never_answers_gets_one_window_and_everything_else() -
         desk.hub.append("problem", None)
         await page.read_until("problem")
 
-    lines = [line.id for line in list(desk.minutes.lines)[before:]]
+    lines = [line.id for line in list(desk.event_log.lines)[before:]]
     steps = page.told(f"commands/{command.command_id}")
     assert [one["frame"] for one in page.telemetry] == list(range(1, FRAMES + 1))
     assert page.bytes <= 2 * BYTES

@@ -1,28 +1,28 @@
 /**
- * The Alarms page: all that is active, whatever the window of time; the sound; the past.
+ * The Alerts page: all that is active, whatever the window of time; the sound; the past.
  */
 
-import { dayAndTime } from "../history/madrid.js";
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
 import { createMembers, floodSaid } from "../panels/alert_members.js";
 import { earlierUnknown, isKnown } from "../panels/alerts.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
+import { dayAndTime } from "./history/local_time.js";
 import { createChips, createRows, soon } from "./rows.js";
 
-/** @typedef {import("../protocol.js").Alert} Alert */
+/** @typedef {import("../core/protocol.js").Alert} Alert */
 
-/** @param {import("../page.js").Page} page */
-export function start({ store, words, tone }) {
-  const list = createAlertList(need("#active-alerts"), words);
-  /** @type {Set<string>} alarms whose occurrences somebody reads */
+/** @param {import("../core/page.js").Page} page */
+export function start({ store, i18n, tone }) {
+  const list = createAlertList(need("#active-alerts"), i18n);
+  /** @type {Set<string>} alerts whose occurrences somebody reads */
   const opened = new Set();
   const isChosen = createChips("data-priority-chip", () => rows.draw());
   const rows = createRows({
     name: "past",
     path: "alerts",
-    words,
-    cells: (alert) => cellsOf(alert, words, opened),
+    i18n,
+    cells: (alert) => cellsOf(alert, i18n, opened),
     admits: ({ priority, cleared_at }) => cleared_at !== null && isChosen(priority),
   });
   const reload = soon(rows.load);
@@ -42,52 +42,52 @@ export function start({ store, words, tone }) {
   });
   store.subscribe("health", draw);
   function drawFlood() {
-    /** @type {import("../protocol.js").Flood | null | undefined} */
+    /** @type {import("../core/protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");
-    setText(need("#flood"), floodSaid(flood, words));
+    setText(need("#flood"), floodSaid(flood, i18n));
     need("#flood").toggleAttribute("data-flood", Boolean(flood?.since));
   }
 
   store.subscribe("flood", drawFlood);
-  words.onChange(draw);
-  words.onChange(drawFlood);
-  createSoundPanel(words, tone);
+  i18n.onChange(draw);
+  i18n.onChange(drawFlood);
+  createSoundPanel(i18n, tone);
   draw();
   drawFlood();
   rows.load();
 }
 
-/** @param {Alert} alert @param {import("../i18n.js").Words} words
+/** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n
  * @param {Set<string>} opened */
-function cellsOf(alert, words, opened) {
+function cellsOf(alert, i18n, opened) {
   const priority = make("td");
   priority.dataset.priority = alert.priority;
   priority.append(
     make("span", "shape"),
-    make("span", "", words.t(`alert.priority.${alert.priority}`)),
+    make("span", "", i18n.t(`alert.priority.${alert.priority}`)),
   );
   const over = alert.cleared_at ? dayAndTime(alert.cleared_at) : "—";
   return [
-    make("td", "time", timesOf(alert, words)),
+    make("td", "time", timesOf(alert, i18n)),
     priority,
-    whatOf(alert, words, opened),
+    whatOf(alert, i18n, opened),
     make("td", "time", over),
-    make("td", "", seenBy(alert, words)),
-    make("td", "number", words.number(alert.count, 0)),
+    make("td", "", seenBy(alert, i18n)),
+    make("td", "number", i18n.number(alert.count, 0)),
   ];
 }
 
-/** First and last time. @param {Alert} alert @param {import("../i18n.js").Words} words */
-function timesOf({ raised_at, last_raised_at, count }, words) {
+/** First and last time. @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
+function timesOf({ raised_at, last_raised_at, count }, i18n) {
   const first = dayAndTime(raised_at);
-  return count === 1 ? first : `${first} – ${words.time(last_raised_at)}`;
+  return count === 1 ? first : `${first} – ${i18n.time(last_raised_at)}`;
 }
 
 /** What it says, and each time that it said so. @param {Alert} alert
- * @param {import("../i18n.js").Words} words @param {Set<string>} opened */
-function whatOf(alert, words, opened) {
-  const cell = make("td", "what", sentenceOf(alert, words));
-  const { element, draw } = createMembers(words);
+ * @param {import("../core/i18n.js").I18n} i18n @param {Set<string>} opened */
+function whatOf(alert, i18n, opened) {
+  const cell = make("td", "what", sentenceOf(alert, i18n));
+  const { element, draw } = createMembers(i18n);
   draw(alert);
   // The table is written anew while somebody reads it.
   element.open = opened.has(alert.alert_id);
@@ -100,9 +100,9 @@ function whatOf(alert, words, opened) {
 }
 
 /** Who, when and what they said. @param {Alert} alert
- * @param {import("../i18n.js").Words} words */
-function seenBy({ acknowledged_at, acknowledged_by, note }, words) {
+ * @param {import("../core/i18n.js").I18n} i18n */
+function seenBy({ acknowledged_at, acknowledged_by, note }, i18n) {
   if (!acknowledged_at) return "—";
-  const who = `${acknowledged_by} ${words.time(acknowledged_at)}`;
+  const who = `${acknowledged_by} ${i18n.time(acknowledged_at)}`;
   return note ? `${who}: ${note}` : who;
 }

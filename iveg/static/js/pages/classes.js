@@ -4,7 +4,7 @@
  * A change is a new version of the rule.  Whoever is at the form keeps what they typed
  * when somebody else is faster, and is told.
  *
- * @typedef {import("../protocol.js").Rule} Rule
+ * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {"person" | "robot"} Class
  */
 
@@ -15,11 +15,11 @@ const CLASSES = ["person", "robot"];
 const WRITERS = new Set(["operator", "admin"]);
 
 /**
- * @param {import("../store.js").Store} store
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/store.js").Store} store
+ * @param {import("../core/i18n.js").I18n} i18n
  * @param {ReturnType<typeof import("./guard.js").createGuard>} guard
  */
-export function createClassForm(store, words, guard) {
+export function createClassForm(store, i18n, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#class-form"));
   const word = /** @type {HTMLInputElement} */ (need("#alias-word"));
   const meaning = /** @type {HTMLSelectElement} */ (need("#alias-class"));
@@ -110,7 +110,7 @@ export function createClassForm(store, words, guard) {
   /** @param {string} key @param {Record<string, string | number>} [slots] */
   function say(key, slots = {}) {
     said = { key, slots };
-    setText(need("#class-result"), words.t(key, slots));
+    setText(need("#class-result"), i18n.t(key, slots));
   }
 
   function draw() {
@@ -122,11 +122,11 @@ export function createClassForm(store, words, guard) {
   /** @param {string} name @param {Class} class_ */
   function makeRow(name, class_) {
     const item = make("li", "alias");
-    const gone = make("button", "button alias__remove", words.t("classes.remove"));
+    const gone = make("button", "button alias__remove", i18n.t("classes.remove"));
     gone.type = "button";
-    gone.ariaLabel = words.t("classes.remove_one", { name });
+    gone.ariaLabel = i18n.t("classes.remove_one", { name });
     gone.addEventListener("click", () => remove(name));
-    const meant = make("span", "", words.t("classes.means", { class: class_ }));
+    const meant = make("span", "", i18n.t("classes.means", { class: class_ }));
     item.append(make("b", "", name), meant, gone);
     return item;
   }
@@ -150,7 +150,7 @@ export function createClassForm(store, words, guard) {
     save();
   });
   store.subscribe("rule", take);
-  words.onChange(draw);
+  i18n.onChange(draw);
   take(store.get("rule"));
   return { open, isDirty };
 }

@@ -2,15 +2,15 @@
  * The Climate page: three numbers to read from afar, how old they are, and their day.
  *
  * @typedef {"temperature" | "humidity" | "co2"} Part
- * @typedef {import("../history/charts.js").Source & {since: string, until: string,
- *   slice_s: number, figures: Record<Part, import("../history/charts.js").Figure>}} Day
+ * @typedef {import("./history/charts.js").Source & {since: string, until: string,
+ *   slice_s: number, figures: Record<Part, import("./history/charts.js").Figure>}} Day
  */
 
-import { readApi } from "../api.js";
-import { ageOf } from "../clock.js";
-import { drawFigure } from "../history/charts.js";
+import { readApi } from "../core/api.js";
+import { ageOf } from "../core/clock.js";
 import { need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
+import { drawFigure } from "./history/charts.js";
 
 /** @type {readonly Part[]} */
 const PARTS = ["temperature", "humidity", "co2"];
@@ -21,12 +21,12 @@ const DAY_MS = 60_000;
 const OLD_S = 300;
 const MINUTES_FROM_S = 120;
 
-/** @param {import("../page.js").Page} page */
-export function start({ store, words }) {
-  const day = createDay(words);
+/** @param {import("../core/page.js").Page} page */
+export function start({ store, i18n }) {
+  const day = createDay(i18n);
 
   function draw() {
-    /** @type {import("../protocol.js").Climate | null} */
+    /** @type {import("../core/protocol.js").Climate | null} */
     const climate = store.get("climate") ?? null;
     const age = climate ? ageOf(climate) : Number.POSITIVE_INFINITY;
     const isOld = age > OLD_S || store.connection.state !== "open";
@@ -42,40 +42,40 @@ export function start({ store, words }) {
   /** @param {Part} part @param {number | null | undefined} value @param {number} age */
   function tile(part, value, age) {
     const isKnown = typeof value === "number";
-    const said = isKnown ? words.t(`climate.tile.${part}`, { value }) : "—";
+    const said = isKnown ? i18n.t(`climate.tile.${part}`, { value }) : "—";
     setText(need(`#climate-${part}`), said);
-    setText(need(`#climate-${part}-age`), isKnown ? ago(age, words) : "");
+    setText(need(`#climate-${part}-age`), isKnown ? ago(age, i18n) : "");
   }
 
   /** @param {number} age (s) @param {boolean} isOld */
   function sentence(age, isOld) {
-    if (!Number.isFinite(age)) return words.t("climate.waiting");
+    if (!Number.isFinite(age)) return i18n.t("climate.waiting");
     // Without seconds: this line is read out whenever it changes.
-    return words.t(isOld ? "climate.old" : "climate.fresh", { ago: ago(age, words) });
+    return i18n.t(isOld ? "climate.old" : "climate.fresh", { ago: ago(age, i18n) });
   }
 
   store.subscribe("climate", draw);
   store.subscribe("connection", draw);
   store.subscribe("snapshot", day.load);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
   day.load();
 }
 
-/** @param {number} age (s) @param {import("../i18n.js").Words} words */
-function ago(age, words) {
+/** @param {number} age (s) @param {import("../core/i18n.js").I18n} i18n */
+function ago(age, i18n) {
   const minutes = Math.floor(age / 60);
-  if (age < MINUTES_FROM_S) return words.t("climate.ago_s", { age });
-  return words.t("climate.ago_min", { minutes });
+  if (age < MINUTES_FROM_S) return i18n.t("climate.ago_s", { age });
+  return i18n.t("climate.ago_min", { minutes });
 }
 
 /**
  * The last 24 hours, asked for again each minute while somebody can see them.
  *
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function createDay(words) {
+function createDay(i18n) {
   /** @type {Day | null} */
   let day = null;
   let status = 200;
@@ -94,7 +94,7 @@ function createDay(words) {
     setHidden(need("#trend-error"), status === 200 && !isBare);
     const wrong = status ? "rows.failed" : "rows.offline";
     const why = isBare ? "history.error.library" : wrong;
-    setText(need("#trend-error"), words.t(why, { status }));
+    setText(need("#trend-error"), i18n.t(why, { status }));
     if (day === null) return;
     const heard = PARTS.filter((part) => day?.figures[part].data.length);
     setHidden(need("#trend-empty"), heard.length > 0);
@@ -106,7 +106,7 @@ function createDay(words) {
   /** @param {Day} shown */
   function noteOf({ slice_s }) {
     const minutes = slice_s / 60;
-    return words.t(`climate.note.${slice_s ? "sliced" : "exact"}`, { minutes });
+    return i18n.t(`climate.note.${slice_s ? "sliced" : "exact"}`, { minutes });
   }
 
   /** @param {Part} part @param {Day} shown */
@@ -118,34 +118,34 @@ function createDay(words) {
     if (figure.data.length === 0) return;
     const span = { since: Date.parse(shown.since), until: Date.parse(shown.until) };
     try {
-      await drawFigure(place, figure, shown, span, words);
+      await drawFigure(place, figure, shown, span, i18n);
       isBare = false;
     } catch {
       isBare = true;
       setHidden(need("#trend-error"), false);
-      setText(need("#trend-error"), words.t("history.error.library"));
+      setText(need("#trend-error"), i18n.t("history.error.library"));
     }
   }
 
   /**
    * Least and most of the day: what the line is for who cannot see it.
    *
-   * @param {Part} part @param {import("../history/charts.js").Figure} figure
+   * @param {Part} part @param {import("./history/charts.js").Figure} figure
    */
   function spreadOf(part, { data }) {
     const [trace] = data;
-    if (!trace) return words.t("climate.silent");
+    if (!trace) return i18n.t("climate.silent");
     const values = trace.y.filter((value) => value !== null);
     const share = part === "humidity" ? 0.01 : 1;
     const say = (/** @type {number} */ value) =>
-      words.t(`climate.tile.${part}`, { value: value * share });
+      i18n.t(`climate.tile.${part}`, { value: value * share });
     const [least, most] = [Math.min(...values), Math.max(...values)];
-    return words.t("climate.spread", { least: say(least), most: say(most) });
+    return i18n.t("climate.spread", { least: say(least), most: say(most) });
   }
 
   setInterval(load, DAY_MS);
   document.addEventListener("visibilitychange", load);
-  words.onChange(draw);
+  i18n.onChange(draw);
   onThemeChange(draw);
   return { load };
 }

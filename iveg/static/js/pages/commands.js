@@ -2,28 +2,28 @@
  * The Commands page: every order with what each of its roads took, to study and print.
  */
 
-import { dayAndTime, millisecondsOf } from "../history/madrid.js";
 import { all, make, need, needPart, setText } from "../panels/dom.js";
 import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
+import { dayAndTime, millisecondsOf } from "./history/local_time.js";
 import { endSaid, summaryOf, tookOf, zeroOf } from "./latency.js";
 import { createChips, createRows, soon } from "./rows.js";
 
-/** @typedef {import("../i18n.js").Words} Words */
+/** @typedef {import("../core/i18n.js").I18n} I18n */
 
-/** @param {import("../page.js").Page} page */
-export function start({ store, words }) {
+/** @param {import("../core/page.js").Page} page */
+export function start({ store, i18n }) {
   /** @type {Set<string>} orders whose steps somebody reads */
   const opened = new Set();
   const isChosen = createChips("data-kind-chip", () => rows.draw());
   const rows = createRows({
     name: "orders",
     path: "commands",
-    words,
-    cells: (command) => cellsOf(command, words, opened),
+    i18n,
+    cells: (command) => cellsOf(command, i18n, opened),
     admits: ({ kind }) => isChosen(kind),
-    onItems: (items) => drawSummary(items, words),
+    onItems: (items) => drawSummary(items, i18n),
   });
-  const drills = createDrills(store, words);
+  const drills = createDrills(store, i18n);
   function load() {
     rows.load();
     drills.load();
@@ -31,17 +31,17 @@ export function start({ store, words }) {
   store.subscribe("commands/", soon(load));
   store.subscribe("snapshot", soon(load));
   store.subscribe("alerts", drills.draw);
-  words.onChange(drills.draw);
+  i18n.onChange(drills.draw);
   load();
 }
 
 /**
  * Each robot's last drill, for the sheet that somebody signs.
  *
- * @param {import("../store.js").Store} store
- * @param {Words} words
+ * @param {import("../core/store.js").Store} store
+ * @param {I18n} i18n
  */
-function createDrills(store, words) {
+function createDrills(store, i18n) {
   /** @typedef {Awaited<ReturnType<typeof readLast>>} Read */
   const lines = all("[data-drills-of]");
   /** @type {Map<HTMLElement, Read>} */
@@ -51,12 +51,12 @@ function createDrills(store, words) {
   function drawLine(line) {
     const { last, status } = read.get(line) ?? { last: null, status: 0 };
     const missing =
-      status === 200 ? words.t("drill.never") : words.t("drill.unread", { status });
-    const result = last ? verdictSaid(last, words) : missing;
+      status === 200 ? i18n.t("drill.never") : i18n.t("drill.unread", { status });
+    const result = last ? verdictSaid(last, i18n) : missing;
     setText(needPart("at", line), dayAndTime(last?.drilled_at ?? null));
     setText(needPart("by", line), last?.by ?? "—");
     setText(needPart("result", line), read.has(line) ? result : "—");
-    drawDue(needPart("due", line), String(line.dataset.drillsOf), store, words);
+    drawDue(needPart("due", line), String(line.dataset.drillsOf), store, i18n);
   }
 
   const draw = () => {
@@ -79,18 +79,18 @@ function createDrills(store, words) {
 
 /**
  * @param {import("./latency.js").Order} command
- * @param {Words} words
+ * @param {I18n} i18n
  * @param {Set<string>} opened
  */
-function cellsOf(command, words, opened) {
+function cellsOf(command, i18n, opened) {
   const took = tookOf(command);
   const number = (/** @type {number | null} */ value) =>
-    make("td", "number", value === null ? "—" : words.number(value, 0));
+    make("td", "number", value === null ? "—" : i18n.number(value, 0));
   return [
     make("td", "time", dayAndTime(zeroOf(command.times))),
     make("td", "", command.robot_id),
-    make("td", "", orderSaid(command, words)),
-    endOf(command, words, opened),
+    make("td", "", orderSaid(command, i18n)),
+    endOf(command, i18n, opened),
     make("td", "", command.requested_by),
     number(took.accepted),
     number(took.sentDirect),
@@ -106,11 +106,11 @@ function cellsOf(command, words, opened) {
  * How it ended, and each step of it on demand.
  *
  * @param {import("./latency.js").Order} command
- * @param {Words} words
+ * @param {I18n} i18n
  * @param {Set<string>} opened
  */
-function endOf(command, words, opened) {
-  const cell = make("td", "what", endSaid(command, words));
+function endOf(command, i18n, opened) {
+  const cell = make("td", "what", endSaid(command, i18n));
   if (!command.steps?.length) return cell;
   const steps = make("details", "members");
   // The table is written anew while somebody reads it.
@@ -122,25 +122,25 @@ function endOf(command, words, opened) {
   const list = make("ol");
   for (const { at, state } of command.steps) {
     const line = make("li", "", `${millisecondsOf(at)} `);
-    line.append(words.t(`history.state.${state}`));
+    line.append(i18n.t(`history.state.${state}`));
     list.append(line);
   }
-  steps.append(make("summary", "", words.t("commandspage.steps")), list);
+  steps.append(make("summary", "", i18n.t("commandspage.steps")), list);
   cell.append(steps);
   return cell;
 }
 
-/** @param {import("./latency.js").Order} command @param {Words} words */
-function orderSaid({ kind, drill }, words) {
-  return drill ? words.t("drill.heading") : words.t(`history.kind.${kind}`);
+/** @param {import("./latency.js").Order} command @param {I18n} i18n */
+function orderSaid({ kind, drill }, i18n) {
+  return drill ? i18n.t("drill.heading") : i18n.t(`history.kind.${kind}`);
 }
 
-/** @param {import("./latency.js").Order[]} items @param {Words} words */
-function drawSummary(items, words) {
+/** @param {import("./latency.js").Order[]} items @param {I18n} i18n */
+function drawSummary(items, i18n) {
   const { count, unconfirmed, ...roads } = summaryOf(items);
-  setText(need("#took-count"), words.number(count, 0));
-  setText(need("#took-unconfirmed"), words.number(unconfirmed, 0));
+  setText(need("#took-count"), i18n.number(count, 0));
+  setText(need("#took-unconfirmed"), i18n.number(unconfirmed, 0));
   for (const [road, stat] of Object.entries(roads)) {
-    setText(need(`#took-${road}`), stat ? words.t("commandspage.stat", stat) : "—");
+    setText(need(`#took-${road}`), stat ? i18n.t("commandspage.stat", stat) : "—");
   }
 }

@@ -2,22 +2,22 @@
  * The evening sheet: the server wrote it; here its times and aisles become the reader's.
  */
 
-import { wallText } from "../history/madrid.js";
-import { laneName } from "../lanes.js";
+import { laneName } from "../core/lanes.js";
 import { all, setText } from "../panels/dom.js";
+import { wallText } from "./history/local_time.js";
 
-/** @param {import("../page.js").Page} page */
-export function start({ words }) {
+/** @param {import("../core/page.js").Page} page */
+export function start({ i18n }) {
   function draw() {
     for (const time of all("[data-moment]")) {
       setText(time, timeOf(String(time.dataset.moment)));
     }
     for (const lane of all("[data-lane]")) {
       const label = String(lane.dataset.lane);
-      setText(lane, label ? laneName(label, words.t) : words.t("day.no_lane"));
+      setText(lane, label ? laneName(label, i18n.t) : i18n.t("day.no_lane"));
     }
   }
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
 }
 

@@ -5,8 +5,8 @@
 import { createRecord } from "../panels/decision.js";
 import { need } from "../panels/dom.js";
 
-/** @param {import("../page.js").Page} page */
-export function start({ words }) {
+/** @param {import("../core/page.js").Page} page */
+export function start({ i18n }) {
   const asked = String(need("#decision-page").dataset.decision);
-  createRecord(need("#decision-record"), words).show(asked);
+  createRecord(need("#decision-record"), i18n).show(asked);
 }

@@ -2,16 +2,16 @@
  * The Fleet page: the chain as a diagram, each robot, and each of its devices.
  */
 
-import { readApi } from "../api.js";
-import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
+import { readApi } from "../core/api.js";
+import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { readingsOf } from "../panels/readings.js";
-import { isHeard, modeSaid, taskSaid } from "../panels/robot_words.js";
-import { judgeChain } from "./chain.js";
+import { isHeard, modeSaid, taskSaid } from "../panels/robot_texts.js";
+import { judgeChain } from "./health_sentence.js";
 import { createTiles } from "./tiles.js";
 
-/** @typedef {import("../protocol.js").Robot} Robot */
-/** @typedef {import("../i18n.js").Words} Words */
+/** @typedef {import("../core/protocol.js").Robot} Robot */
+/** @typedef {import("../core/i18n.js").I18n} I18n */
 
 /** @typedef {{device: string, robot_id: string, kind: string, age_s: number | null}} Device */
 
@@ -19,9 +19,9 @@ const TICK_MS = 500;
 const READ_MS = 5000;
 const SILENT = new Set(["LOST", "UNKNOWN"]);
 
-/** @param {import("../page.js").Page} page */
+/** @param {import("../core/page.js").Page} page */
 export function start(page) {
-  const { store, words } = page;
+  const { store, i18n } = page;
   /** @type {{items: Device[], readMs: number}} */
   let devices = { items: [], readMs: 0 };
 
@@ -30,15 +30,15 @@ export function start(page) {
     drawChain(robots);
     setHidden(need("#machines-empty"), robots.length > 0);
     const isKnown = Boolean(store.get("snapshot"));
-    setText(need("#machines-empty"), words.t(isKnown ? "robot.none" : "rows.loading"));
+    setText(need("#machines-empty"), i18n.t(isKnown ? "robot.none" : "rows.loading"));
     fill(
       "#machines tbody",
-      robots.map((robot) => machineCells(robot, words)),
+      robots.map((robot) => machineCells(robot, i18n)),
     );
     hideEmptyColumns(need("#machines"));
     fill(
       "#devices tbody",
-      devices.items.map((device) => deviceCells(device, devices.readMs, words)),
+      devices.items.map((device) => deviceCells(device, devices.readMs, i18n)),
     );
   }
 
@@ -52,7 +52,7 @@ export function start(page) {
   /** @param {Robot[]} robots */
   function drawChain(robots) {
     const isOpen = store.connection.state === "open";
-    /** @type {import("../protocol.js").Health | null} */
+    /** @type {import("../core/protocol.js").Health | null} */
     const health = store.get("health") ?? null;
     const silent = robots.filter((robot) => SILENT.has(linkOfRobot(robot)));
     const hops = health?.hops ?? [];
@@ -63,11 +63,11 @@ export function start(page) {
       robots.length,
     );
     setAttribute(need("#chain-says"), "data-state", found.state);
-    setText(need("#chain-sentence"), words.t(found.key, found.slots));
+    setText(need("#chain-sentence"), i18n.t(found.key, found.slots));
     for (const box of all(".hop-box")) drawBox(box, hops, robots, silent.length);
   }
 
-  /** @param {HTMLElement} box @param {import("../protocol.js").Health["hops"]} hops
+  /** @param {HTMLElement} box @param {import("../core/protocol.js").Health["hops"]} hops
    * @param {Robot[]} robots @param {number} silent */
   function drawBox(box, hops, robots, silent) {
     const name = String(box.dataset.hop);
@@ -77,7 +77,7 @@ export function start(page) {
       const state = silent ? "down" : live < robots.length ? "late" : "ok";
       setAttribute(box, "data-state", robots.length ? state : "unknown");
       const slots = { live, total: robots.length };
-      setText(need("small", box), words.t("fleet.robots_live", slots));
+      setText(need("small", box), i18n.t("fleet.robots_live", slots));
     } else if (name === "server" || name === "screen") {
       const state = isOpen || name === "screen" ? "ok" : "down";
       drawState(box, state);
@@ -92,12 +92,12 @@ export function start(page) {
   /** @param {HTMLElement} box @param {string} state */
   function drawState(box, state) {
     setAttribute(box, "data-state", state);
-    setText(need("small", box), words.t(`health.state.${state}`));
+    setText(need("small", box), i18n.t(`health.state.${state}`));
   }
 
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   setInterval(load, READ_MS);
   store.subscribe("snapshot", load);
@@ -109,15 +109,15 @@ export function start(page) {
 /**
  * @param {Device} device
  * @param {number} readMs when the server said so
- * @param {Words} words
+ * @param {I18n} i18n
  * @returns {(string | Node)[]}
  */
-function deviceCells({ device, kind, age_s }, readMs, words) {
+function deviceCells({ device, kind, age_s }, readMs, i18n) {
   const age = ageOf({ age_s, receivedAtMs: readMs });
   return [
     make("code", "", device),
-    words.has(`fleet.measures.${kind}`) ? words.t(`fleet.measures.${kind}`) : kind,
-    ageSaid(age, words),
+    i18n.has(`fleet.measures.${kind}`) ? i18n.t(`fleet.measures.${kind}`) : kind,
+    ageSaid(age, i18n),
   ];
 }
 
@@ -133,35 +133,35 @@ function hideEmptyColumns(table) {
   });
 }
 
-/** @param {number} age (s) @param {Words} words */
-function ageSaid(age, words) {
-  return Number.isFinite(age) ? words.t("health.age", { age }) : words.t("fleet.never");
+/** @param {number} age (s) @param {I18n} i18n */
+function ageSaid(age, i18n) {
+  return Number.isFinite(age) ? i18n.t("health.age", { age }) : i18n.t("fleet.never");
 }
 
-/** @param {Robot} robot @param {Words} words @returns {(string | Node)[]} */
-function machineCells(robot, words) {
+/** @param {Robot} robot @param {I18n} i18n @returns {(string | Node)[]} */
+function machineCells(robot, i18n) {
   const link = linkOfRobot(robot);
-  const age = aboutAge(robot, ageSaid(ageOf(robot), words), words);
+  const age = aboutAge(robot, ageSaid(ageOf(robot), i18n), i18n);
   const { profile, navigation, clock_offset_s, holds } = robot;
   const isKnown = isHeard(robot);
-  const sources = holds.map(({ source }) => words.t(`release.hold_source.${source}`));
+  const sources = holds.map(({ source }) => i18n.t(`release.hold_source.${source}`));
   return [
     make("b", "", robot.robot_id),
-    `${words.t(`robot.link.${link}`)} · ${age}`,
-    link === "LOST" ? "—" : modeSaid(robot, words),
-    profile && isKnown ? words.t("robot.profile", profile) : "—",
-    navigation?.task ? taskSaid(navigation.task, words) : "—",
-    robot.transport && isKnown ? words.t(`fleet.transport.${robot.transport}`) : "—",
-    clock_offset_s === null ? "—" : words.t("fleet.clock", { offset: clock_offset_s }),
+    `${i18n.t(`robot.link.${link}`)} · ${age}`,
+    link === "LOST" ? "—" : modeSaid(robot, i18n),
+    profile && isKnown ? i18n.t("robot.profile", profile) : "—",
+    navigation?.task ? taskSaid(navigation.task, i18n) : "—",
+    robot.transport && isKnown ? i18n.t(`fleet.transport.${robot.transport}`) : "—",
+    clock_offset_s === null ? "—" : i18n.t("fleet.clock", { offset: clock_offset_s }),
     robot.cmd_status ?? "—",
     sources.length ? [...new Set(sources)].join(", ") : "—",
-    readingsSaid(robot, words),
+    readingsSaid(robot, i18n),
   ];
 }
 
-/** @param {Robot} robot @param {Words} words */
-function readingsSaid(robot, words) {
-  const readings = readingsOf(robot, words);
+/** @param {Robot} robot @param {I18n} i18n */
+function readingsSaid(robot, i18n) {
+  const readings = readingsOf(robot, i18n);
   return readings.map(({ label, said }) => `${label}: ${said}`).join(" · ");
 }
 

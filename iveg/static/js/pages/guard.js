@@ -3,11 +3,11 @@
  * for a second word, and can be undone for ten minutes.
  */
 
-import { readApi, sendApi } from "../api.js";
+import { readApi, sendApi } from "../core/api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 import { loweringsOf, personShare, sightingsLost } from "./lowering.js";
 
-/** @typedef {import("../protocol.js").Rule} Rule */
+/** @typedef {import("../core/protocol.js").Rule} Rule */
 /** @typedef {import("./lowering.js").Change} Change */
 /** @typedef {{status: number, body: any}} Answer */
 
@@ -18,10 +18,10 @@ const TICK_MS = 1000;
 const SIGHTINGS = 1000;
 
 /**
- * @param {import("../store.js").Store} store
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/store.js").Store} store
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-export function createGuard(store, words) {
+export function createGuard(store, i18n) {
   const box = need("#guard");
   const undo = /** @type {HTMLButtonElement} */ (need("#rule-undo"));
   /** @type {(isMeant: boolean) => void} */
@@ -31,7 +31,7 @@ export function createGuard(store, words) {
   async function isMeant(change, before) {
     const lowerings = loweringsOf(before, change);
     if (!lowerings.length) return true;
-    const told = lowerings.map(({ key, slots }) => words.t(key, slots));
+    const told = lowerings.map(({ key, slots }) => i18n.t(key, slots));
     const count = await countSaid(change, before);
     setText(need("#guard-says"), [...told, count].filter(Boolean).join(" "));
     setHidden(box, false);
@@ -50,8 +50,8 @@ export function createGuard(store, words) {
     day.setHours(0, 0, 0, 0);
     const query = `class=person&min_probability=${from}&since=${day.toISOString()}&limit=${SIGHTINGS}`;
     const { status, body } = await readApi(`detections?${query}`);
-    if (status !== 200 || !body?.items.length) return words.t("lowering.uncounted");
-    return words.t("lowering.sightings", sightingsLost(body.items, from, to));
+    if (status !== 200 || !body?.items.length) return i18n.t("lowering.uncounted");
+    return i18n.t("lowering.sightings", sightingsLost(body.items, from, to));
   }
 
   /** @param {boolean} isYes */
@@ -90,7 +90,7 @@ export function createGuard(store, words) {
     });
     if (status === 200) keep(null);
     const said = status === 200 ? "lowering.undone" : "rule.stale";
-    setText(need("#rule-result"), words.t(said));
+    setText(need("#rule-result"), i18n.t(said));
     draw();
   }
 
@@ -98,13 +98,13 @@ export function createGuard(store, words) {
     const kept = read();
     const minutes = kept ? Math.ceil((kept.untilMs - Date.now()) / 60_000) : 0;
     setHidden(undo, minutes <= 0);
-    setText(undo, words.t("lowering.undo", { minutes }));
+    setText(undo, i18n.t("lowering.undo", { minutes }));
   }
 
   need("#guard-yes").addEventListener("click", () => close(true));
   need("#guard-no").addEventListener("click", () => close(false));
   undo.addEventListener("click", takeBack);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
   return { put };

@@ -7,7 +7,7 @@
  * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
  */
 
-import { loadPlotly, styled, token } from "../history/charts.js";
+import { loadPlotly, styled, token } from "./history/charts.js";
 
 const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
 const COLOURS = /** @type {Record<string, string>} */ ({
@@ -24,14 +24,14 @@ const DASHES = /** @type {Record<string, string>} */ ({
 
 /**
  * @param {HTMLElement} place @param {Figure} figure
- * @param {import("../history/charts.js").Source} source
- * @param {import("../i18n.js").Words} words
+ * @param {import("./history/charts.js").Source} source
+ * @param {import("../core/i18n.js").I18n} i18n
  * @throws {Error} the library could not be loaded
  */
-export async function drawHopFigure(place, { data, layout }, source, words) {
+export async function drawHopFigure(place, { data, layout }, source, i18n) {
   const plotly = await loadPlotly(source);
-  const traces = data.map((trace) => dressed(trace, layout.meta, words));
-  const laid = styled(layout, { since: 0, until: 0 }, words);
+  const traces = data.map((trace) => dressed(trace, layout.meta, i18n));
+  const laid = styled(layout, { since: 0, until: 0 }, i18n);
   if (layout.meta.y === "hop") {
     // First hop on top, and room for its words.
     laid.yaxis = { ...laid.yaxis, autorange: "reversed", title: { text: "" } };
@@ -40,24 +40,24 @@ export async function drawHopFigure(place, { data, layout }, source, words) {
   await plotly.react(place, traces, laid, CONFIG);
 }
 
-/** @param {Trace} trace @param {{x: string, y: string}} axes @param {import("../i18n.js").Words} words */
-function dressed(trace, axes, words) {
+/** @param {Trace} trace @param {{x: string, y: string}} axes @param {import("../core/i18n.js").I18n} i18n */
+function dressed(trace, axes, i18n) {
   const { hop, data } = trace.meta;
   const color = token(COLOURS[hop]);
-  const named = words.t(`hops.step.${hop}`);
+  const named = i18n.t(`hops.step.${hop}`);
   const say = (
     /** @type {string} */ axis,
     /** @type {(number | string)[]} */ values,
   ) =>
     axis === "data" || axis === "hop"
       ? values.map((value) =>
-          words.t(axis === "data" ? `stream.${value}` : `hops.step.${value}`),
+          i18n.t(axis === "data" ? `stream.${value}` : `hops.step.${value}`),
         )
       : values;
   const error_y = trace.error_y && { ...trace.error_y, color: token("--text") };
   return {
     ...trace,
-    name: data ? `${words.t(`stream.${data}`)}, ${named}` : named,
+    name: data ? `${i18n.t(`stream.${data}`)}, ${named}` : named,
     x: say(axes.x, trace.x),
     y: say(axes.y, trace.y),
     marker: { color },

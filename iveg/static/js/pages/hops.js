@@ -12,7 +12,7 @@
  * }} Stream
  * @typedef {{robot_id: string, state: string, offset_ms: number | null,
  *   uncertainty_ms: number | null, jumps: number}} Clock
- * @typedef {import("../history/charts.js").Source & {
+ * @typedef {import("./history/charts.js").Source & {
  *   window: string, direct: boolean,
  *   rows: {data: string, hops: Record<string, Spread>, sampled: string[]}[],
  *   paper: Record<string, Record<string, Record<string, number>>>,
@@ -24,7 +24,7 @@
  * }} Latency
  */
 
-import { readApi } from "../api.js";
+import { readApi } from "../core/api.js";
 import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
 import { drawHopFigure } from "./hop_figures.js";
@@ -42,8 +42,8 @@ const PRINTED = /** @type {Record<string, string>} */ ({
   robot_orion: "total",
 });
 
-/** @param {import("../page.js").Page} page */
-export function start({ words }) {
+/** @param {import("../core/page.js").Page} page */
+export function start({ i18n }) {
   let asked = { window: "15min", robot: "" };
   /** @type {Latency | null} */
   let told = null;
@@ -65,13 +65,13 @@ export function start({ words }) {
   async function draw() {
     const failed = need("#hops-error");
     setHidden(failed, status === 200);
-    setText(failed, words.t(status ? "rows.failed" : "rows.offline", { status }));
+    setText(failed, i18n.t(status ? "rows.failed" : "rows.offline", { status }));
     if (told === null) return;
-    drawRemarks(told, words);
-    drawTable(told, words);
-    drawClocks(told, words);
-    drawStreams(told, words);
-    await drawFigures(told, words);
+    drawRemarks(told, i18n);
+    drawTable(told, i18n);
+    drawClocks(told, i18n);
+    drawStreams(told, i18n);
+    await drawFigures(told, i18n);
   }
 
   function redraw() {
@@ -100,7 +100,7 @@ export function start({ words }) {
   for (const chip of all("[data-of]")) {
     chip.addEventListener("click", () => ask({ robot: chip.dataset.of }));
   }
-  words.onChange(redraw);
+  i18n.onChange(redraw);
   onThemeChange(redraw);
   document.addEventListener("visibilitychange", load);
   setInterval(load, EVERY_MS);
@@ -112,38 +112,38 @@ function queryOf({ window, robot }) {
   return robot ? `window=${window}&robot=${robot}` : `window=${window}`;
 }
 
-/** @param {Latency} told @param {import("../i18n.js").Words} words */
-function drawRemarks({ remarks }, words) {
-  const said = remarks.map(({ key, slots }) => words.t(key, slots));
-  if (!said.length) said.push(words.t("hops.well"));
+/** @param {Latency} told @param {import("../core/i18n.js").I18n} i18n */
+function drawRemarks({ remarks }, i18n) {
+  const said = remarks.map(({ key, slots }) => i18n.t(key, slots));
+  if (!said.length) said.push(i18n.t("hops.well"));
   fill(need("#hops-remarks"), said);
 }
 
 /**
  * One line of what is measured and two of what was printed, for each kind of data.
  *
- * @param {Latency} told @param {import("../i18n.js").Words} words
+ * @param {Latency} told @param {import("../core/i18n.js").I18n} i18n
  */
-function drawTable(told, words) {
+function drawTable(told, i18n) {
   const lines = told.rows.flatMap(({ data, hops, sampled }) => [
     line(
-      words.t(`stream.${data}`),
-      words.t("hops.source.here"),
-      HOPS.map((hop) => cellOf(hops[hop], sampled.includes(hop), words)),
+      i18n.t(`stream.${data}`),
+      i18n.t("hops.source.here"),
+      HOPS.map((hop) => cellOf(hops[hop], sampled.includes(hop), i18n)),
     ),
     ...Object.entries(told.paper).map(([place, rows]) =>
       line(
         "",
-        words.t(`hops.source.${place}`),
-        HOPS.map((hop) => printedOf(rows[data], PRINTED[hop], words)),
+        i18n.t(`hops.source.${place}`),
+        HOPS.map((hop) => printedOf(rows[data], PRINTED[hop], i18n)),
       ),
     ),
   ]);
   need("#hops-table tbody").replaceChildren(...lines);
   const first = told.streams.reduce((sum, one) => sum + one.orion_first, 0);
   const passed = told.streams.reduce((sum, one) => sum + one.fiware.passed, 0);
-  const notes = told.direct ? [] : [words.t("hops.no_direct")];
-  if (first > 0) notes.push(words.t("hops.orion_first", { share: first / passed }));
+  const notes = told.direct ? [] : [i18n.t("hops.no_direct")];
+  if (first > 0) notes.push(i18n.t("hops.orion_first", { share: first / passed }));
   setText(need("#hops-note"), notes.join(" "));
 }
 
@@ -159,49 +159,49 @@ function line(data, source, cells) {
 
 /**
  * @param {Spread} spread @param {boolean} isSampled
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function cellOf({ count, mean_ms, p95_ms }, isSampled, words) {
+function cellOf({ count, mean_ms, p95_ms }, isSampled, i18n) {
   if (!count) return NOTHING;
   const key = isSampled ? "hops.measured_sampled" : "hops.measured";
-  return words.t(key, { mean: mean_ms, p95: p95_ms, count });
+  return i18n.t(key, { mean: mean_ms, p95: p95_ms, count });
 }
 
 /**
  * @param {Record<string, number>} row @param {string | undefined} hop
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function printedOf(row, hop, words) {
+function printedOf(row, hop, i18n) {
   if (!hop) return NOTHING;
   const [mean, p95] = [row[`${hop}_mean`], row[`${hop}_p95`]];
-  return words.t("hops.printed", { mean, p95 });
+  return i18n.t("hops.printed", { mean, p95 });
 }
 
-/** @param {Latency} told @param {import("../i18n.js").Words} words */
-function drawClocks({ clocks, pages_within_ms }, words) {
+/** @param {Latency} told @param {import("../core/i18n.js").I18n} i18n */
+function drawClocks({ clocks, pages_within_ms }, i18n) {
   const said = clocks.map((clock) =>
-    words.t(`hops.clock.${clock.state}`, {
+    i18n.t(`hops.clock.${clock.state}`, {
       robot: clock.robot_id,
       offset: clock.offset_ms,
       within: clock.uncertainty_ms,
     }),
   );
   const page = pages_within_ms === null ? "unknown" : "known";
-  said.push(words.t(`hops.page_clock.${page}`, { within: pages_within_ms }));
+  said.push(i18n.t(`hops.page_clock.${page}`, { within: pages_within_ms }));
   fill(need("#hops-clocks"), said);
 }
 
-/** @param {Latency} told @param {import("../i18n.js").Words} words */
-function drawStreams({ streams }, words) {
+/** @param {Latency} told @param {import("../core/i18n.js").I18n} i18n */
+function drawStreams({ streams }, i18n) {
   const number = (/** @type {number} */ value, decimals = 0) =>
-    words.number(value, decimals);
+    i18n.number(value, decimals);
   const rows = streams.map((one) => {
     const row = make("tr");
     const kept = one.kept_back === null ? NOTHING : `${number(100 * one.kept_back)} %`;
     const texts = [
       number(one.heard_hz, 1),
       number(one.agent_hz, 1),
-      one.throttled ? words.t("hops.throttled") : number(one.orion_hz, 1),
+      one.throttled ? i18n.t("hops.throttled") : number(one.orion_hz, 1),
       kept,
       number(one.uplink.missing),
       number(one.fiware.missing),
@@ -209,12 +209,12 @@ function drawStreams({ streams }, words) {
       number(excludedOf(one)),
     ];
     row.append(make("td", "", one.robot_id));
-    row.append(make("td", "", words.t(`stream.${one.data}`)));
+    row.append(make("td", "", i18n.t(`stream.${one.data}`)));
     row.append(...texts.map((text) => make("td", "number", text)));
     return row;
   });
   need("#hops-streams tbody").replaceChildren(...rows);
-  fill(need("#hops-excluded"), reasonsOf(streams, words));
+  fill(need("#hops-excluded"), reasonsOf(streams, i18n));
 }
 
 /** @param {Stream} stream */
@@ -223,8 +223,8 @@ function excludedOf({ excluded }) {
   return counts.reduce((sum, count) => sum + count, 0);
 }
 
-/** @param {Stream[]} streams @param {import("../i18n.js").Words} words */
-function reasonsOf(streams, words) {
+/** @param {Stream[]} streams @param {import("../core/i18n.js").I18n} i18n */
+function reasonsOf(streams, i18n) {
   /** @type {Map<string, number>} */
   const counts = new Map();
   for (const { robot_id, excluded } of streams) {
@@ -237,24 +237,24 @@ function reasonsOf(streams, words) {
   }
   return [...counts].map(([name, count]) => {
     const [why, robot] = name.split(" ");
-    return words.t(`hops.excluded.${why}`, { robot, count });
+    return i18n.t(`hops.excluded.${why}`, { robot, count });
   });
 }
 
-/** @param {Latency} told @param {import("../i18n.js").Words} words */
-async function drawFigures(told, words) {
+/** @param {Latency} told @param {import("../core/i18n.js").I18n} i18n */
+async function drawFigures(told, i18n) {
   for (const name of FIGURES) {
     const place = need(`#hops-${name}`);
     const figure = told.figures[name];
     if (!figure) continue;
     setHidden(place, figure.data.length === 0);
-    setText(need(`#hops-${name}-says`), noteOf(name, told, words));
+    setText(need(`#hops-${name}-says`), noteOf(name, told, i18n));
     if (figure.data.length === 0) continue;
     try {
-      await drawHopFigure(place, figure, told, words);
+      await drawHopFigure(place, figure, told, i18n);
     } catch {
       setHidden(need("#hops-error"), false);
-      setText(need("#hops-error"), words.t("history.error.library"));
+      setText(need("#hops-error"), i18n.t("history.error.library"));
     }
   }
 }
@@ -262,14 +262,14 @@ async function drawFigures(told, words) {
 /**
  * What a figure shows, for who cannot see it.
  *
- * @param {string} name @param {Latency} told @param {import("../i18n.js").Words} words
+ * @param {string} name @param {Latency} told @param {import("../core/i18n.js").I18n} i18n
  */
-function noteOf(name, told, words) {
-  if (told.figures[name].data.length === 0) return words.t("hops.nothing");
-  if (name !== "trace" || told.trace === null) return words.t(`hops.note.${name}`);
+function noteOf(name, told, i18n) {
+  if (told.figures[name].data.length === 0) return i18n.t("hops.nothing");
+  if (name !== "trace" || told.trace === null) return i18n.t(`hops.note.${name}`);
   const { robot_id, data, stamp, steps } = told.trace;
   const total = Math.max(...steps.map(({ to_ms }) => to_ms));
-  return words.t("hops.note.trace", { robot: robot_id, data, stamp, total });
+  return i18n.t("hops.note.trace", { robot: robot_id, data, stamp, total });
 }
 
 /** @param {HTMLElement} list @param {string[]} sentences */

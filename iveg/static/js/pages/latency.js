@@ -39,13 +39,13 @@ export function tookOf({ times, standstill_ms }) {
  * What became of an order, never what its robot does now.
  *
  * @param {Order} order
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-export function endSaid({ state, reason, outcome = "open", was_loud }, words) {
-  const slots = { state: words.t(`history.state.${state}`), why: reason ?? "" };
-  const said = words.t(`commandspage.end.${outcome}`, slots);
+export function endSaid({ state, reason, outcome = "open", was_loud }, i18n) {
+  const slots = { state: i18n.t(`history.state.${state}`), why: reason ?? "" };
+  const said = i18n.t(`commandspage.end.${outcome}`, slots);
   const isLoudNow = outcome === "open" && LOUD.has(state);
-  return was_loud && !isLoudNow ? `${said} ${words.t("commandspage.was_loud")}` : said;
+  return was_loud && !isLoudNow ? `${said} ${i18n.t("commandspage.was_loud")}` : said;
 }
 
 /**

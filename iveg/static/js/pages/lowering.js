@@ -1,7 +1,7 @@
 /**
  * What a change of the rule takes away from people: pure judgement, before it is made.
  *
- * @typedef {import("../protocol.js").Rule} Rule
+ * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {Partial<Pick<Rule, "confidence_threshold" | "radius_m" | "class_thresholds" |
  *   "aliases" | "possible_people">>} Change
  * @typedef {{key: string, slots: Record<string, string | number>}} Lowering

@@ -4,18 +4,18 @@
  * @typedef {{items: any[], next: string | null}} Listing
  */
 
-import { readApi } from "../api.js";
+import { readApi } from "../core/api.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 
 const ROWS = 50;
 
 /**
- * @param {{name: string, path: string, words: import("../i18n.js").Words,
+ * @param {{name: string, path: string, i18n: import("../core/i18n.js").I18n,
  *   cells: (item: any) => Node[], admits?: (item: any) => boolean,
  *   onItems?: (items: any[]) => void}} options `name` of `_rows.html`; `path` below
  *   `/api/v1/`
  */
-export function createRows({ name, path, words, cells, admits = () => true, onItems }) {
+export function createRows({ name, path, i18n, cells, admits = () => true, onItems }) {
   const body = need(`#${name}-rows tbody`);
   const more = /** @type {HTMLButtonElement} */ (need(`#${name}-more`));
   /** @type {any[]} */
@@ -30,13 +30,13 @@ export function createRows({ name, path, words, cells, admits = () => true, onIt
     body.replaceChildren(...shown.map(makeRow));
     const failed = need(`#${name}-error`);
     setHidden(failed, status === 200);
-    setText(failed, words.t(status ? "rows.failed" : "rows.offline", { status }));
+    setText(failed, i18n.t(status ? "rows.failed" : "rows.offline", { status }));
     setHidden(need(`#${name}-loading`), isLoaded);
     setHidden(need(`#${name}-scroll`), shown.length === 0);
     const empty = need(`#${name}-empty`);
     setHidden(empty, !isLoaded || shown.length > 0 || status !== 200);
     const why = items.length ? "logpanel.empty_filter" : `rows.empty.${name}`;
-    setText(empty, words.t(why));
+    setText(empty, i18n.t(why));
     setHidden(more, next === null);
     onItems?.(items);
   }
@@ -76,7 +76,7 @@ export function createRows({ name, path, words, cells, admits = () => true, onIt
   }
 
   more.addEventListener("click", loadMore);
-  words.onChange(draw);
+  i18n.onChange(draw);
   return { load, draw };
 }
 

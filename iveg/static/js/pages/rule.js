@@ -2,19 +2,19 @@
  * Changing the rule, where the server lets somebody: read, write, say what came of it.
  */
 
-import { dayAndTime } from "../history/madrid.js";
 import { need, setHidden, setText } from "../panels/dom.js";
+import { dayAndTime } from "./history/local_time.js";
 
-/** @typedef {import("../protocol.js").Rule} Rule */
+/** @typedef {import("../core/protocol.js").Rule} Rule */
 
 const WRITERS = new Set(["operator", "admin"]);
 
 /**
- * @param {import("../store.js").Store} store
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/store.js").Store} store
+ * @param {import("../core/i18n.js").I18n} i18n
  * @param {ReturnType<typeof import("./guard.js").createGuard>} guard
  */
-export function createRuleForm(store, words, guard) {
+export function createRuleForm(store, i18n, guard) {
   const form = /** @type {HTMLFormElement} */ (need("#rule-form"));
   const [threshold, radius] = /** @type {HTMLInputElement[]} */ (
     ["threshold", "radius"].map((name) => need(`#rule-new-${name}`))
@@ -49,7 +49,7 @@ export function createRuleForm(store, words, guard) {
 
   /** @param {string} key @param {Record<string, string | number>} [slots] */
   function say(key, slots) {
-    setText(need("#rule-result"), words.t(key, slots));
+    setText(need("#rule-result"), i18n.t(key, slots));
   }
 
   /** @param {Set<string>} verbs what the server knows: `get`, `put` */
@@ -87,9 +87,9 @@ export function createRuleForm(store, words, guard) {
     const rule = store.get("rule");
     const since =
       rule?.since && rule.author
-        ? words.t("rule.since", { at: dayAndTime(rule.since), who: rule.author })
+        ? i18n.t("rule.since", { at: dayAndTime(rule.since), who: rule.author })
         : "";
-    const told = words.t(note ? `rule.${note}` : "rows.loading");
+    const told = i18n.t(note ? `rule.${note}` : "rows.loading");
     setText(need("#rule-note"), `${told} ${since}`.trim());
   }
 
@@ -98,7 +98,7 @@ export function createRuleForm(store, words, guard) {
     save();
   });
   store.subscribe("rule", take);
-  words.onChange(draw);
+  i18n.onChange(draw);
   take(store.get("rule"));
   return { open, isDirty: () => seen !== null && !shows(seen) };
 }

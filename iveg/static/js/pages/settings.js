@@ -2,24 +2,24 @@
  * The Settings page: the rule in force, and what this device remembers.
  */
 
-import { readApi } from "../api.js";
+import { readApi } from "../core/api.js";
 import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createClassForm } from "./classes.js";
 import { createGuard } from "./guard.js";
 import { createRuleForm } from "./rule.js";
 
-/** @typedef {import("../protocol.js").Rule} Rule */
+/** @typedef {import("../core/protocol.js").Rule} Rule */
 
-/** @param {import("../page.js").Page} page */
-export function start({ store, words, tone, wake, installing }) {
-  createSoundPanel(words, tone);
-  wireWake(wake, words);
-  wireInstall(installing, words);
-  const guard = createGuard(store, words);
+/** @param {import("../core/page.js").Page} page */
+export function start({ store, i18n, tone, wake, installing }) {
+  createSoundPanel(i18n, tone);
+  wireWake(wake, i18n);
+  wireInstall(installing, i18n);
+  const guard = createGuard(store, i18n);
   const forms = [
-    createRuleForm(store, words, guard),
-    createClassForm(store, words, guard),
+    createRuleForm(store, i18n, guard),
+    createClassForm(store, i18n, guard),
   ];
   addEventListener("beforeunload", (event) => {
     // The browser asks, in its own words, before what was typed is lost.
@@ -29,23 +29,23 @@ export function start({ store, words, tone, wake, installing }) {
   function draw() {
     /** @type {Rule | null | undefined} */
     const rule = store.get("rule");
-    if (rule) drawRule(rule, words);
+    if (rule) drawRule(rule, i18n);
   }
 
   store.subscribe("rule", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
   findRoutes().then((verbs) => {
     for (const form of forms) form.open(verbs);
   });
 }
 
-/** @param {Rule} rule @param {import("../i18n.js").Words} words */
-function drawRule(rule, words) {
-  const share = (/** @type {number} */ value) => words.t("rule.percent", { value });
+/** @param {Rule} rule @param {import("../core/i18n.js").I18n} i18n */
+function drawRule(rule, i18n) {
+  const share = (/** @type {number} */ value) => i18n.t("rule.percent", { value });
   setText(need("#rule-version"), String(rule.version));
   setText(need("#rule-threshold"), share(rule.confidence_threshold));
-  setText(need("#rule-radius"), words.t("rule.metres", { value: rule.radius_m }));
+  setText(need("#rule-radius"), i18n.t("rule.metres", { value: rule.radius_m }));
   setText(need("#rule-factor"), share(rule.factor));
 }
 
@@ -59,9 +59,9 @@ async function findRoutes() {
   return new Set(Object.keys(body?.paths?.["/api/v1/rule"] ?? {}));
 }
 
-/** @param {import("../wakelock.js").WakeLock} wake
- * @param {import("../i18n.js").Words} words */
-function wireWake(wake, words) {
+/** @param {import("../core/wakelock.js").WakeLock} wake
+ * @param {import("../core/i18n.js").I18n} i18n */
+function wireWake(wake, i18n) {
   const box = /** @type {HTMLInputElement} */ (need("#wake-on"));
   box.checked = wake.isWanted();
   box.disabled = !wake.isPossible();
@@ -71,26 +71,26 @@ function wireWake(wake, words) {
   });
   function draw() {
     const said = wake.isPossible() ? (box.checked ? "on" : "off") : "none";
-    setText(need("#wake-state"), words.t(`device.wake_state.${said}`));
+    setText(need("#wake-state"), i18n.t(`device.wake_state.${said}`));
   }
   setHidden(need("#wake-state"), false);
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
 }
 
 /**
- * @param {import("../page.js").Page["installing"]} installing
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/page.js").Page["installing"]} installing
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function wireInstall(installing, words) {
+function wireInstall(installing, i18n) {
   const button = need("#install");
   function draw() {
     const state = installing.state();
     setHidden(button, state !== "ready");
-    setText(need("#install-state"), words.t(`device.install_state.${state}`));
+    setText(need("#install-state"), i18n.t(`device.install_state.${state}`));
   }
   button.addEventListener("click", () => installing.install());
   installing.onChange(draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
 }

@@ -1,15 +1,15 @@
 /**
- * A list of alarms that can be acknowledged: shape, colour and words say how urgent.
+ * A list of alerts that can be acknowledged: shape, colour and words say how urgent.
  *
- * The bell's panel and the Alarms page show the same list; a note that is being written
- * keeps its focus while alarms come and go around it.
+ * The bell's panel and the Alerts page show the same list; a note that is being written
+ * keeps its focus while alerts come and go around it.
  */
 
-import { sendApi } from "../api.js";
+import { sendApi } from "../core/api.js";
 import { createMembers } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
 
-/** @typedef {import("../protocol.js").Alert} Alert */
+/** @typedef {import("../core/protocol.js").Alert} Alert */
 
 /** Roles that may acknowledge (safety: the table of roles). */
 const ACKNOWLEDGERS = new Set(["operator", "admin"]);
@@ -18,12 +18,12 @@ const STILL_MS = 3000;
 
 /**
  * @param {HTMLElement} list
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  * @param {(alertId: string, note: string) => Promise<number>} [send] tests hand in
  *   their own
  * @param {number} [stillMs] how long nothing moves after somebody acknowledged
  */
-export function createAlertList(list, words, send = acknowledge, stillMs = STILL_MS) {
+export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_MS) {
   /** @type {Map<string, HTMLLIElement>} */
   const items = new Map();
   /** @type {Map<string, ReturnType<typeof createMembers>>} */
@@ -88,7 +88,7 @@ export function createAlertList(list, words, send = acknowledge, stillMs = STILL
       else failures.set(alert.alert_id, status);
       draw(shown);
     });
-    const past = createMembers(words);
+    const past = createMembers(i18n);
     need("small", item).after(past.element);
     members.set(alert.alert_id, past);
     items.set(alert.alert_id, item);
@@ -99,45 +99,45 @@ export function createAlertList(list, words, send = acknowledge, stillMs = STILL
   function drawItem(item, alert) {
     const role = document.body.dataset.role ?? "";
     const failure = failures.get(alert.alert_id);
-    const source = JSON.stringify([alert, words.language(), role, failure]);
+    const source = JSON.stringify([alert, i18n.language(), role, failure]);
     // Each change of one alert tells them all again.
     if (drawn.get(alert.alert_id) === source) return;
     drawn.set(alert.alert_id, source);
     setAttribute(item, "data-priority", alert.priority);
     setAttribute(item, "data-alert", alert.key);
-    const priority = words.t(`alert.priority.${alert.priority}`);
-    setText(need("b", item), `${priority}: ${sentenceOf(alert, words)}`);
-    setText(need("small", item), factsOf(alert, words));
+    const priority = i18n.t(`alert.priority.${alert.priority}`);
+    setText(need("b", item), `${priority}: ${sentenceOf(alert, i18n)}`);
+    setText(need("small", item), factsOf(alert, i18n));
     members.get(alert.alert_id)?.draw(alert);
     const may = ACKNOWLEDGERS.has(role);
     setHidden(need("form", item), alert.acknowledged_at !== null || !may);
     const input = /** @type {HTMLInputElement} */ (need("input", item));
-    input.placeholder = words.t("alert.note");
-    input.setAttribute("aria-label", words.t("alert.note"));
-    setText(need("button", item), words.t("alert.acknowledge"));
+    input.placeholder = i18n.t("alert.note");
+    input.setAttribute("aria-label", i18n.t("alert.note"));
+    setText(need("button", item), i18n.t("alert.acknowledge"));
     setText(
       need("p", item),
-      failure === undefined ? "" : words.t("alert.failed", { status: failure }),
+      failure === undefined ? "" : i18n.t("alert.failed", { status: failure }),
     );
   }
 
   return { draw };
 }
 
-/** What an alarm says. @param {Alert} alert @param {import("../i18n.js").Words} words */
-export function sentenceOf({ key, slots }, words) {
-  return words.t(key.startsWith("alert.") ? key : `alert.${key}`, slots);
+/** What an alert says. @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
+export function sentenceOf({ key, slots }, i18n) {
+  return i18n.t(key.startsWith("alert.") ? key : `alert.${key}`, slots);
 }
 
-/** @param {Alert} alert @param {import("../i18n.js").Words} words */
-function factsOf(alert, words) {
+/** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
+function factsOf(alert, i18n) {
   return [
-    words.t("alert.since", { at: alert.raised_at }),
+    i18n.t("alert.since", { at: alert.raised_at }),
     alert.count > 1 &&
-      words.t("alert.times", { count: alert.count, at: alert.last_raised_at }),
-    alert.cleared_at && words.t("alert.cleared", { at: alert.cleared_at }),
+      i18n.t("alert.times", { count: alert.count, at: alert.last_raised_at }),
+    alert.cleared_at && i18n.t("alert.cleared", { at: alert.cleared_at }),
     alert.acknowledged_at &&
-      words.t("alert.acknowledged", {
+      i18n.t("alert.acknowledged", {
         who: alert.acknowledged_by,
         at: alert.acknowledged_at,
       }),

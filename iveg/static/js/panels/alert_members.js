@@ -1,14 +1,14 @@
 /**
- * An alarm that repeats, one occurrence after the other, behind a line that opens it.
+ * An alert that repeats, one occurrence after the other, behind a line that opens it.
  */
 
 import { make, setHidden, setText } from "./dom.js";
 
-/** @typedef {import("../protocol.js").Alert} Alert */
-/** @typedef {import("../protocol.js").Occurrence} Occurrence */
+/** @typedef {import("../core/protocol.js").Alert} Alert */
+/** @typedef {import("../core/protocol.js").Occurrence} Occurrence */
 
-/** @param {import("../i18n.js").Words} words */
-export function createMembers(words) {
+/** @param {import("../core/i18n.js").I18n} i18n */
+export function createMembers(i18n) {
   const element = make("details", "members");
   const summary = make("summary");
   const list = make("ol");
@@ -19,27 +19,27 @@ export function createMembers(words) {
     setHidden(element, count < 2);
     const kept = members.length;
     const key = kept < count ? "alert.members_newest" : "alert.members";
-    setText(summary, words.t(key, { count, kept }));
+    setText(summary, i18n.t(key, { count, kept }));
     const newest = [...members].reverse();
     while (list.children.length > newest.length) list.lastElementChild?.remove();
     while (list.children.length < newest.length) list.append(make("li"));
     newest.forEach((member, i) => {
-      setText(list.children[i], lineOf(member, words));
+      setText(list.children[i], lineOf(member, i18n));
     });
   }
 
   return { element, draw };
 }
 
-/** @param {Occurrence} member @param {import("../i18n.js").Words} words */
-function lineOf(member, words) {
+/** @param {Occurrence} member @param {import("../core/i18n.js").I18n} i18n */
+function lineOf(member, i18n) {
   const { priority, raised_at, cleared_at, acknowledged_at, note } = member;
   return [
-    words.t(`alert.priority.${priority}`),
-    words.t("alert.since", { at: raised_at }),
-    cleared_at && words.t("alert.cleared", { at: cleared_at }),
+    i18n.t(`alert.priority.${priority}`),
+    i18n.t("alert.since", { at: raised_at }),
+    cleared_at && i18n.t("alert.cleared", { at: cleared_at }),
     acknowledged_at &&
-      words.t("alert.acknowledged", {
+      i18n.t("alert.acknowledged", {
         who: member.acknowledged_by,
         at: acknowledged_at,
       }),
@@ -50,14 +50,14 @@ function lineOf(member, words) {
 }
 
 /**
- * How fast alarms come, in a sentence; empty while nothing is known.
+ * How fast alerts come, in a sentence; empty while nothing is known.
  *
- * @param {import("../protocol.js").Flood | null | undefined} flood
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/protocol.js").Flood | null | undefined} flood
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-export function floodSaid(flood, words) {
+export function floodSaid(flood, i18n) {
   if (!flood) return "";
   const { count, limit, since } = flood;
   const slots = { count, limit, minutes: flood.window_s / 60, since };
-  return words.t(since ? "alert.flood" : "alert.rate", slots);
+  return i18n.t(since ? "alert.flood" : "alert.rate", slots);
 }

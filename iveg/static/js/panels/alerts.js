@@ -1,5 +1,5 @@
 /**
- * Alarms on every page: a bell with the worst and the number, a list, and the sound.
+ * Alerts on every page: a bell with the worst and the number, a list, and the sound.
  *
  * P1 sounds until somebody acknowledges it (ISA-18.2); the others chime once when they
  * come.  The server groups repetitions and keeps who, when and the note.
@@ -9,14 +9,14 @@ import { byUrgency, createAlertList } from "./alert_list.js";
 import { floodSaid } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
-/** @typedef {import("../protocol.js").Alert} Alert */
+/** @typedef {import("../core/protocol.js").Alert} Alert */
 
 /**
  * @param {import("../main.js").App} app
  * @param {import("./tone.js").Tone} tone
  */
-export function createAlertsPanel({ store, words }, tone) {
-  const list = createAlertList(need("#alerts"), words);
+export function createAlertsPanel({ store, i18n }, tone) {
+  const list = createAlertList(need("#alerts"), i18n);
   const button = need("#alerts-button");
   /** @type {Map<string, number> | null} occurrences told before; null before the first */
   let known = null;
@@ -31,10 +31,10 @@ export function createAlertsPanel({ store, words }, tone) {
     // What is over and unseen may be graver than what goes on.
     const [worst] = alerts.map(({ priority }) => priority).sort();
     setAttribute(button, "data-worst", worst ?? "none");
-    /** @type {import("../protocol.js").Flood | null | undefined} */
+    /** @type {import("../core/protocol.js").Flood | null | undefined} */
     const flood = store.get("flood");
-    const rate = floodSaid(flood, words);
-    const active = words.t("header.alerts_count", { count: open.length });
+    const rate = floodSaid(flood, i18n);
+    const active = i18n.t("header.alerts_count", { count: open.length });
     button.title = rate ? `${active} · ${rate}` : active;
     button.toggleAttribute("data-flood", Boolean(flood?.since));
     setText(need("#alerts-flood"), rate);
@@ -61,21 +61,21 @@ export function createAlertsPanel({ store, words }, tone) {
   });
   store.subscribe("flood", draw);
   store.subscribe("health", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
 }
 
 /**
  * Whether the server cannot tell what earlier runs left unseen.
  *
- * @param {import("../store.js").Store} store
+ * @param {import("../core/store.js").Store} store
  */
 export function earlierUnknown(store) {
   return store.get("health")?.earlier === "unknown";
 }
 
-/** That there is no alarm is known only from a server that is heard, and knows its past.
- * @param {import("../store.js").Store} store */
+/** That there is no alert is known only from a server that is heard, and knows its past.
+ * @param {import("../core/store.js").Store} store */
 export function isKnown(store) {
   const isHeard = store.connection.state === "open" && Boolean(store.get("snapshot"));
   return isHeard && !earlierUnknown(store);

@@ -10,7 +10,7 @@ const BACK_SHOWN_MS = 3000;
 const PATIENCE_MS = 1500;
 
 /** @param {import("../main.js").App} app */
-export function createBanner({ store, words }) {
+export function createBanner({ store, i18n }) {
   const banner = need("#banner");
   const mark = need("#mark");
   let wasLost = false;
@@ -31,18 +31,18 @@ export function createBanner({ store, words }) {
   }
 
   /**
-   * @param {import("../store.js").ConnectionState} state
+   * @param {import("../core/store.js").ConnectionState} state
    * @param {number} forMs
    * @param {number} backMs
    */
   function sentenceOf(state, forMs, backMs) {
-    if (state === "signed-out") return words.t("banner.signed_out");
+    if (state === "signed-out") return i18n.t("banner.signed_out");
     if (state === "lost" || (state === "connecting" && wasLost)) {
-      return words.t("banner.lost", { seconds: Math.ceil(forMs / 1000) });
+      return i18n.t("banner.lost", { seconds: Math.ceil(forMs / 1000) });
     }
     if (state === "connecting" && forMs > PATIENCE_MS)
-      return words.t("banner.connecting");
-    return backMs < BACK_SHOWN_MS ? words.t("banner.back") : null;
+      return i18n.t("banner.connecting");
+    return backMs < BACK_SHOWN_MS ? i18n.t("banner.back") : null;
   }
 
   /** @param {string} state */
@@ -52,7 +52,7 @@ export function createBanner({ store, words }) {
     setAttribute(mark, "data-state", state === "open" && isReplay ? "replay" : state);
     setText(
       need("[data-i18n]", mark),
-      words.t(state === "lost" || state === "signed-out" ? "header.no_link" : live),
+      i18n.t(state === "lost" || state === "signed-out" ? "header.no_link" : live),
     );
   }
 
@@ -63,7 +63,7 @@ export function createBanner({ store, words }) {
     document.documentElement.style.setProperty("--messages", height);
   }).observe(messages);
   store.subscribe("connection", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
 }

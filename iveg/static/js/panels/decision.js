@@ -3,8 +3,8 @@
  * panel over any page, and on a page of its own that can be shared and printed.
  */
 
-import { readApi } from "../api.js";
-import { dayAndTime, millisecondsOf } from "../history/madrid.js";
+import { readApi } from "../core/api.js";
+import { dayAndTime, millisecondsOf } from "../pages/history/local_time.js";
 import { drawDecision } from "./decision_map.js";
 import { make, need } from "./dom.js";
 
@@ -20,10 +20,10 @@ import { make, need } from "./dom.js";
  *   & import("./decision_map.js").Drawn} Decision
  */
 
-/** @param {{words: import("../i18n.js").Words, dialogs: any}} app */
-export function createDecisionPanel({ words, dialogs }) {
+/** @param {{i18n: import("../core/i18n.js").I18n, dialogs: any}} app */
+export function createDecisionPanel({ i18n, dialogs }) {
   const panel = /** @type {HTMLDialogElement} */ (need("#decision-panel"));
-  const record = createRecord(need("#decision"), words);
+  const record = createRecord(need("#decision"), i18n);
 
   /** @param {string} decisionId @param {HTMLElement | null} opener */
   function open(decisionId, opener) {
@@ -36,12 +36,12 @@ export function createDecisionPanel({ words, dialogs }) {
 
 /**
  * @param {HTMLElement} place
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-export function createRecord(place, words) {
+export function createRecord(place, i18n) {
   /** @type {Decision | null} */
   let shown = null;
-  /** @type {import("../protocol.js").GreenhouseMap | null} */
+  /** @type {import("../core/protocol.js").GreenhouseMap | null} */
   let map = null;
   let asked = "";
 
@@ -49,47 +49,47 @@ export function createRecord(place, words) {
   async function show(decisionId) {
     asked = decisionId;
     shown = null;
-    place.replaceChildren(make("p", "empty", words.t("decision.loading")));
+    place.replaceChildren(make("p", "empty", i18n.t("decision.loading")));
     const path = `decisions/${encodeURIComponent(decisionId)}`;
-    const [{ status, body }, house] = await Promise.all([
+    const [{ status, body }, greenhouse] = await Promise.all([
       readApi(path),
       map ? null : readApi("map"),
     ]);
     if (asked !== decisionId) return;
-    if (house?.status === 200) map = house.body;
+    if (greenhouse?.status === 200) map = greenhouse.body;
     shown = status === 200 ? body : null;
     place.setAttribute("aria-busy", "false");
     if (shown) draw();
     else
-      place.replaceChildren(make("p", "empty", words.t("decision.failed", { status })));
+      place.replaceChildren(make("p", "empty", i18n.t("decision.failed", { status })));
   }
 
   function draw() {
     if (!shown) return;
     const { sentence } = shown;
-    const head = sentence ? words.t(sentence.key, sentence.slots) : shown.kind;
+    const head = sentence ? i18n.t(sentence.key, sentence.slots) : shown.kind;
     const chain = make("ol", "chain");
     const delays = delaysOf(shown.links ?? []);
     chain.append(
-      ...(shown.links ?? []).map((link, i) => makeLink(link, delays[i], words)),
+      ...(shown.links ?? []).map((link, i) => makeLink(link, delays[i], i18n)),
     );
     const began = momentSaid(shown.started_at);
     const ended = shown.ended_at
-      ? `${words.t("decision.ended")} ${momentSaid(shown.ended_at)}`
-      : words.t("decision.running");
-    const picture = drawDecision(shown, map, words);
+      ? `${i18n.t("decision.ended")} ${momentSaid(shown.ended_at)}`
+      : i18n.t("decision.running");
+    const picture = drawDecision(shown, map, i18n);
     place.replaceChildren(
       make("p", "decision__sentence", `${dateOf(shown)}${head}`),
-      make("small", "", `${words.t("decision.started")} ${began} · ${ended}`),
+      make("small", "", `${i18n.t("decision.started")} ${began} · ${ended}`),
       ...(picture ? [picture] : []),
-      makeFacts(shown, words),
+      makeFacts(shown, i18n),
       chain,
-      make("small", "", `${words.t("decision.id")} ${shown.decision_id}`),
-      makeShare(shown.decision_id, words),
+      make("small", "", `${i18n.t("decision.id")} ${shown.decision_id}`),
+      makeShare(shown.decision_id, i18n),
     );
   }
 
-  words.onChange(draw);
+  i18n.onChange(draw);
   return { show };
 }
 
@@ -109,9 +109,9 @@ function dateOf({ started_at }) {
  * Who saw what where, and the rule with its numbers as they were.
  *
  * @param {Decision} decision
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function makeFacts(decision, words) {
+function makeFacts(decision, i18n) {
   const { x, y } = decision.position ?? { x: null, y: null };
   const { id, version, parameters } = decision.rule;
   const slots = { ...parameters, ...decision, id, version, x, y };
@@ -123,7 +123,7 @@ function makeFacts(decision, words) {
   ];
   const list = make("dl", "facts");
   for (const [name, said] of facts) {
-    list.append(make("dt", "", words.t(name)), make("dd", "", words.t(said, slots)));
+    list.append(make("dt", "", i18n.t(name)), make("dd", "", i18n.t(said, slots)));
   }
   return list;
 }
@@ -151,20 +151,20 @@ export function delaysOf(links) {
   });
 }
 
-/** @param {string} decisionId @param {import("../i18n.js").Words} words */
-function makeShare(decisionId, words) {
+/** @param {string} decisionId @param {import("../core/i18n.js").I18n} i18n */
+function makeShare(decisionId, i18n) {
   const line = make("p", "record__link");
-  const link = make("a", "", words.t("decision.link_to"));
+  const link = make("a", "", i18n.t("decision.link_to"));
   // In full: on paper an address without its server leads nowhere.
   const path = `/decisions/${encodeURIComponent(decisionId)}`;
   link.setAttribute("href", new URL(path, location.href).href);
-  const copy = make("button", "button no-print", words.t("decision.copy"));
+  const copy = make("button", "button no-print", i18n.t("decision.copy"));
   copy.type = "button";
   // A clipboard takes HTTPS or the computer itself; the link can be copied by hand.
   copy.hidden = !navigator.clipboard;
   copy.addEventListener("click", async () => {
     await navigator.clipboard.writeText(link.href);
-    copy.textContent = words.t("decision.copied");
+    copy.textContent = i18n.t("decision.copied");
   });
   line.append(link, copy);
   return line;
@@ -173,39 +173,39 @@ function makeShare(decisionId, words) {
 /**
  * @param {Link} link
  * @param {number | null} delayMs
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-function makeLink(link, delayMs, words) {
+function makeLink(link, delayMs, i18n) {
   const item = make("li");
   item.dataset.verdict = link.verdict;
-  const name = words.has(`decision.link.${link.link}`)
-    ? words.t(`decision.link.${link.link}`)
+  const name = i18n.has(`decision.link.${link.link}`)
+    ? i18n.t(`decision.link.${link.link}`)
     : link.link;
-  const verdict = words.t(`decision.verdict.${link.verdict}`);
+  const verdict = i18n.t(`decision.verdict.${link.verdict}`);
   const when = link.at === null ? "" : ` ${millisecondsOf(link.at)}`;
-  const delay = delayMs === null ? "" : ` ${delaySaid(delayMs, words)}`;
+  const delay = delayMs === null ? "" : ` ${delaySaid(delayMs, i18n)}`;
   item.append(
     make("span", "shape"),
     make("b", "", name),
     make("small", "", `${verdict}${when}${delay}`),
-    make("p", "", saidOf(link, words)),
+    make("p", "", saidOf(link, i18n)),
   );
   return item;
 }
 
 /** A robot may have known before it was told. @param {number} ms
- * @param {import("../i18n.js").Words} words */
-function delaySaid(ms, words) {
+ * @param {import("../core/i18n.js").I18n} i18n */
+function delaySaid(ms, i18n) {
   const key = ms < 0 ? "decision.delay_before" : "decision.delay";
-  return words.t(key, { ms: Math.abs(ms) });
+  return i18n.t(key, { ms: Math.abs(ms) });
 }
 
 /** What a link found, with its unit. @param {Link} link
- * @param {import("../i18n.js").Words} words */
-function saidOf({ link, value }, words) {
+ * @param {import("../core/i18n.js").I18n} i18n */
+function saidOf({ link, value }, i18n) {
   if (value === null || value === undefined) return "";
   const key = `decision.said.${link}`;
-  return typeof value === "number" && words.has(key)
-    ? words.t(key, { value })
+  return typeof value === "number" && i18n.has(key)
+    ? i18n.t(key, { value })
     : String(value);
 }

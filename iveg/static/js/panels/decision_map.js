@@ -7,18 +7,18 @@
  *   distance_m: number | null, confidence: number | null,
  *   rule: {parameters: {ring_m?: number} | null},
  *   places: {robot_id: string, x: number, y: number, yaw: number}[]}} Drawn
- * @typedef {import("../protocol.js").GreenhouseMap} GreenhouseMap
+ * @typedef {import("../core/protocol.js").GreenhouseMap} GreenhouseMap
  */
 
-import * as greenhouse from "../layers/greenhouse.js";
-import * as grid from "../layers/grid.js";
-import * as links from "../layers/links.js";
-import * as people from "../layers/people.js";
-import * as robots from "../layers/robot.js";
-import * as scalebar from "../layers/scalebar.js";
-import { PAPER, readTheme } from "../layers/theme.js";
-import { createWords } from "../layers/words.js";
-import { createViewport, fitTo } from "../viewport.js";
+import * as greenhouse from "../map/layers/greenhouse.js";
+import * as grid from "../map/layers/grid.js";
+import { createLabels } from "../map/layers/labels.js";
+import * as links from "../map/layers/links.js";
+import * as people from "../map/layers/people.js";
+import * as robots from "../map/layers/robot.js";
+import * as scalebar from "../map/layers/scalebar.js";
+import { PAPER, readTheme } from "../map/layers/theme.js";
+import { createViewport, fitTo } from "../map/viewport.js";
 
 const WIDTH = 360;
 const HEIGHT = 260;
@@ -75,10 +75,10 @@ export function sceneOf({ position, places, rule, ...told }, map) {
 /**
  * @param {Drawn} decision
  * @param {GreenhouseMap | null} map
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  * @returns {HTMLCanvasElement | null}
  */
-export function drawDecision(decision, map, words) {
+export function drawDecision(decision, map, i18n) {
   const scene = sceneOf(decision, map);
   if (!scene) return null;
   const canvas = document.createElement("canvas");
@@ -86,7 +86,7 @@ export function drawDecision(decision, map, words) {
   [canvas.width, canvas.height] = [WIDTH * ratio, HEIGHT * ratio];
   canvas.className = "decision__map";
   canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", words.t("decision.picture"));
+  canvas.setAttribute("aria-label", i18n.t("decision.picture"));
   const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   const theme = { ...readTheme(document.body, PAPER) };
@@ -97,7 +97,7 @@ export function drawDecision(decision, map, words) {
     view: fitTo(createViewport(WIDTH, HEIGHT), boxOf(scene), 34),
     theme,
     scene,
-    words: createWords(words.t),
+    labels: createLabels(i18n.t),
     followed: null,
     tape: { points: [] },
   };

@@ -5,15 +5,15 @@
  * very STOP, and what the history keeps of the last one.
  */
 
-import { readApi, sendApi } from "../api.js";
-import { dayAndTime } from "../history/madrid.js";
+import { readApi, sendApi } from "../core/api.js";
+import { dayAndTime } from "../pages/history/local_time.js";
 import { need, needPart, setHidden, setText } from "./dom.js";
 import { whyNotAtAll } from "./release.js";
 import { since } from "./stop_view.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../i18n.js").Words} Words */
-/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("../core/i18n.js").I18n} I18n */
+/** @typedef {import("../core/protocol.js").Command} Command */
 /** @typedef {import("./release.js").Facts} Facts */
 /** @typedef {import("../types.js").Drill} Drill one of GET /drills */
 
@@ -29,7 +29,7 @@ const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
  * @param {HTMLElement} card
  * @param {string} robotId
  */
-export function createDrill({ store, words, line }, card, robotId) {
+export function createDrill({ store, i18n, line }, card, robotId) {
   const button = /** @type {HTMLButtonElement} */ (need("[data-drill]", card));
   const panel = /** @type {HTMLDialogElement} */ (needPart("panel", card));
   /** @type {Drill | null} */
@@ -50,12 +50,12 @@ export function createDrill({ store, words, line }, card, robotId) {
     }
     const why = isBusy ? "busy" : whyNotDrill(facts);
     button.disabled = why !== "ok";
-    setText(needPart("drill-why", card), words.t(`drill.why.${why}`));
-    setText(needPart("drill-words", card), words.t("drill.button", { robot: robotId }));
+    setText(needPart("drill-why", card), i18n.t(`drill.why.${why}`));
+    setText(needPart("drill-words", card), i18n.t("drill.button", { robot: robotId }));
     const command = facts.command?.drill ? facts.command : undefined;
     setText(needPart("drill-result", card), resultSaid(command));
     setText(needPart("drill-last", card), lastSaid());
-    drawDue(needPart("drill-due", card), robotId, store, words);
+    drawDue(needPart("drill-due", card), robotId, store, i18n);
     readOnce(command);
   }
 
@@ -63,27 +63,27 @@ export function createDrill({ store, words, line }, card, robotId) {
   function resultSaid(command) {
     if (refused) {
       const known = `drill.refused.${refused}`;
-      const key = words.has(known) ? known : "drill.refused.other";
-      return words.t(key, { status: refused });
+      const key = i18n.has(known) ? known : "drill.refused.other";
+      return i18n.t(key, { status: refused });
     }
     if (!command) return "";
     const ageMs = 1000 * since(command.times.requested, line.serverNow());
     const key = progressOf(command, ageMs);
-    const state = words.t(`history.state.${command.state}`);
-    const said = words.t(key, { state, ms: command.standstill_ms });
-    return key === "drill.running" ? said : `${said} ${words.t("drill.held")}`;
+    const state = i18n.t(`history.state.${command.state}`);
+    const said = i18n.t(key, { state, ms: command.standstill_ms });
+    return key === "drill.running" ? said : `${said} ${i18n.t("drill.held")}`;
   }
 
   function lastSaid() {
     if (readStatus === 0) return "";
-    if (readStatus !== 200) return words.t("drill.unread", { status: readStatus });
+    if (readStatus !== 200) return i18n.t("drill.unread", { status: readStatus });
     return last
-      ? words.t("drill.last", {
+      ? i18n.t("drill.last", {
           at: dayAndTime(last.drilled_at),
           by: last.by,
-          result: verdictSaid(last, words),
+          result: verdictSaid(last, i18n),
         })
-      : words.t("drill.never");
+      : i18n.t("drill.never");
   }
 
   /** When the panel opens, and when a drill has moved on. @param {Command} [command] */
@@ -115,17 +115,17 @@ export function createDrill({ store, words, line }, card, robotId) {
  *
  * @param {HTMLElement} place
  * @param {string} robotId
- * @param {import("../store.js").Store} store
- * @param {Words} words
+ * @param {import("../core/store.js").Store} store
+ * @param {I18n} i18n
  */
-export function drawDue(place, robotId, store, words) {
-  /** @type {import("../protocol.js").Alert[]} */
+export function drawDue(place, robotId, store, i18n) {
+  /** @type {import("../core/protocol.js").Alert[]} */
   const alerts = store.get("alerts") ?? [];
   const due = alerts.find(
     ({ key, robot_id }) => key === "alert.drill_due" && robot_id === robotId,
   );
   setHidden(place, !due);
-  if (due) setText(place, words.t(due.key, due.slots));
+  if (due) setText(place, i18n.t(due.key, due.slots));
 }
 
 /**
@@ -164,9 +164,9 @@ export function progressOf({ state, standstill_ms: ms }, ageMs) {
   return isOver ? "drill.failed" : "drill.running";
 }
 
-/** What the history says of a drill. @param {Drill} drill @param {Words} words */
-export function verdictSaid({ passed, standstill_ms: ms }, words) {
-  if (passed === null) return words.t("drill.unknown");
-  if (passed) return words.t("drill.passed", { ms });
-  return ms === null ? words.t("drill.failed") : words.t("drill.slow", { ms });
+/** What the history says of a drill. @param {Drill} drill @param {I18n} i18n */
+export function verdictSaid({ passed, standstill_ms: ms }, i18n) {
+  if (passed === null) return i18n.t("drill.unknown");
+  if (passed) return i18n.t("drill.passed", { ms });
+  return ms === null ? i18n.t("drill.failed") : i18n.t("drill.slow", { ms });
 }

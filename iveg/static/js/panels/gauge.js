@@ -28,7 +28,7 @@ const DEFAULT_MAX = 1;
  * What a gauge shows of a robot: the stricter of what it was told and what it says it
  * applies; nothing of what nobody knows.
  *
- * @param {import("../protocol.js").Robot | undefined} robot
+ * @param {import("../core/protocol.js").Robot | undefined} robot
  * @returns {{speed: number | null, max: number, factor: number | null}}
  */
 export function readingOf(robot) {

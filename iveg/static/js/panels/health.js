@@ -2,28 +2,28 @@
  * The chain from robot to screen: a chip with the worst hop, a list with a sentence each.
  */
 
-import { ageOf } from "../clock.js";
-import { sentenceOf } from "../pages/chain.js";
+import { ageOf } from "../core/clock.js";
+import { sentenceOf } from "../pages/health_sentence.js";
 import { make, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
 const WORST_FIRST = ["down", "late", "unknown", "ok"];
 
-/** @typedef {import("../protocol.js").Health["hops"][number]} Hop */
+/** @typedef {import("../core/protocol.js").Health["hops"][number]} Hop */
 
 /** @param {import("../main.js").App} app */
-export function createHealthPanel({ store, words, line }) {
+export function createHealthPanel({ store, i18n, line }) {
   const chip = need("#health-chip");
 
   function draw() {
-    /** @type {import("../protocol.js").Health | undefined} */
+    /** @type {import("../core/protocol.js").Health | undefined} */
     const health = store.get("health") ?? undefined;
     drawChip(worstOf(health?.hops ?? []));
     const ms = line.roundTripMs();
     const isOpen = store.connection.state === "open";
     setText(
       need("#health-latency"),
-      isOpen && ms !== null ? words.t("health.latency", { ms }) : "",
+      isOpen && ms !== null ? i18n.t("health.latency", { ms }) : "",
     );
     const waitedS = health ? ageOf({ age_s: 0, receivedAtMs: health.receivedAtMs }) : 0;
     drawHops(health?.hops ?? [], waitedS);
@@ -36,14 +36,14 @@ export function createHealthPanel({ store, words, line }) {
     const state = isOpen ? (worst?.state ?? "unknown") : "down";
     const hop = isOpen ? (worst?.hop ?? "") : "server";
     setAttribute(chip, "data-state", state);
-    setText(need("#health-sentence"), words.t(`health.chip.${state}`, { hop }));
+    setText(need("#health-sentence"), i18n.t(`health.chip.${state}`, { hop }));
     chip.title = isOpen && worst ? said(worst) : "";
   }
 
   /** @param {Hop} hop */
   function said(hop) {
     const sentence = sentenceOf(hop);
-    return words.t(sentence.key, sentence.slots);
+    return i18n.t(sentence.key, sentence.slots);
   }
 
   /** @param {Hop[]} hops @param {number} waitedS since the server wrote the ages */
@@ -54,10 +54,10 @@ export function createHealthPanel({ store, words, line }) {
     hops.forEach((hop, i) => {
       const item = list.children[i];
       setAttribute(item, "data-state", hop.state);
-      setText(need("b", item), words.t(`hop.${hop.hop}`));
+      setText(need("b", item), i18n.t(`hop.${hop.hop}`));
       const age =
-        hop.age_s === null ? "" : words.t("health.age", { age: hop.age_s + waitedS });
-      setText(need("small", item), `${words.t(`health.state.${hop.state}`)} ${age}`);
+        hop.age_s === null ? "" : i18n.t("health.age", { age: hop.age_s + waitedS });
+      setText(need("small", item), `${i18n.t(`health.state.${hop.state}`)} ${age}`);
       // The lag says it all, and in the reader's language.
       const isTold = sentenceOf(hop).key.startsWith("health.lag.");
       const detail =
@@ -70,7 +70,7 @@ export function createHealthPanel({ store, words, line }) {
   function drawCounters(counters) {
     const rows = Object.entries(counters).map(([name, value]) => {
       const row = make("div");
-      row.append(make("dt", "", name), make("dd", "", words.number(value, 0)));
+      row.append(make("dt", "", name), make("dd", "", i18n.number(value, 0)));
       return row;
     });
     need("#counters").replaceChildren(...rows);
@@ -78,7 +78,7 @@ export function createHealthPanel({ store, words, line }) {
 
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
 }

@@ -2,25 +2,25 @@
  * What every sign on the map means: each drawn by the layer that draws it on the map.
  */
 
-import { createCostmapLayer } from "../layers/costmap.js";
-import * as coverage from "../layers/coverage.js";
-import * as detections from "../layers/detections.js";
-import * as greenhouse from "../layers/greenhouse.js";
-import * as grid from "../layers/grid.js";
-import * as intent from "../layers/intent.js";
-import * as links from "../layers/links.js";
-import * as people from "../layers/people.js";
-import * as robots from "../layers/robot.js";
-import * as scalebar from "../layers/scalebar.js";
-import * as scan from "../layers/scan.js";
-import { readTheme } from "../layers/theme.js";
-import * as trail from "../layers/trail.js";
-import { createWords } from "../layers/words.js";
+import { createCostmapLayer } from "../map/layers/costmap.js";
+import * as coverage from "../map/layers/coverage.js";
+import * as detections from "../map/layers/detections.js";
+import * as greenhouse from "../map/layers/greenhouse.js";
+import * as grid from "../map/layers/grid.js";
+import * as intent from "../map/layers/intent.js";
+import { createLabels } from "../map/layers/labels.js";
+import * as links from "../map/layers/links.js";
+import * as people from "../map/layers/people.js";
+import * as robots from "../map/layers/robot.js";
+import * as scalebar from "../map/layers/scalebar.js";
+import * as scan from "../map/layers/scan.js";
+import { readTheme } from "../map/layers/theme.js";
+import * as trail from "../map/layers/trail.js";
 import { make, need } from "./dom.js";
 
 /**
- * @typedef {import("../layers/paint.js").Paint} Paint
- * @typedef {import("../scene.js").Scene} Scene
+ * @typedef {import("../map/layers/paint.js").Paint} Paint
+ * @typedef {import("../map/scene.js").Scene} Scene
  * @typedef {{name: string, layer: string, draw: (paint: Paint) => void,
  *   scene?: object, scale?: number, right?: number, up?: number}} Sign `right`, `up`: the picture's
  *   middle (m)
@@ -73,7 +73,7 @@ const BOX = {
   named: true,
   item: {},
 };
-const HOUSE = {
+const GREENHOUSE = {
   bounds: { xmin: -9, xmax: 9, ymin: -9, ymax: 9 },
   lanes: [],
   rows: [],
@@ -89,7 +89,7 @@ const oneRobot = (differs) => ({ robots: [{ ...ROBOT, ...differs }] });
 /** @param {object} [differs] */
 const onePerson = (differs) => ({ people: [{ ...PERSON, ...differs }] });
 /** @param {object} differs */
-const house = (differs) => ({ map: { ...HOUSE, ...differs } });
+const greenhouseWith = (differs) => ({ map: { ...GREENHOUSE, ...differs } });
 /** @param {(number | null)[]} ages */
 const looked = (ages) => ({
   coverage: {
@@ -257,25 +257,25 @@ export const SIGNS = [
     name: "aisle",
     layer: "greenhouse",
     draw: greenhouse.draw,
-    scene: house({ lanes: [LANE] }),
+    scene: greenhouseWith({ lanes: [LANE] }),
   },
   {
     name: "crop",
     layer: "greenhouse",
     draw: greenhouse.draw,
-    scene: house({ rows: [{ ...LANE, ymin: -0.4, ymax: 0.4 }] }),
+    scene: greenhouseWith({ rows: [{ ...LANE, ymin: -0.4, ymax: 0.4 }] }),
   },
   {
     name: "post",
     layer: "greenhouse",
     draw: greenhouse.draw,
-    scene: house({ posts: [{ x: 0, y: 0, radius: 0.15 }] }),
+    scene: greenhouseWith({ posts: [{ x: 0, y: 0, radius: 0.15 }] }),
   },
   {
     name: "things",
     layer: "greenhouse",
     draw: greenhouse.draw,
-    scene: house({
+    scene: greenhouseWith({
       obstacles: [
         { kind: "crates", xmin: -1.5, xmax: -0.4, ymin: -0.4, ymax: 0.4 },
         { kind: "trolley", xmin: 0.5, xmax: 1.5, ymin: -0.6, ymax: 0.6 },
@@ -287,40 +287,40 @@ export const SIGNS = [
 ];
 
 /** @param {import("../main.js").App} app */
-export function createLegend({ words }) {
+export function createLegend({ i18n }) {
   const panel = /** @type {HTMLDialogElement} */ (need("#legend-panel"));
 
   function draw() {
     if (!panel.open) return;
-    need("#legend").replaceChildren(...SIGNS.map((sign) => rowOf(sign, words)));
+    need("#legend").replaceChildren(...SIGNS.map((sign) => rowOf(sign, i18n)));
   }
 
   document.addEventListener("iveg:panel", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
 }
 
-/** @param {Sign} sign @param {import("../i18n.js").Words} words */
-function rowOf(sign, words) {
+/** @param {Sign} sign @param {import("../core/i18n.js").I18n} i18n */
+function rowOf(sign, i18n) {
   const row = make("li");
   const canvas = make("canvas");
   [canvas.width, canvas.height] = [WIDTH * devicePixelRatio, HEIGHT * devicePixelRatio];
   canvas.style.width = `${WIDTH}px`;
   canvas.style.height = `${HEIGHT}px`;
   canvas.setAttribute("aria-hidden", "true");
-  paintSign(canvas, sign, createWords(words.t));
-  row.append(canvas, make("span", "", words.t(`map.sign.${sign.name}`)));
+  paintSign(canvas, sign, createLabels(i18n.t));
+  row.append(canvas, make("span", "", i18n.t(`map.sign.${sign.name}`)));
   return row;
 }
 
 /**
  * @param {HTMLCanvasElement} canvas
  * @param {Sign} sign
- * @param {Paint["words"]} words
+ * @param {Paint["labels"]} labels
  */
 export function paintSign(
   canvas,
   { draw, scene, scale = SCALE, right = 0, up = 0 },
-  words,
+  labels,
 ) {
   const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const theme = readTheme(need("#map"));
@@ -334,7 +334,7 @@ export function paintSign(
         ctx,
         view,
         theme,
-        words,
+        labels,
         followed: null,
         tape: { points: [] },
         scene: { ...NOTHING, ...scene },

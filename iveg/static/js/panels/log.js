@@ -6,7 +6,7 @@ import { make, need, setHidden, setText } from "./dom.js";
 import { createChosen, createLogChips } from "./log_filter.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../protocol.js").Entry} Entry */
+/** @typedef {import("../core/protocol.js").Entry} Entry */
 
 /** Entries in the list; the store keeps more, history keeps all. */
 const SHOWN = 200;
@@ -16,7 +16,7 @@ const SHOWN = 200;
  * @param {{open: (decisionId: string, opener: HTMLElement) => void}} decision
  */
 export function createLogPanel(app, decision) {
-  const { store, words } = app;
+  const { store, i18n } = app;
   const list = need("#log");
   const empty = need("#log-empty");
   const clear = need("#log-clear");
@@ -25,7 +25,7 @@ export function createLogPanel(app, decision) {
   const robots = new Set(store.robots().keys());
   const chips = createLogChips({
     place: need("#log-chips"),
-    words,
+    i18n,
     chosen,
     robots: () => robots,
     onChange: rebuild,
@@ -38,10 +38,10 @@ export function createLogPanel(app, decision) {
     item.dataset.id = String(entry.id);
     if (entry.robot_id) item.dataset.robot = entry.robot_id;
     const text = make("p");
-    const time = make("time", "", words.time(entry.at));
+    const time = make("time", "", i18n.time(entry.at));
     time.dateTime = entry.at;
     const place = entry.decision_id ? makeOpener(entry) : text;
-    place.append(time, " ", sentenceOf(entry, words));
+    place.append(time, " ", sentenceOf(entry, i18n));
     if (place !== text) text.append(place);
     item.append(make("span", "log__mark"), text);
     return item;
@@ -51,7 +51,7 @@ export function createLogPanel(app, decision) {
   function makeOpener(entry) {
     const opener = make("button", "log__open");
     opener.type = "button";
-    opener.title = words.t("logpanel.decision");
+    opener.title = i18n.t("logpanel.decision");
     opener.addEventListener("click", (event) => {
       event.stopPropagation();
       decision.open(String(entry.decision_id), opener);
@@ -87,7 +87,7 @@ export function createLogPanel(app, decision) {
     const filters = chips.said().join(" · ");
     const none = store.get("snapshot") ? "logpanel.empty" : "rows.loading";
     const key = isHidden ? "logpanel.hidden" : none;
-    setText(empty, words.t(key, { count: entries.length, filters }));
+    setText(empty, i18n.t(key, { count: entries.length, filters }));
     setHidden(clear, !isHidden);
   }
 
@@ -120,7 +120,7 @@ export function createLogPanel(app, decision) {
   store.subscribe("log", add);
   store.subscribe("log/earlier", rebuild);
   store.subscribe("snapshot", rebuild);
-  words.onChange(() => {
+  i18n.onChange(() => {
     chips.draw();
     rebuild();
   });
@@ -131,12 +131,12 @@ export function createLogPanel(app, decision) {
  * What an entry says; of a slow-down far from anybody, why: the ring had grown.
  *
  * @param {Pick<Entry, "key" | "slots">} entry
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  */
-export function sentenceOf({ key, slots }, words) {
-  const said = words.t(keyOf({ key, slots }), slots);
+export function sentenceOf({ key, slots }, i18n) {
+  const said = i18n.t(keyOf({ key, slots }), slots);
   const isGrown = slots.radius !== undefined && slots.unseen !== undefined;
-  return isGrown ? `${said} ${words.t("log.grown", slots)}` : said;
+  return isGrown ? `${said} ${i18n.t("log.grown", slots)}` : said;
 }
 
 /** A robot may slow down for what iVeg does not know yet.

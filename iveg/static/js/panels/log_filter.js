@@ -5,12 +5,12 @@
  * everything.  What is pressed is remembered, and always in sight: a filter that nobody
  * sees would hide the news.
  *
- * @typedef {import("../protocol.js").Entry} Entry
+ * @typedef {import("../core/protocol.js").Entry} Entry
  * @typedef {"kind" | "robot" | "class" | "rule" | "priority"} Group
  * @typedef {ReturnType<typeof createChosen>} Chosen
  */
 
-import { browserStorage } from "../layers/memory.js";
+import { browserStorage } from "../map/layers/memory.js";
 import { make, setAttribute } from "./dom.js";
 
 const KEY = "iveg.log";
@@ -106,16 +106,16 @@ function write(storage, pressed) {
 /**
  * The chips of all groups.
  *
- * @param {{place: HTMLElement, words: import("../i18n.js").Words, chosen: Chosen,
+ * @param {{place: HTMLElement, i18n: import("../core/i18n.js").I18n, chosen: Chosen,
  *   robots: () => Iterable<string>, onChange: () => void}} options
  */
-export function createLogChips({ place, words, chosen, robots, onChange }) {
+export function createLogChips({ place, i18n, chosen, robots, onChange }) {
   let isOpen = false;
 
   /** @param {Group} group @param {string} name */
   function nameOf(group, name) {
     if (group === "robot") return name;
-    return words.t(group === "class" ? `class.${name}` : `logpanel.${group}.${name}`);
+    return i18n.t(group === "class" ? `class.${name}` : `logpanel.${group}.${name}`);
   }
 
   /** @param {Group} group @param {string} name */
@@ -136,7 +136,7 @@ export function createLogChips({ place, words, chosen, robots, onChange }) {
   function makeMore() {
     const more = make("button", "chip chip--more");
     more.type = "button";
-    more.textContent = words.t(isOpen ? "logpanel.fewer" : "logpanel.more");
+    more.textContent = i18n.t(isOpen ? "logpanel.fewer" : "logpanel.more");
     setAttribute(more, "aria-expanded", String(isOpen));
     more.addEventListener("click", () => {
       isOpen = !isOpen;

@@ -4,19 +4,19 @@
  * Picking a person opens the decision behind its ring; picking a robot goes to its card.
  */
 
-import { ageOf } from "../clock.js";
-import { followCostmap, followCoverage } from "../costmap.js";
-import { hears } from "../layers/belief.js";
-import { TRAIL_SPANS_S } from "../layers/trail.js";
-import { createMap } from "../map.js";
-import { installPaintHook } from "../painthook.js";
+import { ageOf } from "../core/clock.js";
+import { installPaintHook } from "../core/painthook.js";
+import { followCostmap, followCoverage } from "../map/costmap.js";
+import { hears } from "../map/layers/belief.js";
+import { TRAIL_SPANS_S } from "../map/layers/trail.js";
+import { createMap } from "../map/map.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { drawHidden } from "./hidden_layers.js";
 import { createLegend } from "./legend.js";
 import { onThemeChange } from "./theme.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../protocol.js").Person} Person */
+/** @typedef {import("../core/protocol.js").Person} Person */
 /** @typedef {ReturnType<typeof createMap>} LiveMap */
 
 const AGE_MS = 1000;
@@ -28,7 +28,7 @@ const COVERAGE_OLD_S = 6;
  * @param {{open: (decisionId: string, opener: HTMLElement | null) => void}} decision
  */
 export function createMapbox(app, decision) {
-  const { store, words } = app;
+  const { store, i18n } = app;
   const canvas = /** @type {HTMLCanvasElement} */ (need("#map"));
   const map = createMap(canvas, store, {
     onFollow: showFollowed,
@@ -42,14 +42,14 @@ export function createMapbox(app, decision) {
   function showFollowed(robotId) {
     const following = need("#following");
     setHidden(following, robotId === null);
-    setText(following, robotId ? words.t("map.following", { robot: robotId }) : "");
+    setText(following, robotId ? i18n.t("map.following", { robot: robotId }) : "");
   }
 
   /** @param {{on: boolean, points: number, metres: number | null}} measure */
   function showMeasure({ on, points, metres }) {
     setAttribute(need("#map-measure"), "aria-pressed", String(on));
     const asks = points === 1 ? "map.measure_second" : "map.measure_first";
-    const said = metres === null ? words.t(asks) : words.t("map.measured", { metres });
+    const said = metres === null ? i18n.t(asks) : i18n.t("map.measured", { metres });
     setHidden(need("#measured"), !on);
     setText(need("#measured"), on ? said : "");
   }
@@ -59,7 +59,7 @@ export function createMapbox(app, decision) {
     const known = robot === null ? undefined : store.robots().get(robot);
     const key = known && !hears(known) ? "map.believing_deaf" : "map.believing";
     setHidden(need("#believing"), !known);
-    setText(need("#believing"), known ? words.t(key, { robot }) : "");
+    setText(need("#believing"), known ? i18n.t(key, { robot }) : "");
   }
 
   /** @param {{kind: string, id: string}} picked */
@@ -90,20 +90,20 @@ export function createMapbox(app, decision) {
     setHidden(nlos, unseen.length === 0);
     const slowed = new Set(unseen.map(({ robot_id }) => robot_id)).size;
     const key = slowed === 1 ? "map.nlos_one" : "map.nlos_count";
-    setText(nlos, words.t(key, { count: slowed }));
+    setText(nlos, i18n.t(key, { count: slowed }));
   }
 
   /** @param {number} count */
   function peopleSaid(count) {
-    const said = coverageSaid(store.get("coverage"), words);
+    const said = coverageSaid(store.get("coverage"), i18n);
     if (count === 0 && said.isBlind) return said.text;
     const seen = count === 1 ? "map.people_one" : "map.people_count";
-    const people = count ? words.t(seen, { count }) : words.t("map.people_none");
+    const people = count ? i18n.t(seen, { count }) : i18n.t("map.people_none");
     return said.text ? `${people} · ${said.text}` : people;
   }
 
   function drawCostmapAge() {
-    /** @type {import("../protocol.js").Costmap | undefined} */
+    /** @type {import("../core/protocol.js").Costmap | undefined} */
     const costmap = store.get("costmap");
     const isOn = map.layers().some(({ name, on }) => name === "costmap" && on);
     const isKnown = typeof costmap?.age_s === "number";
@@ -111,12 +111,12 @@ export function createMapbox(app, decision) {
     setHidden(need("#costmap-age"), !isOn);
     setText(
       need("#costmap-age"),
-      words.t(key, { age: costmap && isKnown ? ageOf(costmap) : 0 }),
+      i18n.t(key, { age: costmap && isKnown ? ageOf(costmap) : 0 }),
     );
   }
 
   function drawClimate() {
-    /** @type {import("../protocol.js").Climate | null | undefined} */
+    /** @type {import("../core/protocol.js").Climate | null | undefined} */
     const climate = store.get("climate");
     const said = [
       ["temperature", climate?.temperature],
@@ -124,15 +124,15 @@ export function createMapbox(app, decision) {
       ["co2", climate?.co2],
     ]
       .filter(([, value]) => typeof value === "number")
-      .map(([name, value]) => words.t(`climate.${name}`, { value }));
+      .map(([name, value]) => i18n.t(`climate.${name}`, { value }));
     setHidden(need("#climate"), said.length === 0);
     setText(need("#climate"), said.join(" · "));
   }
 
-  const showHidden = () => drawHidden(map.layers(), words);
+  const showHidden = () => drawHidden(map.layers(), i18n);
 
   function drawWords() {
-    map.setLanguage(words.t);
+    map.setLanguage(i18n.t);
     drawLayers(app, map, showBeliever);
     showHidden();
     showBeliever();
@@ -171,7 +171,7 @@ export function createMapbox(app, decision) {
   store.subscribe("coverage", drawFacts);
   store.subscribe("costmap", drawCostmapAge);
   store.subscribe("climate", drawClimate);
-  words.onChange(drawWords);
+  i18n.onChange(drawWords);
   drawWords();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
@@ -179,19 +179,19 @@ export function createMapbox(app, decision) {
 /**
  * How much of the aisles cameras see, in words; blind when none looks.
  *
- * @param {import("../protocol.js").Coverage | undefined} coverage
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/protocol.js").Coverage | undefined} coverage
+ * @param {import("../core/i18n.js").I18n} i18n
  * @returns {{text: string, isBlind: boolean}}
  */
-export function coverageSaid(coverage, words) {
-  if (!coverage) return { text: words.t("map.coverage_unknown"), isBlind: true };
+export function coverageSaid(coverage, i18n) {
+  if (!coverage) return { text: i18n.t("map.coverage_unknown"), isBlind: true };
   const isOld =
     ageOf({ age_s: 0, receivedAtMs: coverage.receivedAtMs }) > COVERAGE_OLD_S;
-  if (isOld) return { text: words.t("map.coverage_unknown"), isBlind: true };
-  if (!coverage.cameras) return { text: words.t("map.coverage_blind"), isBlind: true };
+  if (isOld) return { text: i18n.t("map.coverage_unknown"), isBlind: true };
+  if (!coverage.cameras) return { text: i18n.t("map.coverage_blind"), isBlind: true };
   if (coverage.share === null) return { text: "", isBlind: false };
   const share = Math.floor(coverage.share * 100) / 100;
-  return { text: words.t("map.coverage_share", { share }), isBlind: false };
+  return { text: i18n.t("map.coverage_share", { share }), isBlind: false };
 }
 
 /** @param {Person} person */
@@ -212,14 +212,14 @@ function goToCard(robotId) {
  * @param {LiveMap} map
  * @param {() => void} onBeliever
  */
-function drawLayers({ store, words }, map, onBeliever) {
+function drawLayers({ store, i18n }, map, onBeliever) {
   const switches = map.layers().map(({ name, on }) => {
-    const [choice, input] = makeChoice("checkbox", words.t(`map.layer.${name}`), on);
+    const [choice, input] = makeChoice("checkbox", i18n.t(`map.layer.${name}`), on);
     input.addEventListener("change", () => map.setLayer(name, input.checked));
     return choice;
   });
   const spans = TRAIL_SPANS_S.map((seconds) => {
-    const said = words.t("map.trail_span", { seconds });
+    const said = i18n.t("map.trail_span", { seconds });
     const [choice, input] = makeChoice("radio", said, map.trailSeconds() === seconds);
     input.name = "trail";
     input.addEventListener("change", () => map.setTrail(seconds));
@@ -227,7 +227,7 @@ function drawLayers({ store, words }, map, onBeliever) {
   });
   const [shortcuts, keys] = makeChoice(
     "checkbox",
-    words.t("map.shortcuts"),
+    i18n.t("map.shortcuts"),
     map.hasShortcuts(),
   );
   keys.addEventListener("change", () => map.setShortcuts(keys.checked));
@@ -235,7 +235,7 @@ function drawLayers({ store, words }, map, onBeliever) {
   const beliefs = ids.map((robot) => {
     const key = robot === null ? "map.belief_all" : "map.belief_one";
     const isOn = map.believer() === robot;
-    const [choice, input] = makeChoice("radio", words.t(key, { robot }), isOn);
+    const [choice, input] = makeChoice("radio", i18n.t(key, { robot }), isOn);
     input.name = "belief";
     input.addEventListener("change", () => {
       map.setBeliever(robot);
@@ -245,11 +245,11 @@ function drawLayers({ store, words }, map, onBeliever) {
   });
   need("#layers").replaceChildren(
     ...switches,
-    make("h3", "choices__head", words.t("map.belief")),
+    make("h3", "choices__head", i18n.t("map.belief")),
     ...beliefs,
-    make("h3", "choices__head", words.t("map.trail_length")),
+    make("h3", "choices__head", i18n.t("map.trail_length")),
     ...spans,
-    make("h3", "choices__head", words.t("map.keyboard")),
+    make("h3", "choices__head", i18n.t("map.keyboard")),
     shortcuts,
   );
 }

@@ -2,17 +2,17 @@
  * Who is on the map, in words: for readers of the screen, and for whoever asks why.
  */
 
-import { ageOf } from "../clock.js";
-import { readPerson } from "../scene.js";
+import { ageOf } from "../core/clock.js";
+import { readPerson } from "../map/scene.js";
 import { make, need, setHidden, setText } from "./dom.js";
 
-/** @typedef {import("../protocol.js").Person} Person */
+/** @typedef {import("../core/protocol.js").Person} Person */
 
 /** A list that changes faster cannot be read aloud. */
 const TICK_MS = 1000;
 
 /** @param {import("../main.js").App} app */
-export function createPeoplePanel({ store, words }) {
+export function createPeoplePanel({ store, i18n }) {
   const list = need("#people-list");
 
   function draw() {
@@ -22,7 +22,7 @@ export function createPeoplePanel({ store, words }) {
     while (list.children.length < people.length) list.append(makeItem());
     people.forEach((person, i) => {
       const item = list.children[i];
-      const [who, where, ...rest] = linesOf(person, words);
+      const [who, where, ...rest] = linesOf(person, i18n);
       setText(need("b", item), who);
       setText(need("small", item), where);
       setText(need("p", item), rest.join(". "));
@@ -34,11 +34,11 @@ export function createPeoplePanel({ store, words }) {
       total: store.log().filter(({ key }) => /^log\.speed_down\..*_nlos$/.test(key))
         .length,
     };
-    setText(need("#people-nlos"), words.t("people.nlos", slots));
+    setText(need("#people-nlos"), i18n.t("people.nlos", slots));
   }
 
   document.addEventListener("iveg:panel", draw);
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
 }
@@ -53,10 +53,10 @@ function makeItem() {
  * One person in sentences: who and where, since when, who acts on it.
  *
  * @param {Person} person
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  * @returns {string[]}
  */
-export function linesOf(person, words) {
+export function linesOf(person, i18n) {
   const { stage, ringM } = readPerson(person, performance.now());
   const { x, y } = person.position;
   const slots = {
@@ -70,16 +70,16 @@ export function linesOf(person, words) {
     y,
   };
   const acts = person.acting.map(({ robot_id, distance_m, in_sight }) =>
-    words.t(in_sight ? "people.acts" : "people.acts_blind", {
+    i18n.t(in_sight ? "people.acts" : "people.acts_blind", {
       robot: robot_id,
       distance: distance_m,
     }),
   );
-  const who = words.t(person.lane ? "people.who" : "people.who_free", slots);
+  const who = i18n.t(person.lane ? "people.who" : "people.who_free", slots);
   return [
     `${who[0].toUpperCase()}${who.slice(1)}`,
-    words.t("people.where", slots),
-    words.t(`people.${stage}`, slots),
+    i18n.t("people.where", slots),
+    i18n.t(`people.${stage}`, slots),
     ...acts,
   ];
 }

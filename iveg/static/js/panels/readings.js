@@ -2,31 +2,31 @@
  * What a robot's small sensors say, one row each: the card and the Fleet page show all.
  */
 
-/** @typedef {import("../protocol.js").Robot} Robot */
-/** @typedef {import("../i18n.js").Words} Words */
+/** @typedef {import("../core/protocol.js").Robot} Robot */
+/** @typedef {import("../core/i18n.js").I18n} I18n */
 
 /**
  * @typedef {object} Reading
  * @property {string} label key of its name
- * @property {(robot: Robot, words: Words) => string | null} say null: nothing is known
+ * @property {(robot: Robot, i18n: I18n) => string | null} say null: nothing is known
  */
 
 /** @type {readonly Reading[]} */
 const READINGS = [{ label: "robot.battery", say: saidOfBattery }];
 
 /** Every row, a dash where nothing is known, so that cards keep their height.
- * @param {Robot | undefined} robot @param {Words} words
+ * @param {Robot | undefined} robot @param {I18n} i18n
  * @returns {{label: string, said: string}[]} */
-export function readingsOf(robot, words) {
+export function readingsOf(robot, i18n) {
   return READINGS.map(({ label, say }) => ({
-    label: words.t(label),
-    said: (robot && say(robot, words)) ?? "—",
+    label: i18n.t(label),
+    said: (robot && say(robot, i18n)) ?? "—",
   }));
 }
 
-/** @param {Robot} robot @param {Words} words */
-function saidOfBattery({ battery }, words) {
+/** @param {Robot} robot @param {I18n} i18n */
+function saidOfBattery({ battery }, i18n) {
   if (!battery || battery.percentage === null) return null;
   const key = battery.charging ? "robot.battery_charging" : "robot.battery_level";
-  return words.t(key, { level: battery.percentage });
+  return i18n.t(key, { level: battery.percentage });
 }

@@ -7,13 +7,13 @@
  * it again; here it is explained.
  */
 
-import { ageOf } from "../clock.js";
-import { LIMITS } from "../limits.js";
+import { ageOf } from "../core/clock.js";
+import { LIMITS } from "../core/limits.js";
 import { make, need, needPart, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../protocol.js").Robot} Robot */
-/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("../core/protocol.js").Robot} Robot */
+/** @typedef {import("../core/protocol.js").Command} Command */
 
 const HOLD_MS = 2000;
 const RELEASERS = new Set(["operator", "admin"]);
@@ -24,7 +24,7 @@ const RELEASERS = new Set(["operator", "admin"]);
  * @param {string} robotId
  */
 export function createRelease(app, card, robotId) {
-  const { store, words, stops } = app;
+  const { store, i18n, stops } = app;
   const releaseButton = /** @type {HTMLButtonElement} */ (need("[data-release]", card));
   const resumeButton = /** @type {HTMLButtonElement} */ (need("[data-resume]", card));
   const result = needPart("result", card);
@@ -50,15 +50,15 @@ export function createRelease(app, card, robotId) {
     const why = mayResume === "ok" ? "ok" : mayRelease;
     setText(
       needPart("release-why", card),
-      words.t(`release.why.${isBusy ? "busy" : why}`),
+      i18n.t(`release.why.${isBusy ? "busy" : why}`),
     );
     setText(
       needPart("release-words", card),
-      words.t("release.button", { robot: robotId }),
+      i18n.t("release.button", { robot: robotId }),
     );
     setText(
       needPart("resume-words", card),
-      words.t("release.resume", { robot: robotId }),
+      i18n.t("release.resume", { robot: robotId }),
     );
     setText(result, outcomeSaid());
     drawFacts(robot);
@@ -67,8 +67,8 @@ export function createRelease(app, card, robotId) {
 
   function outcomeSaid() {
     const said = order ? saidOfOrder(order) : [];
-    if (!said.length) return outcome ? words.t(outcome, { status }) : "";
-    return said.map(({ key, slots }) => words.t(key, slots)).join(" ");
+    if (!said.length) return outcome ? i18n.t(outcome, { status }) : "";
+    return said.map(({ key, slots }) => i18n.t(key, slots)).join(" ");
   }
 
   /** @param {Command} command */
@@ -93,11 +93,10 @@ export function createRelease(app, card, robotId) {
   function drawFacts(robot) {
     const profile = robot?.profile;
     const facts = [
-      profile && words.t("robot.profile", profile),
-      robot?.transport && words.t(`robot.transport.${robot.transport}`),
-      robot?.cmd_status && words.t("robot.agent", { status: robot.cmd_status }),
-      robot?.clock_offset_s &&
-        words.t("robot.offset", { offset: robot.clock_offset_s }),
+      profile && i18n.t("robot.profile", profile),
+      robot?.transport && i18n.t(`robot.transport.${robot.transport}`),
+      robot?.cmd_status && i18n.t("robot.agent", { status: robot.cmd_status }),
+      robot?.clock_offset_s && i18n.t("robot.offset", { offset: robot.clock_offset_s }),
     ];
     setText(needPart("facts", card), facts.filter(Boolean).join(" · "));
   }
@@ -117,17 +116,17 @@ export function createRelease(app, card, robotId) {
     holds.forEach((hold, i) => {
       const by =
         hold.source === "iveg" && requesters.length
-          ? ` · ${words.t("release.held_by", { who: requesters.join(", ") })}`
+          ? ` · ${i18n.t("release.held_by", { who: requesters.join(", ") })}`
           : "";
       setText(
         need("b", list.children[i]),
-        words.t(`release.hold_source.${hold.source}`),
+        i18n.t(`release.hold_source.${hold.source}`),
       );
-      const ack = words.t(`release.hold_ack.${hold.ack}`);
+      const ack = i18n.t(`release.hold_ack.${hold.ack}`);
       setText(need("small", list.children[i]), `${ack}${by} · ${hold.id}`);
     });
     if (!holds.length) {
-      setText(need("b", list.children[0]), words.t("release.no_holds"));
+      setText(need("b", list.children[0]), i18n.t("release.no_holds"));
       setText(need("small", list.children[0]), "");
     }
   }
@@ -141,7 +140,7 @@ export function createRelease(app, card, robotId) {
     isBusy = false;
     const isTaken = status === 202 || status === 200;
     const known = `release.failed.${status}`;
-    const failed = words.has(known) ? known : "release.failed.other";
+    const failed = i18n.has(known) ? known : "release.failed.other";
     outcome = isTaken ? "release.sent" : failed;
     draw(shown);
   }
@@ -156,7 +155,7 @@ export function createRelease(app, card, robotId) {
 }
 
 /**
- * @typedef {{connection: import("../store.js").ConnectionState, role: string, robot: Robot | undefined, ageS: number,
+ * @typedef {{connection: import("../core/store.js").ConnectionState, role: string, robot: Robot | undefined, ageS: number,
  *   command: Command | undefined}} Facts
  */
 

@@ -4,17 +4,17 @@
  * Ages are counted here, by the browser's clock, so that silence shows by itself.
  */
 
-import { aboutAge, ageOf, linkOfRobot } from "../clock.js";
+import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { all, make, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge, readingOf } from "./gauge.js";
 import { readingsOf } from "./readings.js";
 import { createRelease } from "./release.js";
-import { faultsSaid, marginSaid, modeSaid, taskSaid, whySaid } from "./robot_words.js";
+import { faultsSaid, marginSaid, modeSaid, taskSaid, whySaid } from "./robot_texts.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../protocol.js").Margin} Margin */
-/** @typedef {import("../protocol.js").Robot} Robot */
+/** @typedef {import("../core/protocol.js").Margin} Margin */
+/** @typedef {import("../core/protocol.js").Robot} Robot */
 
 const TICK_MS = 200;
 /** Cards that nobody sees are drawn at every so many ticks: a second. */
@@ -25,7 +25,7 @@ const DEGREES = 180 / Math.PI;
 
 /** @param {App} app */
 export function createRobotsPanel(app) {
-  const { store, words } = app;
+  const { store, i18n } = app;
   const place = need("#robots");
   /** @type {Map<string, ReturnType<typeof createCard>>} */
   const cards = new Map();
@@ -71,7 +71,7 @@ export function createRobotsPanel(app) {
     for (const robotId of store.robots().keys()) cardOf(robotId);
     setHidden(need("#robots-empty"), cards.size > 0);
     const none = store.get("snapshot") ? "robot.none" : "rows.loading";
-    setText(need("#robots-empty"), words.t(none));
+    setText(need("#robots-empty"), i18n.t(none));
     for (const [robotId, card] of cards) card.draw(store.robots().get(robotId));
   }
 
@@ -101,7 +101,7 @@ export function createRobotsPanel(app) {
   for (const card of all(".card", place)) cardOf(String(card.dataset.robot));
   store.subscribe("robots/", take);
   store.subscribe("snapshot", drawAll);
-  words.onChange(drawAll);
+  i18n.onChange(drawAll);
   setInterval(tick, TICK_MS);
   drawAll();
 }
@@ -133,7 +133,7 @@ function createSight() {
  * @param {HTMLElement} card
  */
 function createCard(app, card) {
-  const { store, words, dialogs } = app;
+  const { store, i18n, dialogs } = app;
   /** @type {Map<string, HTMLElement>} */
   const parts = new Map();
   const robotId = String(card.dataset.robot);
@@ -170,8 +170,8 @@ function createCard(app, card) {
     const link = linkOfRobot(robot);
     setAttribute(card, "data-link", link);
     setAttribute(card, "data-mode", robot?.mode ?? "UNKNOWN");
-    setAttribute(menu, "aria-label", words.t("release.open", { robot: robotId }));
-    setText(fields.link, words.t(`robot.link.${link}`));
+    setAttribute(menu, "aria-label", i18n.t("release.open", { robot: robotId }));
+    setText(fields.link, i18n.t(`robot.link.${link}`));
     const shape = partOf("shape");
     setAttribute(shape, "data-slot", String(store.slotOf(robotId)));
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
@@ -189,9 +189,9 @@ function createCard(app, card) {
 
   /** @param {Robot | undefined} robot */
   function drawMode(robot) {
-    setText(fields.mode, modeSaid(robot, words, app.stops.isResuming(robotId)));
-    setText(partOf("why"), whySaid(robot, words));
-    const faults = robot ? faultsSaid(robot, words).join(" · ") : "";
+    setText(fields.mode, modeSaid(robot, i18n, app.stops.isResuming(robotId)));
+    setText(partOf("why"), whySaid(robot, i18n));
+    const faults = robot ? faultsSaid(robot, i18n).join(" · ") : "";
     setHidden(partOf("faults"), !faults);
     setText(partOf("faults"), faults);
   }
@@ -204,7 +204,7 @@ function createCard(app, card) {
     readout("yaw", pose && pose.yaw * DEGREES, 1, "deg");
     readout("v", twist?.linear, 2, "ms");
     readout("w", twist?.angular, 2, "rads");
-    const said = Number.isFinite(ageS) ? aboutAge(robot, agoOf(ageS), words) : "";
+    const said = Number.isFinite(ageS) ? aboutAge(robot, agoOf(ageS), i18n) : "";
     for (const age of ages) setText(age, said);
     setText(fields.age, said);
   }
@@ -219,14 +219,14 @@ function createCard(app, card) {
     const said =
       value === null || value === undefined
         ? "—"
-        : `${words.number(value, decimals)} ${words.t(`robot.unit.${unit}`)}`;
+        : `${i18n.number(value, decimals)} ${i18n.t(`robot.unit.${unit}`)}`;
     setText(fields[field], said);
   }
 
   /** @param {number} ageS */
   function agoOf(ageS) {
     const key = ageS < 10 ? "robot.ago" : "robot.ago_long";
-    return words.t(key, { age: ageS });
+    return i18n.t(key, { age: ageS });
   }
 
   /** @param {Robot | undefined} robot */
@@ -238,24 +238,24 @@ function createCard(app, card) {
       speed,
       max,
       factor,
-      name: words.t("robot.gauge", { robot: robotId }),
+      name: i18n.t("robot.gauge", { robot: robotId }),
       said: isKnown
-        ? words.t("robot.gauge_value", { speed, max, limit })
-        : words.t("robot.speed_unknown"),
-      limitSaid: factor === null ? "" : words.t("robot.limit", { limit }),
-      speedSaid: isKnown ? words.number(Math.abs(speed), 2) : "—",
+        ? i18n.t("robot.gauge_value", { speed, max, limit })
+        : i18n.t("robot.speed_unknown"),
+      limitSaid: factor === null ? "" : i18n.t("robot.limit", { limit }),
+      speedSaid: isKnown ? i18n.number(Math.abs(speed), 2) : "—",
     });
   }
 
   /** How sure its detector is of the surest thing in its newest look. @param {string} id */
   function certaintyOf(id) {
     const look = store.looks().get(id);
-    if (!look || ageOf(look) > 3) return words.t("robot.certainty_old");
+    if (!look || ageOf(look) > 3) return i18n.t("robot.certainty_old");
     const [best] = [...look.items].sort((a, b) => b.probability - a.probability);
-    if (!best) return words.t("robot.certainty_none");
+    if (!best) return i18n.t("robot.certainty_none");
     const key = best.confident ? "robot.certainty_value" : "robot.certainty_faint";
     const slots = { class: best.class ?? best.class_id, confidence: best.probability };
-    return words.t(key, slots);
+    return i18n.t(key, slots);
   }
 
   /** The least margin to a person, and what it is made of. @param {Margin | null} margin */
@@ -263,21 +263,21 @@ function createCard(app, card) {
     const parts = partOf("margin-parts");
     setHidden(parts, margin === null);
     setAttribute(partOf("margin-line"), "data-band", margin?.band ?? "none");
-    setText(partOf("margin"), marginSaid(margin, words));
+    setText(partOf("margin"), marginSaid(margin, i18n));
     if (!margin) return;
     const slots = { ...margin, ...margin.parts };
-    setText(parts, words.t("robot.margin_parts", slots));
+    setText(parts, i18n.t("robot.margin_parts", slots));
   }
 
   /** @param {Robot | undefined} robot */
   function drawTask(robot) {
-    setText(partOf("task"), taskSaid(robot?.navigation?.task, words));
+    setText(partOf("task"), taskSaid(robot?.navigation?.task, i18n));
   }
 
   /** @param {Robot | undefined} robot */
   function drawReadings(robot) {
     const place = partOf("readings");
-    const readings = readingsOf(robot, words);
+    const readings = readingsOf(robot, i18n);
     while (place.children.length > readings.length) place.lastElementChild?.remove();
     while (place.children.length < readings.length) {
       const line = make("p", "card__line");

@@ -5,11 +5,11 @@
 import { need, setText } from "./dom.js";
 
 /** @param {import("../main.js").App} app */
-export function createSignOut({ words }) {
+export function createSignOut({ i18n }) {
   const button = /** @type {HTMLButtonElement} */ (need("#sign-out"));
   button.addEventListener("click", async () => {
     if (await signOut()) location.assign("/signin");
-    else setText(need("#sign-out-note"), words.t("signout.failed"));
+    else setText(need("#sign-out-note"), i18n.t("signout.failed"));
   });
   button.disabled = false;
 }

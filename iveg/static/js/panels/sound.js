@@ -5,10 +5,10 @@
 import { need, setText } from "./dom.js";
 
 /**
- * @param {import("../i18n.js").Words} words
+ * @param {import("../core/i18n.js").I18n} i18n
  * @param {import("./tone.js").Tone} tone
  */
-export function createSoundPanel(words, tone) {
+export function createSoundPanel(i18n, tone) {
   const others = /** @type {HTMLInputElement} */ (need("#sound-others"));
   let said = tone.canSound() ? "ready" : "blocked";
   others.checked = tone.hasChimes();
@@ -23,10 +23,10 @@ export function createSoundPanel(words, tone) {
   });
 
   function draw() {
-    setText(need("#sound-state"), words.t(`sound.${said}`));
+    setText(need("#sound-state"), i18n.t(`sound.${said}`));
   }
 
-  words.onChange(draw);
+  i18n.onChange(draw);
   draw();
   test.disabled = others.disabled = false;
 }

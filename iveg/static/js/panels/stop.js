@@ -7,8 +7,8 @@
  * comes from `stop_view.js`, what it sends goes through `press.js`.
  */
 
-import { readApi } from "../api.js";
-import { ageOf, linkOfRobot } from "../clock.js";
+import { readApi } from "../core/api.js";
+import { ageOf, linkOfRobot } from "../core/clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createPresser } from "./press.js";
 import { createLoudLines } from "./stop_loud.js";
@@ -16,7 +16,7 @@ import { createPlace } from "./stop_place.js";
 import { since, viewOfFleet, viewOfRobot } from "./stop_view.js";
 
 /** @typedef {import("../main.js").App} App */
-/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("../core/protocol.js").Command} Command */
 /** @typedef {import("./stop_view.js").View} View */
 
 const TICK_MS = 100;
@@ -32,7 +32,7 @@ const KNOWN_BUT_BLIND = 403;
  * @param {App} app
  */
 export function createStopPanel(app) {
-  const { store, words, line } = app;
+  const { store, i18n, line } = app;
   const strip = need("#stops");
   const presser = createPresser(line, drawAll);
   const loud = createLoudLines(app);
@@ -83,7 +83,7 @@ export function createStopPanel(app) {
     drawAll();
   }
 
-  /** @param {import("../protocol.js").Robot} robot */
+  /** @param {import("../core/protocol.js").Robot} robot */
   function takeRobot(robot) {
     if (robot.stop) take({ ...robot.stop, receivedAtMs: robot.receivedAtMs });
     else forget(robot.robot_id);
@@ -97,7 +97,7 @@ export function createStopPanel(app) {
       commands.delete(robotId);
   }
 
-  /** @param {import("../protocol.js").Snapshot} snapshot */
+  /** @param {import("../core/protocol.js").Snapshot} snapshot */
   function restart(snapshot) {
     commands.clear();
     for (const command of snapshot.commands ?? []) take(command);
@@ -171,9 +171,9 @@ export function createStopPanel(app) {
   /** @param {string} id @param {View} view */
   function draw(id, view) {
     const control = controlOf(id);
-    const name = id === "fleet" ? words.t("stop.fleet_name") : id;
+    const name = id === "fleet" ? i18n.t("stop.fleet_name") : id;
     setAttribute(control, "data-state", view.state);
-    setText(need(".stop__words", control), words.t(view.key, view.slots));
+    setText(need(".stop__words", control), i18n.t(view.key, view.slots));
     const who = need(".stop__who", control);
     setText(who, name);
     setHidden(who, view.state === "ready" || view.state === "late");
@@ -186,7 +186,7 @@ export function createStopPanel(app) {
   store.subscribe("commands/", take);
   store.subscribe("robots/", takeRobot);
   store.subscribe("connection", onConnection);
-  words.onChange(drawAll);
+  i18n.onChange(drawAll);
   setInterval(drawAll, TICK_MS);
   presser.goOn();
   drawAll();
@@ -200,7 +200,7 @@ export function createStopPanel(app) {
 /**
  * Whether what a robot does next was asked for by a resume, and no release.
  *
- * @param {import("../store.js").Store} store
+ * @param {import("../core/store.js").Store} store
  * @returns {(robotId: string) => boolean}
  */
 function followOrders(store) {

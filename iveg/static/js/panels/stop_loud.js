@@ -8,12 +8,12 @@
 import { make, need, setText } from "./dom.js";
 import { doubtOf, since, stateOfCommand } from "./stop_view.js";
 
-/** @typedef {import("../protocol.js").Command} Command */
+/** @typedef {import("../core/protocol.js").Command} Command */
 
 const LOUD = new Set(["unconfirmed", "still_moving", "moved"]);
 
 /** @param {import("../main.js").App} app */
-export function createLoudLines({ words, line }) {
+export function createLoudLines({ i18n, line }) {
   /**
    * @param {(Command | undefined)[]} commands the newest STOP of each robot
    * @param {import("./press.js").Pending[]} kept presses that wait for the link
@@ -36,9 +36,9 @@ export function createLoudLines({ words, line }) {
 
   /** @param {import("./press.js").Pending} press */
   function keptSaid({ robotId, atMs }) {
-    const robot = robotId ?? words.t("stop.fleet_name");
+    const robot = robotId ?? i18n.t("stop.fleet_name");
     const seconds = (performance.now() - atMs) / 1000;
-    return words.t("stop.p1.kept", { robot, seconds });
+    return i18n.t("stop.p1.kept", { robot, seconds });
   }
 
   /** @param {Command} command */
@@ -46,17 +46,17 @@ export function createLoudLines({ words, line }) {
     const { robot, transports, times } = command;
     const doubt = doubtOf(command, performance.now());
     const state = String(stateOfCommand(command));
-    return words.t(`stop.p1.${state}`, {
+    return i18n.t(`stop.p1.${state}`, {
       robot: command.robot_id,
       seconds: since(times.pressed ?? times.requested, line.serverNow()),
       who: command.requesters.join(", "),
       tries: command.tries,
       report: doubt
-        ? words.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
-        : words.t("stop.p1.no_report"),
-      moved: doubt ? words.t("stop.p1.could", { distance: doubt.movedM }) : " ",
-      transports: words.t("stop.p1.transports", {
-        said: transportsSaid(transports ?? {}, words),
+        ? i18n.t("stop.p1.report", { age: doubt.ageS, speed: robot?.v ?? 0 })
+        : i18n.t("stop.p1.no_report"),
+      moved: doubt ? i18n.t("stop.p1.could", { distance: doubt.movedM }) : " ",
+      transports: i18n.t("stop.p1.transports", {
+        said: transportsSaid(transports ?? {}, i18n),
       }),
     });
   }
@@ -68,14 +68,13 @@ export function createLoudLines({ words, line }) {
  * Every transport that the table of the server has, with how far the order came on it.
  *
  * @param {Record<string, string>} transports by id
- * @param {{t: (key: string) => string}} words
+ * @param {{t: (key: string) => string}} i18n
  */
-export function transportsSaid(transports, words) {
+export function transportsSaid(transports, i18n) {
   return Object.entries(transports)
     .map(([id, state]) => {
-      const name =
-        id === "direct" ? words.t("stop.transport_direct") : id.toUpperCase();
-      return `${name} ${words.t(`stop.transport.${state}`)}`;
+      const name = id === "direct" ? i18n.t("stop.transport_direct") : id.toUpperCase();
+      return `${name} ${i18n.t(`stop.transport.${state}`)}`;
     })
     .join(", ");
 }

@@ -4,9 +4,9 @@
  * A wish is never shown as a result: *asked*, *acknowledged* and *standing* are three
  * different words, and a control without a line does not look like one that works.
  *
- * @typedef {import("../protocol.js").Command} Command
- * @typedef {import("../clock.js").Link} Link
- * @typedef {import("../store.js").ConnectionState} ConnectionState
+ * @typedef {import("../core/protocol.js").Command} Command
+ * @typedef {import("../core/clock.js").Link} Link
+ * @typedef {import("../core/store.js").ConnectionState} ConnectionState
  * @typedef {import("./press.js").Pending} Pending
  * @typedef {{state: StopState, key: string, slots: Record<string, string | number>}} View
  * @typedef {"ready" | "late" | "lost" | "asked" | "not_taken" | "acknowledged" |
@@ -27,7 +27,7 @@
  * }} RobotFacts `isBlind`: the session is over and may still stop; `isResuming`: what is under way is a resume; `nowMs` is `performance.now()`, `serverNowS` Unix time
  */
 
-import { LIMITS } from "../limits.js";
+import { LIMITS } from "../core/limits.js";
 
 /** @type {Record<string, StopState>} */
 const BY_COMMAND = {

@@ -6,7 +6,7 @@
 import { all } from "./dom.js";
 
 /** @param {import("../main.js").App} app */
-export function labelTables({ words }) {
+export function labelTables({ i18n }) {
   const tables = all("table");
   const label = () => {
     for (const table of tables) labelCells(table);
@@ -15,7 +15,7 @@ export function labelTables({ words }) {
     const observer = new MutationObserver(() => labelCells(table));
     observer.observe(table, { childList: true, subtree: true });
   }
-  words.onChange(label);
+  i18n.onChange(label);
   label();
 }
 

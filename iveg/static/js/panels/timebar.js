@@ -22,7 +22,7 @@ const MARK_WIDTH = 2;
 const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
 
 /** @param {import("../main.js").App} app */
-export function createTimebar({ store, words, line }) {
+export function createTimebar({ store, i18n, line }) {
   const strip = need("#time-strip");
   let minutesAgo = 0;
 
@@ -31,7 +31,7 @@ export function createTimebar({ store, words, line }) {
     minutesAgo = Math.min(MINUTES, Math.max(0, minutes));
     const atS = line.serverNow() - 60 * minutesAgo;
     setAttribute(strip, "aria-valuenow", String(-minutesAgo));
-    setAttribute(strip, "aria-valuetext", words.time(atS));
+    setAttribute(strip, "aria-valuetext", i18n.time(atS));
     document.dispatchEvent(new CustomEvent("iveg:log-at", { detail: 1000 * atS }));
   }
 
@@ -48,8 +48,8 @@ export function createTimebar({ store, words, line }) {
 
   function draw() {
     const nowS = line.serverNow();
-    setText(need("#clock"), words.time(nowS));
-    setAttribute(strip, "aria-label", words.t("time.strip", { minutes: MINUTES }));
+    setText(need("#clock"), i18n.time(nowS));
+    setAttribute(strip, "aria-label", i18n.t("time.strip", { minutes: MINUTES }));
     const marks = marksOf(nowS);
     while (strip.childElementCount > marks.length) strip.lastElementChild?.remove();
     while (strip.childElementCount < marks.length) strip.append(makeSvg("rect"));
@@ -70,7 +70,7 @@ export function createTimebar({ store, words, line }) {
     return [...marks.values()];
   }
 
-  words.onChange(draw);
+  i18n.onChange(draw);
   setInterval(draw, TICK_MS);
   draw();
 }

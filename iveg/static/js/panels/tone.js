@@ -1,5 +1,5 @@
 /**
- * The sound of alarms: a P1 again and again until acknowledged, the others once.
+ * The sound of alerts: a P1 again and again until acknowledged, the others once.
  *
  * Browsers are mute until somebody has touched the page; the tone then begins by itself.
  * Only the single chime can be switched off, and that is remembered; a P1 cannot.
@@ -8,7 +8,7 @@
  * @typedef {(hertz: number, afterS: number) => void} Beep
  */
 
-import { browserStorage } from "../layers/memory.js";
+import { browserStorage } from "../map/layers/memory.js";
 
 const EVERY_MS = 1600;
 const TONES_HZ = [880, 660];
@@ -49,7 +49,7 @@ export function createTone(options = {}) {
       }
     },
     isSounding: () => timer !== undefined,
-    /** One alarm of lower priority has come. */
+    /** One alert of lower priority has come. */
     chime: () => chimes && play(CHIME_HZ),
     /** As a P1 sounds, once; tells whether the browser let it. */
     test: () => play(TONES_HZ),

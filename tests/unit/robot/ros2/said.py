@@ -8,7 +8,7 @@ import numpy as np
 
 from iveg.domain.observations import Instant
 from iveg.robot.ros2.config import RobotConfig
-from iveg.robot.ros2.senses import Senses
+from iveg.robot.ros2.inputs import SensorInputs
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
@@ -111,19 +111,19 @@ class Bench:
         tree: bool = True,
         classes: tuple[str, ...] = (),
     ) -> None:
-        self.senses = Senses(config or RobotConfig(), classes)
+        self.inputs = SensorInputs(config or RobotConfig(), classes)
         if tree:
             self.hear("tf_static", tf(link("base_link", "laser", 0.3)))
             self.hear("tf", tf(link("map", "odom", 10.0)))
 
     def hear(self, topic: str, message: Message, after: float = 0.0) -> "Bench":
-        self.senses.hear(topic, [Arrived(cdr.write(message))], MONO + after)
+        self.inputs.hear(topic, [Arrived(cdr.write(message))], MONO + after)
         return self
 
     def tick(self, after: float = 0.0) -> list[Sensed]:
-        return self.senses.tick(at(after))
+        return self.inputs.tick(at(after))
 
     def faults(self, after: float = 0.0) -> dict[str, str]:
         """Code → what about."""
-        found = self.senses.troubles.faults(MONO + after)
+        found = self.inputs.input_faults.faults(MONO + after)
         return {one.code: one.about for one in found}

@@ -8,7 +8,7 @@ from iveg.domain.geometry import Twist2D
 from iveg.robot.gate import REST
 from iveg.robot.ros2.config import Drive
 from iveg.robot.ros2.drive import DriveTopics
-from iveg.robot.ros2.trouble import Troubles
+from iveg.robot.ros2.input_faults import InputFaults
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2.said import stamp
@@ -16,10 +16,10 @@ from tests.unit.robot.ros2.said import stamp
 AHEAD = m.Twist(m.Vector3(0.5, 0.1, 0.2), m.Vector3(0.3, 0.4, -0.2))
 
 
-def topics(**drive: bool) -> tuple[DriveTopics, Troubles]:
-    troubles = Troubles()
-    found = DriveTopics(Drive(**drive), "/cmd_vel_nav", "base_link", troubles)
-    return found, troubles
+def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
+    input_faults = InputFaults()
+    found = DriveTopics(Drive(**drive), "/cmd_vel_nav", "base_link", input_faults)
+    return found, input_faults
 
 
 def wished(after: float, forward: float = 0.5) -> bytes:
@@ -45,29 +45,29 @@ def test_of_a_twist_what_wheels_can_do_is_read() -> None:
 def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
     forward: float, code: str
 ) -> None:
-    found, troubles = topics()
+    found, input_faults = topics()
 
     wish = found.read(cdr.write(m.Twist(m.Vector3(forward))), 5.0)
 
     assert wish == REST
-    assert troubles.counters == {code: 1}
-    assert troubles.factor(5.0) == (0.5, code)
+    assert input_faults.counters == {code: 1}
+    assert input_faults.factor(5.0) == (0.5, code)
 
 
 def test_bytes_that_are_no_twist_are_a_wish_to_rest() -> None:
-    found, troubles = topics()
+    found, input_faults = topics()
 
     assert found.read(b"\0\1\0\0", 5.0) == REST
-    assert troubles.counters == {"too_short": 1}
+    assert input_faults.counters == {"too_short": 1}
 
 
 def test_a_stamped_twist_that_was_overtaken_is_dropped() -> None:
-    found, troubles = topics(stamped_in=True)
+    found, input_faults = topics(stamped_in=True)
 
     first, late = found.read(wished(1.0), 0.0), found.read(wished(0.9), 0.1)
 
     assert (first, late) == (Twist2D(0.5, 0.0), None)
-    assert troubles.counters == {"time_back": 1}
+    assert input_faults.counters == {"time_back": 1}
 
 
 def test_a_sender_whose_clock_was_set_back_is_believed() -> None:

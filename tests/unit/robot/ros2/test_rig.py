@@ -46,7 +46,7 @@ class Site:
 
     def faults(self) -> set[str]:
         now = clock.now().mono
-        return {one.code for one in self.robot.senses.troubles.faults(now)}
+        return {one.code for one in self.robot.inputs.input_faults.faults(now)}
 
 
 @contextlib.asynccontextmanager
@@ -147,7 +147,7 @@ async def test_who_is_near_goes_out_for_the_costmap_and_for_rviz(site: Site) -> 
 async def test_what_is_wrong_goes_out_with_the_next_report(site: Site) -> None:
     await until(lambda: "no_data" in site.faults())
 
-    assert site.robot.senses.troubles.counters["no_data"] > 0
+    assert site.robot.inputs.input_faults.counters["no_data"] > 0
     await until(lambda: site.robot.node.speed_factor < 1.0)
 
 

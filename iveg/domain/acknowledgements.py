@@ -1,0 +1,101 @@
+"""How soon the fleet does as it is told (safety.md §6.3).
+
+Timed is the whole way of an alert: from the notification of the look that a slow-down
+rests on to the robot's own report that it applies the factor.  Both are read on our
+clock, so no clock has to be believed; left out is the way from camera to iVeg, which
+only the robot's clock could tell.
+
+A robot judges by its own pose what the feedback told it, and may say so before iVeg
+finds it inside: it is timed from the newest look that the fleet had been told of by
+then.  Whoever drives into a ring that nobody has looked at for a while counts as asked
+and answered, but what it took says nothing of the way.  A robot that was slow for
+something else has nothing to answer.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from iveg.domain.decisions import Decision
+from iveg.domain.observations import Instant
+from iveg.domain.stop.latency import nearest_rank
+
+WINDOW_S = 300.0
+ECHO_S = 1.0
+"""A robot that has not answered by then has not echoed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledgements:
+    """The alerts of the last minutes, as the robots answered them.
+
+    Attributes:
+        timed: How many answers could be timed.
+        p50_s: That half of them did not exceed (s); ``p95_s``, ``p99_s`` likewise.
+        echo_age_s: Of the newest timed answer (s).
+        asked: How many alerts should have been answered by now.
+        missed: How many of those were not, within ``ECHO_S``.
+        asked_age_s: Since the newest of those (s).
+    """
+
+    timed: int = 0
+    p50_s: float | None = None
+    p95_s: float | None = None
+    p99_s: float | None = None
+    echo_age_s: float | None = None
+    asked: int = 0
+    missed: int = 0
+    asked_age_s: float | None = None
+
+
+def acknowledgements_of(
+    decisions: Iterable[Decision], now: Instant
+) -> Acknowledgements:
+    """What the decisions of the last five minutes tell; of those in memory."""
+    recent = [one for one in decisions if _counts(one, now)]
+    due = [one for one in recent if _is_due(one, now)]
+    timed = [one for one in recent if one.took_s is not None]
+    took = sorted(one.took_s for one in timed if one.took_s is not None)
+    return Acknowledgements(
+        timed=len(took),
+        p50_s=nearest_rank(took, 0.50) if took else None,
+        p95_s=nearest_rank(took, 0.95) if took else None,
+        p99_s=nearest_rank(took, 0.99) if took else None,
+        echo_age_s=_age((_answered(one) for one in timed), now),
+        asked=len(due),
+        missed=sum(not _is_acknowledged(one) for one in due),
+        asked_age_s=_age((one.crossing.entered.mono for one in due), now),
+    )
+
+
+def _counts(decision: Decision, now: Instant) -> bool:
+    crossing = decision.crossing
+    # Who was ahead and has braked by now was not slow for something else.
+    asked = decision.answered is not None or not crossing.already_slow
+    return asked and now.mono - crossing.entered.mono <= WINDOW_S
+
+
+def _answered(decision: Decision) -> float | None:
+    if decision.answered is not None:
+        return decision.answered
+    return None if decision.applied is None else decision.applied.mono
+
+
+def _is_due(decision: Decision, now: Instant) -> bool:
+    """An answer that may still come in time is not missed yet."""
+    waited = now.mono - decision.crossing.entered.mono
+    return waited > ECHO_S or _is_acknowledged(decision)
+
+
+def _is_acknowledged(decision: Decision) -> bool:
+    return decision.crossing.ahead or _waited_s(decision) <= ECHO_S
+
+
+def _waited_s(decision: Decision) -> float:
+    applied, entered = decision.applied, decision.crossing.entered
+    return math.inf if applied is None else applied.mono - entered.mono
+
+
+def _age(moments: Iterable[float | None], now: Instant) -> float | None:
+    newest = max((at for at in moments if at is not None), default=None)
+    return None if newest is None else now.mono - newest

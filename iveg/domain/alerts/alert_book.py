@@ -1,0 +1,210 @@
+"""Alerts to people, after ISA-18.2: raised, acknowledged, cleared (product.md §3).
+
+What is wrong is a set of conditions, found anew each time; the book compares it with
+what it holds.  A condition that goes clears its alert; one that comes back is the same
+alert, one occurrence more.  One row stands for all of them, but never for less than
+the gravest that nobody has seen: grouping cannot hide an escalation.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from iveg.domain.events import Slot
+from iveg.domain.observations import Instant
+
+Priority = Literal["P1", "P2", "P3"]
+
+GROUPING_S = 600.0
+"""The same condition back within this time is the same alert, counted once more."""
+MOST_KEPT = 200
+"""More alerts than this, and even a P1 that nobody saw is left to the history."""
+MEMBERS_KEPT = 100
+"""Occurrences that an alert can still tell one by one; the others are counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """Something that is wrong now.
+
+    Attributes:
+        key: Names the sentence; ``subject`` tells two of a kind apart.
+    """
+
+    priority: Priority
+    key: str
+    subject: str
+    robot_id: str | None = None
+    slots: Mapping[str, Slot] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Occurrence:
+    """One time that a condition held, and who has seen it."""
+
+    priority: Priority
+    raised: Instant
+    cleared: Instant | None = None
+    acknowledged: Instant | None = None
+    acknowledged_by: str | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """One notice with its life: every occurrence of one condition.
+
+    Attributes:
+        condition: As it is now, or was when it cleared.
+        raised: The first occurrence.
+        members: The newest occurrences, oldest first; at least one.
+        unseen: Gravest priority that nobody has acknowledged; None when all are seen.
+        count: All occurrences.
+    """
+
+    alert_id: str
+    condition: Condition
+    raised: Instant
+    members: tuple[Occurrence, ...]
+    unseen: Priority | None
+    count: int = 1
+
+    @property
+    def last(self) -> Occurrence:
+        """The newest occurrence."""
+        return self.members[-1]
+
+    @property
+    def cleared(self) -> Instant | None:
+        """When the condition went; None while it holds."""
+        return self.last.cleared
+
+    @property
+    def waits(self) -> bool:
+        """Whether it is for people to see: it holds, or was a P1 that nobody saw."""
+        return self.cleared is None or self.unseen == "P1"
+
+    @property
+    def priority(self) -> Priority:
+        """What it is shown and sounds as: never less than the gravest unseen."""
+        return graver(self.condition.priority, self.unseen)
+
+
+def graver(one: Priority, other: Priority | None) -> Priority:
+    """The priority that must not be hidden by the other."""
+    return one if other is None else min(one, other)
+
+
+class AlertBook:
+    """All active alerts and the recently cleared ones."""
+
+    def __init__(self) -> None:
+        self._alerts: dict[tuple[str, str], Alert] = {}
+
+    @property
+    def waiting(self) -> list[Alert]:
+        """What is wrong now, seen or not, and each P1 that went before it was seen."""
+        return [one for one in self._alerts.values() if one.waits]
+
+    def sync(
+        self, conditions: Iterable[Condition], now: Instant, new_id: str
+    ) -> list[Alert]:
+        """Take what is wrong now; returns the alerts that were raised or cleared."""
+        wrong = _gravest(conditions)
+        changed = []
+        for key, alert in list(self._alerts.items()):
+            if key in wrong or alert.cleared is not None:
+                continue
+            self._alerts[key] = _clear(alert, now)
+            changed.append(self._alerts[key])
+        for number, (key, condition) in enumerate(wrong.items()):
+            before = self._alerts.get(key)
+            if before is not None and _goes_on(before, condition):
+                self._alerts[key] = replace(before, condition=condition)
+                continue
+            self._alerts[key] = _raise(before, condition, now, f"{new_id}-{number}")
+            changed.append(self._alerts[key])
+        self._forget(now)
+        return changed
+
+    def acknowledge(
+        self, alert_id: str, by: str, note: str, now: Instant
+    ) -> Alert | None:
+        """Somebody has seen all of it; None when there is no such alert."""
+        alert = self.find(alert_id)
+        if alert is not None:
+            alert = _see(alert, by, note, now)
+            self._alerts[alert.condition.key, alert.condition.subject] = alert
+        return alert
+
+    def remember(self, alerts: Iterable[Alert]) -> None:
+        """Take up alerts that are over and that nobody has seen; what is known stays.
+
+        One whose condition holds again already stands beside it under its own name.
+        """
+        for alert in alerts:
+            key = alert.condition.key, alert.condition.subject
+            if key in self._alerts:
+                named = replace(alert.condition, subject=alert.alert_id)
+                alert = replace(alert, condition=named)
+                key = named.key, named.subject
+            self._alerts[key] = alert
+
+    def find(self, alert_id: str) -> Alert | None:
+        """An alert that is active or was not long ago."""
+        found = (one for one in self._alerts.values() if one.alert_id == alert_id)
+        return next(found, None)
+
+    def _forget(self, now: Instant) -> None:
+        for key, alert in list(self._alerts.items()):
+            cleared = alert.cleared
+            is_old = cleared is not None and now.mono - cleared.mono > GROUPING_S
+            if is_old and (not alert.waits or len(self._alerts) > MOST_KEPT):
+                del self._alerts[key]
+
+
+def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition]:
+    """What is wrong by kind and subject; of two of the same the graver."""
+    wrong: dict[tuple[str, str], Condition] = {}
+    for one in conditions:
+        known = wrong.setdefault((one.key, one.subject), one)
+        if one.priority < known.priority:
+            wrong[one.key, one.subject] = one
+    return wrong
+
+
+def _goes_on(before: Alert, condition: Condition) -> bool:
+    """Whether it is the same occurrence: one that gets graver is a new one."""
+    return before.cleared is None and condition.priority >= before.condition.priority
+
+
+def _clear(alert: Alert, now: Instant) -> Alert:
+    last = replace(alert.last, cleared=now)
+    return replace(alert, members=(*alert.members[:-1], last))
+
+
+def _raise(
+    before: Alert | None, condition: Condition, now: Instant, alert_id: str
+) -> Alert:
+    new = Occurrence(condition.priority, now)
+    if before is None:
+        return Alert(alert_id, condition, now, (new,), unseen=new.priority)
+    past = before if before.cleared is not None else _clear(before, now)
+    # The same alert, but a new occurrence needs a new acknowledgement.
+    return replace(
+        past,
+        condition=condition,
+        members=(*past.members, new)[-MEMBERS_KEPT:],
+        unseen=graver(new.priority, past.unseen),
+        count=past.count + 1,
+    )
+
+
+def _see(alert: Alert, by: str, note: str, now: Instant) -> Alert:
+    members = tuple(
+        one
+        if one.acknowledged is not None
+        else replace(one, acknowledged=now, acknowledged_by=by, note=note)
+        for one in alert.members
+    )
+    return replace(alert, members=members, unseen=None)

@@ -1,0 +1,117 @@
+"""What is wrong now, found anew each time from decisions and robots (product.md §3)."""
+
+from collections.abc import Iterable
+from math import inf
+
+from iveg.domain.alerts.alert_book import Condition
+from iveg.domain.decisions import Decision
+from iveg.domain.events import Slot
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.rule.overload import Overload
+from iveg.domain.world import RobotState
+
+ESTIMATED_SHOWN_AFTER_S = 5.0
+"""So long a robot may take to hear its first feedback."""
+UNREADABLE_SHOWN_S = 10.0
+KIND_SHOWN_S = 10.0
+"""How long after its last message a robot of the wrong kind is told of."""
+STORM_SHOWN_S = 10.0
+"""So that a detector at its bound is one alert and not one a second."""
+
+
+def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
+    """One that is not obeyed is grave; a slow-down is the rule at work and no alert.
+
+    It is on the robot's card, on the map and in the log, and asks nothing of anybody.
+    """
+    crossing = decision.crossing
+    slots: dict[str, Slot] = {
+        "robot": crossing.robot_id,
+        "person": crossing.zone.cause,
+        "distance": round(crossing.distance_m, 2),
+        "decision": decision.decision_id,
+    }
+    subject = f"{crossing.robot_id}/{crossing.zone.cause}"
+    person = crossing.zone.reason == "person"
+    if decision.overdue(now):
+        key = "alert.person_not_slowing" if person else "alert.no_slow_down"
+        yield Condition("P1", key, subject, crossing.robot_id, slots)
+
+
+def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """A robot that is lost, whose clock is off, or whose detections are unreadable."""
+    slots: dict[str, Slot] = {"robot": robot.robot_id}
+    name = robot.robot_id
+    if robot.link(now) == "LOST":
+        moving = _was_moving(robot)
+        key = "alert.moving_robot_lost" if moving else "alert.robot_lost"
+        yield Condition("P1" if moving else "P2", key, name, name, slots)
+    offset = robot.clock.warning(now, _may_be_late_s(robot, now))
+    if offset is not None:
+        slots = {**slots, "offset": round(offset, 2)}
+        yield Condition("P3", "alert.clock_offset", name, name, slots)
+    unreadable = robot.unreadable_at
+    if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
+        yield Condition("P3", "alert.unreadable_detection", name, name, slots)
+
+
+def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
+    """What a robot is by its messages, where the fleet says something else."""
+    slots: dict[str, Slot] = {"robot": robot.robot_id}
+    name = robot.robot_id
+    if _is_recent(robot.live_at, now):
+        yield Condition("P1", "alert.recording_is_live", name, name, slots)
+    if _is_recent(robot.refused_at, now):
+        yield Condition("P2", "alert.replay_refused", name, name, slots)
+
+
+def _is_recent(moment: float | None, now: Instant) -> bool:
+    return moment is not None and now.mono - moment < KIND_SHOWN_S
+
+
+def _may_be_late_s(robot: RobotState, now: Instant) -> float:
+    """How late messages of a robot that echoes may be (s); of others no more."""
+    if robot.odometry is None or not robot.odometry.origin.acknowledgements:
+        return 0.0
+    age = robot.age_s(now)
+    return inf if age is None else age
+
+
+def _was_moving(robot: RobotState) -> bool:
+    """What a robot did when last heard: its report may be newer than its odometry."""
+    report, at = robot.safety, robot.safety_received
+    if report is None or at is None or at.mono < (robot.pose_at or 0.0):
+        return not robot.stands
+    return max(abs(report.linear), abs(report.angular)) >= LIMITS.standing_speed
+
+
+def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
+    """Detectors that say more than can be judged: one notice names them all."""
+    names = [
+        name
+        for name, at in overload.last.items()
+        if name in overload.since or now.mono - at < STORM_SHOWN_S
+    ]
+    if names:
+        slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}
+        yield Condition("P2", "alert.pictures_not_judged", "fleet", None, slots)
+
+
+def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
+    """Robots whose age is only estimated, or that nobody described: one notice each."""
+    fleet = list(robots)
+    estimated = [
+        robot.robot_id
+        for robot in fleet
+        if robot.estimated_since is not None
+        and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
+    ]
+    undescribed = [one.robot_id for one in fleet if not one.description.is_described]
+    for key, names in (
+        ("alert.age_estimated", estimated),
+        ("alert.robots_not_described", undescribed),
+    ):
+        if names:
+            slots: dict[str, Slot] = {"robots": ", ".join(names)}
+            yield Condition("P3", key, "fleet", None, slots)

@@ -1,0 +1,261 @@
+"""Who must drive slower, and why: the fleet's speed limits at one moment.
+
+A robot inside the ring of a person or of a moving peer is limited to half speed at once;
+it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap
+(safety.md §6.2).  The least factor counts, never the product.  Silence is a reason of
+its own: a robot that is not seen, or a fleet whose eyes are shut, drives at half.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from iveg.domain.detection_rule import Rule
+from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.rule.overload import Overload
+from iveg.domain.rule.zones import NOT_FAR_M, Zone, zones_near
+from iveg.domain.tracking.people import People
+from iveg.domain.world import RobotState, World
+
+SPEEDING_UP = 0.05
+"""Faster than in the mean of its last second by more than this (m/s)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """One robot inside one ring, from trigger to release.
+
+    Attributes:
+        zone: The nearest circle of the cause at trigger.
+        distance_m: Now; ``entered_m`` at the trigger.
+        outside_since: When it was first found outside (monotonic, s).
+        already_slow: It was slowed for something else: no slow-down will be seen.
+        ahead: It had judged this very zone itself and said so before.
+        speeding_up: It had not reached the speed that it wanted, so half of that may
+            be more than half of what it drove.
+        in_sight: Whether the robot saw it itself, or had a line of sight to the centre
+            at the trigger.
+    """
+
+    decision_id: str
+    robot_id: str
+    zone: Zone
+    entered: Instant
+    entered_m: float
+    speed_before: float
+    in_sight: bool
+    distance_m: float
+    already_slow: bool = False
+    ahead: bool = False
+    speeding_up: bool = False
+    outside_since: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A crossing that began or ended."""
+
+    crossing: Crossing
+    began: bool
+
+
+class SpeedLimits:
+    """Keeps the crossings of the fleet and gives every robot its speed limit."""
+
+    def __init__(self, greenhouse: Greenhouse) -> None:
+        self._greenhouse = greenhouse
+        self._open: dict[str, dict[str, Crossing]] = {}
+        """By robot and cause."""
+        self.overload = Overload()
+
+    @property
+    def crossings(self) -> Iterable[Crossing]:
+        """Every crossing that has begun and not ended."""
+        return [one for mine in self._open.values() for one in mine.values()]
+
+    def evaluate(
+        self,
+        world: World,
+        people: People,
+        rule: Rule,
+        now: Instant,
+        new_id: str,
+    ) -> tuple[dict[str, SpeedLimit], list[Change]]:
+        """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
+        near = zones_near(world, people, rule, now, self._open)
+        changes: list[Change] = []
+        for robot in world.robots.values():
+            zones = near(robot)
+            changes += self._cross(robot, zones, now, f"{new_id}-{len(changes)}")
+        silent = _silent_observer(world, now)
+        bounds = self._greenhouse.bounds
+        flooded = self.overload.slowed(world, bounds.xmax - bounds.xmin)
+        return {
+            robot.robot_id: self._speed_limit(robot, silent, flooded, now)
+            for robot in world.robots.values()
+        }, changes
+
+    def _cross(
+        self, robot: RobotState, zones: Iterable[Zone], now: Instant, new_id: str
+    ) -> Iterator[Change]:
+        mine = self._open.setdefault(robot.robot_id, {})
+        nearest = _nearest(robot, zones, mine)
+        for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
+            crossing = mine.get(cause)
+            if crossing is not None:
+                mine[cause] = _still(crossing, depth, distance, now)
+            elif depth <= 0.0:
+                name = f"{new_id}-{number}"
+                crossing = self._enter(robot, zone, distance, now, name)
+                mine[cause] = crossing
+                yield Change(crossing, began=True)
+        yield from _leave(mine, nearest, now)
+
+    def _enter(
+        self,
+        robot: RobotState,
+        zone: Zone,
+        distance: float,
+        now: Instant,
+        decision_id: str,
+    ) -> Crossing:
+        odometry = robot.odometry
+        assert odometry is not None  # noqa: S101 - nothing is near without it
+        pose, speed = odometry.pose, abs(odometry.twist.linear_x)
+        return Crossing(
+            decision_id,
+            robot.robot_id,
+            zone,
+            entered=now,
+            entered_m=distance,
+            speed_before=speed,
+            # Whom its own detector found it sees, whatever leaves the plan knows of.
+            in_sight=zone.observer == robot.robot_id
+            or self._greenhouse.in_sight(pose.x, pose.y, zone.x, zone.y),
+            distance_m=distance,
+            already_slow=_is_slow_already(robot, zone, speed),
+            ahead=_is_ahead(robot, zone),
+            speeding_up=robot.speed_gained() > SPEEDING_UP,
+        )
+
+    def _speed_limit(
+        self,
+        robot: RobotState,
+        silent: str | None,
+        flooded: Mapping[str, str],
+        now: Instant,
+    ) -> SpeedLimit:
+        """The reason that says most: a person, then a peer, then silence."""
+        mine = self._open.get(robot.robot_id)
+        if mine:
+            worst = min(
+                mine.values(),
+                key=lambda one: (one.zone.reason != "person", one.distance_m),
+            )
+            return SpeedLimit(
+                HALF_SPEED,
+                worst.zone.reason,
+                worst.zone.cause,
+                worst.distance_m,
+                worst.decision_id,
+            )
+        if robot.robot_id in flooded:
+            return SpeedLimit(HALF_SPEED, "stale", flooded[robot.robot_id])
+        age = robot.age_s(now)
+        if age is None or age > LIMITS.silence_s:
+            return SpeedLimit(HALF_SPEED, "stale", robot.robot_id)
+        blinded = robot.unreadable_at
+        if blinded is not None and now.mono - blinded <= LIMITS.silence_s:
+            return SpeedLimit(HALF_SPEED, "stale", robot.robot_id)
+        if silent is not None and not robot.is_replay:
+            return SpeedLimit(HALF_SPEED, "stale", silent or None)
+        return CLEAR
+
+
+def _nearest(
+    robot: RobotState, zones: Iterable[Zone], mine: Mapping[str, Crossing]
+) -> dict[str, tuple[float, float, Zone]]:
+    """Of each cause the deepest circle: how far outside (m), distance (m), it.
+
+    Causes that the robot is far from and was not near to are left out.
+    """
+    nearest: dict[str, tuple[float, float, Zone]] = {}
+    if robot.odometry is None:
+        return nearest
+    pose, robot_id = robot.odometry.pose, robot.robot_id
+    for zone in zones:
+        cause, reach = zone.cause, zone.radius_m + NOT_FAR_M
+        dx, dy = zone.x - pose.x, zone.y - pose.y
+        if dx * dx + dy * dy > reach * reach and cause not in mine:
+            continue
+        if cause == robot_id or zone.recording not in (None, robot.recording):
+            continue
+        distance = pose.distance_to(zone.x, zone.y)
+        depth = distance - zone.radius_m
+        if cause not in nearest or depth < nearest[cause][0]:
+            nearest[cause] = depth, distance, zone
+    return nearest
+
+
+def _leave(
+    mine: dict[str, Crossing], near: Mapping[str, object], now: Instant
+) -> Iterator[Change]:
+    for cause, crossing in list(mine.items()):
+        if cause not in near and crossing.outside_since is None:
+            crossing = replace(crossing, outside_since=now.mono)
+            mine[cause] = crossing
+        since = crossing.outside_since
+        if since is not None and now.mono - since >= LIMITS.release_after_s:
+            del mine[cause]
+            yield Change(crossing, began=False)
+
+
+def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
+    """A crossing that goes on, or whose robot is outside since now."""
+    since = None
+    if depth > LIMITS.release_beyond_m:
+        since = crossing.outside_since or now.mono
+    if distance == crossing.distance_m and since == crossing.outside_since:
+        return crossing
+    return replace(crossing, distance_m=distance, outside_since=since)
+
+
+def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
+    """Whether a robot will show no slow-down, because it drives slowly already.
+
+    A robot judges alerts by its own pose, too, and may report this very zone a few
+    milliseconds before it is found here; while it is still fast, its slow-down is yet
+    to be seen.
+    """
+    if robot.safety is None or robot.safety.speed_factor > HALF_SPEED:
+        return False
+    slow = HALF_SPEED * robot.profile.max_speed
+    return not _is_ahead(robot, zone) or speed <= slow
+
+
+def _is_ahead(robot: RobotState, zone: Zone) -> bool:
+    """Whether a robot reports that it is slow for this very zone."""
+    report = robot.safety
+    if report is None or report.speed_factor > HALF_SPEED:
+        return False
+    # A peer's own ring has no alert, and a robot may name none: that is no match.
+    ours = {zone.alert_id, zone.cause} - {None}
+    return report.decision_id in ours or report.cause in ours
+
+
+def _silent_observer(world: World, now: Instant) -> str | None:
+    """Who of the fleet's eyes is shut; an empty text when nobody looks at all."""
+    ages = {
+        robot.robot_id: now.mono - robot.detections_at
+        for robot in world.live_robots()
+        if robot.detections_at is not None
+    }
+    eyes = {
+        name: age for name, age in ages.items() if age <= LIMITS.observer_forgotten_s
+    }
+    if not eyes:
+        return ""
+    slowest = max(eyes, key=lambda name: eyes[name])
+    return slowest if eyes[slowest] > LIMITS.silence_s else None

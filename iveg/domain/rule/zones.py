@@ -1,0 +1,185 @@
+"""Every circle that slows whoever is inside, and which of them a robot is near.
+
+Few circles are compared with every robot one by one; many as arrays, where a look at a
+circle costs nothing unless somebody is near it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from iveg.domain.detection_rule import Rule
+from iveg.domain.limits import LIMITS, ring_radius
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.people import People
+from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.point_index import Floats
+from iveg.domain.world import RobotState, World
+
+NOT_FAR_M = 0.01
+"""So far outside a ring nobody can be inside, whatever rounding does."""
+_FEW_PAIRS = 150
+"""Robots times circles; beyond, arrays are quicker."""
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """One circle that slows whoever is inside.
+
+    Attributes:
+        cause: The person or robot at its centre.
+        observer: Who saw it; the peer itself for a peer's own odometry.
+        x: Centre in ``map`` (m); ``y`` likewise.
+        sighting: What was seen; None for a peer's own odometry.
+        recording: The map frame of the recording that saw it, which slows recordings
+            of that frame alone; None: a live robot saw it.
+        alert_id: Of the alert that robots hear of it.
+    """
+
+    reason: Literal["person", "robot"]
+    cause: str
+    observer: str
+    x: float
+    y: float
+    radius_m: float
+    sighting: Sighting | None = None
+    recording: str | None = None
+    alert_id: str | None = None
+
+
+def zones_of(world: World, people: People, rule: Rule, now: Instant) -> Iterator[Zone]:
+    """Every circle that slows somebody now."""
+    for person in people.known.values():
+        yield from _zones_of(person, world, rule, now)
+    yield from _peers(world, rule, now)
+
+
+def _zones_of(person: Person, world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
+    for sighting, radius in person.rings(rule, now):
+        yield Zone(
+            person.class_,
+            person.person_id,
+            sighting.observer,
+            sighting.x,
+            sighting.y,
+            radius,
+            sighting,
+            world.robot(sighting.observer).recording,
+            person.decision_id,
+        )
+
+
+def _peers(world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
+    for peer in world.robots.values():
+        since = peer.likely_pose_at()
+        # A recording cannot yield, and nobody yields to it.
+        if peer.odometry is None or since is None or peer.is_replay:
+            continue
+        age = max(0.0, now.mono - since)
+        known = peer.age_s(now)
+        at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
+        if at_rest or age > LIMITS.ring_lasts_s:
+            continue
+        pose = peer.odometry.pose
+        yield Zone(
+            "robot",
+            peer.robot_id,
+            peer.robot_id,
+            pose.x,
+            pose.y,
+            rule.radius_at(age),
+        )
+
+
+Near = Callable[[RobotState], Iterable[Zone]]
+"""A robot → every circle that it is in or was in, and perhaps others; in order."""
+
+
+def zones_near(
+    world: World,
+    people: People,
+    rule: Rule,
+    now: Instant,
+    inside: Mapping[str, Mapping[str, Any]],
+) -> Near:
+    """Find out once which robots are near which circles.
+
+    Args:
+        world: The fleet.
+        people: Everybody.
+        rule: How wide a ring is.
+        now: The rings' age is counted from.
+        inside: By robot the causes that it is told to be slow for: never left out.
+    """
+    if len(world.robots) * (len(people.known) + len(world.robots)) <= _FEW_PAIRS:
+        everything = list(zones_of(world, people, rule, now))
+        return lambda _: everything
+    near = _people_near(world, people, rule, now)
+    peers = _peers_near(world, list(_peers(world, rule, now)), inside)
+    order = {person_id: place for place, person_id in enumerate(people.known)}
+    circles: dict[str, list[Zone]] = {}
+
+    def found(robot: RobotState) -> Iterable[Zone]:
+        mine = inside.get(robot.robot_id, {})
+        wanted = near.get(robot.robot_id, set()) | (mine.keys() & order.keys())
+        for person_id in sorted(wanted, key=order.__getitem__):
+            if person_id not in circles:
+                person = people.known[person_id]
+                circles[person_id] = list(_zones_of(person, world, rule, now))
+            yield from circles[person_id]
+        yield from peers.get(robot.robot_id, ())
+
+    return found
+
+
+def _people_near(
+    world: World, people: People, rule: Rule, now: Instant
+) -> dict[str, set[str]]:
+    """Robot → everybody whom it may be near."""
+    spots = people.spots
+    x, y, seen_at, reach = spots.columns
+    age = np.maximum(0.0, now.mono - seen_at)
+    ring = ring_radius(rule.radius_m, age, np.minimum, np.maximum)
+    ring = np.maximum(reach, ring) + 2 * NOT_FAR_M
+    limit = np.where(age <= LIMITS.ring_lasts_s, ring, -1.0)
+    robots, columns = _pairs(world, x, y, limit)
+    near: dict[str, set[str]] = {}
+    for robot_id, column in zip(robots, columns, strict=True):
+        near.setdefault(robot_id, set()).add(spots.owners[column][0])
+    return near
+
+
+def _peers_near(
+    world: World, peers: list[Zone], inside: Mapping[str, Mapping[str, Any]]
+) -> dict[str, list[Zone]]:
+    """Robot → the peers that it may be near or is slow for."""
+    x, y = np.array([(one.x, one.y) for one in peers]).reshape(-1, 2).T
+    limit = np.array([one.radius_m for one in peers]) + 2 * NOT_FAR_M
+    chosen: dict[str, set[int]] = {}
+    for robot_id, column in zip(*_pairs(world, x, y, limit), strict=True):
+        chosen.setdefault(robot_id, set()).add(column)
+    place = {one.cause: column for column, one in enumerate(peers)}
+    for robot_id, causes in inside.items():
+        known = {place[cause] for cause in causes.keys() & place.keys()}
+        chosen[robot_id] = chosen.get(robot_id, set()) | known
+    return {
+        robot_id: [peers[column] for column in sorted(columns)]
+        for robot_id, columns in chosen.items()
+    }
+
+
+def _pairs(
+    world: World, x: Floats, y: Floats, limit: Floats
+) -> tuple[list[str], list[int]]:
+    """Which robots are within ``limit`` (m) of which places."""
+    placed = [
+        (robot.robot_id, robot.odometry.pose)
+        for robot in world.robots.values()
+        if robot.odometry is not None
+    ]
+    own = np.array([(pose.x, pose.y) for _, pose in placed]).reshape(-1, 2)
+    dx, dy = x - own[:, :1], y - own[:, 1:]
+    rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
+    return [placed[row][0] for row in rows.tolist()], columns.tolist()

@@ -1,0 +1,251 @@
+"""Who is in the greenhouse: detections of robots become people on the map.
+
+A detection is placed in ``map``, judged by the rule, recognised as a fleet member where
+one stands there, and else handed to the tracker.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from iveg.domain.detection_rule import Class, Rule
+from iveg.domain.geometry import Pose2D, Rectangle
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.point_index import PointIndex
+from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
+from iveg.domain.tracking.tracker import Seen, Tracker
+from iveg.domain.world import RobotState, World
+
+_SUSPECT_M = 1.0
+_PEER_GATE_M = 1.0
+_BEYOND_WALL_M = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A detection in ``map`` with what became of it.
+
+    Attributes:
+        person: The person it belongs to; None when faint, another class, or a peer.
+        peer: The fleet member that it is a sighting of.
+        peer_residual_m: How far from that member's own odometry (m).
+        appeared: Whether it made a new person.
+        possible: Below the threshold, but seen again and again.
+        doubtful: Outside the greenhouse, so nobody knows where it is: where its
+            observer stood, and how far that one sees (m).
+    """
+
+    detection: Detection
+    position: tuple[float, float, float]
+    kind: Literal["alert", "faint", "other"]
+    class_: Class | None
+    person: Person | None = None
+    peer: str | None = None
+    peer_residual_m: float | None = None
+    appeared: bool = False
+    possible: bool = False
+    doubtful: tuple[Pose2D, float] | None = None
+
+
+class People:
+    """Everyone who is known, in the order of their appearance.
+
+    Args:
+        bounds: The outer wall; what is seen beyond it is of doubtful position.
+    """
+
+    def __init__(self, bounds: Rectangle | None = None) -> None:
+        self._bounds = bounds
+        self._possible_people = PossiblePeople()
+        self._tracker = Tracker()
+        self._faint: dict[str, list[Placed]] = {}
+        self._spots = PointIndex()
+        self._indexed: dict[str, Person] = {}
+        self.turned_away = 0
+        """How many of the last look there was no room for."""
+
+    @property
+    def spots(self) -> PointIndex:
+        """Where the sightings of everybody are."""
+        if not self._indexed.keys() <= self.known.keys():
+            for person_id in self._indexed.keys() - self.known.keys():
+                del self._indexed[person_id]
+                self._spots.remove(person_id)
+        for person_id, person in self.known.items():
+            if self._indexed.get(person_id) is not person:
+                self._indexed[person_id] = person
+                spots = [
+                    (one.x, one.y, one.at.mono, one.reach_m) for one in person.sightings
+                ]
+                self._spots.put(person_id, spots)
+        return self._spots
+
+    @property
+    def known(self) -> dict[str, Person]:
+        """Everyone, by id."""
+        return self._tracker.known
+
+    def sight(
+        self,
+        frame: DetectionFrame,
+        world: World,
+        rule: Rule,
+        at: Instant,
+        new_id: str,
+    ) -> list[Placed]:
+        """Take one look of one robot in.
+
+        ``at`` is the look's source moment on our clocks; ``new_id`` begins the
+        decision ids of whoever appears.
+
+        Returns:
+            Every detection that could be placed, judged and, if confident, assigned.
+        """
+        observer = world.robot(frame.robot_id)
+        placed = [
+            judged
+            for detection in frame.detections
+            if (judged := _place(detection, frame, observer, rule)) is not None
+        ]
+        if rule.possible_people:
+            placed = self._suspect(placed, frame.robot_id, at)
+        placed = [_match_peer(one, observer, world, at) for one in placed]
+        placed = [self._doubt(one, frame, observer) for one in placed]
+        self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
+        return self._assign(placed, observer, at, new_id)
+
+    def _suspect(
+        self, placed: Sequence[Placed], observer: str, at: Instant
+    ) -> list[Placed]:
+        """Raise faint people who are seen again and again to possible ones."""
+        spots = [one.position[:2] for one in placed if _is_suspect(one)]
+        again = set(self._possible_people.seen_again(spots, observer, at))
+        return [
+            replace(one, kind="alert", possible=True)
+            if one.kind == "faint" and _is_suspect(one) and one.position[:2] in again
+            else one
+            for one in placed
+        ]
+
+    def _doubt(
+        self, one: Placed, frame: DetectionFrame, observer: RobotState
+    ) -> Placed:
+        """Mark what cannot be where it was said to be (safety.md §3.4)."""
+        x, y, _ = one.position
+        if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
+            return one
+        pose = observer.pose_at_stamp(frame.origin.own_s)
+        if one.kind != "alert" or one.peer is not None or pose is None:
+            return one
+        return replace(one, doubtful=(pose, observer.profile.camera_range))
+
+    def _assign(
+        self, placed: Sequence[Placed], observer: RobotState, at: Instant, new_id: str
+    ) -> list[Placed]:
+        """Hand confident detections that are no fleet member to the tracker."""
+        out = list(placed)
+        wanting = [
+            index
+            for index, one in enumerate(out)
+            if one.kind == "alert" and one.peer is None
+        ]
+        before = set(self.known)
+        tracks = self._tracker.take(
+            [
+                Seen(
+                    out[index].class_ or "person",
+                    _sighting(out[index], observer, at),
+                    f"{new_id}-{index}",
+                )
+                for index in wanting
+            ],
+            at,
+        )
+        self.turned_away = tracks.count(None)
+        for index, track in zip(wanting, tracks, strict=True):
+            if track is not None:
+                out[index] = replace(
+                    out[index], person=self.known[track], appeared=track not in before
+                )
+        return out
+
+    def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
+        """Somebody has looked there in vain: this look protects nobody any more."""
+        return self._tracker.drop(person_id, sighting)
+
+    def is_suspected(self, person: Person, x: float, y: float, observer: str) -> bool:
+        """Whether a robot's newest look holds a faint one of the kind near a spot."""
+        return any(
+            one.class_ == person.class_
+            and math.hypot(one.position[0] - x, one.position[1] - y) <= _SUSPECT_M
+            for one in self._faint.get(observer, ())
+        )
+
+    def forget(self, now: Instant) -> list[Person]:
+        """Drop who has not been seen for ten minutes; returns them."""
+        return self._tracker.forget(now)
+
+
+def _place(
+    detection: Detection, frame: DetectionFrame, observer: RobotState, rule: Rule
+) -> Placed | None:
+    x, y, z = detection.box.centre
+    if detection.frame_id == "base_link":
+        pose = observer.pose_at_stamp(frame.origin.own_s)
+        if pose is None:
+            return None
+        x, y = pose.transform(x, y)
+    verdict = rule.judge(detection.class_id, detection.probability)
+    return Placed(detection, (x, y, z), verdict.kind, verdict.class_)
+
+
+def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) -> Placed:
+    """Recognise a sighted robot as the fleet member that stands there by odometry."""
+    if one.class_ != "robot":
+        return one
+    nearest: tuple[float, str] | None = None
+    for peer in world.robots.values():
+        since = peer.likely_pose_at()
+        if peer is observer or peer.odometry is None or since is None:
+            continue
+        if peer.recording != observer.recording:
+            continue
+        reach = _PEER_GATE_M
+        if peer.description.is_described:
+            # Of a body of unknown size one sighting more is safer than one less.
+            reach += peer.profile.length / 2
+        reach += LIMITS.walking_m_s * min(1.0, max(0.0, at.mono - since))
+        residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
+        if residual <= reach and (nearest is None or residual < nearest[0]):
+            nearest = (residual, peer.robot_id)
+    if nearest is None:
+        return one
+    return replace(one, peer=nearest[1], peer_residual_m=nearest[0])
+
+
+def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:
+    x, y, z = one.position
+    reach = 0.0
+    if one.doubtful is not None:
+        pose, reach = one.doubtful
+        x, y = pose.x, pose.y
+    said = one.detection
+    return Sighting(
+        observer.robot_id,
+        x,
+        y,
+        z,
+        at,
+        said.class_id,
+        said.probability,
+        one.possible,
+        reach,
+        recording=observer.recording,
+    )
+
+
+def _is_suspect(one: Placed) -> bool:
+    return one.class_ == "person" and one.detection.probability >= POSSIBLE_FROM

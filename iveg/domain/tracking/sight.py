@@ -1,0 +1,145 @@
+"""Who can see what: cameras, crop, and the all-clear of an empty spot.
+
+A ring goes by time or because a robot has looked at its centre for a second and found
+nobody, not even faintly; never for one missing frame (safety.md §3.4).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D, wrap_angle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.people import People
+from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.world import RobotState, World
+
+CLEAR_S = 1.0
+_EDGE_RAD = math.radians(5.0)
+"""So far inside the picture that a person there would be seen whole."""
+_NEAR_M, _RANGE_SHARE = 1.0, 0.75
+_FRESH_LOOK_S = 0.5
+
+_Look = tuple[int, str]
+_Spots = NDArray[np.float64]
+_NONE = np.empty(0, np.intp)
+
+
+class AllClear:
+    """Watches old sightings until somebody has looked there in vain."""
+
+    def __init__(self) -> None:
+        self._since: dict[_Look, float] = {}
+
+    def sweep(
+        self, people: People, world: World, greenhouse: Greenhouse, now: Instant
+    ) -> list[Person]:
+        """Take away rings whose centre is seen to be empty; returns whose."""
+        watched: dict[_Look, float] = {}
+        cleared: list[Person] = []
+        for person in list(people.known.values()):
+            for sighting in list(person.sightings):
+                if not LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s:
+                    continue
+                if sighting.reach_m > 0.0:  # nobody knows where to look
+                    continue
+                if world.robot(sighting.observer).is_replay:  # no place of today
+                    continue
+                lookers = [
+                    robot.robot_id
+                    for robot in world.live_robots()
+                    if can_see(robot, sighting.x, sighting.y, greenhouse, now)
+                    and not _sees_faintly(robot, people, person, sighting)
+                ]
+                if self._is_empty(sighting, lookers, now, watched):
+                    cleared.append(people.drop_sighting(person.person_id, sighting))
+        self._since = watched
+        return cleared
+
+    def _is_empty(
+        self,
+        sighting: Sighting,
+        lookers: list[str],
+        now: Instant,
+        watched: dict[_Look, float],
+    ) -> bool:
+        for robot_id in lookers:
+            look = sighting.chain, robot_id
+            watched[look] = self._since.get(look, now.mono)
+            if now.mono - watched[look] >= CLEAR_S:
+                return True
+        return False
+
+
+def _sees_faintly(
+    robot: RobotState, people: People, person: Person, sighting: Sighting
+) -> bool:
+    return people.is_suspected(person, sighting.x, sighting.y, robot.robot_id)
+
+
+def can_see(
+    robot: RobotState, x: float, y: float, greenhouse: Greenhouse, now: Instant
+) -> bool:
+    """Whether a robot's camera looks at a spot now, nothing in between."""
+    camera = _camera_of(robot, now)
+    if camera is None:
+        return False
+    profile = robot.profile
+    distance = camera.distance_to(x, y)
+    if not _NEAR_M <= distance <= _RANGE_SHARE * profile.camera_range:
+        return False
+    bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
+    in_picture = abs(bearing) <= profile.camera_fov / 2 - _EDGE_RAD
+    return in_picture and greenhouse.in_sight(camera.x, camera.y, x, y)
+
+
+def looks_from(
+    robot: RobotState, spots: _Spots, greenhouse: Greenhouse, now: Instant
+) -> NDArray[np.intp]:
+    """Which of many spots a robot's camera looks at now, nothing in between.
+
+    Args:
+        robot: One whose camera may be blind: then none.
+        spots: Shape (n, 2), in ``map`` (m).
+        greenhouse: What stands in between.
+        now: This moment.
+    """
+    camera = _camera_of(robot, now)
+    if camera is None:
+        return _NONE
+    profile = robot.profile
+    dx, dy = spots[:, 0] - camera.x, spots[:, 1] - camera.y
+    distance = np.hypot(dx, dy)
+    bearing = np.arctan2(dy, dx) - camera.yaw
+    off = np.abs((bearing + math.pi) % math.tau - math.pi)
+    in_picture = np.flatnonzero(
+        (distance >= _NEAR_M)
+        & (distance <= _RANGE_SHARE * profile.camera_range)
+        & (off <= profile.camera_fov / 2 - _EDGE_RAD)
+    )
+    clear = [
+        one
+        for one in in_picture.tolist()
+        if greenhouse.in_sight(camera.x, camera.y, spots[one, 0], spots[one, 1])
+    ]
+    return np.array(clear, np.intp)
+
+
+def is_looking(robot: RobotState, now: Instant) -> bool:
+    """Whether a robot's camera looks at all, and it is known where from."""
+    return _camera_of(robot, now) is not None
+
+
+def _camera_of(robot: RobotState, now: Instant) -> Pose2D | None:
+    """Where a robot's camera is, if it looks now and nobody doubts where that is."""
+    age, looked = robot.age_s(now), robot.detections_at
+    if robot.odometry is None or looked is None:
+        return None
+    if age is None or age > LIMITS.live_s:
+        return None
+    if now.mono - looked > _FRESH_LOOK_S:
+        return None
+    return robot.odometry.pose.compose(robot.profile.camera)

@@ -1,0 +1,77 @@
+"""What people are told of what is wrong: alerts, their lines, how fast they come."""
+
+from collections.abc import Iterable
+
+from iveg.domain.alerts.alert_book import Alert, AlertBook, Condition
+from iveg.domain.alerts.flood import Flood, FloodGauge
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.observations import Instant
+from iveg.pipeline import topics
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.log_messages import alert_line, flood_line
+from iveg.pipeline.ports import Ids
+from iveg.pipeline.publish import Hub
+
+
+class Alerting:
+    """Raises, clears and acknowledges, and writes each of it down."""
+
+    def __init__(self, event_log: EventLog, hub: Hub, new_id: Ids) -> None:
+        self._event_log = event_log
+        self._hub = hub
+        self._new_id = new_id
+        self._book = AlertBook()
+        self._gauge = FloodGauge()
+
+    @property
+    def waiting(self) -> list[Alert]:
+        """What is wrong now, and each P1 that went before anybody saw it."""
+        return self._book.waiting
+
+    @property
+    def flood(self) -> Flood:
+        """How fast alerts come."""
+        return self._gauge.flood
+
+    def knows(self, alert_id: str) -> bool:
+        """Whether an alert is of this run, active or over not long ago."""
+        return self._book.find(alert_id) is not None
+
+    def remember(self, earlier: Iterable[Alert]) -> None:
+        """Take up what nobody saw in an earlier run."""
+        self._book.remember(one for one in earlier if not self.knows(one.alert_id))
+        self._hub.changed(topics.ALERTS.name)
+
+    def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
+        """Take what is wrong now."""
+        changed = self._book.sync(wrong, now, self._new_id())
+        for alert in changed:
+            self._event_log.alert(alert)
+            self._event_log.log(alert_line(alert), now)
+        self._watch_flood(sum(one.cleared is None for one in changed), now)
+
+    def acknowledge(
+        self, alert_id: str, by: str, note: str, now: Instant
+    ) -> Alert | None:
+        """Somebody has seen an alert; None when there is no such one."""
+        alert = self._book.acknowledge(alert_id, by, note, now)
+        if alert is not None:
+            self._event_log.alert(alert)
+            slots: dict[str, Slot] = {
+                **alert.condition.slots,
+                "alert": alert.condition.key,
+                "by": by,
+                "priority": alert.priority,
+            }
+            self._event_log.log(LogEvent("alert", "log.alert.acknowledged", slots), now)
+        return alert
+
+    def _watch_flood(self, raised: int, now: Instant) -> None:
+        before = self.flood
+        after = self._gauge.take(raised, now)
+        if after == before:
+            return
+        self._hub.changed(topics.FLOOD.name)
+        line = flood_line(before, after)
+        if line is not None:
+            self._event_log.log(line, now)

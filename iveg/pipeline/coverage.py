@@ -1,0 +1,42 @@
+"""Keeps account of where cameras have looked, beside the rule loop.
+
+Nobody stops for it, and aisles do not change: twice a second is often enough for a
+robot that drives a step in that time.
+"""
+
+import asyncio
+
+from iveg.domain.coverage import Coverage
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.sight import is_looking
+from iveg.domain.world import World
+from iveg.pipeline.ports import Clock
+
+TICK_S = 0.5
+
+
+class Watch:
+    """When each spot of the aisles was last looked at.
+
+    Attributes:
+        coverage: What was looked at, and when.
+    """
+
+    def __init__(self, world: World, greenhouse: Greenhouse) -> None:
+        self._world = world
+        self.coverage = Coverage(greenhouse)
+
+    async def run(self, clock: Clock) -> None:
+        """Until cancelled."""
+        while True:
+            self.tick(clock())
+            await asyncio.sleep(TICK_S)
+
+    def tick(self, now: Instant) -> None:
+        """Take in where the cameras look now."""
+        self.coverage.look(self._world.live_robots(), now)
+
+    def cameras(self, now: Instant) -> int:
+        """How many cameras look now, wherever they are."""
+        return sum(is_looking(robot, now) for robot in self._world.live_robots())

@@ -1,0 +1,151 @@
+"""From a look of one robot to people on the map, and the lines that tell of it.
+
+A sighting is logged at its start and written down once in two seconds, so that a
+person who stands before a camera for an hour does not fill the log.
+"""
+
+from collections.abc import Callable
+
+from iveg.domain.detection_rule import Rule
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.feedback import FeedbackAlert
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import DetectionFrame, Instant, Received
+from iveg.domain.order import Verdict
+from iveg.domain.rule.overload import Overload
+from iveg.domain.tracking.people import People, Placed
+from iveg.domain.world import World
+from iveg.pipeline import topics
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.ports import Ids
+from iveg.pipeline.publish import Hub
+
+_LOGGED_S = 2.0
+_MAX_SUBJECTS = 1000
+_KEYS = {
+    "alert": "log.detection",
+    "faint": "log.detection_faint",
+    "other": "log.detection_unmapped",
+}
+
+
+class DetectionTracking:
+    """Takes the looks of the fleet.
+
+    Attributes:
+        placed: What each robot's newest look found, faint ones included.
+        other: The stamp of the newest confident object of another class, by robot.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        event_log: EventLog,
+        hub: Hub,
+        new_id: Ids,
+        stamp: Callable[[float], str],
+        overload: Overload,
+    ) -> None:
+        self.placed: dict[str, list[Placed]] = {}
+        self.other: dict[str, FeedbackAlert] = {}
+        self._world = world
+        self._people = people
+        self._event_log = event_log
+        self._hub = hub
+        self._new_id = new_id
+        self._stamp = stamp
+        self._overload = overload
+        self._told: dict[tuple[str, str], float] = {}
+
+    @property
+    def subjects(self) -> int:
+        """Of how many it is remembered when they were last told."""
+        return len(self._told)
+
+    def take(
+        self, frame: DetectionFrame, received: Received, verdict: Verdict, rule: Rule
+    ) -> None:
+        """A late look still saw somebody; a late answer of Orion's is yesterday's.
+
+        Later than a ring lives it protects nobody, and would only show ghosts.
+        """
+        late = verdict == "late" and not received.asked
+        if verdict != "new" and not (
+            late and self._age_s(frame, received) <= LIMITS.ring_lasts_s
+        ):
+            return
+        robot_id = frame.robot_id
+        if not self._overload.admits(robot_id, received.at):
+            self._world.counters["pictures.not_judged"] += 1
+            self._overload.judged(robot_id, received.at, whole=False)
+            return
+        placed = self._look(frame, received, rule)
+        turned_away = self._people.turned_away
+        if turned_away:
+            self._world.counters["people.turned_away"] += turned_away
+        if verdict == "new" or turned_away:
+            self._overload.judged(robot_id, received.at, whole=not turned_away)
+        if verdict == "new":
+            self.placed[robot_id] = placed
+            self._hub.changed(topics.DETECTIONS.of(robot_id))
+
+    def _age_s(self, frame: DetectionFrame, received: Received) -> float:
+        """How old the look that has just come is (s)."""
+        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
+        return received.at.mono - seen_at.mono
+
+    def _look(
+        self, frame: DetectionFrame, received: Received, rule: Rule
+    ) -> list[Placed]:
+        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
+        placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
+        for one in placed:
+            self._describe(one, frame, received)
+        if any(one.person is not None for one in placed):
+            self._hub.changed(topics.PEOPLE.name)
+        return placed
+
+    def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
+        at, robot_id = received.at, frame.robot_id
+        subject = one.peer or (one.person.person_id if one.person else "")
+        subject = subject or f"{one.kind}:{one.detection.class_id}"
+        last = self._told.get((robot_id, subject))
+        self._told[robot_id, subject] = at.mono
+        if one.kind == "other":
+            self.other[robot_id] = FeedbackAlert("", self._stamp(at.wall))
+        if last is not None and at.mono - last < _LOGGED_S:
+            # Keep the first moment, so that a long sighting gets a row every so often.
+            self._told[robot_id, subject] = last
+            return
+        self._event_log.detection(one, robot_id, frame.origin.stamp, at, received.road)
+        if last is None or at.mono - last >= 2 * _LOGGED_S:
+            self._event_log.log(_line(one, robot_id, subject), at)
+
+    def forget(self, now: Instant) -> None:
+        """Do not remember for ever what was told of whom."""
+        if len(self._told) > _MAX_SUBJECTS:
+            self._told = {
+                key: at
+                for key, at in self._told.items()
+                if now.mono - at < LIMITS.ring_lasts_s
+            }
+
+
+def _line(one: Placed, robot_id: str, subject: str) -> LogEvent:
+    x, y, _ = one.position
+    slots: dict[str, Slot] = {
+        "robot": robot_id,
+        "class": one.class_ or one.detection.class_id,
+        "class_id": one.detection.class_id,
+        "confidence": one.detection.probability,
+        "x": round(x, 2),
+        "y": round(y, 2),
+        "person": subject,
+    }
+    key = _KEYS[one.kind]
+    if one.doubtful is not None:
+        key = "log.detection_doubtful"
+    elif one.possible:
+        key = "log.detection_possible"
+    return LogEvent("detection", key, slots, robot_id, one.class_)

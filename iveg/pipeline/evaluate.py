@@ -1,0 +1,343 @@
+"""The rule at work: every observation into the world, every change into words.
+
+``take`` applies one observation and ``settle`` judges the fleet, once for all that was
+taken; ``tick`` does what only time brings: silence, expiry, overdue links.  The
+heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
+falls silent and slows the robots.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from iveg.domain.alerts import conditions
+from iveg.domain.alerts.alert_book import Condition
+from iveg.domain.decisions import Decision, Decisions
+from iveg.domain.detection_rule import Rule
+from iveg.domain.exposure import Exposure, Exposures
+from iveg.domain.feedback import CLEAR, SpeedLimit
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
+from iveg.domain.margins import margins_of
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    Instant,
+    Odometry,
+    Origin,
+    Received,
+    SafetyReport,
+)
+from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.rule.speed_limits import Change, Crossing, SpeedLimits
+from iveg.domain.tracking.people import People, Placed
+from iveg.domain.world import World
+from iveg.pipeline import topics
+from iveg.pipeline.alerting import Alerting
+from iveg.pipeline.detections import DetectionTracking
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.evidence import places_of, record_of
+from iveg.pipeline.feedback import FeedbackPublisher
+from iveg.pipeline.first_reports import FirstReports
+from iveg.pipeline.kinds import LowValues, kind
+from iveg.pipeline.log_messages import evidence_of, speed_line
+from iveg.pipeline.ports import Fleet, Ids
+from iveg.pipeline.publish import Hub
+from iveg.pipeline.staleness import Staleness
+
+HEARTBEAT_S = 0.1
+
+
+class Evaluator:
+    """Keeps the world and decides for the fleet.
+
+    Args:
+        stamp: Writes a wall-clock moment the way the wire does.
+        boot: Random, new at each start: identity of our feedback.
+
+    Attributes:
+        rule: The version in force; a new one counts from the next judgement on.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        greenhouse: Greenhouse,
+        rule: Rule,
+        fleet: Fleet,
+        event_log: EventLog,
+        hub: Hub,
+        new_id: Ids,
+        stamp: Callable[[float], str],
+        boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
+    ) -> None:
+        self.world = world
+        self.greenhouse = greenhouse
+        self.rule = rule
+        self.people = People(greenhouse.bounds)
+        self.decisions = Decisions()
+        self.alerts = Alerting(event_log, hub, new_id)
+        self._exposures = Exposures()
+        self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(world.robots, CLEAR)
+        self.protected_unseen = 0
+        """How often a robot slowed for somebody whom it could not see itself."""
+        self._speed_limits = SpeedLimits(greenhouse)
+        overload = self._speed_limits.overload
+        self.looks = DetectionTracking(
+            world, self.people, event_log, hub, new_id, stamp, overload
+        )
+        self._staleness = Staleness(world, self.people, greenhouse, event_log, hub)
+        other = self.looks.other
+        self._feedback_publisher = FeedbackPublisher(
+            world, self.people, other, fleet, stamp, boot, backlog
+        )
+        self._event_log = event_log
+        self._hub = hub
+        self._new_id = new_id
+        self._applied: dict[str, tuple[float, str]] = {}
+        self._first_reports = FirstReports()
+        self._low = LowValues()
+        self._moved: set[str] = set()
+        self._unjudged: Instant | None = None
+        self._untold = False
+
+    @property
+    def crossings(self) -> Iterable[Crossing]:
+        """Who is inside whose ring now."""
+        return self._speed_limits.crossings
+
+    @property
+    def placed(self) -> Mapping[str, list[Placed]]:
+        """What each robot's newest look found, faint ones included."""
+        return self.looks.placed
+
+    def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
+        """A decision that is still in memory, with the verdicts of now."""
+        decision = self.decisions.get(decision_id)
+        return None if decision is None else record_of(decision, now)
+
+    def live_decisions(self) -> Iterable[Decision]:
+        """Those in memory that are of robots, not of recordings."""
+        robots = self.world.robots
+        return (
+            one
+            for one in self.decisions.known
+            if not robots[one.crossing.robot_id].is_replay
+        )
+
+    @property
+    def exposure(self) -> Exposure | None:
+        """How close the fleet came to people today; None before the first look."""
+        return self._exposures.today
+
+    # --- what arrives -------------------------------------------------------------
+
+    def take(self, received: Received) -> bool:
+        """Apply one observation; :meth:`settle` judges what follows from it.
+
+        Returns:
+            Whether it became part of the state.
+        """
+        verdict = self.world.apply(received)
+        if verdict == "refused":
+            return False
+        observation = received.observation
+        if isinstance(observation, DetectionFrame):
+            self.looks.take(observation, received, verdict, self.rule)
+            self._notice(observation.robot_id, received.at)
+        if verdict != "new":
+            return False
+        row, robot_id = kind(observation), getattr(observation, "robot_id", "")
+        for topic in row.touches:
+            self._hub.changed(topic.of(robot_id))
+        if row.kept:
+            self._event_log.reading(observation, robot_id, received.at)
+        match observation:
+            case Odometry():
+                self._drove(observation, received.at)
+            case Climate():
+                self._event_log.climate(observation, received.at)
+            case SafetyReport():
+                self._reported(observation, received.at)
+            case DetectionFrame():
+                self._unjudged = _later(self._unjudged, received.at)
+        return True
+
+    def _notice(self, robot_id: str, at: Instant) -> None:
+        for one in self.placed.get(robot_id, ()):
+            if one.person is not None:
+                self._first_reports.seen(one.person.person_id, at)
+
+    def settle(self) -> None:
+        """Judge the fleet once for everything that was taken since the last time."""
+        at, self._unjudged = self._unjudged, None
+        if at is None:
+            return
+        self._judge(at)
+        for robot_id in self._moved:
+            robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
+            self._event_log.odometry(
+                robot, speed_limit.speed_factor, robot.link(at), at
+            )
+        self._moved.clear()
+
+    def _drove(self, odometry: Odometry, at: Instant) -> None:
+        for decision in self.decisions.open_of(odometry.robot_id):
+            self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
+        self._unjudged = _later(self._unjudged, at)
+        self._moved.add(odometry.robot_id)
+
+    def _reported(self, report: SafetyReport, at: Instant) -> None:
+        for decision in self.decisions.open_of(report.robot_id):
+            self._advance(decision, decision.reported(report, at), at)
+        self._first_reports.reported(report, self._feedback_publisher.published_at, at)
+        applied = report.speed_factor, report.reason
+        before = self._applied.get(report.robot_id)
+        if applied != before:
+            self._applied[report.robot_id] = applied
+            if before is None or before[0] != applied[0]:
+                self._log_speed(report, at)
+
+    def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
+        if after is not before:
+            self.decisions.put(after)
+            self._event_log.decision(after, at)
+
+    # --- judgement ----------------------------------------------------------------
+
+    def _judge(self, now: Instant) -> None:
+        speed_limits, changes = self._speed_limits.evaluate(
+            self.world, self.people, self.rule, now, self._new_id()
+        )
+        for change in changes:
+            self._crossed(change, now)
+        before, self.speed_limits = self.speed_limits, speed_limits
+        changed = [
+            robot_id
+            for robot_id, speed_limit in speed_limits.items()
+            if speed_limit.speed_factor != before[robot_id].speed_factor
+            or speed_limit.reason != before[robot_id].reason
+        ]
+        for robot_id in changed:
+            self._hub.changed(topics.ROBOT.of(robot_id))
+            if self.world.robots[robot_id].safety is None:
+                self._log_speed_limit(
+                    robot_id, before[robot_id], speed_limits[robot_id], now
+                )
+        slower = any(
+            speed_limits[robot_id].speed_factor < before[robot_id].speed_factor
+            for robot_id in changed
+        )
+        self._untold = self._untold or bool(changed or changes)
+        # Who must slow down never waits; what else is news, while robots can use it.
+        if slower or (self._untold and self._feedback_publisher.may_publish(now)):
+            self.tell(now)
+
+    def _crossed(self, change: Change, now: Instant) -> None:
+        crossing = change.crossing
+        if change.began:
+            if not crossing.in_sight:
+                self.protected_unseen += 1
+            notice = self._first_reports.of(crossing)
+            decision = Decision(
+                crossing,
+                self.rule,
+                noticed=None if notice is None else notice.at,
+                answered=None if notice is None else notice.answered,
+                places=tuple(places_of(crossing, self.world)),
+            )
+            self.decisions.put(decision)
+            self._event_log.decision(decision, now)
+            return
+        ended = self.decisions.get(crossing.decision_id)
+        if ended is not None:
+            self._advance(ended, ended.closed(now), now)
+
+    def tell(self, now: Instant) -> None:
+        """Send every robot what the fleet must know (Algorithm 2, line 13)."""
+        self._untold = False
+        self._feedback_publisher.tell(self.speed_limits, self.rule, now)
+        for decision in self.decisions.every_open():
+            self._advance(decision, decision.published(now), now)
+
+    # --- time ---------------------------------------------------------------------
+
+    def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
+        """Let time pass: silence, ages, overdue links, alerts, heartbeat."""
+        self._staleness.tick(now)
+        self.looks.forget(now)
+        self._first_reports.forget(self.people.known)
+        self.settle()
+        self._judge(now)
+        if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
+            self.tell(now)
+        for decision in self.decisions.every_open():
+            self._advance(decision, decision.aged(now), now)
+        if self._exposures.due(now):
+            self._look_at_margins(now)
+        self.alerts.sync([*self._conditions(now), *more], now)
+
+    def _look_at_margins(self, now: Instant) -> None:
+        fleet = list(self.world.live_robots())
+        margins = [*margins_of(fleet, self.people.known.values(), now)]
+        ages = [robot.age_s(now) for robot in fleet]
+        seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
+        self._exposures.look(margins, now, seen=seen)
+
+    def _conditions(self, now: Instant) -> Iterable[Condition]:
+        for decision in self.decisions.every_open():
+            yield from conditions.of_decision(decision, now)
+        for robot in self.world.live_robots():
+            yield from conditions.of_robot(robot, now)
+            yield from self._low.conditions(robot)
+            yield from conditions.of_kind(robot, now)
+        yield from conditions.of_fleet(self.world.live_robots(), now)
+        yield from conditions.of_pictures(self._speed_limits.overload, now)
+
+    def close_earlier(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """Close the rows that an earlier run left open; nobody follows them any more.
+
+        Their ids are random, so what is not in memory is not of this run.
+        """
+        self._event_log.left_behind(
+            [one for one in decisions if self.decisions.get(one.decision_id) is None],
+            [one for one in alerts if not self.alerts.knows(one.alert_id)],
+            now,
+        )
+
+    def leave(self, now: Instant) -> None:
+        """Break off what is open: iVeg goes away, and the record says so."""
+        for decision in self.decisions.every_open():
+            self._advance(decision, decision.broken_off(now), now)
+
+    # --- words --------------------------------------------------------------------
+
+    def _log_speed(self, report: SafetyReport, at: Instant) -> None:
+        evidence = evidence_of(
+            report, self.decisions, self.people, self.world, self.greenhouse
+        )
+        self._event_log.log(speed_line(report, evidence), at)
+
+    def _log_speed_limit(
+        self, robot_id: str, before: SpeedLimit, after: SpeedLimit, at: Instant
+    ) -> None:
+        """For a robot that reports nothing: what it was told, at least."""
+        if before.speed_factor == after.speed_factor:
+            return
+        report = SafetyReport(
+            robot_id,
+            Origin(),
+            after.speed_factor,
+            after.reason,
+            after.cause,
+            after.decision_id,
+        )
+        self._log_speed(report, at)
+
+
+def _later(first: Instant | None, second: Instant) -> Instant:
+    return second if first is None or second.mono >= first.mono else first

@@ -1,0 +1,294 @@
+"""The minutes: what happened, told to people at once and written down for later.
+
+One place turns domain values into log lines and history records, so that the page, the
+API and the database say the same.
+"""
+
+import json
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import asdict, fields, replace
+
+from iveg.domain.alerts.alert_book import Alert, Occurrence
+from iveg.domain.decisions import Decision
+from iveg.domain.events import LogEvent
+from iveg.domain.observations import Climate, Instant, Observation
+from iveg.domain.records import (
+    AlertRecord,
+    ClimateRecord,
+    CommandEventRecord,
+    CommandRecord,
+    DecisionRecord,
+    DetectionRecord,
+    LogRecord,
+    OdometryRecord,
+    ReadingRecord,
+)
+from iveg.domain.stop import Changed, Closed, Command
+from iveg.domain.tracking.people import Placed
+from iveg.domain.transports import DIRECT, FIWARE
+from iveg.domain.world import RobotState
+from iveg.pipeline import topics
+from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
+from iveg.pipeline.publish import Hub
+from iveg.pipeline.record import OdometryThinner, RecordSink
+
+_KEPT_LINES = 500
+CLIMATE_PERIOD_S = 60.0
+"""Air changes slowly: a day is 1,440 rows."""
+READING_PERIOD_S = 60.0
+_NOT_VALUES = ("robot_id", "origin")
+
+
+class EventLog:
+    """Tells and writes down.
+
+    Attributes:
+        lines: The newest log lines, oldest first.
+    """
+
+    def __init__(self, hub: Hub, sink: RecordSink, start: Instant) -> None:
+        self._hub = hub
+        self._sink = sink
+        self._thinner = OdometryThinner()
+        self._climate_kept: float | None = None
+        self._readings_kept: dict[tuple[str, type[Observation]], float] = {}
+        # Starting at the clock keeps ids growing over restarts without asking anyone.
+        self._next_id = int(start.wall * 1000)
+        self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
+
+    def log(self, event: LogEvent, at: Instant) -> None:
+        """One line of the log."""
+        self._next_id += 1
+        record = LogRecord(
+            id=self._next_id,
+            at=at.wall,
+            kind=event.kind,
+            robot_id=event.robot_id,
+            key=event.key,
+            slots=json.dumps(dict(event.slots), ensure_ascii=False),
+            class_=event.class_,
+            decision_id=event.decision_id,
+        )
+        self.lines.append(record)
+        self._sink.offer(record)
+        self._hub.append(topics.LOG.name, record)
+
+    def recall(self, earlier: Iterable[LogRecord]) -> None:
+        """Put lines of an earlier run before those of this one; any order."""
+        first = self.lines[0].id if self.lines else self._next_id + 1
+        before = sorted((one for one in earlier if one.id < first), key=_number)
+        before = before[-(_KEPT_LINES - len(self.lines)) :]
+        if before and len(self.lines) < _KEPT_LINES:
+            self.lines.extendleft(reversed(before))
+            self._hub.append(topics.EARLIER_LOG.name, before)
+
+    def decision(self, decision: Decision, now: Instant) -> None:
+        """A decision is new or has grown a link."""
+        self._sink.offer(record_of(decision, now))
+
+    def left_behind(
+        self,
+        decisions: Iterable[DecisionRecord],
+        alerts: Iterable[AlertRecord],
+        now: Instant,
+    ) -> None:
+        """What an earlier run left open is over, and nobody knows how it ended."""
+        for decision in decisions:
+            self._sink.offer(left_behind(decision, now.wall))
+        for alert in alerts:
+            self._sink.offer(cleared_behind(alert, now.wall))
+
+    def detection(
+        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: str
+    ) -> None:
+        """One detection that is worth a row."""
+        x, y, z = one.position
+        self._sink.offer(
+            DetectionRecord(
+                at=at.wall,
+                robot_id=robot_id,
+                class_id=one.detection.class_id,
+                probability=one.detection.probability,
+                x=x,
+                y=y,
+                z=z,
+                confident=one.kind != "faint",
+                road=road,
+                stamp=stamp,
+                class_=one.class_,
+                person_id=None if one.person is None else one.person.person_id,
+                box=json.dumps(
+                    {
+                        **asdict(one.detection.box),
+                        "frame_id": one.detection.frame_id,
+                    }
+                ),
+            )
+        )
+
+    def odometry(
+        self, robot: RobotState, mandated: float, link: str, at: Instant
+    ) -> None:
+        """A pose, if it is one of the two a second that are kept."""
+        if robot.odometry is None:
+            return
+        pose, twist = robot.odometry.pose, robot.odometry.twist
+        record = self._thinner.take(
+            OdometryRecord(
+                at=at.wall,
+                robot_id=robot.robot_id,
+                x=pose.x,
+                y=pose.y,
+                yaw=pose.yaw,
+                linear=twist.linear_x,
+                angular=twist.angular_z,
+                mandated_factor=mandated,
+                applied_factor=None
+                if robot.safety is None
+                else robot.safety.speed_factor,
+                link=link,
+            )
+        )
+        if record is not None:
+            self._sink.offer(record)
+
+    def command(self, command: Command, changed: Changed | None, at: Instant) -> None:
+        """A command is new or has taken a step."""
+        times = command.times
+        self._sink.offer(
+            CommandRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                kind=command.kind,
+                state=command.state,
+                requested_by=command.requesters[0],
+                requested_at=times.requested.wall,
+                sent_fiware_at=wall_of(times.sent.get(FIWARE.id)),
+                sent_direct_at=wall_of(times.sent.get(DIRECT.id)),
+                answer_fiware_at=wall_of(times.answered.get(FIWARE.id)),
+                answer_direct_at=wall_of(times.answered.get(DIRECT.id)),
+                standing_at=wall_of(times.standing),
+                standstill_ms=command.standstill_ms,
+                tries=command.tries,
+                reason=command.reason,
+                pressed_at=times.pressed,
+                drill=command.drill,
+            )
+        )
+        if changed is not None:
+            self._audit(command, changed.state, changed.why or changed.key, at)
+        self._hub.append(topics.COMMAND.of(command.command_id), command)
+
+    def closed(self, closed: Closed, at: Instant) -> None:
+        """A command is followed no more."""
+        command = closed.command
+        self.command(command, None, at)
+        self._audit(command, command.state, closed.key, at)
+
+    def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:
+        """A command of an earlier run is followed no more.
+
+        Args:
+            row: As the crash left it.
+            heir: The STOP that was asserted again in its place, if one was.
+            at: This moment.
+        """
+        state = "EXPIRED" if heir is None else "REPLACED"
+        self._sink.offer(replace(row, state=state, reason="restarted"))
+        told = "followed no more" if heir is None else f"asserted again under {heir}"
+        self._audit(row, state, f"server restarted; {told}", at)
+
+    async def flushed(self) -> None:
+        """Return when every command and audit row so far would outlive a crash."""
+        await self._sink.flushed()
+
+    def rule(self, event: LogEvent, at: Instant) -> None:
+        """Another version of the rule is in force: its rings are others, too."""
+        self.log(event, at)
+        for topic in (topics.RULE, topics.PEOPLE):
+            self._hub.changed(topic.name)
+
+    def _audit(
+        self, command: Command | CommandRecord, state: str, why: str, at: Instant
+    ) -> None:
+        self._sink.offer(
+            CommandEventRecord(
+                command_id=command.command_id,
+                robot_id=command.robot_id,
+                at=at.wall,
+                state=state,
+                why=why,
+            )
+        )
+
+    def climate(self, read: Climate, at: Instant) -> None:
+        """The air was measured: history keeps it once a minute."""
+        # Devices that send every minute are late as often as early.
+        kept = self._climate_kept
+        if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:
+            return
+        self._climate_kept = at.mono
+        self._sink.offer(
+            ClimateRecord(
+                at=at.wall,
+                temperature=read.temperature,
+                relative_humidity=read.relative_humidity,
+                co2=read.co2,
+            )
+        )
+
+    def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
+        """A small sensor spoke: history keeps each of them once a minute."""
+        kind = type(read)
+        kept = self._readings_kept.get((robot_id, kind))
+        if kept is not None and at.mono - kept < 0.9 * READING_PERIOD_S:
+            return
+        self._readings_kept[robot_id, kind] = at.mono
+        own = (one.name for one in fields(read) if one.name not in _NOT_VALUES)
+        self._sink.offer(
+            ReadingRecord(
+                at=at.wall,
+                robot_id=robot_id,
+                kind=kind.__name__.lower(),
+                value={name: getattr(read, name) for name in own},
+            )
+        )
+
+    def alert(self, alert: Alert) -> None:
+        """An alert was raised, acknowledged or cleared."""
+        condition, last = alert.condition, alert.last
+        members = [_member(one) for one in alert.members]
+        self._sink.offer(
+            AlertRecord(
+                alert_id=alert.alert_id,
+                priority=alert.priority,
+                key=condition.key,
+                raised_at=alert.raised.wall,
+                last_raised_at=last.raised.wall,
+                slots=json.dumps(dict(condition.slots), ensure_ascii=False),
+                robot_id=condition.robot_id,
+                cleared_at=wall_of(last.cleared),
+                acknowledged_at=wall_of(last.acknowledged),
+                acknowledged_by=last.acknowledged_by,
+                note=last.note or None,
+                count=alert.count,
+                members=json.dumps(members, ensure_ascii=False),
+            )
+        )
+        self._hub.changed(topics.ALERTS.name)
+
+
+def _number(line: LogRecord) -> int:
+    return line.id
+
+
+def _member(one: Occurrence) -> dict[str, str | float | None]:
+    return {
+        "priority": one.priority,
+        "raised_at": one.raised.wall,
+        "cleared_at": wall_of(one.cleared),
+        "acknowledged_at": wall_of(one.acknowledged),
+        "acknowledged_by": one.acknowledged_by,
+        "note": one.note or None,
+    }

@@ -1,0 +1,127 @@
+"""What the fleet is told (Algorithm 2, line 13): one feedback for each observer."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from iveg.domain.detection_rule import Rule
+from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.observations import Instant, Origin
+from iveg.domain.tracking.people import People
+from iveg.domain.world import RobotState, World
+from iveg.pipeline.ports import Fleet
+
+USED_HZ, BURST = 30.0, 8.0
+"""What robots can use of feedback, and how many may come at once (1/s, 1)."""
+MOST_ALERTS = 256
+"""A robot refuses feedback with more."""
+
+
+class FeedbackPublisher:
+    """Writes the feedback and hands it to the fleet.
+
+    One count goes over all topics of a boot of iVeg, so that what a robot echoes names
+    one message (docs/interfaces.md §4).
+
+    Args:
+        other: The stamp of each robot's newest confident object of another class.
+        stamp: Writes a wall-clock moment the way the wire does.
+        boot: Random, new at each start: identity of our feedback.
+        backlog: How far Orion is behind (s); None where nobody knows.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        other: Mapping[str, FeedbackAlert],
+        fleet: Fleet,
+        stamp: Callable[[float], str],
+        boot: str,
+        backlog: Callable[[Instant], float | None] = lambda _: None,
+    ) -> None:
+        self.published_at = float("-inf")
+        self._world = world
+        self._people = people
+        self._other = other
+        self._fleet = fleet
+        self._stamp = stamp
+        self._boot = boot
+        self._backlog = backlog
+        self._seq = 0
+        self._left, self._left_at = BURST, float("-inf")
+
+    def may_publish(self, now: Instant) -> bool:
+        """Whether robots can use one more: 30 Hz in the mean, a few close together."""
+        return self._allowance(now) >= 1.0
+
+    def _allowance(self, now: Instant) -> float:
+        since = max(0.0, now.mono - self._left_at)
+        return min(BURST, self._left + USED_HZ * since)
+
+    def tell(
+        self, speed_limits: Mapping[str, SpeedLimit], rule: Rule, now: Instant
+    ) -> None:
+        """Send every robot what the fleet must know."""
+        self.published_at = now.mono
+        self._left = max(0.0, self._allowance(now) - 1.0)
+        self._left_at = now.mono
+        alerts = _newest(tuple(self._alerts(rule, now)))
+        seen = {
+            robot.robot_id: robot.safety.origin.seq
+            for robot in self._world.robots.values()
+            if robot.safety is not None and robot.safety.origin.seq is not None
+        }
+        robots = self._world.robots
+        first, last = self._seq + 1, self._seq + len(robots)
+        # Before anybody can have heard it: a moment too early makes ages no younger.
+        self._world.ledger.composed(self._boot, first, last, now.mono)
+        for robot in robots.values():
+            self._seq += 1
+            self._fleet.tell(self._feedback(robot, alerts, speed_limits, seen, now))
+
+    def _feedback(
+        self,
+        robot: RobotState,
+        alerts: tuple[FeedbackAlert, ...],
+        speed_limits: Mapping[str, SpeedLimit],
+        seen: Mapping[str, int],
+        now: Instant,
+    ) -> Feedback:
+        mine = [one for one in alerts if one.observer == robot.robot_id]
+        newest = max(mine, key=lambda one: one.stamp, default=None)
+        odometry = None if robot.is_replay else robot.odometry
+        return Feedback(
+            robot.robot_id,
+            Origin(self._boot, self._seq, self._stamp(now.wall)),
+            newest or self._other.get(robot.robot_id),
+            alerts,
+            None if odometry is None else odometry.pose,
+            None if odometry is None else odometry.twist,
+            None if odometry is None else odometry.origin.stamp,
+            speed_limits,
+            seen,
+            self._backlog(now),
+        )
+
+    def _alerts(self, rule: Rule, now: Instant) -> Iterable[FeedbackAlert]:
+        for person in self._people.known.values():
+            for sighting, radius in person.rings(rule, now):
+                # What a recording saw long ago must not slow a robot of today.
+                if self._world.robots[sighting.observer].is_replay:
+                    continue
+                yield FeedbackAlert(
+                    person.decision_id,
+                    self._stamp(sighting.at.wall),
+                    person.class_,
+                    sighting.class_id,
+                    sighting.confidence,
+                    (sighting.x, sighting.y, sighting.z),
+                    radius,
+                    sighting.observer,
+                )
+
+
+def _newest(alerts: tuple[FeedbackAlert, ...]) -> tuple[FeedbackAlert, ...]:
+    """As many as a robot reads; the speed limits count the others, too."""
+    if len(alerts) <= MOST_ALERTS:
+        return alerts
+    return tuple(sorted(alerts, key=lambda one: one.stamp)[-MOST_ALERTS:])

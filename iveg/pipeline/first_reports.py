@@ -1,0 +1,93 @@
+"""When iVeg was told of each person, so that a robot's answer can be timed from there.
+
+A robot judges what the feedback told it by its own pose and is often ahead of iVeg: its
+report that it slows for an alert comes before iVeg finds it inside the ring.  It is
+timed all the same, from the newest look that robots had been told of by then::
+
+    look notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
+         └───────────── timed ─────────────┘
+"""
+
+from collections import deque
+from collections.abc import Container
+from dataclasses import dataclass, field
+
+from iveg.domain.feedback import HALF_SPEED
+from iveg.domain.observations import Instant, SafetyReport
+from iveg.domain.rule.speed_limits import Crossing
+
+FRESH_S = 0.25
+"""A ring that nobody has looked at for longer is known: who enters it is not timed."""
+_KEPT = 16
+
+
+@dataclass(frozen=True, slots=True)
+class FirstReport:
+    """The look that an answer is timed from.
+
+    Attributes:
+        at: Arrival of its notification (monotonic, s).
+        answered: When the robot said that it slows (monotonic, s); None where that is
+            still to come.
+    """
+
+    at: float
+    answered: float | None = None
+
+
+@dataclass(slots=True)
+class FirstReports:
+    """Looks by person, and the robots that slowed for an alert by themselves."""
+
+    _detections: dict[str, deque[float]] = field(default_factory=dict)
+    _ahead: dict[str, tuple[str, float, float]] = field(default_factory=dict)
+    """Robot → alert, when it first said so, when feedback had gone out before."""
+    _slow: set[str] = field(default_factory=set)
+
+    def seen(self, person_id: str, at: Instant) -> None:
+        """A look that found this person was notified."""
+        looks = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
+        looks.append(at.mono)
+
+    def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
+        """A robot said what it applies; feedback last went out at ``published_at``."""
+        robot_id, alert = report.robot_id, report.decision_id or ""
+        was_slow = robot_id in self._slow
+        if report.speed_factor > HALF_SPEED:
+            self._slow.discard(robot_id)
+            self._ahead.pop(robot_id, None)
+            return
+        self._slow.add(robot_id)
+        if not was_slow:
+            self._ahead[robot_id] = alert, at.mono, published_at
+        elif robot_id in self._ahead and self._ahead[robot_id][0] != alert:
+            # Slow for something else already: that it names this too tells no time.
+            del self._ahead[robot_id]
+
+    def of(self, crossing: Crossing) -> FirstReport | None:
+        """What the answer to a crossing is timed from; None where nothing tells."""
+        zone = crossing.zone
+        if zone.sighting is None:
+            return None
+        if not crossing.ahead:
+            return self._notice(zone.cause, crossing.entered.mono)
+        alert, answered, published_at = self._ahead.get(
+            crossing.robot_id, ("", 0.0, 0.0)
+        )
+        if alert != zone.alert_id:
+            return None
+        return self._notice(zone.cause, published_at, answered)
+
+    def _notice(
+        self, person_id: str, before: float, answered: float | None = None
+    ) -> FirstReport | None:
+        looks = [at for at in self._detections.get(person_id, ()) if at <= before]
+        now = before if answered is None else answered
+        if not looks or now - looks[-1] > FRESH_S:
+            return None
+        return FirstReport(looks[-1], answered)
+
+    def forget(self, known: Container[str]) -> None:
+        """Keep only those who are still known."""
+        for person_id in [one for one in self._detections if one not in known]:
+            del self._detections[person_id]

@@ -1,0 +1,190 @@
+"""What the log says of speeds and alerts: which sentence, and what fills its holes."""
+
+from dataclasses import dataclass, replace
+
+from iveg.domain.alerts.alert_book import Alert
+from iveg.domain.alerts.flood import FLOOD_LIMIT, FLOOD_WINDOW_S, Flood
+from iveg.domain.decisions import Decisions
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.feedback import FULL_SPEED
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import SafetyReport
+from iveg.domain.rule.speed_limits import Crossing
+from iveg.domain.tracking.people import People
+from iveg.domain.tracking.person import Person
+from iveg.domain.world import RobotState, World
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Who was seen by whom, and how far from the robot that slowed down (m).
+
+    Attributes:
+        decision_id: The decision that opens; None where the robot was ahead of ours.
+        radius_m: Of the ring that it came into, where it had grown: nobody had looked
+            for ``unseen_s`` seconds.
+    """
+
+    cause: str
+    class_: str
+    observer: str
+    distance_m: float
+    in_sight: bool
+    confidence: float | None = None
+    decision_id: str | None = None
+    radius_m: float | None = None
+    unseen_s: float | None = None
+
+
+def evidence_of(
+    report: SafetyReport,
+    decisions: Decisions,
+    people: People,
+    world: World,
+    greenhouse: Greenhouse,
+) -> Evidence | None:
+    """What iVeg knows of the reason that a robot gives; None when nothing.
+
+    A robot judges alerts by its own pose, too, and may be ahead of our decision; it
+    then names the alert, and what is known of that person is the evidence.
+    """
+    if report.reason not in ("person", "robot"):
+        return None
+    decision = decisions.get(report.decision_id or "")
+    if decision is not None:
+        return _of_crossing(decision.crossing)
+    robot = world.robots[report.robot_id]
+    found = _without_decision(report, robot, people, world, greenhouse)
+    if found is None:
+        return None
+    ours = (
+        one.decision_id
+        for one in decisions.every_open()
+        if (one.crossing.robot_id, one.crossing.zone.cause)
+        == (robot.robot_id, found.cause)
+    )
+    return replace(found, decision_id=next(ours, None))
+
+
+def _without_decision(
+    report: SafetyReport,
+    robot: RobotState,
+    people: People,
+    world: World,
+    greenhouse: Greenhouse,
+) -> Evidence | None:
+    for person in people.known.values():
+        if report.decision_id == person.decision_id:
+            return _of_person(person, robot, greenhouse)
+    peer = world.robots.get(report.cause or "")
+    return None if peer is None else _of_peer(peer, robot, greenhouse)
+
+
+def _of_crossing(crossing: Crossing) -> Evidence:
+    zone, look = crossing.zone, crossing.zone.sighting
+    confidence = None if look is None else look.confidence
+    unseen = None if look is None else look.age_s(crossing.entered)
+    grown = unseen is not None and unseen > LIMITS.growth_grace_s
+    return Evidence(
+        zone.cause,
+        zone.reason,
+        zone.observer,
+        crossing.entered_m,
+        crossing.in_sight,
+        confidence,
+        crossing.decision_id,
+        zone.radius_m if grown else None,
+        unseen if grown else None,
+    )
+
+
+def _of_person(
+    person: Person, robot: RobotState, greenhouse: Greenhouse
+) -> Evidence | None:
+    if robot.odometry is None:
+        return None
+    pose, look = robot.odometry.pose, person.newest
+    return Evidence(
+        person.person_id,
+        person.class_,
+        look.observer,
+        pose.distance_to(look.x, look.y),
+        look.observer == robot.robot_id
+        or greenhouse.in_sight(pose.x, pose.y, look.x, look.y),
+        look.confidence,
+    )
+
+
+def _of_peer(
+    peer: RobotState, robot: RobotState, greenhouse: Greenhouse
+) -> Evidence | None:
+    if robot.odometry is None or peer.odometry is None:
+        return None
+    pose, other = robot.odometry.pose, peer.odometry.pose
+    return Evidence(
+        peer.robot_id,
+        "robot",
+        peer.robot_id,
+        pose.distance_to(other.x, other.y),
+        greenhouse.in_sight(pose.x, pose.y, other.x, other.y),
+    )
+
+
+def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
+    """A robot applies another factor than before, and why."""
+    slots: dict[str, Slot] = {
+        "robot": report.robot_id,
+        "factor": report.speed_factor,
+        "reason": report.reason,
+        "cause": report.cause,
+    }
+    key = "log.speed_up"
+    if report.speed_factor < FULL_SPEED:
+        key = f"log.speed_down.{report.reason}"
+        if evidence is not None:
+            key += "" if evidence.in_sight else "_nlos"
+            slots |= {
+                "distance": round(evidence.distance_m, 2),
+                "observer": evidence.observer,
+                "person": evidence.cause,
+                "class": evidence.class_,
+                "confidence": evidence.confidence,
+                "in_sight": evidence.in_sight,
+            }
+            if evidence.radius_m is not None and evidence.unseen_s is not None:
+                slots["radius"] = round(evidence.radius_m, 2)
+                slots["unseen"] = round(evidence.unseen_s, 1)
+    return LogEvent(
+        "speed",
+        key,
+        slots,
+        report.robot_id,
+        None if evidence is None else evidence.class_,
+        None if evidence is None else evidence.decision_id,
+    )
+
+
+def flood_line(before: Flood, after: Flood) -> LogEvent | None:
+    """A flood of alerts began or is over; None while neither."""
+    if (before.since is None) == (after.since is None):
+        return None
+    key = "log.flood.over" if after.since is None else "log.flood.began"
+    slots: dict[str, Slot] = {
+        "count": after.count,
+        "minutes": FLOOD_WINDOW_S / 60,
+        "limit": FLOOD_LIMIT,
+    }
+    return LogEvent("alert", key, slots)
+
+
+def alert_line(alert: Alert) -> LogEvent:
+    """An alert came or went."""
+    condition = alert.condition
+    key = "log.alert.raised" if alert.cleared is None else "log.alert.cleared"
+    slots: dict[str, Slot] = {
+        **condition.slots,
+        "alert": condition.key,
+        "priority": alert.priority,
+    }
+    return LogEvent("alert", key, slots, condition.robot_id)

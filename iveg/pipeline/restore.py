@@ -1,0 +1,140 @@
+"""What earlier runs left in the history, taken up while STOP serves already.
+
+A P1 that nobody saw waits on, the log goes on where it broke off, and what a crash left
+open is closed.  Nothing waits for this: until the history answers the page says that
+earlier alerts are unknown.
+"""
+
+import asyncio
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, cast
+
+from iveg.domain.alerts.alert_book import (
+    MOST_KEPT,
+    Alert,
+    Condition,
+    Occurrence,
+    Priority,
+)
+from iveg.domain.errors import HopError
+from iveg.domain.observations import Instant
+from iveg.domain.records import (
+    AlertRecord,
+    CommandRecord,
+    DecisionRecord,
+    LogRecord,
+)
+from iveg.pipeline.command import Commander
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.evidence import cleared_behind
+from iveg.pipeline.health_monitor import HealthMonitor
+from iveg.pipeline.ports import Clock
+
+LINES = 200
+"""Lines of the log that come back."""
+_AGAIN_S = 5.0
+
+
+class History(Protocol):
+    """What is asked of the history; each raises HopError while it does not answer."""
+
+    async def open_commands(self) -> Sequence[CommandRecord]:
+        """Commands that still went on."""
+
+    async def open_decisions(self) -> Sequence[DecisionRecord]:
+        """Decisions without an end."""
+
+    async def open_alerts(self) -> Sequence[AlertRecord]:
+        """Alerts that were active."""
+
+    async def unseen_alerts(self, most: int) -> Sequence[AlertRecord]:
+        """The newest P1s that nobody acknowledged."""
+
+    async def last_drills(self) -> dict[str, float]:
+        """Robot → its last drill (Unix s)."""
+
+    async def newest_lines(self, most: int) -> Sequence[LogRecord]:
+        """The newest lines of the log."""
+
+
+async def remember(
+    history: History,
+    commander: Commander,
+    evaluator: Evaluator,
+    event_log: EventLog,
+    health_monitor: HealthMonitor,
+    read_clock: Clock,
+) -> None:
+    """Ask until the history answers; returns when all of it is taken up."""
+    while True:
+        try:
+            left_open = await history.open_commands()
+            decisions = await history.open_decisions()
+            alerted = await history.open_alerts()
+            unseen = await history.unseen_alerts(MOST_KEPT)
+            drilled = await history.last_drills()
+            lines = await history.newest_lines(LINES)
+        except HopError:
+            await asyncio.sleep(_AGAIN_S)
+            continue
+        now = read_clock()
+        commander.close_earlier(left_open, now)
+        commander.drills.remember(drilled)
+        evaluator.close_earlier(decisions, alerted, now)
+        evaluator.alerts.remember(alert_of(one, now) for one in unseen)
+        event_log.recall(lines)
+        health_monitor.earlier_read = True
+        return
+
+
+def alert_of(record: AlertRecord, now: Instant) -> Alert:
+    """An alert of the history as one that is over, with its life as it was."""
+    if record.cleared_at is None:
+        record = cleared_behind(record, now.wall)
+    priority = cast("Priority", record.priority)
+    members = tuple(_occurrence(one, now) for one in json.loads(record.members))
+    last = Occurrence(
+        priority,
+        _moment(record.last_raised_at, now),
+        _moment(record.cleared_at or now.wall, now),
+    )
+    return Alert(
+        record.alert_id,
+        Condition(
+            priority,
+            record.key,
+            _subject(record),
+            record.robot_id,
+            json.loads(record.slots),
+        ),
+        _moment(record.raised_at, now),
+        members or (last,),
+        unseen=priority if record.acknowledged_at is None else None,
+        count=record.count,
+    )
+
+
+def _subject(record: AlertRecord) -> str:
+    """Whom it was about; of a person nobody knows after a restart who it was."""
+    if record.robot_id is None or "person" in json.loads(record.slots):
+        return record.alert_id
+    return record.robot_id
+
+
+def _occurrence(told: Mapping[str, Any], now: Instant) -> Occurrence:
+    cleared, seen = told["cleared_at"], told["acknowledged_at"]
+    return Occurrence(
+        told["priority"],
+        _moment(told["raised_at"], now),
+        None if cleared is None else _moment(cleared, now),
+        None if seen is None else _moment(seen, now),
+        told["acknowledged_by"],
+        told["note"] or "",
+    )
+
+
+def _moment(wall: float, now: Instant) -> Instant:
+    """A moment of an earlier run on this run's clock."""
+    return Instant(now.mono - (now.wall - wall), wall)

@@ -1,0 +1,105 @@
+"""What only time brings: links that fall silent, people who are remembered and go."""
+
+from iveg.domain.events import LogEvent, Slot
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.people import People
+from iveg.domain.tracking.person import Person
+from iveg.domain.tracking.sight import AllClear
+from iveg.domain.world import Link, RobotState, World
+from iveg.pipeline import topics
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.publish import Hub
+
+_STAGE_KEYS = {
+    "seen": "log.person_seen",
+    "remembered": "log.person_remembered",
+    "last_seen": "log.person_expired",
+}
+
+
+class Staleness:
+    """Lets the world grow older and logs each step of it."""
+
+    def __init__(
+        self,
+        world: World,
+        people: People,
+        greenhouse: Greenhouse,
+        event_log: EventLog,
+        hub: Hub,
+    ) -> None:
+        self._world = world
+        self._people = people
+        self._greenhouse = greenhouse
+        self._event_log = event_log
+        self._hub = hub
+        self._all_clear = AllClear()
+        self._links: dict[str, Link] = {}
+        self._stages: dict[str, str] = {}
+
+    def tick(self, now: Instant) -> None:
+        """Compare every link and every person with what was last said of them."""
+        for robot in self._world.robots.values():
+            self._watch_link(robot, now)
+        people = self._people
+        for person in people.known.values():
+            self._log_stage(person, now)
+        empty = self._all_clear.sweep(people, self._world, self._greenhouse, now)
+        for person in empty:
+            self._log_clear(person, now)
+        for person in people.forget(now):
+            self._stages.pop(person.person_id, None)
+            self._hub.changed(topics.PEOPLE.name)
+
+    def _watch_link(self, robot: RobotState, now: Instant) -> None:
+        link = robot.link(now)
+        before = self._links.get(robot.robot_id, "UNKNOWN")
+        if link == before:
+            return
+        self._links[robot.robot_id] = link
+        self._hub.changed(topics.ROBOT.of(robot.robot_id))
+        if link == "UNKNOWN":
+            # For as long as it takes to prove an age; if that fails, it is LOST.
+            return
+        age, slots = robot.age_s(now), dict[str, Slot](robot=robot.robot_id)
+        key = "log.link.unproven" if age is None else f"log.link.{link.lower()}"
+        if age is not None:
+            slots["age"] = round(age, 1)
+        self._event_log.log(LogEvent("link", key, slots, robot.robot_id), now)
+
+    def _log_stage(self, person: Person, now: Instant) -> None:
+        stage = person.stage(now)
+        before = self._stages.get(person.person_id)
+        if stage == before:
+            return
+        self._stages[person.person_id] = stage
+        self._hub.changed(topics.PEOPLE.name)
+        key = _STAGE_KEYS.get(stage)
+        # The first sighting has a line of its own.
+        if key is None or before is None:
+            return
+        newest = person.newest
+        slots: dict[str, Slot] = {
+            "person": person.person_id,
+            "observer": newest.observer,
+            "class": person.class_,
+            "lane": self._greenhouse.lane_at(newest.x, newest.y) or "",
+        }
+        self._event_log.log(
+            LogEvent("detection", key, slots, newest.observer, person.class_), now
+        )
+
+    def _log_clear(self, person: Person, now: Instant) -> None:
+        self._hub.changed(topics.PEOPLE.name)
+        newest = person.newest
+        if person.sightings or person.stage(now) != "remembered":
+            return
+        slots: dict[str, Slot] = {
+            "person": person.person_id,
+            "lane": self._greenhouse.lane_at(newest.x, newest.y) or "",
+        }
+        self._event_log.log(
+            LogEvent("detection", "log.person_cleared", slots, None, person.class_),
+            now,
+        )

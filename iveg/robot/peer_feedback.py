@@ -1,0 +1,267 @@
+"""What a robot knows from others: feedback of every peer topic, kept and aged.
+
+Algorithm 3 of the paper, judged against the robot's own pose.  It differs in four
+ways: a person who is missing from a message ages out instead of vanishing, a ring grows
+while its topic is silent (safety.md §3.4), a peer that is known to stand slows nobody,
+and an alert about the robot itself is ignored, or it would slow for ever.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from iveg.domain.feedback import (
+    CLEAR,
+    FULL_SPEED,
+    HALF_SPEED,
+    Feedback,
+    FeedbackAlert,
+    SpeedLimit,
+)
+from iveg.domain.geometry import Pose2D
+from iveg.domain.limits import LIMITS, ring_radius
+from iveg.domain.observations import Origin
+from iveg.robot.caps import FREE, Cap, known_reason, quantised
+
+MOVED_ON_S = 1.0
+MYSELF_WITHIN_M = 1.0
+_MAX_TOPICS, _MAX_ALERTS, _MAX_BOOTS = 64, 512, 32
+
+_Key = tuple[str, str | None, str | None, int]
+"""Decision, observer, class, and which of those that share them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """One alert as last told.
+
+    Attributes:
+        missing_since: First message of the topic that was without it; None: present.
+        myself: It describes this robot.
+    """
+
+    alert: FeedbackAlert
+    at: float
+    missing_since: float | None = None
+    myself: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Peer:
+    """The observer of a topic, where iVeg believes it to be.
+
+    Attributes:
+        stamp: As told; while it stays the same, the pose grows old.
+        at: When this stamp was first told (monotonic, s).
+    """
+
+    pose: Pose2D
+    stands: bool
+    stamp: str | None
+    at: float
+
+    def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
+        """What the peer asks of a robot at ``own``."""
+        age = now - self.at
+        if age > LIMITS.ring_lasts_s or (self.stands and age <= LIMITS.silence_s):
+            return FREE
+        ring = ring_radius(LIMITS.ring_default_m, age) + beyond
+        near = own.distance_to(self.pose.x, self.pose.y) <= ring
+        return Cap(HALF_SPEED, "robot", name) if near else FREE
+
+
+@dataclass(slots=True)
+class _Topic:
+    """What one topic said last; ``boots`` are all it ever had, newest last."""
+
+    origin: Origin
+    at: float
+    boots: list[str | None]
+    peer: _Peer | None = None
+    speed_limit: SpeedLimit = CLEAR
+    alerts: dict[_Key, _Kept] = field(default_factory=dict)
+
+
+class PeerFeedback:
+    """Everything that feedback told one robot.
+
+    Args:
+        robot_id: Whose speed limits count.
+    """
+
+    def __init__(self, robot_id: str) -> None:
+        self._me = robot_id
+        self._topics: dict[str, _Topic] = {}
+
+    def take(
+        self, topic: str, feedback: Feedback, own: Pose2D | None, now: float
+    ) -> bool:
+        """Take a message of ``topic``; older ones than it already gave are dropped.
+
+        Returns:
+            Whether it counted.
+        """
+        memory = self._topics.get(topic)
+        if memory is None:
+            memory = _Topic(feedback.origin, now, [feedback.origin.boot])
+            self._make_room()
+            self._topics[topic] = memory
+        elif not _newer(feedback.origin, memory):
+            return False
+        memory.origin, memory.at = feedback.origin, now
+        memory.peer = self._peer(memory.peer, feedback, now)
+        memory.speed_limit = feedback.speed_limits.get(self._me, CLEAR)
+        self._remember(memory, feedback, own, now)
+        return True
+
+    def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
+        """Everything that asks this robot to be slow, at pose ``own`` in ``map``.
+
+        Args:
+            own: None while the robot does not know where it is.
+            slowed: The robot is slow for a person or peer: rings let go later.
+            now: Monotonic (s).
+        """
+        beyond = LIMITS.release_beyond_m if slowed else 0.0
+        for name, topic in self._topics.items():
+            silence = now - topic.at
+            if silence > LIMITS.ring_lasts_s:
+                continue
+            yield _mandated(topic.speed_limit)
+            for kept in topic.alerts.values():
+                if kept.myself or not _alive(kept, topic, now):
+                    continue
+                ring = _ring(kept.alert, silence) + beyond
+                if _inside(kept.alert, topic.peer, own, ring):
+                    yield _alerted(kept.alert)
+            if topic.peer is not None and own is not None:
+                yield topic.peer.cap(name, own, beyond, now)
+
+    def _peer(
+        self, before: _Peer | None, feedback: Feedback, now: float
+    ) -> _Peer | None:
+        if feedback.robot_id == self._me or feedback.pose is None:
+            return None
+        twist, stamp = feedback.twist, feedback.pose_stamp
+        stands = (
+            twist is not None
+            and max(abs(twist.linear_x), abs(twist.angular_z)) < LIMITS.standing_speed
+        )
+        repeated = before is not None and stamp is not None and before.stamp == stamp
+        at = before.at if before is not None and repeated else now
+        return _Peer(feedback.pose, stands, stamp, at)
+
+    def _make_room(self) -> None:
+        if len(self._topics) >= _MAX_TOPICS:
+            del self._topics[min(self._topics, key=lambda name: self._topics[name].at)]
+
+    def _remember(
+        self, topic: _Topic, feedback: Feedback, own: Pose2D | None, now: float
+    ) -> None:
+        told = _told(feedback)
+        kept = {
+            key: one for key, one in topic.alerts.items() if _alive(one, topic, now)
+        }
+        for key, one in kept.items():
+            if key not in told and one.missing_since is None:
+                kept[key] = replace(one, missing_since=now)
+        for key, alert in told.items():
+            myself = self._is_me(alert, topic, own, kept.get(key))
+            kept[key] = _Kept(alert, now, None, myself)
+        topic.alerts = dict(list(kept.items())[-_MAX_ALERTS:])
+
+    def _is_me(
+        self,
+        alert: FeedbackAlert,
+        topic: _Topic,
+        own: Pose2D | None,
+        before: _Kept | None,
+    ) -> bool:
+        # What I see myself is never me.
+        if alert.class_ != "robot" or alert.observer == self._me:
+            return False
+        if alert.class_id == self._me or _limited_free(topic.speed_limit, alert):
+            return True
+        if alert.position is None or own is None:
+            return False
+        near = own.distance_to(*alert.position[:2]) <= MYSELF_WITHIN_M
+        # I drive on; the spot where I was seen stays behind and is still about me.
+        same_spot = before is not None and before.alert.position == alert.position
+        return near or (same_spot and before is not None and before.myself)
+
+
+def _alive(kept: _Kept, topic: _Topic, now: float) -> bool:
+    """Whether an alert still counts: told lately, and its topic has not moved on."""
+    missing = kept.missing_since
+    moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
+    return not moved_on and now - kept.at <= LIMITS.ring_lasts_s
+
+
+def _newer(origin: Origin, topic: _Topic) -> bool:
+    """Whether a message counts: a boot not met before, or further in the count."""
+    if origin.boot != topic.origin.boot:
+        if origin.boot in topic.boots:
+            return False
+        topic.boots = [*topic.boots, origin.boot][-_MAX_BOOTS:]
+        return True
+    if origin.seq is None or topic.origin.seq is None:
+        return True
+    return origin.seq > topic.origin.seq
+
+
+def _told(feedback: Feedback) -> dict[_Key, FeedbackAlert]:
+    """The people and robots of one message; the newest is usually in the list too."""
+    alerts = list(feedback.alerts)
+    if feedback.alert is not None and feedback.alert not in alerts:
+        alerts.append(feedback.alert)
+    told: dict[_Key, FeedbackAlert] = {}
+    for alert in alerts:
+        if alert.class_ is None:
+            continue
+        number = 0
+        while (key := (*_whose(alert), number)) in told:
+            number += 1
+        told[key] = alert
+    return told
+
+
+def _whose(alert: FeedbackAlert) -> tuple[str, str | None, str | None]:
+    return alert.decision_id, alert.observer, alert.class_
+
+
+def _mandated(speed_limit: SpeedLimit) -> Cap:
+    factor = quantised(speed_limit.speed_factor)
+    if factor == FULL_SPEED:
+        return FREE
+    reason = known_reason(speed_limit.reason)
+    return Cap(factor, reason, speed_limit.cause, speed_limit.decision_id)
+
+
+def _limited_free(speed_limit: SpeedLimit, alert: FeedbackAlert) -> bool:
+    return (
+        alert.decision_id != ""
+        and speed_limit.decision_id == alert.decision_id
+        and speed_limit.speed_factor >= FULL_SPEED
+    )
+
+
+def _ring(alert: FeedbackAlert, silence: float) -> float:
+    told = LIMITS.ring_default_m if alert.radius_m is None else alert.radius_m
+    return ring_radius(told, silence)
+
+
+def _inside(
+    alert: FeedbackAlert, observer: _Peer | None, own: Pose2D | None, ring: float
+) -> bool:
+    """Whether I am in the ring; somebody of unknown place is where the observer is."""
+    if alert.position is not None:
+        place = alert.position[:2]
+    elif observer is not None:
+        place = (observer.pose.x, observer.pose.y)
+    else:
+        return True
+    return own is None or own.distance_to(*place) <= ring
+
+
+def _alerted(alert: FeedbackAlert) -> Cap:
+    reason = known_reason(alert.class_ or "stale")
+    return Cap(HALF_SPEED, reason, None, alert.decision_id or None)

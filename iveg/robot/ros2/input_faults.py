@@ -1,0 +1,77 @@
+"""What is wrong with what a robot's topics say: named, counted, and what it costs.
+
+A trouble lasts as long as it is noted, and two seconds more; while it lasts the robot
+is slow, or stands where driving on would be a guess.
+"""
+
+from collections import Counter
+from dataclasses import dataclass
+
+from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
+from iveg.domain.observations import RobotFault
+from iveg.robot.ros2.reading import clean
+
+LASTS_S = 2.0
+_MOST = 16
+
+STANDS = frozenset({"second_publisher"})
+"""Another program tells the drive where to go: what we let through decides nothing."""
+HARMLESS = frozenset({"unknown_to_iveg", "nobody_there"})
+"""Cost no speed: silence is judged by the watchdog, and by the age of odometry."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Noted:
+    """Since when and until when (monotonic, s); ``for_s`` None: since ``since``."""
+
+    since: float
+    last: float
+    for_s: float | None
+
+
+class InputFaults:
+    """Keeps what was noted; times are monotonic seconds."""
+
+    def __init__(self) -> None:
+        self._noted: dict[tuple[str, str], _Noted] = {}
+        self.counters: Counter[str] = Counter()
+        """How often each was noted, by its code."""
+
+    def note(
+        self, code: str, about: str, now: float, for_s: float | None = None
+    ) -> None:
+        """Something is wrong at this moment.
+
+        Args:
+            code: A short, stable name.
+            about: Topic or frames.
+            now: Monotonic (s).
+            for_s: How long it has been so where that is known better.
+        """
+        self.counters[code] += 1
+        key = clean(code), clean(about)
+        before = self._noted.get(key)
+        fresh = before is None or now - before.last > LASTS_S
+        since = now if fresh or before is None else before.since
+        if fresh and len(self._noted) >= _MOST:
+            del self._noted[min(self._noted, key=lambda one: self._noted[one].last)]
+        self._noted[key] = _Noted(since, now, for_s)
+
+    def faults(self, now: float) -> tuple[RobotFault, ...]:
+        """What lasts, in the order in which it began."""
+        self._noted = {
+            key: one for key, one in self._noted.items() if now - one.last <= LASTS_S
+        }
+        return tuple(
+            RobotFault(code, about, now - one.since if one.for_s is None else one.for_s)
+            for (code, about), one in self._noted.items()
+        )
+
+    def factor(self, now: float) -> tuple[float, str | None]:
+        """The fastest that is still no guess, and because of what."""
+        codes = [one.code for one in self.faults(now)]
+        for code in codes:
+            if code in STANDS:
+                return 0.0, code
+        slow = next((code for code in codes if code not in HARMLESS), None)
+        return (FULL_SPEED if slow is None else HALF_SPEED), slow

@@ -1,0 +1,427 @@
+"""Algorithm 1 on a ROS 2 robot: the newest of each topic, moved into ``map``.
+
+What has no place because a transform is missing or old goes out as unplaced, and the
+transform is named; nothing is placed by an old one.  Of all that waits only the newest
+message is read, so a flood costs no more than its bytes.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.observations import Battery as BatterySaid
+from iveg.domain.observations import (
+    Detection,
+    DetectionFrame,
+    Instant,
+    Odometry,
+    Origin,
+    Unplaced,
+)
+from iveg.robot.grounding.locate import Grounding
+from iveg.robot.ros2 import pictures, reading
+from iveg.robot.ros2.config import RobotConfig, Topics
+from iveg.robot.ros2.input_faults import InputFaults
+from iveg.robot.ros2.reading import Battery
+from iveg.robot.ros2.transforms import NoTransformError, Rigid, TransformBuffer
+from iveg.robot.uplink import Sensed
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
+
+TOPICS: dict[str, type[Message]] = {
+    "tf_static": m.TFMessage,
+    "tf": m.TFMessage,
+    "odometry": m.Odometry,
+    "scan": m.LaserScan,
+    "detections_3d": m.Detection3DArray,
+    "detections_2d": m.Detection2DArray,
+    "depth": m.Image,
+    "camera_info": m.CameraInfo,
+    "mask": m.Image,
+    "battery": m.BatteryState,
+    "path": m.Path,
+}
+"""What is listened to, in the order in which it is read."""
+
+SILENT_S = 1.0
+_CLOCK_OFF_S = 10.0
+_BACK_MESSAGES = 5
+_PICTURES = 6
+_SAME_PICTURE_S = 0.05
+_DEPTH_LATE_S = 0.3
+BATTERY_EVERY_S = 5.0
+"""A battery says nothing new more often than that."""
+
+_M = TypeVar("_M", bound=Message)
+
+
+PICTURES = ("depth", "mask")
+"""Large ones, of which few may wait."""
+
+
+def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
+    """What a robot listens to: key → full name and type.
+
+    A camera is listened to only where there are detections without depth.
+    """
+    camera = (*PICTURES, "camera_info") if not topics.detections_2d else ()
+    return {
+        key: (name, message)
+        for key, message in TOPICS.items()
+        if (name := getattr(topics, key)) and key not in camera
+    }
+
+
+class Payload(Protocol):
+    """One message as DDS gave it."""
+
+    @property
+    def payload(self) -> bytes:
+        """With its encapsulation."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Here:
+    """Where the robot was: in ``map``, and in its odometry's frame, at a stamp (s)."""
+
+    in_map: Rigid
+    in_odom: Rigid
+    odom: str
+    stamp: float
+
+
+@dataclass(slots=True)
+class _Stamps:
+    """The stamps of one topic: newer ones count, until its clock was set back."""
+
+    newest: float = 0.0
+    back: int = 0
+
+    def verdict(self, stamp: float) -> str:
+        """``new``, ``same``, ``back``, or ``reset`` when time really went back."""
+        if stamp > self.newest or stamp == 0.0:
+            self.newest, self.back = max(stamp, self.newest), 0
+            return "new"
+        if stamp == self.newest:
+            return "same"
+        self.back += 1
+        if self.back < _BACK_MESSAGES:
+            return "back"
+        self.newest, self.back = stamp, 0
+        return "reset"
+
+
+class SensorInputs:
+    """Turns what topics say into observations.
+
+    Args:
+        config: Names of topics and frames.
+        classes: A detector's class names by number; none: as sent.
+        sim_time: Stamps are a simulator's; they say nothing about clocks.
+    """
+
+    def __init__(
+        self,
+        config: RobotConfig,
+        classes: tuple[str, ...] = (),
+        *,
+        sim_time: bool = False,
+    ) -> None:
+        self._names = config.full_topics
+        self._frames = config.frames
+        self._classes = classes
+        self._sim_time = sim_time
+        self._grounding = Grounding(p_min=config.p_min)
+        self._transforms = TransformBuffer(config.tf_max_age_s)
+        self._tf_max_age_s = config.tf_max_age_s
+        self._stamps: dict[str, _Stamps] = {}
+        self._newest: dict[str, bytes] = {}
+        self._heard_at: dict[str, float] = {}
+        self._began: float | None = None
+        self._here: _Here | None = None
+        self._depths: deque[m.Image] = deque(maxlen=_PICTURES)
+        self._masks: deque[m.Image] = deque(maxlen=_PICTURES)
+        self._camera: m.CameraInfo | None = None
+        self._look: tuple[m.Detection2DArray, float] | None = None
+        self.battery: Battery | None = None
+        """What the battery said last."""
+        self._battery_told = float("-inf")
+        self.input_faults = InputFaults()
+
+    @property
+    def place(self) -> Rigid | None:
+        """Where the robot was last placed in ``map``."""
+        return None if self._here is None else self._here.in_map
+
+    @property
+    def transforms(self) -> TransformBuffer:
+        """The tree as it is known."""
+        return self._transforms
+
+    # --- what came ----------------------------------------------------------------
+
+    def hear(
+        self, topic: str, arrived: Sequence[Payload], now: float, most: int = 0
+    ) -> None:
+        """Take what waited on one of ``TOPICS``; ``most`` is how much could have."""
+        if not arrived:
+            return
+        self._heard_at[topic] = now
+        if most and len(arrived) >= most:
+            self.input_faults.note("flood", self._name(topic), now)
+        if topic in ("tf", "tf_static"):
+            for one in arrived:
+                self._hear_transforms(topic, one.payload, now)
+        else:
+            self._newest[topic] = arrived[-1].payload
+
+    def _hear_transforms(self, topic: str, payload: bytes, now: float) -> None:
+        message = self._read(topic, m.TFMessage, payload, now)
+        if message is not None:
+            refused = self._transforms.add(message, static=topic == "tf_static")
+            self.input_faults.counters["transforms_refused"] += refused
+
+    def tick(self, now: Instant) -> list[Sensed]:
+        """Everything that is new, odometry first."""
+        if self._began is None:
+            self._began = now.mono
+        found: list[Sensed] = []
+        self._note_silence(now.mono)
+        for topic, work in (
+            ("odometry", self._odometry),
+            ("scan", self._scan),
+            ("detections_3d", self._detections),
+            ("depth", self._depth),
+            ("mask", self._mask),
+            ("camera_info", self._camera_info),
+            ("detections_2d", self._picture),
+            ("battery", self._battery),
+            ("path", self._path),
+        ):
+            payload = self._newest.pop(topic, None)
+            if payload is not None:
+                found += self._attempt(topic, work, payload, now)
+        found += self._grounded(now)
+        return found
+
+    def _attempt(
+        self,
+        topic: str,
+        work: Callable[[bytes, Instant], list[Sensed]],
+        payload: bytes,
+        now: Instant,
+    ) -> list[Sensed]:
+        try:
+            return work(payload, now)
+        except UnreadableError as error:
+            self.input_faults.note(error.reason, self._name(topic), now.mono)
+            return []
+
+    def _read(
+        self, topic: str, message: type[_M], payload: bytes, now: float
+    ) -> _M | None:
+        try:
+            return cdr.read(message, payload)
+        except UnreadableError:
+            self.input_faults.note("unreadable", self._name(topic), now)
+            return None
+
+    def _stamped(
+        self, topic: str, message: type[_M], payload: bytes, now: Instant
+    ) -> tuple[_M, float] | None:
+        """A message and its stamp (s); None for one that is no news."""
+        read = self._read(topic, message, payload, now.mono)
+        if read is None:
+            return None
+        stamp = read.header.stamp.seconds  # type: ignore[attr-defined]
+        verdict = self._stamps.setdefault(topic, _Stamps()).verdict(stamp)
+        if verdict in ("back", "reset"):
+            self.input_faults.note("time_back", self._name(topic), now.mono)
+        if verdict == "reset":
+            self._transforms.clear()
+            self._here = None
+        if not self._sim_time and abs(stamp - now.wall) > _CLOCK_OFF_S:
+            self.input_faults.note("clock_off", self._name(topic), now.mono)
+        return None if verdict in ("back", "same") else (read, stamp)
+
+    def _name(self, topic: str) -> str:
+        return str(getattr(self._names, topic))
+
+    def _note_silence(self, now: float) -> None:
+        for topic in ("odometry", "scan"):
+            heard = self._heard_at.get(topic)
+            # A robot may have no laser; one that had one and is silent is blind.
+            since = self._began if heard is None and topic == "odometry" else heard
+            if since is not None and now - since > SILENT_S:
+                self.input_faults.note("no_data", self._name(topic), now, now - since)
+
+    # --- places -------------------------------------------------------------------
+
+    def _in_map(self, frame: str, stamp: float, now: float) -> Rigid | None:
+        return self._lookup(self._frames.map, frame, stamp, now)
+
+    def _lookup(self, outer: str, inner: str, stamp: float, now: float) -> Rigid | None:
+        """Where a frame is; None is noted as a trouble with its name."""
+        try:
+            return self._transforms.lookup(outer, inner.lstrip("/"), stamp)
+        except NoTransformError as error:
+            self.input_faults.note("no_transform", error.link, now, error.for_s)
+            return None
+
+    # --- topics -------------------------------------------------------------------
+
+    def _odometry(self, payload: bytes, now: Instant) -> list[Sensed]:
+        read = self._stamped("odometry", m.Odometry, payload, now)
+        if read is None:
+            return []
+        message, stamp = read
+        twist = reading.read_twist(message.twist.twist)
+        odom = message.header.frame_id.lstrip("/") or self._frames.odom
+        in_odom = self._base_in_odom(message, stamp, now.mono)
+        to_map = self._in_map(odom, stamp, now.mono)
+        if in_odom is None or to_map is None:
+            self._here = None
+            return [Unplaced("", Origin(), "odometry", twist)]
+        place = to_map.compose(in_odom)
+        self._here = _Here(place, in_odom, odom, stamp)
+        return [Odometry("", Origin(), place.flat(), twist)]
+
+    def _base_in_odom(
+        self, message: m.Odometry, stamp: float, now: float
+    ) -> Rigid | None:
+        pose = reading.read_pose(message)
+        child = message.child_frame_id.lstrip("/")
+        if child in ("", self._frames.base_link):
+            return pose
+        base = self._lookup(child, self._frames.base_link, stamp, now)
+        return None if base is None else pose.compose(base)
+
+    def _scan(self, payload: bytes, now: Instant) -> list[Sensed]:
+        read = self._stamped("scan", m.LaserScan, payload, now)
+        if read is None:
+            return []
+        message, stamp = read
+        here = self._here
+        late = here is None or abs(stamp - here.stamp) > self._tf_max_age_s
+        laser = self._laser(message.header.frame_id, stamp, now.mono)
+        if late or laser is None:
+            return [Unplaced("", Origin(), "scan")]
+        return [reading.read_scan(message, laser)]
+
+    def _laser(self, frame: str, stamp: float, now: float) -> Rigid | None:
+        """Where the laser was as seen from where odometry says the robot is."""
+        here = self._here
+        if here is not None:
+            try:
+                in_odom = self._transforms.lookup(here.odom, frame.lstrip("/"), stamp)
+                return here.in_odom.inverse().compose(in_odom)
+            except NoTransformError:
+                pass  # odometry need not be in the tree; the mount must be
+        return self._lookup(self._frames.base_link, frame, stamp, now)
+
+    def _detections(self, payload: bytes, now: Instant) -> list[Sensed]:
+        read = self._stamped("detections_3d", m.Detection3DArray, payload, now)
+        if read is None:
+            return []
+        message, stamp = read
+        found: list[Detection] = []
+        places: dict[str, Rigid | None] = {}
+        lost = 0
+        for one in message.detections:
+            frame = one.header.frame_id or message.header.frame_id
+            if frame not in places:
+                places[frame] = self._in_map(frame, stamp, now.mono)
+            place = places[frame]
+            try:
+                if place is None:
+                    lost += 1
+                else:
+                    found.append(reading.read_detection(one, place, self._classes))
+            except UnreadableError as error:
+                self.input_faults.note(
+                    error.reason, self._name("detections_3d"), now.mono
+                )
+                lost += 1
+        return [DetectionFrame("", Origin(), tuple(found), lost)]
+
+    def _path(self, payload: bytes, now: Instant) -> list[Sensed]:
+        message = self._read("path", m.Path, payload, now.mono)
+        if message is None:
+            return []
+        frame = message.header.frame_id or self._frames.map
+        # A plan is old by nature: it is where it is now.
+        stamp = self._here.stamp if self._here else message.header.stamp.seconds
+        place = self._in_map(frame, stamp, now.mono)
+        return [] if place is None else [reading.read_path(message, place)]
+
+    def _battery(self, payload: bytes, now: Instant) -> list[Sensed]:
+        message = self._read("battery", m.BatteryState, payload, now.mono)
+        if message is None:
+            return []
+        self.battery = said = reading.read_battery(message)
+        if now.mono - self._battery_told < BATTERY_EVERY_S:
+            return []
+        self._battery_told = now.mono
+        share, charging, volts = said.percentage, said.charging, said.voltage
+        return [BatterySaid("", Origin(), share, charging, volts)]
+
+    # --- pictures -----------------------------------------------------------------
+
+    def _depth(self, payload: bytes, now: Instant) -> list[Sensed]:
+        message = self._read("depth", m.Image, payload, now.mono)
+        if message is not None:
+            self._depths.append(message)
+        return []
+
+    def _mask(self, payload: bytes, now: Instant) -> list[Sensed]:
+        message = self._read("mask", m.Image, payload, now.mono)
+        if message is not None:
+            self._masks.append(message)
+        return []
+
+    def _camera_info(self, payload: bytes, now: Instant) -> list[Sensed]:
+        message = self._read("camera_info", m.CameraInfo, payload, now.mono)
+        self._camera = message or self._camera
+        return []
+
+    def _picture(self, payload: bytes, now: Instant) -> list[Sensed]:
+        read = self._stamped("detections_2d", m.Detection2DArray, payload, now)
+        if read is not None:
+            self._look = read[0], now.mono
+        return []
+
+    def _grounded(self, now: Instant) -> list[Sensed]:
+        """The newest look once its depth picture is there, or has not come in time."""
+        if self._look is None:
+            return []
+        look, since = self._look
+        stamp = look.header.stamp.seconds
+        depth, camera = pictures.nearest(self._depths, stamp, _SAME_PICTURE_S), None
+        if depth is not None:
+            camera = self._camera
+        if (depth is None or camera is None) and now.mono - since < _DEPTH_LATE_S:
+            return []
+        self._look = None
+        if not look.detections:
+            return [DetectionFrame("", Origin(), ())]
+        frame = depth.header.frame_id if depth is not None else ""
+        place = self._in_map(frame, stamp, now.mono) if depth is not None else None
+        if depth is None or camera is None:
+            self.input_faults.note("no_depth", self._name("detections_2d"), now.mono)
+        if depth is None or camera is None or place is None:
+            return [DetectionFrame("", Origin(), (), len(look.detections))]
+        mask = pictures.nearest(self._masks, stamp, _SAME_PICTURE_S)
+        try:
+            picture = pictures.read_depth(depth, camera)
+            return [
+                pictures.grounded(
+                    look, picture, mask, place, self._classes, self._grounding
+                )
+            ]
+        except UnreadableError as error:
+            self.input_faults.note(error.reason, self._name("depth"), now.mono)
+            return [DetectionFrame("", Origin(), (), len(look.detections))]

@@ -1,0 +1,84 @@
+/**
+ * What stands on a page besides STOP: the shell's panels everywhere, the route's own after.
+ *
+ * Each part starts on its own: one that fails is reported and the others go on.
+ */
+
+import { createAlertsPanel } from "../panels/alerts.js";
+import { createDecisionPanel } from "../panels/decision.js";
+import { createHealthPanel } from "../panels/health.js";
+import { createSignOut } from "../panels/signout.js";
+import { labelTables } from "../panels/tables.js";
+import { createTone } from "../panels/tone.js";
+import { createInstalling, registerWorker } from "./install.js";
+import { createWakeLock } from "./wakelock.js";
+
+/**
+ * @typedef {import("../main.js").App} App
+ * @typedef {App & {
+ *   tone: import("../panels/tone.js").Tone,
+ *   wake: import("./wakelock.js").WakeLock,
+ *   installing: ReturnType<typeof createInstalling>,
+ * }} Page what the page of a route is given
+ */
+
+/** @type {Record<string, () => Promise<{start: (page: Page) => unknown}>>} */
+const ROUTES = {
+  alerts: () => import("../pages/alerts.js"),
+  commands: () => import("../pages/commands.js"),
+  fleet: () => import("../pages/fleet.js"),
+  climate: () => import("../pages/climate.js"),
+  latency: () => import("../pages/hops.js"),
+  settings: () => import("../pages/settings.js"),
+  decision: () => import("../pages/decision.js"),
+  day: () => import("../pages/day.js"),
+  about: () => import("../pages/about.js"),
+};
+
+/** @param {App} app */
+export async function startPage(app) {
+  const decision = createDecisionPanel(app);
+  const installing = createInstalling();
+  const page = { ...app, installing, tone: createTone(), wake: createWakeLock() };
+  attempt(() => createAlertsPanel(app, page.tone));
+  attempt(() => createHealthPanel(app));
+  attempt(() => createSignOut(app));
+  attempt(wirePrinting);
+  registerWorker();
+  attempt(() => labelTables(app));
+  const route = ROUTES[document.body.dataset.route ?? ""];
+  if (route) (await route()).start(page);
+  if (!document.querySelector("#map")) return;
+  attempt(() => page.wake.supervise());
+  const parts = await Promise.allSettled([
+    import("../panels/mapbox.js").then(({ createMapbox }) =>
+      createMapbox(app, decision),
+    ),
+    import("../panels/robots.js").then(({ createRobotsPanel }) =>
+      createRobotsPanel(app),
+    ),
+    import("../panels/log.js").then(({ createLogPanel }) =>
+      createLogPanel(app, decision),
+    ),
+    import("../panels/timebar.js").then(({ createTimebar }) => createTimebar(app)),
+    import("../panels/people.js").then(({ createPeoplePanel }) =>
+      createPeoplePanel(app),
+    ),
+  ]);
+  for (const part of parts) if (part.status === "rejected") reportError(part.reason);
+}
+
+function wirePrinting() {
+  for (const button of document.querySelectorAll("[data-prints]")) {
+    button.addEventListener("click", () => print());
+  }
+}
+
+/** @param {() => void} start */
+function attempt(start) {
+  try {
+    start();
+  } catch (error) {
+    reportError(error);
+  }
+}

@@ -1,0 +1,128 @@
+/**
+ * The words of `/live`: what a frame says, and nothing about what is done with it.
+ *
+ * Shapes come from the models of the server (`types.d.ts`); here they get what the page
+ * adds: when a value arrived.  Lengths are metres, angles radians, frames `map`.
+ *
+ * @typedef {import("./clock.js").Aged} Aged
+ * @typedef {import("../types.js").Point} Point
+ * @typedef {import("../types.js").Position} Position
+ * @typedef {import("../types.js").Pose} Pose
+ * @typedef {import("../types.js").Area} Box2D
+ * @typedef {Robot["link"]} Link
+ * @typedef {Robot["mode"]} Mode
+ * @typedef {import("../types.js").Hold} Hold
+ * @typedef {import("../types.js").Margin} Margin
+ * @typedef {Aged & import("../types.js").Robot} Robot
+ * @typedef {Aged & import("../types.js").Person} Person
+ * @typedef {import("../types.js").Detection} Detection
+ * @typedef {Aged & import("../types.js").DetectionFrame} Look
+ * @typedef {Aged & import("../types.js").Command} Command
+ * @typedef {import("../types.js").Occurrence} Occurrence
+ * @typedef {import("../types.js").Alert} Alert
+ * @typedef {import("../types.js").Flood} Flood
+ * @typedef {import("../types.js").Rule} Rule
+ * @typedef {import("../types.js").LogEntry} Entry
+ * @typedef {Aged & import("../types.js").Health} Health
+ * @typedef {import("../types.js").Safety} Safety
+ * @typedef {Aged & import("../types.js").Climate} Climate
+ * @typedef {import("../types.js").GreenhouseMap} GreenhouseMap
+ * @typedef {Aged & {robot_id: string, stamp: string | null, points: Float32Array}} Scan
+ * @typedef {Aged & import("../types.js").Costmap} Costmap
+ * @typedef {Aged & import("../types.js").Coverage} Coverage when a camera last looked where
+ * @typedef {Aged & import("../types.js").Snapshot} Snapshot
+ *
+ * @typedef {{topic: string, data: unknown, at?: number}} Message `at`: when it was true,
+ *   on the server's monotonic clock (s)
+ */
+
+import { readTelemetry } from "./telemetry.js";
+import { ProtocolError, parse, readHead } from "./wire.js";
+
+export { ProtocolError };
+
+/**
+ * Reads one frame as the socket hands it over (`binaryType` "arraybuffer").
+ *
+ * @param {unknown} frame
+ * @returns {Message}
+ * @throws {ProtocolError}
+ */
+export function readFrame(frame) {
+  if (typeof frame === "string") return readText(frame);
+  if (frame instanceof ArrayBuffer) return readBytes(frame);
+  throw new ProtocolError("neither text nor bytes");
+}
+
+/**
+ * @param {string} text `{"topic": T, "data": D}`
+ * @returns {Message}
+ * @throws {ProtocolError}
+ */
+export function readText(text) {
+  const message = parse(text);
+  if (typeof message?.topic !== "string" || !("data" in message)) {
+    throw new ProtocolError("no topic or no data");
+  }
+  return { topic: message.topic, data: message.data, at: message.at };
+}
+
+/**
+ * @param {ArrayBuffer} bytes one scan, or a frame of telemetry
+ * @returns {Message}
+ */
+function readBytes(bytes) {
+  const { head, start } = readHead(bytes);
+  if (typeof head?.frame !== "number") return readScan(bytes);
+  return { topic: "telemetry", data: readTelemetry(head, bytes, start) };
+}
+
+/**
+ * Reads a scan frame; the points stay where they arrived, no byte is copied.
+ *
+ * Little-endian, as every browser's hardware is: `uint32` length of the head, the head
+ * (JSON, padded to a multiple of four), then `float32` pairs x, y in `map` (m).
+ *
+ * @param {ArrayBuffer} bytes
+ * @returns {{topic: string, data: Scan}}
+ * @throws {ProtocolError}
+ */
+export function readScan(bytes) {
+  const { head, start } = readHead(bytes);
+  if ((bytes.byteLength - start) % 8) throw new ProtocolError("half a point");
+  if (typeof head?.topic !== "string" || typeof head.robot_id !== "string") {
+    throw new ProtocolError("scan without topic or robot_id");
+  }
+  const { topic, robot_id, stamp, age_s } = head;
+  const points = new Float32Array(bytes, start);
+  return { topic, data: { robot_id, stamp, age_s, points } };
+}
+
+/**
+ * @param {number} t `performance.now()` (ms); the server sends it back
+ * @returns {string}
+ */
+export function writePing(t) {
+  return JSON.stringify({ type: "ping", t });
+}
+
+/**
+ * @param {number} frame the newest that was painted
+ * @param {{at: number, within: number} | null} [drawn] when, on the server's monotonic
+ *   clock, and how wrong that may be (s); null where nothing was drawn or nobody knows
+ * @returns {string} as the server's counters know it: nothing before `type`, no spaces
+ */
+export function writePainted(frame, drawn = null) {
+  return JSON.stringify({ type: "painted", frame, ...drawn });
+}
+
+/**
+ * @param {string | null} robotId null = the whole fleet
+ * @param {string} pressId the same for every repetition of one press
+ * @param {number} pressedAt Unix time (s), corrected by the server clock's offset
+ * @returns {string}
+ */
+export function writeStop(robotId, pressId, pressedAt) {
+  const stop = { type: "stop", robot_id: robotId };
+  return JSON.stringify({ ...stop, press_id: pressId, pressed_at: pressedAt });
+}

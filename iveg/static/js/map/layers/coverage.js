@@ -1,0 +1,93 @@
+/**
+ * What nobody sees: the longer no camera has looked at a spot of an aisle, the more it is
+ * hatched.  That nobody is drawn in a hatched spot says nothing.
+ *
+ * @typedef {import("../../core/protocol.js").Coverage} Coverage
+ * @typedef {import("./paint.js").Paint} Paint
+ */
+
+import { screenX, screenY } from "../viewport.js";
+import { isolated } from "./paint.js";
+
+/** Hatched from this age on (s), and how strongly; never looked at is the last. */
+const STEPS = [
+  { fromS: 10, alpha: 0.2 },
+  { fromS: 60, alpha: 0.38 },
+  { fromS: 600, alpha: 0.6 },
+];
+const HATCH_PX = 7;
+
+/**
+ * How strongly a cell is hatched, 0–1.
+ *
+ * @param {number | null} ageS null: never looked at
+ */
+export function hatchAt(ageS) {
+  if (ageS === null) return STEPS[STEPS.length - 1].alpha;
+  return STEPS.findLast(({ fromS }) => ageS >= fromS)?.alpha ?? 0;
+}
+
+/** @param {Paint} paint */
+export function draw(paint) {
+  const { ctx, scene, theme } = paint;
+  const coverage = scene.coverage;
+  if (!coverage) return;
+  const sinceS = Math.max(0, scene.nowMs - (coverage.receivedAtMs ?? 0)) / 1000;
+  isolated(ctx, () => {
+    ctx.fillStyle = hatchOf(ctx, theme.muted);
+    for (const lane of coverage.lanes) drawLane(paint, lane, sinceS);
+  });
+}
+
+/**
+ * @param {Paint} paint
+ * @param {Coverage["lanes"][number]} lane
+ * @param {number} sinceS since the ages were told
+ */
+function drawLane({ ctx, view }, lane, sinceS) {
+  const [width, height] = [
+    ((lane.xmax - lane.xmin) / lane.columns) * view.scale,
+    ((lane.ymax - lane.ymin) / lane.rows) * view.scale,
+  ];
+  const [left, bottom] = [screenX(view, lane.xmin), screenY(view, lane.ymin)];
+  for (let row = 0; row < lane.rows; row += 1) {
+    for (let column = 0; column < lane.columns; column += 1) {
+      const told = lane.ages_s[row * lane.columns + column];
+      ctx.globalAlpha = hatchAt(told === null ? null : told + sinceS);
+      if (!ctx.globalAlpha) continue;
+      const [x, y] = [left + column * width, bottom - (row + 1) * height];
+      ctx.fillRect(x, y, width, height);
+    }
+  }
+}
+
+/** @type {Map<string, HTMLCanvasElement>} */
+const tiles = new Map();
+
+/**
+ * Slanting lines that run on from cell to cell.
+ *
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {string} ink
+ */
+function hatchOf(ctx, ink) {
+  const tile = tiles.get(ink) ?? makeTile(ink);
+  tiles.set(ink, tile);
+  return /** @type {CanvasPattern} */ (ctx.createPattern(tile, "repeat"));
+}
+
+/** @param {string} ink */
+function makeTile(ink) {
+  const tile = document.createElement("canvas");
+  tile.width = tile.height = HATCH_PX;
+  const ctx = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
+  ctx.strokeStyle = ink;
+  ctx.lineWidth = 1;
+  ctx.beginPath();
+  for (const shift of [-HATCH_PX, 0, HATCH_PX]) {
+    ctx.moveTo(shift, HATCH_PX);
+    ctx.lineTo(shift + HATCH_PX, 0);
+  }
+  ctx.stroke();
+  return tile;
+}

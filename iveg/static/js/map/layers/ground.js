@@ -1,0 +1,94 @@
+/**
+ * What lies under the machines, drawn when it has changed and copied in between: the
+ * greenhouse, the costmap, trails and scans.
+ *
+ * Robots move in every frame; what their scanners saw comes fifteen times a second.  A
+ * fleet's scans are thousands of points, so they are drawn together no more often than
+ * that; those of a few robots in the very next frame.
+ *
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {[name: string, draw: (paint: Paint) => void]} Layer
+ */
+
+/** More points than this are drawn together (a scan has 720). */
+const MANY_POINTS = 4000;
+const TOGETHER_MS = 66;
+/** Trails fade with time alone. */
+const FADING_MS = 250;
+
+/**
+ * @param {{image: (paint: Paint, ratio: number, isOn: (layer: string) => boolean) =>
+ *   HTMLCanvasElement}} still what lies under it and never moves
+ * @param {Layer[]} layers from the ground up
+ * @param {() => unknown[]} look what else decides how they look
+ */
+export function createGround(still, layers, look) {
+  const canvas = document.createElement("canvas");
+  const ctx = /** @type {CanvasRenderingContext2D} */ (
+    canvas.getContext("2d", { alpha: false })
+  );
+  /** @type {unknown[]} */
+  let drawnFor = [];
+  /** @type {unknown[]} */
+  let drawn = [];
+  let drawnAtMs = 0;
+
+  /** @param {Paint} paint @param {number} ratio @param {(layer: string) => boolean} isOn */
+  function redraw(paint, ratio, isOn) {
+    const ground = still.image(paint, ratio, isOn);
+    if (canvas.width !== ground.width) canvas.width = ground.width;
+    if (canvas.height !== ground.height) canvas.height = ground.height;
+    ctx.setTransform(1, 0, 0, 1, 0, 0);
+    ctx.drawImage(ground, 0, 0);
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    for (const [name, draw] of layers) if (isOn(name)) draw({ ...paint, ctx });
+  }
+
+  return {
+    canvas,
+    /**
+     * Brings the picture up to date.
+     *
+     * @param {Paint} paint
+     * @param {number} ratio device pixels per CSS pixel
+     * @param {(layer: string) => boolean} isOn
+     * @returns {number} when what is missing may be drawn (ms from now); 0: all is there
+     */
+    update(paint, ratio, isOn) {
+      const { nowMs, scans } = paint.scene;
+      const wanted = [...placeOf(paint, ratio), ...look()];
+      const content = contentOf(paint);
+      const isMoved = !isSame(wanted, drawnFor);
+      if (!isMoved && isSame(content, drawn)) return 0;
+      const waitedMs = Math.abs(nowMs - drawnAtMs);
+      const isMany = scans.reduce((n, { points }) => n + points.length / 2, 0);
+      if (!isMoved && isMany > MANY_POINTS && waitedMs < TOGETHER_MS) {
+        return TOGETHER_MS - waitedMs;
+      }
+      redraw(paint, ratio, isOn);
+      [drawnFor, drawn, drawnAtMs] = [wanted, content, nowMs];
+      return 0;
+    },
+  };
+}
+
+/** @param {Paint} paint @param {number} ratio */
+function placeOf({ view, theme, labels, scene }, ratio) {
+  const { width, height, scale, x, y } = view;
+  const told = [scene.map, scene.coverage, scene.costmap];
+  return [width, height, scale, x, y, ratio, theme, labels, ...told];
+}
+
+/** @param {Paint} paint */
+function contentOf({ scene }) {
+  return [
+    Math.floor(scene.nowMs / FADING_MS),
+    ...scene.robots.map(({ id }) => id),
+    ...scene.scans.flatMap(({ points, strength }) => [points, strength]),
+  ];
+}
+
+/** @param {unknown[]} one @param {unknown[]} other */
+function isSame(one, other) {
+  return one.length === other.length && one.every((it, i) => it === other[i]);
+}

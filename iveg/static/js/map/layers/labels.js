@@ -1,0 +1,59 @@
+/**
+ * The few words that stand on the map itself, in the reader's language and numbers.
+ *
+ * @typedef {(key: string, slots?: Record<string, string | number>) => string} Translate
+ * @typedef {ReturnType<typeof createLabels>} Labels
+ */
+
+import { laneName } from "../../core/lanes.js";
+
+/**
+ * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
+ *   `map.replay`; without it numbers stand alone
+ * @param {string} [locale] BCP 47; the page's by default
+ */
+export function createLabels(t = wordless, locale = document.documentElement.lang) {
+  const tongue = locale || "es";
+  const plain = new Intl.NumberFormat(tongue, { maximumFractionDigits: 1 });
+  const tenths = new Intl.NumberFormat(tongue, {
+    minimumFractionDigits: 1,
+    maximumFractionDigits: 1,
+  });
+  const hundredths = new Intl.NumberFormat(tongue, {
+    minimumFractionDigits: 2,
+    maximumFractionDigits: 2,
+  });
+  const percents = new Intl.NumberFormat(tongue, { style: "percent" });
+  return {
+    /** @param {string} lane */
+    lane: (lane) => laneName(lane, t),
+    /** A length of the scale bar. @param {number} m */
+    metres: (m) => `${plain.format(m)} m`,
+    /** A measured distance. @param {number} m */
+    distance: (m) => `${tenths.format(m)} m`,
+    /** A length that a person measured. @param {number} m */
+    measured: (m) => `${hundredths.format(m)} m`,
+    /** A task in the reader's words; one of another fleet as it was sent.
+     * @param {string} task */
+    task: (task) => {
+      const key = `task.${task}`;
+      const said = t(key);
+      return said === key || said === task.toUpperCase() ? task : said;
+    },
+    /** @param {number} share 0–1 */
+    percent: (share) => percents.format(share),
+    /** An age short enough for a tag; tenths while they matter. @param {number} s */
+    age: (s) => `${s < 10 ? tenths.format(s) : plain.format(Math.round(s))} s`,
+    /** @param {number} s */
+    ago: (s) => t("map.ghost", { age: Math.round(s) }),
+    /** @param {number} s */
+    lastSeen: (s) => t("map.last_seen", { age: Math.round(s) }),
+    replay: () => t("map.replay"),
+  };
+}
+
+/** @type {Translate} */
+function wordless(key, slots = {}) {
+  const values = Object.values(slots);
+  return values.length ? values.join(" ") : (key.split(".").pop() ?? "").toUpperCase();
+}

@@ -1,0 +1,87 @@
+/**
+ * What every layer is given, and the few strokes that several of them share.
+ *
+ * A layer is a module with `draw(paint)`: it reads the scene, paints in CSS pixels, keeps
+ * nothing between frames and leaves the context's state as it found it (`isolated`).
+ *
+ * @typedef {import("../scene.js").Scene} Scene
+ * @typedef {import("../viewport.js").Viewport} Viewport
+ * @typedef {import("./theme.js").Theme} Theme
+ * @typedef {import("./labels.js").Labels} Labels
+ * @typedef {CanvasRenderingContext2D} Context
+ * @typedef {{
+ *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, labels: Labels,
+ *   followed: string | null, tape: import("./measure.js").Tape,
+ *   places?: import("./places.js").Places,
+ * }} Paint `places`: of the words of this frame
+ */
+
+/**
+ * Draws with the context's state restored afterwards.
+ *
+ * @param {Context} ctx
+ * @param {() => void} draw
+ */
+export function isolated(ctx, draw) {
+  ctx.save();
+  draw();
+  ctx.restore();
+}
+
+/**
+ * Text that can be read on anything: a halo of the field's colour behind it.
+ *
+ * @param {Paint} paint
+ * @param {string} text
+ * @param {number} x centre (px)
+ * @param {number} y middle (px)
+ * @param {{size?: number, weight?: number, colour?: string}} [style]
+ */
+export function label({ ctx, theme }, text, x, y, style = {}) {
+  const { size = 12, weight = 600, colour = theme.text } = style;
+  ctx.font = `${weight} ${size}px ${theme.font}`;
+  ctx.textAlign = "center";
+  ctx.textBaseline = "middle";
+  ctx.lineJoin = "round";
+  ctx.lineWidth = 3.5;
+  ctx.strokeStyle = theme.bg;
+  ctx.strokeText(text, x, y);
+  ctx.fillStyle = colour;
+  ctx.fillText(text, x, y);
+}
+
+/**
+ * A word in a filled capsule; tells how wide it became.
+ *
+ * @param {Paint} paint
+ * @param {string} text
+ * @param {number} x left edge (px)
+ * @param {number} y middle (px)
+ * @param {string} fill
+ * @param {string} colour
+ * @returns {number} width (px)
+ */
+export function pill({ ctx, theme }, text, x, y, fill, colour) {
+  ctx.font = `700 11px ${theme.font}`;
+  const width = ctx.measureText(text).width + 12;
+  ctx.fillStyle = fill;
+  ctx.beginPath();
+  ctx.roundRect(x, y - 9, width, 18, 9);
+  ctx.fill();
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  ctx.fillStyle = colour;
+  ctx.fillText(text, x + 6, y + 0.5);
+  return width;
+}
+
+/**
+ * @param {Context} ctx
+ * @param {number} x (px)
+ * @param {number} y (px)
+ * @param {number} radius (px)
+ */
+export function circle(ctx, x, y, radius) {
+  ctx.beginPath();
+  ctx.arc(x, y, Math.max(0, radius), 0, 2 * Math.PI);
+}

@@ -1,0 +1,155 @@
+/**
+ * People, and peers seen by robots, with the ring that the rule keeps around them.
+ *
+ * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
+ * marker alone, which fades and is gone after a minute: nobody knows where the person is
+ * now, and the marks of a morning would hide who is there.
+ */
+
+import { MARK_LIMIT_S } from "../scene.js";
+import { screenX, screenY } from "../viewport.js";
+import { circle, isolated, label } from "./paint.js";
+
+/**
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {import("../scene.js").ScenePerson} ScenePerson
+ */
+
+const WORDS_FROM_SCALE = 24;
+
+/** A mark is never fainter than this: what can hardly be seen is dirt. */
+const FAINTEST = 0.3;
+
+/** Labels nearer to each other than this would be read as one (px). */
+const WORDS_ACROSS_PX = 92;
+const WORDS_ABOVE_PX = 13;
+
+/** @param {Paint} paint */
+export function draw(paint) {
+  for (const person of paint.scene.people) {
+    isolated(paint.ctx, () => drawPerson(paint, person));
+  }
+  isolated(paint.ctx, () => {
+    for (const person of worded(paint)) drawAge(paint, person);
+  });
+}
+
+/**
+ * Who gets words: of several whose words would lie on each other the newest.
+ *
+ * @param {Paint} paint
+ */
+export function worded({ scene, view }) {
+  const unseen = scene.people.filter(({ stage }) => stage !== "seen");
+  /** @type {ScenePerson[]} */
+  const chosen = [];
+  for (const person of unseen.sort((a, b) => a.ageS - b.ageS)) {
+    const isCovered = chosen.some(
+      ({ x, y }) =>
+        Math.abs(x - person.x) * view.scale < WORDS_ACROSS_PX &&
+        Math.abs(y - person.y) * view.scale < WORDS_ABOVE_PX,
+    );
+    if (!isCovered) chosen.push(person);
+  }
+  return chosen;
+}
+
+/** @param {Paint} paint @param {ScenePerson} person */
+function drawPerson(paint, person) {
+  const { ctx, view } = paint;
+  ctx.translate(screenX(view, person.x), screenY(view, person.y));
+  if (person.stage !== "last_seen") drawRing(paint, person);
+  if (person.peer) drawPeer(paint, person);
+  else drawFigure(paint, person);
+}
+
+/** How much of a figure is left. @param {ScenePerson} person */
+function strengthOf({ stage, ageS }) {
+  if (stage !== "last_seen") return 1;
+  return Math.max(FAINTEST, 0.8 * (1 - ageS / MARK_LIMIT_S));
+}
+
+/** How long ago somebody was seen. @param {Paint} paint @param {ScenePerson} person */
+function drawAge(paint, person) {
+  const { view, labels } = paint;
+  const isGone = person.stage === "last_seen";
+  // From afar, sentences of several people would lie on each other.
+  const isNear = view.scale >= WORDS_FROM_SCALE;
+  const said = isGone ? labels.lastSeen(person.ageS) : labels.ago(person.ageS);
+  const text = isNear ? said : labels.age(person.ageS);
+  const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
+  const dy = placeOfAge(paint, text, x, y);
+  if (dy === null) return;
+  label(paint, text, x, y + dy, { size: 11, colour: paint.theme.muted });
+}
+
+/**
+ * Below the sign, else above; null where other words stand in both places.
+ *
+ * @param {Paint} paint @param {string} text @param {number} x @param {number} y
+ */
+function placeOfAge({ ctx, theme, places }, text, x, y) {
+  const heights = [20, -22];
+  if (!places) return heights[0];
+  ctx.font = `600 11px ${theme.font}`;
+  const half = ctx.measureText(text).width / 2;
+  const rects = heights.map((dy) => {
+    const [top, bottom] = [y + dy - WORDS_ABOVE_PX / 2, y + dy + WORDS_ABOVE_PX / 2];
+    return { left: x - half, right: x + half, top, bottom };
+  });
+  const found = places.claim(rects);
+  return found === null ? null : heights[found];
+}
+
+/** @param {Paint} paint @param {ScenePerson} person */
+function drawRing({ ctx, view, theme }, person) {
+  const isSeen = person.stage === "seen";
+  circle(ctx, 0, 0, person.ringM * view.scale);
+  ctx.fillStyle = theme.ring;
+  ctx.globalAlpha = isSeen ? 0.1 : 0.05;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.strokeStyle = theme.ring;
+  ctx.lineWidth = 2;
+  ctx.setLineDash(isSeen ? [] : [8, 6]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** Head and shoulders. @param {Paint} paint @param {ScenePerson} person */
+function drawFigure({ ctx, theme }, person) {
+  ctx.globalAlpha = strengthOf(person);
+  ctx.strokeStyle = theme.bg;
+  ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.person;
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  ctx.ellipse(0, 6, 9, 7, 0, Math.PI, 2 * Math.PI);
+  ctx.closePath();
+  ctx.stroke();
+  ctx.fill();
+  circle(ctx, 0, -5, 5);
+  ctx.stroke();
+  ctx.fill();
+  ctx.globalAlpha = 1;
+}
+
+/** A diamond: a machine, but one that nobody steers from here. @param {Paint} paint
+ * @param {ScenePerson} person */
+function drawPeer({ ctx, theme }, person) {
+  ctx.globalAlpha = strengthOf(person);
+  ctx.strokeStyle = theme.bg;
+  ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.peer;
+  ctx.lineWidth = 2;
+  ctx.beginPath();
+  for (const [x, y] of [
+    [0, -9],
+    [9, 0],
+    [0, 9],
+    [-9, 0],
+  ])
+    ctx.lineTo(x, y);
+  ctx.closePath();
+  ctx.stroke();
+  ctx.fill();
+  ctx.globalAlpha = 1;
+}

@@ -1,0 +1,314 @@
+/**
+ * The machines: to scale, heading first, and never fresher than they are.
+ *
+ * Live is filled; late has an amber outline and its age; lost is a dashed ghost at its
+ * last pose.  Each kind of drive has its own body, so hue never carries identity alone.
+ */
+
+import { LIMITS } from "../../core/limits.js";
+import { screenX, screenY } from "../viewport.js";
+import { circle, isolated, label, pill } from "./paint.js";
+
+/**
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {import("./paint.js").Context} Context
+ * @typedef {import("../scene.js").SceneRobot} SceneRobot
+ */
+
+/** A body is never drawn shorter than this (px), however far away the eye is. */
+const SHORTEST_PX = 20;
+const PADLOCK_PX = 12;
+/** From one line of words to the next. */
+const WORDS_PX = 28;
+
+/** @param {Paint} paint */
+export function draw(paint) {
+  for (const robot of paint.scene.robots) {
+    isolated(paint.ctx, () => drawRobot(paint, robot));
+  }
+}
+
+/**
+ * Length and width on screen (px).
+ *
+ * @param {SceneRobot} robot
+ * @param {number} scale (px/m)
+ * @returns {[number, number]}
+ */
+export function bodySize(robot, scale) {
+  const length = Math.max(SHORTEST_PX, robot.length * scale);
+  return [length, (length * robot.width) / robot.length];
+}
+
+/** @param {Paint} paint @param {SceneRobot} robot */
+function drawRobot(paint, robot) {
+  const { ctx, view } = paint;
+  const [length, width] = bodySize(robot, view.scale);
+  ctx.translate(screenX(view, robot.pose.x), screenY(view, robot.pose.y));
+  if (robot.unsureM > 0) drawUnsure(paint, robot, length);
+  if (paint.followed === robot.id) drawFollowed(paint, length);
+  ctx.save();
+  ctx.rotate(-robot.pose.yaw);
+  drawBody(paint, robot, length, width);
+  ctx.restore();
+  drawWords(paint, robot, length);
+}
+
+/**
+ * A STOP that nobody confirmed: the disc in which the robot may be by now.
+ *
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @param {number} length
+ */
+function drawUnsure({ ctx, view, theme }, robot, length) {
+  circle(ctx, 0, 0, robot.unsureM * view.scale + length / 2);
+  ctx.globalAlpha = 0.12;
+  ctx.fillStyle = theme.alert[0];
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.strokeStyle = theme.alert[0];
+  ctx.lineWidth = 2;
+  ctx.stroke();
+}
+
+/** @param {Paint} paint @param {number} length */
+function drawFollowed({ ctx, theme }, length) {
+  circle(ctx, 0, 0, length * 0.62 + 8);
+  ctx.globalAlpha = 0.6;
+  ctx.strokeStyle = theme.text;
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([2, 4]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+}
+
+/**
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @param {number} length
+ * @param {number} width
+ */
+function drawBody({ ctx, theme }, robot, length, width) {
+  const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
+  const hue = isLost ? theme.muted : theme.robots[robot.slot - 1];
+  outline(ctx, robot.drive, length, width);
+  if (robot.link === "LATE") halo(ctx, theme.alert[1]);
+  else if (!isLost) halo(ctx, theme.bg);
+  if (!isLost) drawWheels(ctx, robot, length, width, theme.text);
+  outline(ctx, robot.drive, length, width);
+  ctx.globalAlpha = isLost ? 0.15 : 1;
+  ctx.fillStyle = hue;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  if (isLost) ghost(ctx, hue);
+  drawHeading(ctx, length, width, hue, isLost ? hue : theme.bg);
+}
+
+/** @param {Context} ctx @param {string} colour */
+function halo(ctx, colour) {
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = 6;
+  ctx.lineJoin = "round";
+  ctx.stroke();
+}
+
+/** @param {Context} ctx @param {string} colour */
+function ghost(ctx, colour) {
+  ctx.strokeStyle = colour;
+  ctx.lineWidth = 1.5;
+  ctx.setLineDash([4, 3]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/**
+ * The body's path, nose along +x: a box that turns on the spot, a car with a drawn-in
+ * nose that steers, six corners for anything else.
+ *
+ * @param {Context} ctx
+ * @param {string} drive
+ * @param {number} length
+ * @param {number} width
+ */
+function outline(ctx, drive, length, width) {
+  const [x, y] = [length / 2, width / 2];
+  ctx.beginPath();
+  if (drive === "differential") {
+    ctx.roundRect(-x, -y, length, width, Math.min(x, y) * 0.35);
+  } else if (drive === "ackermann") {
+    ctx.moveTo(-x, -y);
+    ctx.lineTo(x * 0.3, -y);
+    ctx.quadraticCurveTo(x, -y * 0.75, x, 0);
+    ctx.quadraticCurveTo(x, y * 0.75, x * 0.3, y);
+    ctx.lineTo(-x, y);
+    ctx.closePath();
+  } else {
+    const corners = [
+      [x, 0],
+      [x / 2, y],
+      [-x / 2, y],
+      [-x, 0],
+      [-x / 2, -y],
+      [x / 2, -y],
+    ];
+    for (const [cx, cy] of corners) ctx.lineTo(cx, cy);
+    ctx.closePath();
+  }
+}
+
+/**
+ * @param {Context} ctx
+ * @param {SceneRobot} robot
+ * @param {number} length
+ * @param {number} width
+ * @param {string} colour
+ */
+function drawWheels(ctx, robot, length, width, colour) {
+  if (length < 28) return;
+  const [long, thick] = [length * 0.24, Math.max(3.5, width * 0.18)];
+  const axles = robot.drive === "ackermann" ? [-0.3, 0.24] : [-0.26, 0.26];
+  ctx.fillStyle = colour;
+  for (const axle of axles) {
+    for (const side of [-1, 1]) {
+      const x = axle * length - long / 2;
+      const y = (side * (width + thick)) / 2 - thick / 2;
+      ctx.fillRect(x, y, long, thick);
+    }
+  }
+}
+
+/**
+ * A notch on the body and an arrow ahead of it.
+ *
+ * @param {Context} ctx
+ * @param {number} length
+ * @param {number} width
+ * @param {string} hue
+ * @param {string} ink
+ */
+function drawHeading(ctx, length, width, hue, ink) {
+  const [nose, half] = [length * 0.34, Math.min(width * 0.3, length * 0.22)];
+  ctx.strokeStyle = ink;
+  ctx.lineWidth = Math.max(2, length * 0.05);
+  ctx.lineJoin = "miter";
+  ctx.beginPath();
+  ctx.moveTo(nose - half, -half);
+  ctx.lineTo(nose, 0);
+  ctx.lineTo(nose - half, half);
+  ctx.stroke();
+  ctx.fillStyle = hue;
+  ctx.beginPath();
+  ctx.moveTo(length / 2 + 14, 0);
+  ctx.lineTo(length / 2 + 5, -5);
+  ctx.lineTo(length / 2 + 5, 5);
+  ctx.closePath();
+  ctx.fill();
+}
+
+/**
+ * Whether a padlock is true: the robot has said that it is held, and that was just now.
+ *
+ * @param {Pick<SceneRobot, "mode" | "ageS">} robot
+ */
+export const isSeenHeld = ({ mode, ageS }) =>
+  mode === "STOPPED" && ageS <= LIMITS.report_stale_s;
+
+/**
+ * A dark octagon with a padlock: held, and not by accident.
+ *
+ * @param {Paint} paint
+ * @param {number} x (px)
+ * @param {number} y (px)
+ */
+function drawPadlock({ ctx, theme }, x, y) {
+  ctx.save();
+  ctx.translate(x, y);
+  ctx.beginPath();
+  for (let i = 0; i < 8; i += 1) {
+    const angle = (Math.PI / 4) * (i + 0.5);
+    ctx.lineTo(PADLOCK_PX * Math.cos(angle), PADLOCK_PX * Math.sin(angle));
+  }
+  ctx.closePath();
+  ctx.strokeStyle = theme.bg;
+  ctx.lineWidth = 2;
+  ctx.stroke();
+  ctx.fillStyle = theme.text;
+  ctx.fill();
+  ctx.strokeStyle = theme.bg;
+  ctx.lineWidth = 1.8;
+  ctx.beginPath();
+  ctx.arc(0, -1.5, 3, Math.PI, 2 * Math.PI);
+  ctx.stroke();
+  ctx.fillStyle = theme.bg;
+  ctx.fillRect(-4.5, -1.5, 9, 7);
+  ctx.restore();
+}
+
+/**
+ * Name above; beside it what a person must know: age, half speed, recording.
+ *
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @param {number} length
+ */
+function drawWords(paint, robot, length) {
+  const { ctx, theme } = paint;
+  const y = heightOfWords(paint, robot, length);
+  const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
+  label(paint, robot.id, 0, y, {
+    size: 13,
+    weight: 700,
+    colour: isLost ? theme.muted : theme.text,
+  });
+  let x = ctx.measureText(robot.id).width / 2 + 6;
+  if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
+  for (const [text, fill] of tagsOf(paint, robot)) {
+    x += pill(paint, text, x, y, fill, theme.bg) + 4;
+  }
+}
+
+/**
+ * Above the robot, else below, else farther away: where no other words stand.
+ *
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @param {number} length
+ * @returns {number} middle of the labels, from the robot's (px)
+ */
+function heightOfWords(paint, robot, length) {
+  const { ctx, view, theme, places } = paint;
+  const near = length / 2 + 20;
+  const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
+  if (!places) return heights[0];
+  ctx.font = `700 13px ${theme.font}`;
+  const half = ctx.measureText(robot.id).width / 2;
+  const tags = tagsOf(paint, robot).map(([text]) => ctx.measureText(text).width + 12);
+  const x = screenX(view, robot.pose.x);
+  const y = screenY(view, robot.pose.y);
+  const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);
+  const right = x + half + tags.reduce((sum, width) => sum + width + 4, 6);
+  const rects = heights.map((dy) => {
+    const [top, bottom] = [y + dy - PADLOCK_PX, y + dy + PADLOCK_PX];
+    return { left, right, top, bottom };
+  });
+  return heights[places.claim(rects) ?? 0];
+}
+
+/**
+ * @param {Paint} paint
+ * @param {SceneRobot} robot
+ * @returns {[string, string][]} words and their ground
+ */
+function tagsOf({ theme, labels }, robot) {
+  /** @type {[string, string][]} */
+  const tags = [];
+  if (robot.link === "LATE") tags.push([labels.age(robot.ageS), theme.alert[1]]);
+  if (robot.link === "LOST") tags.push([labels.ago(robot.ageS), theme.muted]);
+  if (robot.mode === "SLOW" && robot.link !== "LOST") {
+    tags.push([labels.percent(LIMITS.slow_factor), theme.text]);
+  }
+  if (robot.replay) tags.push([labels.replay(), theme.muted]);
+  return tags;
+}

@@ -1,0 +1,47 @@
+/** How long a metre is on this screen. */
+
+import { isolated, label } from "./paint.js";
+
+const LONGEST_PX = 130;
+const MARGIN_PX = 16;
+/** With its label. */
+const TALL_PX = 22;
+const STEPS_M = [200, 100, 50, 20, 10, 5, 2, 1, 0.5, 0.2, 0.1];
+
+/** @param {number} scale (px/m) @returns {number} (m) */
+export function barLength(scale) {
+  return STEPS_M.find((m) => m * scale <= LONGEST_PX) ?? 0.1;
+}
+
+/**
+ * Where a bar of any length may lie.
+ *
+ * @param {{height: number}} view
+ * @returns {import("../viewport.js").Rect}
+ */
+export function coverOf({ height }) {
+  const right = MARGIN_PX + LONGEST_PX;
+  return { left: 0, top: height - MARGIN_PX - TALL_PX, right, bottom: height };
+}
+
+/** @param {import("./paint.js").Paint} paint */
+export function draw(paint) {
+  const { ctx, view, theme, labels } = paint;
+  const metres = barLength(view.scale);
+  const length = metres * view.scale;
+  const y = view.height - MARGIN_PX;
+  isolated(ctx, () => {
+    ctx.beginPath();
+    ctx.moveTo(MARGIN_PX, y - 6);
+    ctx.lineTo(MARGIN_PX, y);
+    ctx.lineTo(MARGIN_PX + length, y);
+    ctx.lineTo(MARGIN_PX + length, y - 6);
+    ctx.strokeStyle = theme.bg;
+    ctx.lineWidth = 5;
+    ctx.stroke();
+    ctx.strokeStyle = theme.text;
+    ctx.lineWidth = 2;
+    ctx.stroke();
+    label(paint, labels.metres(metres), MARGIN_PX + length / 2, y - 13);
+  });
+}

@@ -1,0 +1,218 @@
+/**
+ * Figures that the server made and checked, in this page's colours and language.
+ *
+ * The library is large and comes from this server; it is asked for with the first
+ * figure.  It styles a plot by sheets that a strict policy refuses, so an element of
+ * each sheet's name keeps it from trying, and the style sheet of pages with figures holds
+ * what a plot needs.  A figure's `meta` says what its traces and axes are.
+ *
+ * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
+ *   y: (number | null)[], meta: Record<string, any>, line?: object,
+ *   marker?: object}} Trace
+ * @typedef {{data: Trace[], layout: Record<string, any>}} Figure
+ * @typedef {"speed" | "detections" | "stops"} ChartName
+ * @typedef {{library: string, style_ids: string[]}} Source where the library is
+ * @typedef {Source & Record<ChartName, Figure>} Charts
+ * @typedef {{since: number, until: number}} Span Unix milliseconds
+ */
+
+import { all, make, need, setHidden, setText } from "../../panels/dom.js";
+import { wallText } from "./local_time.js";
+
+/** @type {readonly ChartName[]} */
+export const CHARTS = ["speed", "detections", "stops"];
+const CONFIG = { displayModeBar: false, responsive: true, displaylogo: false };
+/** Numbers only: month names would be in the library's language. */
+const TICKS = [
+  { dtickrange: [null, 60_000], value: "%H:%M:%S" },
+  { dtickrange: [60_000, 86_400_000], value: "%H:%M\n%d/%m" },
+  { dtickrange: [86_400_000, null], value: "%d/%m/%y" },
+];
+const PEOPLE = new Set(["person", "farmer", "human", "operator"]);
+const AIR = new Set(["temperature", "humidity", "co2"]);
+const SYMBOLS = { direct: "circle", fiware: "diamond", standstill: "square" };
+
+/** @type {Promise<any> | null} */
+let library = null;
+
+/**
+ * Draws all figures, each over the whole range: an hour of silence is an hour wide.
+ *
+ * @param {Charts} charts
+ * @param {import("./asked.js").Asked} asked
+ * @param {import("../../core/i18n.js").I18n} i18n
+ * @throws {Error} the library could not be loaded
+ */
+export async function drawCharts(charts, asked, i18n) {
+  for (const name of CHARTS) {
+    setText(need(`#chart-${name}-note`), noteOf(name, charts[name].data, i18n));
+    setHidden(need(`#chart-${name}`), charts[name].data.length === 0);
+    setHidden(need(`#chart-${name}-empty`), charts[name].data.length > 0);
+  }
+  if (CHARTS.every((name) => charts[name].data.length === 0)) return;
+  for (const name of CHARTS) {
+    if (charts[name].data.length === 0) continue;
+    await drawFigure(need(`#chart-${name}`), charts[name], charts, asked, i18n);
+  }
+}
+
+/**
+ * Draws one figure over the whole span.
+ *
+ * @param {HTMLElement} place
+ * @param {Figure} figure
+ * @param {Source} source
+ * @param {Span} span
+ * @param {import("../../core/i18n.js").I18n} i18n
+ * @throws {Error} the library could not be loaded
+ */
+export async function drawFigure(place, { data, layout }, source, span, i18n) {
+  const plotly = await loadPlotly(source);
+  const traces = data.map((trace, index) => dressed(trace, index, i18n));
+  await plotly.react(place, traces, styled(layout, span, i18n), CONFIG);
+}
+
+/** @param {Source} source */
+export async function loadPlotly(source) {
+  library ??= summon(source);
+  try {
+    return await library;
+  } catch (error) {
+    library = null;
+    throw error;
+  }
+}
+
+/** @param {Source} source */
+async function summon(source) {
+  for (const id of source.style_ids) {
+    const keeper = make("i", "no-inline-styles");
+    keeper.id = id;
+    keeper.hidden = true;
+    document.body.append(keeper);
+  }
+  await import(source.library);
+  return /** @type {any} */ (globalThis).Plotly;
+}
+
+/**
+ * A trace with its name, its colour and the greenhouse's clock.
+ *
+ * @param {Trace} trace @param {number} index
+ * @param {import("../../core/i18n.js").I18n} i18n
+ */
+function dressed(trace, index, i18n) {
+  const { kind, robot, class_id } = trace.meta;
+  const colour = colourOf(kind, robot ?? class_id, index);
+  const name = class_id ?? i18n.t(`history.trace.${kind}`, { robot });
+  if (trace.type === "bar") return { ...trace, name, marker: { color: colour } };
+  const x = trace.x.map((at) => (at === null ? null : wallText(at)));
+  const line = { ...trace.line, color: colour, width: 2 };
+  if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
+  const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
+  const marker = { size: 9, symbol, ...trace.marker, color: colour };
+  // What is newest lies on the edge, and would be cut in half there.
+  return { ...trace, x, name, line, marker, cliponaxis: false };
+}
+
+/**
+ * Robots and people keep the colour that they have on the map; alert colours stay with
+ * alerts.
+ *
+ * @param {string} kind @param {string | undefined} who @param {number} index
+ */
+function colourOf(kind, who, index) {
+  const slots = all("[data-robot][data-slot]");
+  const slot = slots.find((chip) => chip.dataset.robot === who)?.dataset.slot;
+  if (slot) return token(`--robot-${slot}`);
+  if (PEOPLE.has(String(who))) return token("--person");
+  if (AIR.has(kind)) return token("--text-2");
+  if (kind === "class") return token(`--robot-${((index + 3) % 6) + 3}`);
+  return token(kind === "standstill" ? "--text" : `--robot-${index + 3}`);
+}
+
+/**
+ * @param {Record<string, any>} layout
+ * @param {Span} asked
+ * @param {import("../../core/i18n.js").I18n} i18n
+ */
+export function styled(layout, asked, i18n) {
+  const axis = (/** @type {string} */ name) => ({
+    ...layout[`${name}axis`],
+    title: { text: i18n.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
+    gridcolor: token("--line"),
+    // Where lines are black for the sun, whole ones would outshout what was measured.
+    griddash: "1px,4px",
+    zerolinecolor: token("--line-strong"),
+    linecolor: token("--line-strong"),
+    // Margins that follow their labels may chase each other (Plotly gives up with a
+    // warning); these hold the widest label of either language.
+    automargin: false,
+    fixedrange: name === "y",
+    ...(layout.meta[name] === "time"
+      ? {
+          range: [wallText(asked.since), wallText(asked.until)],
+          tickformatstops: TICKS,
+          hoverformat: "%d/%m %H:%M:%S",
+        }
+      : {}),
+  });
+  const line = { color: token("--text"), width: 2, dash: "dot" };
+  const { showlegend = true } = layout;
+  return {
+    ...layout,
+    xaxis: axis("x"),
+    yaxis: { ...axis("y"), ...layout.yaxis },
+    ...Object.fromEntries(
+      Object.keys(layout)
+        .filter((key) => /^yaxis\d/.test(key))
+        .map((key) => [key, { ...axis("y"), ...layout[key] }]),
+    ),
+    shapes: layout.shapes?.map((/** @type {Record<string, any>} */ shape) =>
+      shape.name === "slow" ? shaded(shape) : { ...shape, line },
+    ),
+    paper_bgcolor: "rgba(0,0,0,0)",
+    plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: token("--font"), size: 12, color: token("--text-2") },
+    hoverlabel: { bgcolor: token("--raised"), font: { color: token("--text") } },
+    separators: i18n.language() === "es" ? ",." : ".,",
+    margin: { l: 60, r: 16, t: showlegend ? 36 : 12, b: 60 },
+    legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+    showlegend,
+    hovermode: "closest",
+    autosize: true,
+  };
+}
+
+/** A time in which a robot was to be slow. @param {Record<string, any>} shape */
+function shaded(shape) {
+  const [x0, x1] = [wallText(shape.x0), wallText(shape.x1)];
+  return { ...shape, x0, x1, fillcolor: token("--line"), line: { width: 0 } };
+}
+
+/**
+ * What a figure shows, in one sentence; also what it is for who cannot see it.
+ *
+ * @param {ChartName} name @param {Trace[]} data
+ * @param {import("../../core/i18n.js").I18n} i18n
+ */
+function noteOf(name, data, i18n) {
+  if (data.length === 0) return "";
+  if (name === "speed") {
+    const seconds = Math.max(...data.map((trace) => trace.meta.slice_s));
+    return i18n.t(seconds > 0 ? "history.note.sliced" : "history.note.exact", {
+      seconds,
+    });
+  }
+  const sum = (/** @type {Trace} */ trace) =>
+    trace.y.reduce((/** @type {number} */ total, n) => total + (n ?? 0), 0);
+  const count =
+    name === "stops"
+      ? data[0].x.length
+      : data.reduce((total, trace) => total + sum(trace), 0);
+  return i18n.t(`history.note.${name}`, { count });
+}
+
+/** @param {string} name */
+export const token = (name) =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();

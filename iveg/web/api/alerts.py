@@ -1,0 +1,44 @@
+"""Acknowledging an alert: who has seen it, when, and what they say of it."""
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from iveg.domain.observations import Instant
+from iveg.models.alert import Alert
+from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.evaluate import Evaluator
+from iveg.web.api.answers import Json
+from iveg.web.problems import Problem
+from iveg.web.security.authentication import Principal, require
+
+
+class Acknowledgement(BaseModel):
+    """What the person says of it."""
+
+    model_config = ConfigDict(strict=True, extra="ignore")
+
+    note: Annotated[str, Field(max_length=200)] = ""
+
+
+def router(evaluator: Evaluator, clock: Callable[[], Instant]) -> APIRouter:
+    """Alerts as people handle them."""
+    routes = APIRouter(prefix="/api/v1", tags=["alerts"])
+
+    @routes.post("/alerts/{alert_id}/acknowledge", response_model=Alert)
+    async def acknowledge(
+        alert_id: str,
+        body: Acknowledgement,
+        who: Annotated[Principal, Depends(require("release"))],
+    ) -> Response:
+        """Say that somebody has seen it; it stays listed while it is active."""
+        note = clean_text(body.note)
+        found = evaluator.alerts.acknowledge(alert_id, who.name, note, clock())
+        if found is None:
+            return Problem(404, "There is no such alert.").response()
+        return Json(Alert.of(found))
+
+    return routes

@@ -1,0 +1,95 @@
+"""STOP, release, resume (docs/interfaces.md §5).
+
+STOP is accepted from everyone who is signed in, in any state, without limit.  Release
+and resume are refused unless the robot stands and its report is fresh.
+"""
+
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.requests import Request
+from starlette.responses import Response
+
+from iveg.domain.observations import Instant
+from iveg.models.command import FleetPressed, Pressed
+from iveg.pipeline.command import Commander
+from iveg.web.api.answers import Json
+from iveg.web.presses import DESCRIBED, press_of
+from iveg.web.security.authentication import Principal, require
+
+Pressing = Annotated[Principal, Depends(require("stop"))]
+Releasing = Annotated[Principal, Depends(require("release"))]
+HoldId = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class Release(BaseModel):
+    """The holds that the person saw."""
+
+    model_config = ConfigDict(strict=True, extra="ignore")
+
+    holds: Annotated[list[HoldId], Field(min_length=1, max_length=64)]
+
+
+def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
+    """Commands to robots."""
+    routes = APIRouter(prefix="/api/v1", tags=["commands"])
+
+    @routes.post(
+        "/robots/{robot_id}/stop",
+        status_code=202,
+        response_model=Pressed,
+        openapi_extra=DESCRIBED,
+    )
+    async def stop(request: Request, robot_id: str, who: Pressing) -> Response:
+        """STOP one robot, on every transport at once."""
+        press = await press_of(request)
+        pressed = await commander.stop([robot_id], who.name, clock(), press)
+        return Json(Pressed.of(pressed[0]), 202)
+
+    @routes.post(
+        "/fleet/stop",
+        status_code=202,
+        response_model=FleetPressed,
+        openapi_extra=DESCRIBED,
+    )
+    async def stop_fleet(request: Request, who: Pressing) -> Response:
+        """STOP every robot, in parallel."""
+        press = await press_of(request)
+        pressed = await commander.stop(commander.machines, who.name, clock(), press)
+        return Json(FleetPressed(commands=[Pressed.of(one) for one in pressed]), 202)
+
+    @routes.post(
+        "/robots/{robot_id}/drill",
+        status_code=202,
+        response_model=Pressed,
+        openapi_extra=DESCRIBED,
+    )
+    async def drill(request: Request, robot_id: str, who: Releasing) -> Response:
+        """STOP a robot that stands or crawls, to prove that STOP works; 409 else."""
+        press = await press_of(request)
+        command = await commander.drill(robot_id, who.name, clock(), press)
+        return Json(Pressed.of(command), 202)
+
+    @routes.post(
+        "/robots/{robot_id}/release",
+        status_code=202,
+        response_model=Pressed,
+    )
+    async def release(robot_id: str, body: Release, who: Releasing) -> Response:
+        """Lift exactly the holds that the person saw; 409 when they have changed."""
+        command = await commander.release(robot_id, body.holds, who.name, clock())
+        return Json(Pressed.of(command), 202)
+
+    @routes.post(
+        "/robots/{robot_id}/resume",
+        status_code=202,
+        response_model=Pressed,
+    )
+    async def resume(robot_id: str, who: Releasing) -> Response:
+        """Let a released robot drive again."""
+        command = await commander.resume(robot_id, who.name, clock())
+        return Json(Pressed.of(command), 202)
+
+    return routes

@@ -1,0 +1,115 @@
+"""The costmap over HTTP: numbers for programs and the page, a picture for people.
+
+The picture is a PNG of shades of grey, white free and black taken, with the grey that
+ROS map files use for unknown; its first line is the north.
+"""
+
+import asyncio
+import struct
+import zlib
+from collections.abc import Callable
+from typing import Annotated
+
+import numpy as np
+import orjson
+from fastapi import APIRouter, Depends, Query, Request
+from numpy.typing import NDArray
+from starlette.responses import Response
+
+from iveg.domain.costmap import UNKNOWN, Costmap
+from iveg.domain.observations import Instant
+from iveg.domain.rule.zones import zones_of
+from iveg.models.base import write_json
+from iveg.models.places import Costmap as CostmapModel
+from iveg.models.places import Point
+from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.mapping import Mapper
+from iveg.web.security.authentication import require
+
+_PNG = "image/png"
+_UNKNOWN_GREY = 205
+_NOTHING = CostmapModel(
+    resolution=0.1, width=0, height=0, origin=Point(x=0.0, y=0.0), data=[]
+)
+
+
+def router(
+    mapper: Mapper, evaluator: Evaluator, clock: Callable[[], Instant]
+) -> APIRouter:
+    """Where robots can drive, as their lasers have found."""
+    routes = APIRouter(
+        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
+    )
+
+    @routes.get(
+        "/costmap",
+        response_model=CostmapModel,
+        responses={200: {"content": {_PNG: {}}}},
+    )
+    async def costmap(
+        request: Request, robot: Annotated[str | None, Query(max_length=64)] = None
+    ) -> Response:
+        """The shared costmap, or what one robot believes.
+
+        Rows from the south, 0 free to 100 taken, -1 unknown; a PNG where the caller
+        accepts `image/png`.
+        """
+        now = clock()
+        world = evaluator.world
+        zones = zones_of(world, evaluator.people, evaluator.rule, now)
+        if robot is None:
+            found = mapper.shared(zones, now)
+        else:
+            found = mapper.of(world.robot(robot).robot_id, zones, now)
+        headers = {"Vary": "Accept"}
+        if _PNG in request.headers.get("accept", ""):
+            body = await asyncio.to_thread(write_png, _shades(found))
+            return Response(body, 200, headers, _PNG)
+        age = mapper.age_s(robot, now)
+        return Response(_json(found, age), 200, headers, "application/json")
+
+    return routes
+
+
+def _json(costmap: Costmap | None, age_s: float | None) -> bytes:
+    if costmap is None:
+        return write_json(_NOTHING)
+    grid = costmap.grid
+    # Cells by the hundred thousand go as they are: the model names them, no more.
+    told = {
+        "resolution": round(grid.resolution, 6),
+        "width": grid.width,
+        "height": grid.height,
+        "origin": {"x": grid.xmin, "y": grid.ymin},
+        "data": costmap.data.reshape(-1),
+        "age_s": None if age_s is None else round(age_s, 1),
+    }
+    return orjson.dumps(told, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _shades(costmap: Costmap | None) -> NDArray[np.uint8]:
+    if costmap is None:
+        return np.full((1, 1), _UNKNOWN_GREY, np.uint8)
+    data = costmap.data
+    shades = np.rint(255 - data.astype(np.float32) * 2.55).clip(0, 255).astype(np.uint8)
+    shades[data == UNKNOWN] = _UNKNOWN_GREY
+    return np.ascontiguousarray(shades[::-1])
+
+
+def write_png(shades: NDArray[np.uint8]) -> bytes:
+    """A picture of grey shades, shape (height, width), as a PNG (ISO 15948)."""
+    height, width = shades.shape
+    lines = np.zeros((height, width + 1), np.uint8)  # each line begins "no filter"
+    lines[:, 1:] = shades
+    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + _chunk(b"IHDR", head)
+        + _chunk(b"IDAT", zlib.compress(lines.tobytes(), 6))
+        + _chunk(b"IEND", b"")
+    )
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    check = zlib.crc32(kind + data)
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", check)

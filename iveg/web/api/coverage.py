@@ -1,0 +1,58 @@
+"""Where cameras have looked, over HTTP: the page shades the aisles by it."""
+
+from collections.abc import Callable
+
+from fastapi import APIRouter, Depends
+from starlette.responses import Response
+
+from iveg.domain.coverage import RECENT_S
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import write_json
+from iveg.models.places import Coverage, LaneCoverage
+from iveg.pipeline.coverage import Watch
+from iveg.web.security.authentication import require
+
+
+def router(watch: Watch, clock: Callable[[], Instant]) -> APIRouter:
+    """What nobody sees."""
+    routes = APIRouter(
+        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
+    )
+
+    @routes.get("/coverage", response_model=Coverage)
+    async def coverage() -> Response:
+        """When a camera last looked at each cell of the aisles; null: never.
+
+        ``share`` of the cells (0-1) was looked at within ``within_s``; null where the
+        greenhouse has no aisles.
+        """
+        now = clock()
+        share = watch.coverage.share(now)
+        told = Coverage(
+            at=format_stamp(now.wall),
+            cameras=watch.cameras(now),
+            within_s=RECENT_S,
+            share=None if share is None else round(share, 4),
+            lanes=_lanes(watch, now),
+        )
+        return Response(write_json(told), media_type="application/json")
+
+    return routes
+
+
+def _lanes(watch: Watch, now: Instant) -> list[LaneCoverage]:
+    pairs = zip(watch.coverage.lanes, watch.coverage.ages(now), strict=True)
+    return [
+        LaneCoverage(
+            label=one.lane.label,
+            xmin=one.lane.area.xmin,
+            ymin=one.lane.area.ymin,
+            xmax=one.lane.area.xmax,
+            ymax=one.lane.area.ymax,
+            columns=one.columns,
+            rows=one.rows,
+            ages_s=ages,
+        )
+        for one, ages in pairs
+    ]

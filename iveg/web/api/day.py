@@ -1,0 +1,147 @@
+"""The evening sheet over HTTP: as numbers, and as a page to print."""
+
+from collections.abc import Callable
+from datetime import date, timedelta
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query
+from starlette.requests import Request
+from starlette.responses import Response
+
+from iveg.adapters.history.lists import MOST_ROWS, Filter
+from iveg.adapters.history.queries import Queries
+from iveg.domain.alerts.alert_book import MOST_KEPT
+from iveg.domain.day import (
+    Passing,
+    closest_passes,
+    due_drills,
+    slowed_minutes,
+    worked_minutes,
+)
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.records import CommandRecord, DecisionRecord
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import write_json
+from iveg.models.command import Command
+from iveg.models.day import Day, Pass, Slowed, Worked
+from iveg.models.places import GreenhouseMap, Point
+from iveg.web.pages.contexts import DayPage
+from iveg.web.pages.local_time import in_madrid, start_of
+from iveg.web.pages.routes import Pages
+from iveg.web.security.authentication import require
+
+_DAY = timedelta(days=1)
+_MOST_PAGES = 20
+"""So many pages of rows are read; a day with more is told by those."""
+
+
+class Days:
+    """Reads days off the history.
+
+    Args:
+        queries: The history.
+        greenhouse: Whose aisles count.
+        drill_days: A STOP drill is due after so many days; 0: never.
+    """
+
+    def __init__(
+        self, queries: Queries, greenhouse: Greenhouse, drill_days: float
+    ) -> None:
+        self._queries = queries
+        self._greenhouse = greenhouse
+        self._drill_days = drill_days
+
+    async def read(self, day: date, now: float) -> Day:
+        """One day, as far as it has gone (``now`` in Unix s)."""
+        since, end = start_of(day), start_of(day + _DAY)
+        until = max(since, min(end, now))
+        poses, seen = await self._queries.day_series(since, until)
+        worked = worked_minutes(poses, self._greenhouse)
+        slowed = slowed_minutes(
+            await self._decisions(since, until), self._greenhouse, until
+        )
+        last = await self._queries.last_drills()
+        by = start_of(day + 2 * _DAY)
+        return Day(
+            day=day.isoformat(),
+            since=format_stamp(since),
+            until=format_stamp(until),
+            robots=sorted({pose.robot_id for pose in poses}),
+            worked=[
+                Worked(lane=lane, robot_id=robot, minutes=round(minutes, 1))
+                for lane, robots in worked.items()
+                for robot, minutes in sorted(robots.items())
+            ],
+            slowed=[
+                Slowed(cause=cause, lane=lane, minutes=round(minutes, 1))
+                for (cause, lane), minutes in sorted(
+                    slowed.items(), key=lambda one: -one[1]
+                )
+            ],
+            passes=[
+                _pass(one) for one in closest_passes(poses, seen, self._greenhouse)
+            ],
+            stops=[Command.of_record(one) for one in await self._stops(since, until)],
+            drills_due=due_drills(last, self._drill_days, by),
+            unseen=len(await self._queries.unseen_alerts(MOST_KEPT)),
+            map=GreenhouseMap.of(self._greenhouse),
+        )
+
+    async def _decisions(self, since: float, until: float) -> list[DecisionRecord]:
+        asked = Filter(since=since, until=until, limit=MOST_ROWS)
+        found: list[DecisionRecord] = []
+        for _ in range(_MOST_PAGES):
+            page = await self._queries.decisions(asked)
+            found += page.items
+            if page.next is None:
+                break
+            asked = Filter(since=since, until=until, limit=MOST_ROWS, cursor=page.next)
+        return found
+
+    async def _stops(self, since: float, until: float) -> list[CommandRecord]:
+        asked = Filter(since=since, until=until, limit=MOST_ROWS)
+        page = await self._queries.commands(asked)
+        return [one for one in reversed(page.items) if one.kind == "stop"]
+
+
+def _pass(one: Passing) -> Pass:
+    return Pass(
+        at=format_stamp(one.at),
+        robot_id=one.robot_id,
+        distance_m=round(one.distance_m, 2),
+        speed=round(one.speed, 2),
+        robot=Point(x=round(one.robot[0], 2), y=round(one.robot[1], 2)),
+        person=Point(x=round(one.person[0], 2), y=round(one.person[1], 2)),
+        lane=one.lane,
+    )
+
+
+def router(days: Days, pages: Pages, clock: Callable[[], Instant]) -> APIRouter:
+    """The evening sheet."""
+    routes = APIRouter()
+    who = Depends(require("read"))
+
+    @routes.get("/api/v1/day", response_model=Day, dependencies=[who], tags=["history"])
+    async def numbers(
+        day: Annotated[date | None, Query(description="Today unless told")] = None,
+    ) -> Response:
+        """What the fleet did on one day, Europe/Madrid, and what is due next."""
+        now = clock().wall
+        found = await days.read(day or in_madrid(now).date(), now)
+        return Response(write_json(found), media_type="application/json")
+
+    @routes.get("/day", response_model=None, include_in_schema=False)
+    async def sheet(
+        request: Request,
+        visitor: Annotated[Any, who],
+        day: Annotated[date | None, Query()] = None,
+    ) -> Response:
+        now = clock().wall
+        wanted = day or in_madrid(now).date()
+        found = await days.read(wanted, now)
+        before, after = ((wanted + step).isoformat() for step in (-_DAY, _DAY))
+        frame = pages.frame(request, "day", visitor)
+        return pages.draw(DayPage(frame, found, before, after))
+
+    return routes

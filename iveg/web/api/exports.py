@@ -1,0 +1,136 @@
+"""Lists as files: CSV for spreadsheets, NDJSON for programs.
+
+A CSV in a reader's language is one that Excel opens with a double click: a byte order
+mark, the separator and decimals of the language, and what happened as a sentence.
+
+An export runs through every page of a list while it is sent, so that a month of rows
+is never held in memory.
+"""
+
+import codecs
+import csv
+import io
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, Literal, TypeVar
+
+import orjson
+from starlette.datastructures import Headers
+
+from iveg.domain.records import AlertRecord, DecisionRecord, LogRecord, Record
+from iveg.domain.stamps import format_stamp
+from iveg.models.base import Model, write_json
+from iveg.models.decision import sentence_of
+from iveg.web.pages.sentences import Sentences
+
+Form = Literal["json", "csv", "ndjson"]
+MEDIA_TYPES: dict[Form, str] = {
+    "json": "application/json",
+    "csv": "text/csv",
+    "ndjson": "application/x-ndjson",
+}
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+R = TypeVar("R", bound=Record)
+
+
+def form_of(headers: Headers) -> Form:
+    """What the ``Accept`` header likes best; JSON for whoever does not say."""
+    best: Form = "json"
+    weight = 0.0
+    for part in headers.get("accept", "").split(","):
+        kind, _, rest = part.partition(";")
+        liked = _quality(rest)
+        for form, media_type in MEDIA_TYPES.items():
+            if kind.strip().lower() == media_type and liked > weight:
+                best, weight = form, liked
+    return best
+
+
+async def write_csv(
+    kind: type[R],
+    pages: AsyncIterator[Sequence[R]],
+    reader: Sentences | None = None,
+) -> AsyncIterator[bytes]:
+    """Rows as CSV (RFC 4180), one column a field of the record, times in UTC.
+
+    Args:
+        kind: What each row is.
+        pages: The rows.
+        reader: Whose spreadsheet it is for; None for programs.
+    """
+    names = [field.name for field in fields(kind)]
+    tell = None if reader is None else _telling(kind, reader)
+    head = [name.rstrip("_") for name in names]
+    if reader is not None:
+        yield codecs.BOM_UTF8
+        head = [reader.say("export.sentence", {}), *head] if tell else head
+    yield _csv_lines([head], reader)
+    async for records in pages:
+        rows = []
+        for record in records:
+            row = [_cell(name, getattr(record, name), reader) for name in names]
+            rows.append([tell(record), *row] if tell else row)
+        yield _csv_lines(rows, reader)
+
+
+def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
+    """What says in words what a row is; None where it is numbers alone."""
+    if kind in (LogRecord, AlertRecord):
+        return lambda row: _safe(reader.say(row.key, orjson.loads(row.slots)))
+    if kind is DecisionRecord:
+        return lambda row: _safe(_decision_said(row, reader))
+    return None
+
+
+def _decision_said(row: DecisionRecord, reader: Sentences) -> str:
+    sentence = sentence_of(row)
+    return reader.say(sentence.key, sentence.slots)
+
+
+async def write_ndjson(
+    view: Callable[[Sequence[R]], Awaitable[Sequence[Model]]],
+    pages: AsyncIterator[Sequence[R]],
+) -> AsyncIterator[bytes]:
+    """Rows as one JSON value a line, each as the list has it."""
+    async for records in pages:
+        models = await view(records)
+        yield b"".join(write_json(one) + b"\n" for one in models)
+
+
+def _csv_lines(rows: list[list[str]], reader: Sentences | None) -> bytes:
+    text = io.StringIO()
+    # Excel takes the separator of lists of its country; Spain's is the semicolon.
+    is_spanish = reader is not None and reader.translations.language == "es"
+    csv.writer(text, delimiter=";" if is_spanish else ",").writerows(rows)
+    return text.getvalue().encode()
+
+
+def _cell(name: str, value: object, reader: Sentences | None) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float) and (name == "at" or name.endswith("_at")):
+        return format_stamp(value)
+    if isinstance(value, float) and reader is not None:
+        text = str(value)
+        return text.replace(".", ",") if reader.translations.language == "es" else text
+    if isinstance(value, Mapping | list):
+        return write_json(value).decode()
+    return _safe(value) if isinstance(value, str) else str(value)
+
+
+def _safe(text: str) -> str:
+    """A spreadsheet would run it; numbers are ours and stay numbers."""
+    return "'" + text if text.startswith(_FORMULA) else text
+
+
+def _quality(parameters: str) -> float:
+    for parameter in parameters.split(";"):
+        name, _, value = parameter.partition("=")
+        if name.strip().lower() == "q":
+            try:
+                return float(value)
+            except ValueError:
+                return 0.0
+    return 1.0

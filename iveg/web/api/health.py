@@ -1,0 +1,32 @@
+"""Whether the chain is whole: for people, for supervisors, for Prometheus."""
+
+from collections.abc import Callable
+
+from fastapi import APIRouter, Depends
+from starlette.responses import PlainTextResponse, Response
+
+from iveg.domain.observations import Instant
+from iveg.models.health import Health
+from iveg.web.api.answers import Json
+from iveg.web.security.authentication import require
+
+
+def router(
+    clock: Callable[[], Instant],
+    health: Callable[[Instant], Health],
+) -> APIRouter:
+    """The endpoints that machines ask."""
+    routes = APIRouter(tags=["health"])
+
+    @routes.get("/healthz", dependencies=[Depends(require("open"))])
+    async def alive() -> Response:
+        """The process answers; says nothing else to strangers."""
+        return PlainTextResponse("ok\n")
+
+    @routes.get("/readyz", dependencies=[Depends(require("read"))])
+    async def ready() -> Response:
+        """200 when every hop is well, else 503."""
+        state = health(clock())
+        return Json({"ok": state.ok}, 200 if state.ok else 503)
+
+    return routes

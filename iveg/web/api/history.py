@@ -1,0 +1,325 @@
+"""What is remembered, over HTTP: lists to filter and export, and figures to draw.
+
+Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Annotated, Any, Generic, TypeVar
+
+import orjson
+from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+
+from iveg.adapters import clock
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Filter, ListOf, Page
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import ClimateSeries
+from iveg.domain.alerts.flood import Flood as NoFlood
+from iveg.domain.fleet import NOBODY, FleetDescription
+from iveg.domain.observations import Instant
+from iveg.domain.records import CommandRecord, DecisionRecord, Record
+from iveg.domain.stamps import format_stamp
+from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
+from iveg.models.base import Listing, Model, write_json
+from iveg.models.climate import ClimateReading
+from iveg.models.command import Command
+from iveg.models.decision import Decision
+from iveg.models.people import Detection
+from iveg.models.reading import Reading
+from iveg.web.api import exports
+from iveg.web.api.answers import Json
+from iveg.web.api.exports import MEDIA_TYPES, Form
+from iveg.web.api.history_filters import Filters, Range, Span, filter_of, range_of
+from iveg.web.pages import charts
+from iveg.web.pages.local_time import in_madrid
+from iveg.web.pages.sentences import Sentences
+from iveg.web.pages.translations import read_translations
+
+R = TypeVar("R", bound=Record)
+_DAY_S = 86_400.0
+_FOR_GOOD = "public, max-age=31536000, immutable"
+_CSV_AND_NDJSON: dict[str, dict[str, str]] = {
+    MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _List(Generic[R]):
+    """One list: where it comes from and how it looks; ``more`` stands beside it."""
+
+    path: str
+    of: ListOf[R]
+    ask: Callable[[Filter], Awaitable[Page[R]]]
+    view: Callable[[Sequence[R]], Awaitable[list[Model]]]
+    listing: type[Listing[Any]]
+    says: str
+    more: Callable[[], dict[str, Any]] = dict
+
+
+def router(
+    queries: Queries,
+    *,
+    reader: Callable[..., Any],
+    threshold: Callable[[], float | None] = lambda: None,
+    present: Callable[[str], DecisionRecord | None] = lambda _: None,
+    flood: Callable[[], Flood] = lambda: Flood.of(NoFlood()),
+    fleet: FleetDescription = NOBODY,
+    read_clock: Callable[[], Instant] = clock.now,
+) -> APIRouter:
+    """The routes of the history.
+
+    Args:
+        queries: Where the past is asked for.
+        reader: Dependency that refuses whoever may not read.
+        threshold: Least confidence of the rule in force, marked in the chart.
+        present: A decision that is still in memory; its links are those of now.
+        flood: How fast alerts come.
+        fleet: Whose greatest speeds the chart is about.
+        read_clock: What "the last 15 minutes" end at.
+    """
+    routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
+    for one in _lists(queries, flood):
+        _add_list(routes, one)
+
+    @routes.get(
+        "/api/v1/decisions/{decision_id}",
+        summary="One decision",
+        response_model=Decision,
+    )
+    async def decision(
+        decision_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+    ) -> Response:
+        found = present(decision_id) or await queries.decision(decision_id)
+        if found is None:
+            raise HTTPException(404, "There is no such decision.")
+        return Json(Decision.of_record(found))
+
+    @routes.get(
+        "/api/v1/history/charts",
+        summary="Plotly figures of a range",
+        description="Speed with the mandated limit, detections by class and "
+        "confidence, how long each STOP took; the last 15 minutes unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def draw(asked: Annotated[Range, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall)
+        return await _charts(queries, since, until, asked.robot, threshold(), fleet)
+
+    @routes.get(
+        "/api/v1/history/climate",
+        summary="The air over a range",
+        description="Readings, or their means over slices of time, and Plotly figures "
+        "of them; the last 24 hours unless told.",
+        response_class=Response,
+        responses={200: {"content": {"application/json": {}}}},
+    )
+    async def climate(asked: Annotated[Span, Query()]) -> Response:
+        since, until = range_of(asked, read_clock().wall, _DAY_S)
+        return await _climate(queries, since, until)
+
+    @routes.get("/vendor/{name}", include_in_schema=False)
+    async def vendor(name: str) -> Response:
+        script = await asyncio.to_thread(charts.library)
+        if name != script.name:
+            raise HTTPException(404, "There is no such file.")
+        headers = {"Content-Encoding": "gzip", "Cache-Control": _FOR_GOOD}
+        return Response(script.packed, 200, headers, "text/javascript")
+
+    return routes
+
+
+def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ...]:
+    async def audited(records: Sequence[CommandRecord]) -> list[Model]:
+        steps = await queries.steps_of([one.command_id for one in records])
+        return [
+            Command.of_record(one, steps.get(one.command_id, ())) for one in records
+        ]
+
+    return (
+        _List(
+            "decisions",
+            lists.DECISIONS,
+            queries.decisions,
+            _each(Decision.of_record),
+            Listing[Decision],
+            "Why robots were slowed, by when it began",
+        ),
+        _List(
+            "detections",
+            lists.DETECTIONS,
+            queries.detections,
+            _each(Detection.of_record),
+            Listing[Detection],
+            "What robots saw, by when it reached iVeg",
+        ),
+        _List(
+            "commands",
+            lists.COMMANDS,
+            queries.commands,
+            audited,
+            Listing[Command],
+            "Every STOP, release and resume, by when it was asked",
+        ),
+        _List(
+            "alerts",
+            lists.ALERTS,
+            queries.alerts,
+            _each(Alert.of_record),
+            AlertListing,
+            "Every alert, by when it was last raised, and how fast they come",
+            lambda: {"flood": flood()},
+        ),
+        _List(
+            "log",
+            lists.LOG,
+            queries.log,
+            _each(LogEntry.of_record),
+            Listing[LogEntry],
+            "The action and inference log",
+        ),
+        _List(
+            "readings",
+            lists.READINGS,
+            queries.readings,
+            _each(Reading.of_record),
+            Listing[Reading],
+            "What small sensors of robots said; `class` asks for a kind, as `battery`",
+        ),
+    )
+
+
+def _add_list(routes: APIRouter, one: _List[R]) -> None:
+    @routes.get(
+        f"/api/v1/{one.path}",
+        name=one.path,
+        summary=one.says,
+        response_model=one.listing,
+        responses={200: {"content": _CSV_AND_NDJSON}},
+    )
+    async def listing(
+        request: Request, filters: Annotated[Filters, Query()]
+    ) -> Response:
+        form = filters.format or exports.form_of(request.headers)
+        asked = filter_of(filters, one.of)
+        if form == "json":
+            return await _listing(await one.ask(asked), one)
+        return await _file(one, filters, asked, form)
+
+
+def _each(
+    view: Callable[[R], Model],
+) -> Callable[[Sequence[R]], Awaitable[list[Model]]]:
+    """Rows of which each says all that is told of it."""
+
+    async def views(records: Sequence[R]) -> list[Model]:
+        return [view(record) for record in records]
+
+    return views
+
+
+async def _listing(page: Page[R], one: _List[R]) -> Response:
+    after = None if page.next is None else lists.write_cursor(page.next)
+    items = await one.view(page.items)
+    return Json(one.listing(items=items, next=after, **one.more()))
+
+
+async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> Response:
+    """A whole list as a file; with a limit, that many rows of it."""
+    if filters.limit is None:
+        asked = replace(asked, limit=lists.MOST_ROWS)
+    # The first page is read before the answer begins, so that a refusal can be told.
+    first = await one.ask(asked)
+    pages = _pages(one, first, asked, whole=filters.limit is None)
+    if form == "csv":
+        body = exports.write_csv(one.of.kind, pages, _reader(filters.language))
+    else:
+        body = exports.write_ndjson(one.view, pages)
+    name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
+    headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+    return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
+
+
+@cache
+def _reader(language: str | None) -> Sentences | None:
+    return None if language is None else Sentences(read_translations(language))
+
+
+def _day(asked: Filter) -> str:
+    """The day that a file is about, for its name: the first that was asked for."""
+    at = clock.now().wall if asked.since is None else asked.since
+    return f"-{in_madrid(at):%Y-%m-%d}"
+
+
+async def _pages(
+    one: _List[R], page: Page[R], asked: Filter, *, whole: bool
+) -> AsyncIterator[Sequence[R]]:
+    yield page.items
+    while whole and page.next is not None:
+        page = await one.ask(replace(asked, cursor=page.next))
+        yield page.items
+
+
+async def _charts(
+    queries: Queries,
+    since: float,
+    until: float,
+    robot: str | None,
+    threshold: float | None,
+    fleet: FleetDescription,
+) -> Response:
+    speeds, counts, stops = await asyncio.gather(
+        queries.speed_series(since, until, robot),
+        queries.confidence_counts(since, until, robot),
+        queries.command_latencies(since, until, robot),
+    )
+
+    def draw() -> bytes:
+        parts = (
+            orjson.dumps(_library()).removesuffix(b"}"),
+            b'"speed":' + charts.speed_figure(speeds, fleet),
+            b'"detections":' + charts.confidence_figure(counts, threshold),
+            b'"stops":' + charts.stop_figure(stops) + b"}",
+        )
+        return b",".join(parts)
+
+    body = await asyncio.to_thread(draw)
+    return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+async def _climate(queries: Queries, since: float, until: float) -> Response:
+    series = await queries.climate_series(since, until)
+
+    def draw() -> bytes:
+        head = write_json(
+            {
+                "since": format_stamp(since),
+                "until": format_stamp(until),
+                "slice_s": round(series.slice_s, 3),
+                "items": _readings(series),
+                **_library(),
+            }
+        )
+        figures = charts.climate_figures(series).items()
+        parts = (b'"%s":%s' % (name.encode(), figure) for name, figure in figures)
+        return head.removesuffix(b"}") + b',"figures":{' + b",".join(parts) + b"}}"
+
+    body = await asyncio.to_thread(draw)
+    return Response(body, media_type=MEDIA_TYPES["json"])
+
+
+def _readings(series: ClimateSeries) -> list[ClimateReading]:
+    """Oldest first."""
+    columns = (series.at, series.temperature, series.relative_humidity, series.co2)
+    return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
+
+
+def _library() -> dict[str, object]:
+    """Where the browser finds what draws figures, and what a strict page must hold."""
+    library = charts.library()
+    return {"library": f"/vendor/{library.name}", "style_ids": library.style_ids}

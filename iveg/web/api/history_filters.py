@@ -1,0 +1,145 @@
+"""What may be asked of the past, read and checked where it enters.
+
+Times are ISO-8601; one without an offset is UTC.  A name that is not a filter is
+refused: a misspelt filter that answers everything would mislead.
+"""
+
+from datetime import UTC, datetime
+from typing import Annotated, Literal, Self, TypeVar
+
+from fastapi.exceptions import RequestValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    model_validator,
+)
+
+from iveg.adapters.history import lists
+from iveg.adapters.history.lists import Cursor, Filter, ListOf
+from iveg.domain.errors import UnreadableError
+from iveg.domain.records import Record
+from iveg.web.api.exports import Form
+
+R = TypeVar("R", bound=Record)
+LONGEST_RANGE_S = 31 * 86_400.0
+_USUAL_RANGE_S = 15 * 60.0
+_ROBOT_ID = r"^[A-Za-z0-9-]{1,64}$"
+_NO_CONTROLS = r"^[^\x00-\x1f]*$"
+"""PostgreSQL refuses text that holds NUL."""
+
+
+def _mend_plus(value: object) -> object:
+    # An unescaped "+00:00" reaches us as " 00:00", from nearly every first attempt.
+    if isinstance(value, str) and "T" in value:
+        return value.strip().replace(" ", "+")
+    return value
+
+
+def _in_utc(moment: datetime) -> datetime:
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+
+
+Moment = Annotated[datetime, BeforeValidator(_mend_plus), AfterValidator(_in_utc)]
+
+
+class Span(BaseModel):
+    """Since when and until when."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    since: Moment | None = Field(None, description="From here on, inclusive (ISO-8601)")
+    until: Moment | None = Field(None, description="Up to here, exclusive (ISO-8601)")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.since and self.until and self.since > self.until:
+            raise ValueError("since is after until")
+        return self
+
+
+class Range(Span):
+    """Since when, until when, and of which robot."""
+
+    robot: str | None = Field(None, pattern=_ROBOT_ID, description="Robot id")
+
+
+class Filters(Range):
+    """Filters of every list."""
+
+    class_: str | None = Field(
+        None,
+        alias="class",
+        max_length=64,
+        pattern=_NO_CONTROLS,
+        description="Canonical class, or as sent",
+    )
+    min_probability: float | None = Field(
+        None, ge=0, le=1, allow_inf_nan=False, description="Least confidence, inclusive"
+    )
+    limit: int | None = Field(
+        None, ge=1, le=lists.MOST_ROWS, description="Rows of a page; 100 unless told"
+    )
+    cursor: str | None = Field(
+        None, max_length=200, description="`next` of the page before"
+    )
+    format: Form | None = Field(None, description="Instead of an `Accept` header")
+    language: Literal["es", "en"] | None = Field(
+        None,
+        description="CSV as that reader's spreadsheet expects it, with sentences",
+    )
+
+
+def filter_of(filters: Filters, of: ListOf[R]) -> Filter:
+    """The question to the database.
+
+    Raises:
+        RequestValidationError: the cursor belongs to another list, or to none.
+    """
+    return Filter(
+        since=_seconds(filters.since),
+        until=_seconds(filters.until),
+        robot=filters.robot,
+        class_=filters.class_,
+        min_probability=filters.min_probability,
+        limit=filters.limit or lists.USUAL_ROWS,
+        cursor=_cursor(filters.cursor, of),
+    )
+
+
+def range_of(
+    asked: Span, now: float, usual_s: float = _USUAL_RANGE_S
+) -> tuple[float, float]:
+    """Since and until in Unix seconds; the last ``usual_s`` when nothing is asked.
+
+    Raises:
+        RequestValidationError: the range is turned round or too long to draw.
+    """
+    until = now if asked.until is None else asked.until.timestamp()
+    since = until - usual_s if asked.since is None else asked.since.timestamp()
+    if since > until:
+        raise _invalid("since", "since is after until")
+    if until - since > LONGEST_RANGE_S:
+        raise _invalid("since", "a chart shows 31 days at most")
+    return since, until
+
+
+def _seconds(moment: datetime | None) -> float | None:
+    return None if moment is None else moment.timestamp()
+
+
+def _cursor(text: str | None, of: ListOf[R]) -> Cursor | None:
+    if text is None:
+        return None
+    try:
+        return lists.read_cursor(text, of)
+    except UnreadableError as error:
+        raise _invalid("cursor", "not a cursor of this list") from error
+
+
+def _invalid(name: str, why: str) -> RequestValidationError:
+    return RequestValidationError(
+        [{"type": "invalid", "loc": ("query", name), "msg": why}]
+    )

@@ -1,0 +1,324 @@
+"""Latency by hop: the paper's table live, beside what it printed (interfaces.md §5)."""
+
+import asyncio
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+import orjson
+from fastapi import APIRouter, Depends, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from iveg.domain.latency.account import Cell, Spread, collect, merge, spread_of
+from iveg.domain.latency.hops import DATA, HOPS, WINDOW_S, Data, Hop, Window
+from iveg.domain.latency.offset import ClockOffset
+from iveg.domain.latency.order import Order
+from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.sketch import Sketch
+from iveg.domain.latency.stream import Stream
+from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.observations import Instant
+from iveg.ngsi.codec import format_stamp
+from iveg.web.api.exports import form_of
+from iveg.web.pages import charts
+from iveg.web.pages.latency_figures import (
+    StepJson,
+    bars_figure,
+    cdf_figure,
+    steps_of,
+    trace_figure,
+)
+from iveg.web.security.authentication import require
+
+
+class SpreadJson(TypedDict):
+    """One hop (ms); null where nothing was measured."""
+
+    count: int
+    mean_ms: float | None
+    p50_ms: float | None
+    p95_ms: float | None
+    p99_ms: float | None
+    least_ms: float | None
+    most_ms: float | None
+
+
+class RowJson(TypedDict):
+    """One kind of data; ``sampled``: hops of which not every message is told."""
+
+    data: Data
+    hops: dict[str, SpreadJson]
+    sampled: list[str]
+
+
+class ClockJson(TypedDict):
+    """A robot's clock less the server's, as far as it is proven."""
+
+    robot_id: str
+    state: str
+    offset_ms: float | None
+    uncertainty_ms: float | None
+    jumps: int
+
+
+class OrderJson(TypedDict):
+    """What passed a hop since the start."""
+
+    passed: int
+    missing: int
+    reordered: int
+    repeated: int
+
+
+class StreamJson(TypedDict):
+    """One kind of data of one robot: what really comes, and how."""
+
+    robot_id: str
+    data: Data
+    heard_hz: float
+    agent_hz: float
+    orion_hz: float
+    kept_back: float | None
+    throttled: bool
+    orion_first: int
+    uplink: OrderJson
+    fiware: OrderJson
+    excluded: dict[str, dict[str, int]]
+
+
+class RemarkJson(TypedDict):
+    """What is wrong with a hop now: a sentence's name, and what fills it."""
+
+    key: str
+    hop: str
+    slots: dict[str, str | float]
+
+
+class TraceJson(TypedDict):
+    """One message, hop by hop."""
+
+    robot_id: str
+    data: Data
+    stamp: str | None
+    steps: list[StepJson]
+
+
+class LatencyJson(TypedDict):
+    """All of it over one window."""
+
+    at: str
+    window: Window
+    window_s: float
+    robot: str | None
+    direct: bool
+    rows: list[RowJson]
+    paper: dict[str, dict[str, dict[str, float]]]
+    clocks: list[ClockJson]
+    pages_within_ms: float | None
+    streams: list[StreamJson]
+    remarks: list[RemarkJson]
+    trace: TraceJson | None
+    library: str
+    style_ids: list[str]
+    figures: dict[str, Any]
+
+
+class Asked(BaseModel):
+    """Which window, of which robot."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    window: Window = Field("15min", description="1min, 15min or 24h")
+    robot: str | None = Field(
+        None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
+    )
+    figures: bool = Field(True, description="Whether to draw them, too")
+    format: Literal["json", "csv"] | None = Field(
+        None, description="Instead of an `Accept` header"
+    )
+
+
+def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
+    """What the watch has measured."""
+    routes = APIRouter(
+        prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
+    )
+
+    @routes.get("/latency", response_model=LatencyJson)
+    async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
+        """Mean and quantiles of each hop, clocks, rates, loss, and the figures."""
+        parts = collect(watch.streams, asked.window, asked.robot)
+        form = asked.format or form_of(request.headers)
+        if form == "csv":
+            return Response(_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
+        told = _told(watch, asked, clock())
+        # A day of twenty robots is merged beside the loop, not in it.
+        draws = asked.figures
+        body = await asyncio.to_thread(_finished, parts, told, draws=draws)
+        return Response(body, media_type="application/json")
+
+    return routes
+
+
+_CSV = {
+    "Content-Type": "text/csv; charset=utf-8",
+    "Content-Disposition": 'attachment; filename="latency.csv"',
+}
+
+
+def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
+    """What is read off the streams, in the loop's thread."""
+    streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
+    traced = max(
+        (one for one in streams if one.tracer.newest is not None),
+        key=lambda one: one.tracer.newest.heard_at,  # type: ignore[union-attr]
+        default=None,
+    )
+    return {
+        "at": format_stamp(now.wall),
+        "window": asked.window,
+        "window_s": WINDOW_S[asked.window],
+        "robot": asked.robot,
+        "paper": {
+            place: {data: asdict(row) for data, row in rows.items()}
+            for place, rows in PAPER.items()
+        },
+        "clocks": [
+            _clock(robot_id, one)
+            for robot_id, one in watch.clocks.items()
+            if asked.robot in (None, robot_id)
+        ],
+        "pages_within_ms": _ms(watch.pages_within_s),
+        "streams": [_stream(one) for one in streams],
+        "sampled": _sampled(streams),
+        "remarks": [
+            {"key": one.key, "hop": one.hop, "slots": dict(one.slots)}
+            for one in watch.overloads.remarks
+        ],
+        "traced": None if traced is None else (traced.robot_id, traced.data),
+        "newest": None if traced is None else traced.tracer.newest,
+    }
+
+
+def _finished(
+    parts: Mapping[Cell, list[Sketch]], told: dict[str, Any], *, draws: bool
+) -> bytes:
+    """The whole answer; in a thread of its own."""
+    sketches = merge(parts)
+    spreads = {cell: spread_of(sketch) for cell, sketch in sketches.items()}
+    traced, newest = told.pop("traced"), told.pop("newest")
+    sampled = told.pop("sampled")
+    figures = {}
+    if draws:
+        figures = {
+            "bars": bars_figure(spreads),
+            "cdf": cdf_figure(sketches),
+            "trace": trace_figure(newest),
+        }
+    library = charts.library()
+    return orjson.dumps(
+        {
+            **told,
+            "direct": any(spreads[data, "uplink"].count for data in DATA),
+            "rows": [_row(data, spreads, sampled[data]) for data in DATA],
+            "trace": None
+            if traced is None
+            else {
+                "robot_id": traced[0],
+                "data": traced[1],
+                "stamp": newest.stamp,
+                "steps": steps_of(newest),
+            },
+            "library": f"/vendor/{library.name}",
+            "style_ids": library.style_ids,
+            "figures": {
+                name: orjson.Fragment(figure) for name, figure in figures.items()
+            },
+        }
+    )
+
+
+def _row(data: Data, spreads: Mapping[Cell, Spread], sampled: list[Hop]) -> RowJson:
+    hops: dict[str, SpreadJson] = {hop: _spread(spreads[data, hop]) for hop in HOPS}
+    return {"data": data, "hops": hops, "sampled": list(sampled)}
+
+
+def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
+    """Hops of which some messages are not told: Orion is throttled, pages are paced."""
+    throttled = {one.data for one in streams if one.is_throttled}
+    return {
+        data: [*(("fiware", "robot_orion") if data in throttled else ()), "screen"]
+        for data in DATA
+    }
+
+
+def _spread(of: Spread) -> SpreadJson:
+    return {
+        "count": of.count,
+        "mean_ms": _ms(of.mean),
+        "p50_ms": _ms(of.p50),
+        "p95_ms": _ms(of.p95),
+        "p99_ms": _ms(of.p99),
+        "least_ms": _ms(of.least),
+        "most_ms": _ms(of.most),
+    }
+
+
+def _clock(robot_id: str, of: ClockOffset) -> ClockJson:
+    return {
+        "robot_id": robot_id,
+        "state": of.state,
+        "offset_ms": _ms(of.offset_s),
+        "uncertainty_ms": _ms(of.uncertainty_s),
+        "jumps": of.jumps,
+    }
+
+
+def _stream(of: Stream) -> StreamJson:
+    rates = of.rates
+    excluded: dict[str, dict[str, int]] = {}
+    for (hop, why), count in of.excluded.items():
+        excluded.setdefault(hop, {})[why] = count
+    return {
+        "robot_id": of.robot_id,
+        "data": of.data,
+        "heard_hz": round(rates.heard, 1),
+        "agent_hz": round(rates.agent, 1),
+        "orion_hz": round(rates.orion, 1),
+        "kept_back": round(1.0 - rates.agent / rates.heard, 2) if rates.heard else None,
+        "throttled": of.is_throttled,
+        "orion_first": of.orion_first,
+        "uplink": _order(of.up),
+        "fiware": _order(of.fiware),
+        "excluded": excluded,
+    }
+
+
+def _order(of: Order) -> OrderJson:
+    return {
+        "passed": of.passed,
+        "missing": of.missing,
+        "reordered": of.reordered,
+        "repeated": of.repeated,
+    }
+
+
+def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
+    """One line a kind of data and hop (RFC 4180)."""
+    text = io.StringIO()
+    lines = csv.writer(text)
+    names = list(SpreadJson.__annotations__)
+    lines.writerow(["data", "hop", *names])
+    for (data, hop), sketch in sketches.items():
+        told = dict(_spread(spread_of(sketch)))
+        cells = ("" if told[name] is None else told[name] for name in names)
+        lines.writerow([data, hop, *cells])
+    return text.getvalue().encode()
+
+
+def _ms(seconds: float | None) -> float | None:
+    return None if seconds is None else round(1000.0 * seconds, 2)

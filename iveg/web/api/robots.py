@@ -1,0 +1,73 @@
+"""REST twins of what is live: robots, people, map, climate (docs/interfaces.md §5)."""
+
+from collections.abc import Callable
+
+from fastapi import APIRouter, Depends
+from starlette.responses import Response
+
+from iveg.domain.observations import Instant
+from iveg.models.base import Listing
+from iveg.models.climate import Climate
+from iveg.models.device import Device
+from iveg.models.health import Health
+from iveg.models.people import Person
+from iveg.models.places import GreenhouseMap, Scan
+from iveg.models.robot import Robot
+from iveg.web.api.answers import Json
+from iveg.web.security.authentication import require
+from iveg.web.views import Views
+
+
+def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
+    """What is known now."""
+    routes = APIRouter(
+        prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
+    )
+
+    @routes.get("/robots", response_model=Listing[Robot])
+    async def robots() -> Response:
+        """The whole fleet, each robot with the age of what is said of it."""
+        return Json(Listing(items=views.robots(clock())))
+
+    @routes.get("/robots/{robot_id}", response_model=Robot)
+    async def robot(robot_id: str) -> Response:
+        """One robot."""
+        return Json(views.robot(robot_id, clock()))
+
+    @routes.get("/robots/{robot_id}/scan", response_model=Scan)
+    async def scan(robot_id: str) -> Response:
+        """The newest sweep of one robot, as points in `map`."""
+        swept = views.scan(robot_id)
+        points: list[tuple[float, float]] = []
+        stamp = None
+        if swept is not None:
+            stamp = swept[0].origin.stamp
+            points = [(round(x, 3), round(y, 3)) for x, y in swept[1].tolist()]
+        return Json(Scan(robot_id=robot_id, stamp=stamp, points=points))
+
+    @routes.get("/people", response_model=Listing[Person])
+    async def people() -> Response:
+        """Everyone who is known, in their three stages."""
+        return Json(Listing(items=views.people(clock())))
+
+    @routes.get("/devices", response_model=Listing[Device])
+    async def devices() -> Response:
+        """Each robot's devices at the IoT Agent, and when each was last heard of."""
+        return Json(Listing(items=views.devices(clock())))
+
+    @routes.get("/map", response_model=GreenhouseMap)
+    async def greenhouse() -> Response:
+        """The greenhouse: lanes, crop rows, posts, obstacles (m)."""
+        return Json(views.map())
+
+    @routes.get("/climate", response_model=Climate | None)
+    async def climate() -> Response:
+        """The newest reading of the air; null before the first."""
+        return Json(views.climate(clock()))
+
+    @routes.get("/health", response_model=Health)
+    async def chain() -> Response:
+        """The chain from robot to screen, hop by hop, and what was counted."""
+        return Json(views.health(clock()))
+
+    return routes

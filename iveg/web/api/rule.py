@@ -1,0 +1,104 @@
+"""The alert rule over HTTP: the version in force, every earlier one, and a new one."""
+
+from collections.abc import Callable
+from typing import Annotated, Literal, TypeVar
+
+from fastapi import APIRouter, Depends
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+from starlette.responses import Response
+
+from iveg.domain.detection_rule import Class, Rule
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.models.base import Listing
+from iveg.models.rule import Rule as RuleModel
+from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.rules import Rules
+from iveg.web.api.answers import Json
+from iveg.web.security.authentication import Principal, require
+
+T = TypeVar("T")
+_Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+_RADIUS = Field(ge=LIMITS.ring_least_m, le=LIMITS.ring_most_m, allow_inf_nan=False)
+_MOST_ALIASES = 200
+
+
+class RuleChange(BaseModel):
+    """What is to be different; what is not named stays as it is.
+
+    A class that a detector may name must stand for `person` or `robot`; both names
+    always stand for themselves.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    version: int | None = None
+    """The version that the person saw; 409 when it is no longer in force."""
+    confidence_threshold: _Share | None = None
+    class_thresholds: dict[Literal["person", "robot"], _Share] | None = None
+    radius_m: Annotated[float, _RADIUS] | None = None
+    aliases: (
+        Annotated[
+            dict[str, Literal["person", "robot"]], Field(max_length=_MOST_ALIASES)
+        ]
+        | None
+    ) = None
+    possible_people: bool | None = None
+
+    @field_validator("aliases")
+    @classmethod
+    def _readable(cls, aliases: dict[str, Class] | None) -> dict[str, Class] | None:
+        if aliases is None:
+            return None
+        cleaned = {clean_text(name).strip().lower(): aliases[name] for name in aliases}
+        own: dict[str, Class] = {"person": "person", "robot": "robot"}
+        if "" in cleaned or any(cleaned.get(n, c) != c for n, c in own.items()):
+            raise ValueError("names must not be empty; person and robot are themselves")
+        return {**cleaned, **own}
+
+    def applied_to(self, rule: Rule) -> Rule:
+        """The rule with these parameters."""
+        return Rule(
+            rule.id,
+            rule.version,
+            _new(self.confidence_threshold, rule.threshold),
+            _new(self.class_thresholds, dict(rule.class_thresholds)),
+            _new(self.radius_m, rule.radius_m),
+            _new(self.aliases, dict(rule.aliases)),
+            _new(self.possible_people, rule.possible_people),
+        )
+
+
+def _new(wanted: T | None, old: T) -> T:
+    return old if wanted is None else wanted
+
+
+def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
+    """Read by all, changed by operators; every version keeps its author and time."""
+    routes = APIRouter(prefix="/api/v1", tags=["rule"])
+    reader = [Depends(require("read"))]
+
+    @routes.get("/rule", response_model=RuleModel, dependencies=reader)
+    async def rule() -> Response:
+        """The version in force."""
+        return Json(RuleModel.of(rules.current))
+
+    @routes.get(
+        "/rule/versions", response_model=Listing[RuleModel], dependencies=reader
+    )
+    async def versions() -> Response:
+        """Every version with its author and time, newest first."""
+        items = [RuleModel.of(one) for one in reversed(rules.versions)]
+        return Json(Listing(items=items))
+
+    @routes.put("/rule", response_model=RuleModel)
+    async def change(
+        body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
+    ) -> Response:
+        """Put a new version in force at once; what is not named stays as it is."""
+        wanted = body.applied_to(rules.current)
+        return Json(
+            RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))
+        )
+
+    return routes

@@ -1,0 +1,119 @@
+"""How long STOP took, and the drills that prove it (docs/interfaces.md §5).
+
+Both are read from the history, so they outlive a restart and can be printed.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from starlette.responses import Response
+
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.series import CommandLatency
+from iveg.domain.observations import Instant
+from iveg.domain.records import CommandRecord
+from iveg.domain.stamps import format_stamp
+from iveg.domain.stop.latency import spread
+from iveg.models.base import Listing, rounded
+from iveg.models.command import (
+    Command,
+    Drill,
+    Latency,
+    LatencySpread,
+    RobotLatency,
+)
+from iveg.web.api.answers import Json
+from iveg.web.api.history_filters import Range, range_of
+from iveg.web.security.authentication import require
+
+DRILL_DEADLINE_MS = 5000.0
+"""Press to STANDING, safety.md §2.4."""
+_DRILLS_SHOWN = 100
+
+
+def router(
+    queries: Queries,
+    clock: Callable[[], Instant],
+    find: Callable[[str, Instant], Command | None],
+) -> APIRouter:
+    """What is remembered of STOP; ``find`` knows the commands of this run."""
+    routes = APIRouter(
+        prefix="/api/v1", tags=["commands"], dependencies=[Depends(require("read"))]
+    )
+
+    @routes.get("/commands/latency", response_model=Latency)
+    async def latency(asked: Annotated[Range, Query()]) -> Response:
+        """P50, P95 and longest of each step, per robot; 15 minutes unless told."""
+        since, until = range_of(asked, clock().wall)
+        found = await queries.command_latencies(since, until, asked.robot)
+        body = Latency(
+            since=format_stamp(since),
+            until=format_stamp(until),
+            robots=_by_robot(found),
+        )
+        return Json(body)
+
+    @routes.get("/commands/{command_id}", response_model=Command)
+    async def command(
+        command_id: Annotated[str, Path(pattern=r"^[ -~]{1,64}$")],
+    ) -> Response:
+        """One command: as it stands, or as the history knows it."""
+        followed = find(command_id, clock())
+        if followed is not None:
+            return Json(followed)
+        found = await queries.command(command_id)
+        if found is None:
+            raise HTTPException(404, "There is no such command.")
+        steps = await queries.command_events(command_id)
+        return Json(Command.of_record(found, steps))
+
+    @routes.get("/drills", response_model=Listing[Drill])
+    async def drills(robot: str | None = None) -> Response:
+        """The newest drills, each with its verdict: standing within five seconds."""
+        found = await queries.drills(robot, _DRILLS_SHOWN)
+        now = clock().wall
+        return Json(Listing(items=[_drill(one, now) for one in found]))
+
+    return routes
+
+
+def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
+    by_robot: dict[str, list[CommandLatency]] = defaultdict(list)
+    for one in found:
+        by_robot[one.robot_id].append(one)
+    return [_robot(robot_id, stops) for robot_id, stops in sorted(by_robot.items())]
+
+
+def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
+    return RobotLatency(
+        robot_id=robot_id,
+        stops=len(stops),
+        accepted=LatencySpread.of(spread(one.accepted_ms for one in stops)),
+        sent_direct=LatencySpread.of(spread(one.sent_direct_ms for one in stops)),
+        sent_fiware=LatencySpread.of(spread(one.sent_fiware_ms for one in stops)),
+        answer_direct=LatencySpread.of(spread(one.direct_ms for one in stops)),
+        answer_fiware=LatencySpread.of(spread(one.fiware_ms for one in stops)),
+        standing=LatencySpread.of(spread(one.standstill_ms for one in stops)),
+    )
+
+
+def _drill(record: CommandRecord, now: float) -> Drill:
+    return Drill(
+        robot_id=record.robot_id,
+        command_id=record.command_id,
+        drilled_at=format_stamp(record.requested_at),
+        by=record.requested_by,
+        passed=_passed(record, now),
+        standstill_ms=rounded(record.standstill_ms, 1),
+        command=Command.of_record(record),
+    )
+
+
+def _passed(record: CommandRecord, now: float) -> bool | None:
+    """None while it may still come true."""
+    if record.standstill_ms is not None:
+        return record.standstill_ms <= DRILL_DEADLINE_MS
+    late = 1000.0 * (now - record.requested_at) > DRILL_DEADLINE_MS
+    return False if late else None

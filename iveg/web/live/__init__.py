@@ -1,0 +1,1 @@
+"""The WebSocket to browsers: sessions, pacing, telemetry frames."""

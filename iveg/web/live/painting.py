@@ -1,0 +1,92 @@
+"""Δt₄: what a page tells of the frames that it has drawn, against what was in them.
+
+Only identities that the server sent itself are measured, so a page can be wrong about
+nothing but the moment; a moment that cannot be is counted and not used.
+"""
+
+from collections import deque
+from math import isfinite
+from typing import Final, TypeGuard
+
+from iveg.domain.latency.hops import Data
+from iveg.domain.latency.watch import LatencyWatch
+from iveg.web.live.pacing import FRAMES
+
+TRUSTED_S: Final = 0.1
+"""Half the shortest round trip (s): how well a page knows the server's clock."""
+SAMPLE_S: Final = 0.1
+"""Between two samples of one topic and page: the hop is paced, and so is this."""
+_SLACK_S: Final = 0.05
+
+_Sample = tuple[str, Data, float]
+
+
+class Painting:
+    """The frames of one page that are on their way, and what was decided in them."""
+
+    def __init__(self, watch: LatencyWatch) -> None:
+        self._watch = watch
+        self._on_way: deque[tuple[int, float, list[_Sample]]] = deque(maxlen=FRAMES)
+        self._sampled: dict[str, float] = {}
+        self._samples: list[_Sample] = []
+
+    def adds(self, topic: str, now: float) -> None:
+        """A topic goes with the next frame (``now`` monotonic, s)."""
+        if now - self._sampled.get(topic, float("-inf")) < SAMPLE_S:
+            return
+        of = _stream_of(topic)
+        decided_at = None if of is None else self._watch.decided_at(*of)
+        if of is not None and decided_at is not None:
+            self._sampled[topic] = now
+            self._samples.append((*of, decided_at))
+
+    def sent(self, number: int, now: float) -> None:
+        """That frame has gone."""
+        self._on_way.append((number, now, self._samples))
+        self._samples = []
+
+    def painted(self, number: int, at: object, within: object, now: float) -> None:
+        """A page says that it drew a frame, and all before, then.
+
+        Args:
+            number: Of the frame; it was on its way.
+            at: When, on the server's monotonic clock (s); None: nothing was drawn.
+            within: How wrong that may be (s).
+            now: When this was heard (monotonic, s).
+        """
+        while self._on_way and self._on_way[0][0] <= number:
+            _, sent_at, samples = self._on_way.popleft()
+            if at is not None:
+                for sample in samples:
+                    self._judge(sample, sent_at, at, within, now)
+
+    def _judge(
+        self, sample: _Sample, sent_at: float, at: object, within: object, now: float
+    ) -> None:
+        robot_id, data, decided_at = sample
+        if not _is_number(at) or not _is_number(within) or within < 0.0:
+            self._watch.not_painted(robot_id, data, "page_nonsense")
+        elif within > TRUSTED_S:
+            self._watch.not_painted(robot_id, data, "clock_untrusted")
+        elif not sent_at - within - _SLACK_S <= at <= now + within + _SLACK_S:
+            self._watch.not_painted(robot_id, data, "page_nonsense")
+        else:
+            self._watch.pages_within_s = within
+            self._watch.painted(robot_id, data, decided_at, at)
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    is_one = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_one and isfinite(value)  # type: ignore[arg-type]
+
+
+def _stream_of(topic: str) -> tuple[str, Data] | None:
+    head, _, rest = topic.partition("/")
+    if head == "detections":
+        return rest, "detections"
+    if head != "robots":
+        return None
+    robot_id, _, leaf = rest.partition("/")
+    if leaf == "scan":
+        return robot_id, "lidar"
+    return None if leaf else (robot_id, "odometry")

@@ -1,0 +1,328 @@
+"""The WebSocket to browsers: a snapshot, then what changes.
+
+A message is encoded once, whoever looks.  Each browser has one task that sends what is
+newest; a browser that reads nothing keeps no queue and is closed after a while (fault
+F23).  One that speaks ``iveg.2`` is sent telemetry in frames, as fast as it paints
+them; everything else passes beside them at once.  One that does not gets a message a
+topic, for one version more.
+"""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocketState
+
+from iveg.domain.errors import UnknownRobotError, UnreadableError
+from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.observations import Instant
+from iveg.domain.stop import Press
+from iveg.models.base import write_json
+from iveg.models.snapshot import Snapshot
+from iveg.ngsi.codec import load_json
+from iveg.pipeline import topics
+from iveg.pipeline.publish import Hub, Subscriber
+from iveg.pipeline.topics import is_telemetry
+from iveg.web.live.feed import TelemetryFeed
+from iveg.web.live.pacing import SUBPROTOCOL
+from iveg.web.live.painting import Painting
+from iveg.web.live.telemetry import TelemetryEncoder
+from iveg.web.presses import read_press
+from iveg.web.security.authentication import (
+    NO_SESSION,
+    Action,
+    Authenticator,
+    Principal,
+    require,
+)
+from iveg.web.views import Views
+
+_log = logging.getLogger(__name__)
+TOO_SLOW = 4008
+_SEND_LIMIT_S = 10.0
+_SESSION_CHECK_S = 0.5
+_MAX_MESSAGE = 65536
+_SNAPSHOT_LINES = 200
+_CACHE = 512
+
+Stop = Callable[[str | None, str, Press], Awaitable[object]]
+
+
+class Encoder:
+    """Turns topics into frames, each version once."""
+
+    def __init__(
+        self,
+        views: Views,
+        hub: Hub,
+        clock: Callable[[], Instant],
+    ) -> None:
+        self._views = views
+        self._hub = hub
+        self._clock = clock
+        self.telemetry = TelemetryEncoder(views, hub)
+        self._frames: dict[str, tuple[int, bytes]] = {}
+
+    def frame(self, topic: str) -> bytes | None:
+        """The newest frame of a state topic; None when there is nothing to say."""
+        version = self._hub.versions[topic]
+        kept = self._frames.get(topic)
+        if kept is not None and kept[0] == version:
+            return kept[1]
+        frame = self._encode(topic)
+        if frame is not None:
+            if len(self._frames) >= _CACHE:
+                self._frames.clear()
+            self._frames[topic] = version, frame
+        return frame
+
+    def _encode(self, topic: str) -> bytes | None:
+        now, (row, key) = self._clock(), topics.find(topic)
+        if row is topics.SCAN:
+            return self._scan(topic, key, now)
+        data = None if row.read is None else row.read(self._views, key, now)
+        return None if data is None else text(topic, data, now)
+
+    def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
+        swept = self._views.scan(robot_id)
+        if swept is None:
+            return None
+        scan, points = swept
+        head = orjson.dumps(
+            {
+                "topic": topic,
+                "robot_id": robot_id,
+                "stamp": scan.origin.stamp,
+                "age_s": self._views.scan_age_s(robot_id, now),
+            }
+        )
+        head += b" " * (-len(head) % 4)
+        return len(head).to_bytes(4, "little") + head + points.tobytes()
+
+    def event(self, topic: str, item: object) -> bytes:
+        """The frame of an event that nobody may miss."""
+        now = self._clock()
+        return text(topic, topics.find(topic)[0].tell(self._views, item, now), now)
+
+
+def text(topic: str, data: Any, now: Instant) -> bytes:
+    """A JSON frame; ``at`` is when it was true, on the server's monotonic clock."""
+    return write_json({"topic": topic, "data": data, "at": now.mono})
+
+
+def router(
+    hub: Hub,
+    encoder: Encoder,
+    snapshot: Callable[[Principal, Instant], Snapshot],
+    clock: Callable[[], Instant],
+    stop: Stop,
+    latency: LatencyWatch,
+) -> APIRouter:
+    """The live endpoint.
+
+    ``snapshot`` says everything that is known to one who has just come; ``stop``
+    presses STOP for one robot, or for all, by somebody; ``latency`` is told when pages
+    have drawn what was decided.
+    """
+    routes = APIRouter()
+
+    @routes.websocket("/live")
+    async def live(
+        websocket: WebSocket,
+        principal: Annotated[Principal, Depends(require("read"))],
+    ) -> None:
+        """A browser looks."""
+        is_paced = SUBPROTOCOL in websocket.scope.get("subprotocols", ())
+        await websocket.accept(SUBPROTOCOL if is_paced else None)
+        subscriber = hub.join()
+        line = Line(websocket, subscriber, encoder, clock)
+        feed = (
+            TelemetryFeed(encoder.telemetry, subscriber, Painting(latency))
+            if is_paced
+            else None
+        )
+        try:
+            now = clock()
+            await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
+            async with asyncio.TaskGroup() as tasks:
+                sender = tasks.create_task(
+                    line.send_all() if feed is None else line.send_paced(feed),
+                    name="live-send",
+                )
+                watcher = tasks.create_task(
+                    _watch_session(websocket, principal), name="live-session"
+                )
+                ear = Ear(websocket, subscriber, clock, stop, principal, feed)
+                tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
+        except* (WebSocketDisconnect, ConnectionError) as gone:
+            _log.debug("browser gone: %s", gone)
+        except* Exception:
+            # A mistake of ours, told as one; the browser comes back by itself.
+            _log.exception("live: the line of a browser has failed")
+        finally:
+            hub.leave(subscriber)
+
+    return routes
+
+
+class Line:
+    """What goes to one browser, one message after the other."""
+
+    def __init__(
+        self,
+        websocket: WebSocket,
+        subscriber: Subscriber,
+        encoder: Encoder,
+        clock: Callable[[], Instant],
+    ) -> None:
+        self._websocket = websocket
+        self._subscriber = subscriber
+        self._encoder = encoder
+        self._clock = clock
+
+    async def say(self, frame: bytes) -> None:
+        """Send JSON."""
+        await _sent(self._websocket.send_text(frame.decode()))
+
+    async def send_all(self) -> None:
+        """The newest of every topic, as fast as the browser reads."""
+        while True:
+            await self._subscriber.news()
+            if not await self._in_time(self._send_news(lambda _: True)):
+                return
+
+    async def send_paced(self, feed: TelemetryFeed) -> None:
+        """Telemetry as fast as the browser paints, everything else at once."""
+        while True:
+            await self._subscriber.news(feed.wait_s(self._clock().mono))
+            if not await self._in_time(self._send_with(feed)):
+                return
+
+    async def _in_time(self, sending: Coroutine[Any, Any, None]) -> bool:
+        """Whether the browser still reads; one that does not is closed."""
+        try:
+            if not self._subscriber.overflowed:
+                async with asyncio.timeout(_SEND_LIMIT_S):
+                    await sending
+                return True
+        except TimeoutError:
+            pass
+        sending.close()
+        await _sent(self._websocket.close(TOO_SLOW))
+        return False
+
+    async def _send_with(self, feed: TelemetryFeed) -> None:
+        await self._send_news(lambda topic: not is_telemetry(topic))
+        frame = feed.next_frame(self._clock())
+        if frame is not None:
+            await _sent(self._websocket.send_bytes(frame))
+
+    async def _send_news(self, wanted: Callable[[str], bool]) -> None:
+        for topic, item in self._subscriber.take_events():
+            await self.say(self._encoder.event(topic, item))
+        for topic in self._subscriber.take_topics(wanted):
+            frame = self._encoder.frame(topic)
+            if frame is None:
+                continue
+            if topics.find(topic)[0] is topics.SCAN:
+                await _sent(self._websocket.send_bytes(frame))
+            else:
+                await self.say(frame)
+
+
+async def _watch_session(websocket: WebSocket, principal: Principal) -> None:
+    """Close soon after the session is over; STOP stays possible over HTTP."""
+    while True:
+        await asyncio.sleep(_SESSION_CHECK_S)
+        if not _may_still(websocket, principal, "read"):
+            await _sent(websocket.close(NO_SESSION))
+            return
+
+
+async def _sent(sending: Coroutine[Any, Any, None]) -> None:
+    """Send; of a socket that has closed meanwhile a server says RuntimeError.
+
+    Raises:
+        ConnectionResetError: nobody is there any more.
+    """
+    try:
+        await sending
+    except RuntimeError as error:
+        raise ConnectionResetError(str(error)) from error
+
+
+def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bool:
+    authenticator: Authenticator = websocket.app.state.authenticator
+    current = authenticator.sessions.current(principal)
+    return current is not None and current.may(action)
+
+
+class Ear:
+    """What one browser says: pings, presses, and what it has painted.
+
+    Answers go out with all else, so that a press is read at once also where the way
+    back is full.
+    """
+
+    def __init__(
+        self,
+        websocket: WebSocket,
+        subscriber: Subscriber,
+        clock: Callable[[], Instant],
+        stop: Stop,
+        principal: Principal,
+        feed: TelemetryFeed | None,
+    ) -> None:
+        self._websocket = websocket
+        self._subscriber = subscriber
+        self._clock = clock
+        self._stop = stop
+        self._principal = principal
+        self._feed = feed
+
+    async def listen(self, others: Iterable[asyncio.Task[None]]) -> None:
+        """Until the browser goes or is sent away; then ``others`` end, too."""
+        line = self._websocket
+        try:
+            while line.application_state is WebSocketState.CONNECTED:
+                await self._hear(await line.receive_text())
+        except WebSocketDisconnect:
+            return
+        finally:
+            for task in others:
+                task.cancel()
+
+    async def _hear(self, raw: str) -> None:
+        try:
+            message = load_json(raw[:_MAX_MESSAGE])
+        except UnreadableError as error:
+            self._subscriber.append(topics.PROBLEM.name, {"reason": error.reason})
+            return
+        if not isinstance(message, dict):
+            return
+        match message.get("type"):
+            case "painted":
+                if self._feed is not None:
+                    self._feed.painted(
+                        message.get("frame"),
+                        self._clock().mono,
+                        message.get("at"),
+                        message.get("within"),
+                    )
+            case "ping":
+                t, server = message.get("t"), self._clock().wall
+                self._subscriber.append(topics.PONG.name, {"t": t, "server": server})
+            case "stop":
+                await self._press(message)
+
+    async def _press(self, message: dict[str, Any]) -> None:
+        robot_id = message.get("robot_id")
+        allowed = _may_still(self._websocket, self._principal, "stop")
+        if allowed and (robot_id is None or isinstance(robot_id, str)):
+            try:
+                await self._stop(robot_id, self._principal.name, read_press(message))
+            except UnknownRobotError as error:
+                self._subscriber.append(topics.PROBLEM.name, {"reason": str(error)})

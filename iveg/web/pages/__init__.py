@@ -1,0 +1,1 @@
+"""HTML pages: routes, template contexts, translations, charts."""

@@ -1,0 +1,285 @@
+"""Rows → Plotly figures: plotly's one door.
+
+The package checks every figure as it is made; the browser draws it with the library
+that lies in the same package, so the two always fit.  ``meta`` names what a trace or an
+axis shows, and the page puts the words in the reader's language.
+"""
+
+import gzip
+import hashlib
+import importlib.resources
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+from iveg.adapters.history.series import (
+    CONFIDENCE_BINS,
+    ClimateSeries,
+    CommandLatency,
+    ConfidenceCount,
+    SpeedSeries,
+)
+from iveg.domain.feedback import FULL_SPEED
+from iveg.domain.fleet import FleetDescription
+
+_Trace = Mapping[str, object]
+
+_SILENCE_S = 5.0
+_AIR_SILENCE_S = 300.0
+_LEAST_ROOM = {"temperature": 4.0, "humidity": 20.0, "co2": 100.0}
+_STYLE_ID = re.compile(rb'getElementById\("([0-9a-f]{64})"\)')
+_BIN = 1.0 / CONFIDENCE_BINS
+
+
+def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> bytes:
+    """Speed (m/s) with the limited to limit as a step line, a strip a robot, as JSON.
+
+    The limit is the limited to factor of the robot's greatest speed; while it is lower
+    the strip is shaded.  Lines break where nothing was heard for 5 s: a line through
+    silence would be invented.
+    """
+    traces: list[_Trace] = []
+    layout: dict[str, object] = {}
+    shapes: list[_Trace] = []
+    for n, one in enumerate(series):
+        number = str(n + 1) if n else ""
+        traces += [
+            {**trace, "yaxis": f"y{number}"} for trace in _speed_traces(one, fleet)
+        ]
+        layout[f"yaxis{number}"] = {
+            "rangemode": "tozero",
+            "domain": _strip(n, len(series)),
+            "title": {"text": f"{one.robot_id} (m/s)"},
+        }
+        layout["xaxis"] = {"anchor": f"y{number}"}
+        shapes += _slow_downs(one, f"y{number}")
+    return figure_of(traces, ("time", "speed"), {**layout, "shapes": shapes})
+
+
+def _strip(n: int, of: int) -> list[float]:
+    """Where the n-th of so many strips lies, from the top down (0–1)."""
+    top = 1.0 - n / of
+    return [round(top - (0.86 if of > 1 else 1.0) / of, 4), round(top, 4)]
+
+
+def _slow_downs(series: SpeedSeries, axis: str) -> Iterator[_Trace]:
+    """A shade for each time in which less than full speed was limited to."""
+    since: float | None = None
+    for at, factor in zip(series.at, series.mandated, strict=True):
+        if factor < FULL_SPEED and since is None:
+            since = at
+        elif factor >= FULL_SPEED and since is not None:
+            yield _shade(since, at, axis)
+            since = None
+    if since is not None:
+        yield _shade(since, series.at[-1], axis)
+
+
+def _shade(since: float, until: float, axis: str) -> _Trace:
+    return {
+        "type": "rect",
+        "name": "slow",
+        "layer": "below",
+        "x0": _ms(since),
+        "x1": _ms(until),
+        "yref": f"{axis} domain",
+        "y0": 0,
+        "y1": 1,
+    }
+
+
+def confidence_figure(
+    counts: Sequence[ConfidenceCount], threshold: float | None
+) -> bytes:
+    """Detections stacked by class over their confidence, the threshold marked."""
+    traces = [
+        {
+            "type": "bar",
+            "name": class_id,
+            "meta": {"kind": "class", "class_id": class_id},
+            "x": [
+                round(c.least + _BIN / 2, 4) for c in counts if c.class_id == class_id
+            ],
+            "y": [c.count for c in counts if c.class_id == class_id],
+            "width": 0.9 * _BIN,
+        }
+        for class_id in sorted({c.class_id for c in counts})
+    ]
+    layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
+    if threshold is not None:
+        layout["shapes"] = [_line_at(threshold)]
+    return figure_of(traces, ("confidence", "count"), layout)
+
+
+def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
+    """How long each STOP took (ms): to both answers, and to standing still."""
+    kinds = ("direct_ms", "fiware_ms", "standstill_ms")
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": kind.removesuffix("_ms"),
+            "meta": {"kind": kind.removesuffix("_ms")},
+            "x": [_ms(one.requested_at) for one in latencies],
+            "y": [getattr(one, kind) for one in latencies],
+            "text": [one.robot_id for one in latencies],
+        }
+        for kind in kinds
+        if any(getattr(one, kind) is not None for one in latencies)
+    ]
+    return figure_of(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
+
+
+def climate_figures(series: ClimateSeries) -> dict[str, bytes]:
+    """Temperature (°C), relative humidity (%) and CO₂ (ppm) over time, as JSON.
+
+    A figure is empty where its sensor was silent all along; lines break where nothing
+    was heard for five minutes.
+    """
+    humidity = [None if h is None else 100.0 * h for h in series.relative_humidity]
+    values: dict[str, Sequence[float | None]] = {
+        "temperature": series.temperature,
+        "humidity": humidity,
+        "co2": series.co2,
+    }
+    return {kind: _climate_figure(series, kind, y) for kind, y in values.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """Plotly for the browser.
+
+    Attributes:
+        name: Changes with the content, so that a browser may keep it for good.
+        packed: The script, gzipped.
+        style_ids: Style elements that it makes unless one of that id is there; a page
+            whose policy refuses them has to put something in their place first.
+    """
+
+    name: str
+    packed: bytes
+    style_ids: tuple[str, ...] = ()
+
+
+@cache
+def library() -> Library:
+    """The script that lies in the installed package; the first call takes a while."""
+    data = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    script = data.read_bytes()
+    digest = hashlib.sha256(script).hexdigest()[:16]
+    style_ids = ("plotly.js-style-global", *map(bytes.decode, _ids_in(script)))
+    packed = gzip.compress(script, 6, mtime=0)
+    return Library(f"plotly-{digest}.min.js", packed, style_ids)
+
+
+def _ids_in(script: bytes) -> list[bytes]:
+    """Of the sheets that parts of the library bring along, named by their hash."""
+    return sorted(set(_STYLE_ID.findall(script)))
+
+
+def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Trace]:
+    robot = series.robot_id
+    fastest = fleet.of_robot(robot).profile.max_speed
+    at = [_ms(moment) for moment in series.at]
+    lines: tuple[tuple[str, Sequence[float | None], _Trace], ...] = (
+        ("speed", [round(v, 3) for v in series.linear], {}),
+        ("mandated", [fastest * f for f in series.mandated], {"shape": "hv"}),
+    )
+    gaps = _gaps(series.at, max(_SILENCE_S, 3 * series.slice_s))
+    for kind, values, line in lines:
+        yield {
+            "type": "scatter",
+            "mode": "lines",
+            "name": f"{robot} {kind}",
+            "meta": {"kind": kind, "robot": robot, "slice_s": series.slice_s},
+            "x": _broken(at, gaps, at),
+            "y": _broken(values, gaps, [None] * len(at)),
+            "line": line,
+            "connectgaps": False,
+        }
+
+
+def _climate_figure(
+    series: ClimateSeries, kind: str, values: Sequence[float | None]
+) -> bytes:
+    at = [_ms(moment) for moment in series.at]
+    gaps = _gaps(series.at, max(_AIR_SILENCE_S, 3 * series.slice_s))
+    trace: _Trace = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": kind,
+        "meta": {"kind": kind, "slice_s": series.slice_s},
+        "marker": {"size": 4},
+        "x": _broken(at, gaps, at),
+        "y": _broken(values, gaps, [None] * len(at)),
+        "connectgaps": False,
+    }
+    heard = [value for value in values if value is not None]
+    layout = {"showlegend": False, "yaxis": {"range": _room(heard, _LEAST_ROOM[kind])}}
+    return figure_of([trace] if heard else [], ("time", kind), layout)
+
+
+def _room(values: Sequence[float], least: float) -> list[float] | None:
+    """A range that keeps a sensor's noise from looking like weather; None: automatic.
+
+    Args:
+        values: What is drawn.
+        least: The axis covers at least as much.
+    """
+    low, high = min(values, default=0.0), max(values, default=0.0)
+    if not values or high - low >= least:
+        return None
+    middle = (low + high) / 2
+    return [middle - least / 2, middle + least / 2]
+
+
+def _gaps(at: Sequence[float], longest: float) -> list[int]:
+    """Places after which nothing was heard for too long."""
+    pairs = enumerate(pairwise(at))
+    return [place for place, (one, other) in pairs if other - one > longest]
+
+
+def _broken(
+    values: Sequence[float | None], gaps: Sequence[int], fill: Sequence[float | None]
+) -> list[float | None]:
+    out: list[float | None] = []
+    start = 0
+    for gap in gaps:
+        out += [*values[start : gap + 1], fill[gap]]
+        start = gap + 1
+    return out + list(values[start:])
+
+
+def _line_at(x: float) -> _Trace:
+    return {
+        "type": "line",
+        "name": "threshold",
+        "x0": x,
+        "x1": x,
+        "yref": "paper",
+        "y0": 0,
+        "y1": 1,
+    }
+
+
+def figure_of(
+    traces: Sequence[_Trace], axes: tuple[str, str], layout: Mapping[str, object]
+) -> bytes:
+    """A figure as JSON; ``axes`` say what they show.
+
+    Checked by the package: a wrong name or value raises here, not in a browser.
+    """
+    # Half of its users never open a chart, and the package is slow to load.
+    from plotly.graph_objects import Figure
+
+    figure = Figure(data=list(traces), layout=dict(layout))
+    figure.update_layout(template="none", meta={"x": axes[0], "y": axes[1]})
+    if axes[0] == "time":
+        figure.update_xaxes(type="date")
+    return str(figure.to_json()).encode()
+
+
+def _ms(moment: float) -> float:
+    return round(1000.0 * moment, 1)

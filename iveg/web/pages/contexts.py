@@ -1,0 +1,221 @@
+"""What each template may say: one frozen dataclass a template, and nothing beside it.
+
+A template sees its own dataclass as ``page`` and the functions ``t`` (a sentence),
+``say`` (a sentence that follows the language switch) and ``label`` (the same, as an
+attribute).  Live values never come this way; they arrive on ``/live``.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from iveg.domain.detection_rule import Rule
+from iveg.models.day import Day
+from iveg.web.pages.openapi import ApiDoc
+
+Theme = Literal["auto", "light", "dark", "sunlight"]
+THEMES: tuple[Theme, ...] = ("auto", "light", "dark", "sunlight")
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What is the same on every page while this server runs.
+
+    Attributes:
+        greenhouse: Name as people say it.
+        robots: Ids in fleet order; the order decides each robot's colour.
+        demo: The robots are emulated.
+    """
+
+    greenhouse: str
+    robots: tuple[str, ...]
+    version: str
+    demo: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How this browser wants the page; remembered in its cookies."""
+
+    language: str = "es"
+    theme: Theme = "auto"
+    paper_colours: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What ``base.html`` draws around every page.
+
+    Attributes:
+        route: Which entry of the navigation is current.
+        name: Who is signed in; None shows neither navigation nor STOP.
+        role: ``viewer``, ``operator``, ``admin`` or ``program``.
+    """
+
+    site: Site
+    look: Look
+    route: str
+    name: str | None = None
+    role: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LivePage:
+    """``live.html``: the five widgets, empty until ``/live`` speaks."""
+
+    template: ClassVar[str] = "live.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryPage:
+    """``history.html``: the shell that the history scripts fill."""
+
+    template: ClassVar[str] = "history.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class AlertsPage:
+    """``alerts.html``: what is active, the sound, and what was."""
+
+    template: ClassVar[str] = "alerts.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class CommandsPage:
+    """``commands.html``: every STOP, release and resume with its times."""
+
+    template: ClassVar[str] = "commands.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class FleetPage:
+    """``fleet.html``: the chain from robot to screen, the robots, their devices."""
+
+    template: ClassVar[str] = "fleet.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class ClimatePage:
+    """``climate.html``: the air in the greenhouse."""
+
+    template: ClassVar[str] = "climate.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyPage:
+    """``latency.html``: where the milliseconds go, hop by hop."""
+
+    template: ClassVar[str] = "latency.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsPage:
+    """``settings.html``: the rule in force, and what this device remembers."""
+
+    template: ClassVar[str] = "settings.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionPage:
+    """``decision.html``: one decision by its own address, to share and to print.
+
+    Attributes:
+        decision_id: As asked for; whether it exists is said by the API.
+    """
+
+    template: ClassVar[str] = "decision.html"
+    frame: Frame
+    decision_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class DayPage:
+    """``day.html``: one day of the fleet on one sheet.
+
+    Attributes:
+        day: What was, read from the history.
+        before: The day before, ``after`` the one after it, as ISO dates.
+    """
+
+    template: ClassVar[str] = "day.html"
+    frame: Frame
+    day: Day
+    before: str
+    after: str
+
+
+@dataclass(frozen=True, slots=True)
+class DocsPage:
+    """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
+
+    template: ClassVar[str] = "docs.html"
+    frame: Frame
+    document: ApiDoc
+
+
+@dataclass(frozen=True, slots=True)
+class AboutPage:
+    """``about.html``: what iVeg is, and what STOP is not.
+
+    Attributes:
+        rule: In force now; the page follows it on ``/live``.
+    """
+
+    template: ClassVar[str] = "about.html"
+    frame: Frame
+    rule: Rule
+
+
+@dataclass(frozen=True, slots=True)
+class SignInPage:
+    """``signin.html``: how to get in.
+
+    Attributes:
+        address: Of this server, as the browser reached it.
+        wrong: A link was tried and does not sign in.
+    """
+
+    template: ClassVar[str] = "signin.html"
+    frame: Frame
+    address: str
+    wrong: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorPage:
+    """``error.html``: what went wrong, for a person.
+
+    Attributes:
+        status: HTTP status.
+        sentence: Key of the sentence that explains it.
+    """
+
+    template: ClassVar[str] = "error.html"
+    frame: Frame
+    status: int
+    sentence: str
+
+
+Page = (
+    LivePage
+    | DayPage
+    | HistoryPage
+    | AlertsPage
+    | CommandsPage
+    | FleetPage
+    | ClimatePage
+    | LatencyPage
+    | SettingsPage
+    | DecisionPage
+    | DocsPage
+    | AboutPage
+    | SignInPage
+    | ErrorPage
+)

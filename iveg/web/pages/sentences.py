@@ -1,0 +1,108 @@
+"""Sentences as the page says them, for files and paper: templates, slots and formats.
+
+The formats are those of ``static/js/core/i18n.js``; a template that is missing shows its
+key, so that a row of an older version is never lost.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Final
+
+from iveg.web.pages.local_time import in_madrid
+from iveg.web.pages.translations import Translations
+
+_HOLE = re.compile(r"\{(\w+)(?::(\w+))?\}")
+_TRACK = re.compile(r"([PR])(\d+)")
+_NOTHING: Final = "—"
+_NAMED: Final = {"class": "class", "a": "class.a", "why": "why", "hop": "hop"}
+_LANES: Final = (
+    (re.compile(r"(?:Pasillo )?(\d+)"), "lane.number"),
+    (re.compile(r"Pasillo (\d+) norte"), "lane.number_north"),
+    (re.compile(r"Pasillo (\d+) sur"), "lane.number_south"),
+    (re.compile(r"Pasillo central"), "lane.central"),
+    (re.compile(r"Cabecera norte"), "lane.end_north"),
+    (re.compile(r"Cabecera sur"), "lane.end_south"),
+)
+
+Slots = Mapping[str, object]
+
+
+class Sentences:
+    """Says what happened in one language."""
+
+    def __init__(self, translations: Translations) -> None:
+        self.translations = translations
+
+    def say(self, key: str, slots: Slots) -> str:
+        """A sentence with its holes filled."""
+        template = self._find(key)
+        if template is None:
+            return key
+        return _HOLE.sub(
+            lambda hole: self._write(slots.get(hole[1]), hole[2], slots), template
+        ).strip()
+
+    def number(self, value: float, decimals: int) -> str:
+        """With the decimal sign of the language."""
+        text = f"{value:.{decimals}f}"
+        return text.replace(".", ",") if self.translations.language == "es" else text
+
+    def lane(self, label: str) -> str:
+        """An aisle in the reader's words; a name that a grower gave stays."""
+        for form, key in _LANES:
+            found = form.fullmatch(label)
+            if found:
+                return self.say(key, {"n": "".join(found.groups())})
+        return label
+
+    def _find(self, key: str) -> str | None:
+        sentences, head = self.translations.sentences, key.rpartition(".")[0]
+        for one in (key, f"{head}.default", f"{key}.default"):
+            if one in sentences:
+                return sentences[one]
+        return None
+
+    def _write(self, value: object, form: str | None, slots: Slots) -> str:
+        if value is None or value == "":
+            return _NOTHING
+        if form == "sentence":
+            return self._sentence(value, slots)
+        if form == "person":
+            return self._person(str(value))
+        if form == "lane":
+            return self.lane(str(value))
+        if form in _NAMED:
+            return self._find_plain(f"{_NAMED[form]}.{value}") or str(value)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            return str(value)
+        return self._measure(float(value), form)
+
+    def _measure(self, value: float, form: str | None) -> str:
+        if form == "percent":
+            sign = "\u00a0%" if self.translations.language == "es" else "%"
+            return f"{100 * value:.0f}{sign}"
+        if form == "time":
+            return f"{in_madrid(value):%H:%M:%S}"
+        decimals = int(form) if form and form.isdigit() else 3
+        text = self.number(value, decimals)
+        return text if form else _trimmed(text)
+
+    def _find_plain(self, key: str) -> str | None:
+        return self.translations.sentences.get(key)
+
+    def _person(self, track: str) -> str:
+        found = _TRACK.fullmatch(track)
+        if found:
+            return self.say(f"class.track.{found[1]}", {"n": found[2]})
+        return self._find_plain(f"class.{track}") or track
+
+    def _sentence(self, value: object, slots: Slots) -> str:
+        if isinstance(value, Mapping):
+            key, slots = str(value.get("key")), value.get("slots") or slots
+        else:
+            key = str(value)
+        return self.say(key if key.startswith("alert.") else f"alert.{key}", slots)
+
+
+def _trimmed(text: str) -> str:
+    return text.rstrip("0").rstrip(".,") if "." in text or "," in text else text

@@ -1,0 +1,291 @@
+"""The door: who is there, and what may they do.
+
+People come with a session cookie, programs with a bearer token, Orion with a shared
+secret.  Every route declares what it asks for with ``require``; ``undeclared`` finds
+those that forgot::
+
+    link with token ──> session cookie ──> operator: read, stop, release
+    bearer token ─────────────────────────> program:  read, stop
+    session past its age ─────────────────> expired:  stop, 12 h longer
+
+STOP outlives the session (safety.md §5.2): whoever was let in once can still stop.
+"""
+
+import hmac
+import logging
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final
+
+from fastapi import FastAPI
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import iter_route_contexts
+from starlette.exceptions import WebSocketException
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import RedirectResponse, Response
+from starlette.websockets import WebSocket
+
+from iveg.domain.errors import NotAllowedError
+from iveg.domain.observations import Instant
+from iveg.web.problems import NotSignedInError, Problem
+from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
+from iveg.web.security.rate_limits import Attempts
+from iveg.web.security.roles import MAY, NOBODY, Action, Principal, Role
+from iveg.web.security.sessions import Sessions, SessionStore
+
+__all__ = [
+    "FOREIGN_ORIGIN",
+    "MAY",
+    "NO_SESSION",
+    "Action",
+    "Authenticator",
+    "NotifySecret",
+    "Principal",
+    "Requirement",
+    "Role",
+    "declared_action",
+    "require",
+    "undeclared",
+]
+
+NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
+"""Close codes of ``/live``."""
+
+_SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
+
+_log = logging.getLogger(__name__)
+
+
+class Authenticator:
+    """Tells people and programs from strangers.
+
+    Args:
+        sign_in_token: The link's token (hex); it signs a browser in as operator.
+        api_token: The bearer token of programs; empty lets no program in.
+        clock: Read at each question.
+        store: Where sessions outlive a restart; None forgets them.
+    """
+
+    def __init__(
+        self,
+        *,
+        sign_in_token: str,
+        api_token: str,
+        clock: Callable[[], Instant],
+        store: SessionStore | None = None,
+    ) -> None:
+        self._sign_in_token = sign_in_token
+        self._api_token = api_token
+        self._clock = clock
+        self._attempts = Attempts()
+        self.sessions = Sessions(clock, store)
+        self.refused = 0
+        """Sign-ins with a wrong token."""
+        self._told_at: float | None = None
+
+    # --- people sign in ---------------------------------------------------------
+
+    def sign_in(self, request: Request, token: str) -> Response | Problem:
+        """Exchange the link's token for a session cookie, or say why not."""
+        address = "" if request.client is None else request.client.host
+        now = self._clock().mono
+        wait_s = self._attempts.wait_s(address, now)
+        if wait_s > 0.0:
+            headers = {"Retry-After": str(math.ceil(wait_s))}
+            detail = "Too many wrong links came from your address; wait a minute."
+            return Problem(429, detail, headers=headers)
+        if not _same(token, self._sign_in_token):
+            self._attempts.failed(address, now)
+            self._tell_refused(now)
+            return Problem(401, "This link does not sign in here, or not any more.")
+        self._attempts.succeeded(address)
+        response = RedirectResponse("/", 303)
+        response.headers["Cache-Control"] = "no-store"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        secure = request.url.scheme == "https"
+        response.set_cookie(
+            _cookie_name(secure=secure),
+            self.sessions.open("operator", "operator"),
+            path="/",
+            secure=secure,
+            httponly=True,
+            samesite="strict",
+        )
+        return response
+
+    def sign_out(self, request: Request) -> Response:
+        """End the session of this browser and go where one signs in."""
+        principal = self.identify(request)
+        if principal is not None:
+            self.sessions.revoke(principal)
+        response = RedirectResponse("/", 303)
+        secure = request.url.scheme == "https"
+        response.delete_cookie(
+            _cookie_name(secure=secure), secure=secure, httponly=True, samesite="strict"
+        )
+        return response
+
+    def _tell_refused(self, now: float) -> None:
+        """Count it and say so once a minute, so that nobody can flood the log."""
+        self.refused += 1
+        if self._told_at is None or now - self._told_at >= 60.0:
+            self._told_at = now
+            _log.warning("sign-in refused: wrong token (%d so far)", self.refused)
+
+    # --- who is it --------------------------------------------------------------
+
+    def identify(self, connection: HTTPConnection) -> Principal | None:
+        """Whose cookie or bearer token this is; None for a stranger."""
+        scheme, _, token = connection.headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer":
+            known = bool(self._api_token) and _same(token.strip(), self._api_token)
+            return Principal("program", "program") if known else None
+        secure = connection.scope["scheme"] in ("https", "wss")
+        cookie = connection.cookies.get(_cookie_name(secure=secure))
+        return None if cookie is None else self.sessions.find(cookie)
+
+    def authorise(self, request: Request, action: Action) -> Principal:
+        """Let a request in, or say why not.
+
+        Raises:
+            NotSignedInError: a stranger.
+            NotAllowedError: the role may not do this.
+            ForeignOriginError: another site's page sent it with our cookie.
+            NotJsonError: a body that is not JSON.
+        """
+        principal = self.identify(request)
+        if principal is None:
+            raise NotSignedInError
+        if not principal.may(action):
+            raise NotAllowedError(action, principal.role)
+        if principal.role == "expired" and action == "stop":
+            _log.info("STOP by %s, whose session is over", principal.name)
+        if request.method not in _SAFE_METHODS:
+            if principal.session is not None:
+                refuse_forgery(request)
+            refuse_other_bodies(request)
+        return principal
+
+    async def authorise_websocket(self, websocket: WebSocket) -> Principal:
+        """Let a WebSocket in; the caller accepts it.
+
+        A foreign origin is refused before the handshake ends (HTTP 403).  A missing
+        session is refused after it, because a browser sees close codes only then and
+        must tell "sign in again" from "try again".
+
+        Raises:
+            WebSocketException: 4403 foreign origin, 4401 nobody signed in; Starlette
+                closes the connection with it.
+        """
+        origin = websocket.headers.get("origin")
+        principal = self.identify(websocket)
+        by_cookie = principal is not None and principal.session is not None
+        # Programs send no Origin; browsers always do.
+        if (origin is not None or by_cookie) and not is_own(origin, websocket):
+            raise WebSocketException(FOREIGN_ORIGIN)
+        if principal is None or not principal.may("read"):
+            # A browser that asked for a subprotocol takes no handshake without one.
+            await websocket.accept(
+                next(iter(websocket.scope.get("subprotocols", ())), None)
+            )
+            raise WebSocketException(NO_SESSION)
+        return principal
+
+
+class NotifySecret:
+    """The secret that Orion sends with each notification.
+
+    Args:
+        current: What new subscriptions carry.
+        previous: Still taken while the secret is being changed; empty: none.
+    """
+
+    def __init__(self, current: str, previous: str = "") -> None:
+        self.current = current
+        self._previous = previous
+
+    def admits(self, given: str | None) -> bool:
+        """Whether a notification with this ``X-Iveg-Notify-Token`` is Orion's."""
+        if not given:
+            return False
+        # Both are always compared, so that time does not tell which one matched.
+        matches = [_same(given, known) for known in (self.current, self._previous)]
+        return any(matches)
+
+
+# --- what a route asks for ----------------------------------------------------------
+
+
+class Requirement:
+    """A FastAPI dependency that lets a role in; made by ``require``.
+
+    It serves HTTP and WebSocket routes alike and finds its ``Authenticator`` at
+    ``app.state.authenticator``.
+    """
+
+    def __init__(self, action: Action) -> None:
+        self.action = action
+
+    async def __call__(self, connection: HTTPConnection) -> Principal:
+        """Who comes in, or the error that keeps them out."""
+        authenticator: Authenticator = connection.app.state.authenticator
+        if self.action == "open":
+            return authenticator.identify(connection) or NOBODY
+        if isinstance(connection, WebSocket):
+            return await authenticator.authorise_websocket(connection)
+        return authenticator.authorise(Request(connection.scope), self.action)
+
+
+_REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
+    action: Requirement(action)
+    for action in ("open", "read", "stop", "release", "admin")
+}
+
+
+def require(action: Action) -> Requirement:
+    """What a route declares: ``Depends(require("stop"))``; ``open`` asks nothing."""
+    return _REQUIREMENTS[action]
+
+
+def declared_action(route: Any) -> Action | None:
+    """What a route, or its FastAPI context, declares; None when it forgot."""
+    dependant = getattr(route, "dependant", None)
+    if not isinstance(dependant, Dependant):
+        # A plain ASGI endpoint says it itself.
+        action: Action | None = getattr(
+            getattr(route, "endpoint", None), "action", None
+        )
+        return action
+    actions = [
+        call.action for call in _calls(dependant) if isinstance(call, Requirement)
+    ]
+    # A router's requirement comes before the route's own, which is stricter.
+    return actions[-1] if actions else None
+
+
+def undeclared(app: FastAPI, open_paths: Iterable[str] = ()) -> list[str]:
+    """All routes and WebSockets that declare nothing and are not in ``open_paths``."""
+    allowed = frozenset(open_paths)
+    return sorted(
+        str(route.path)
+        for route in iter_route_contexts(app.routes)
+        if declared_action(route) is None and route.path not in allowed
+    )
+
+
+def _calls(dependant: Dependant) -> Iterator[object]:
+    for child in dependant.dependencies:
+        yield child.call
+        yield from _calls(child)
+
+
+# --- small shared pieces ------------------------------------------------------------
+
+
+def _cookie_name(*, secure: bool) -> str:
+    return "__Host-iveg" if secure else "iveg"
+
+
+def _same(given: str, known: str) -> bool:
+    """Compare in constant time; an empty secret matches nothing."""
+    return hmac.compare_digest(given.encode(), known.encode()) and bool(known)

@@ -1,0 +1,213 @@
+"""How often somebody may try the door, and how much a page may say (safety.md §5.2).
+
+STOP is never limited: not over HTTP, and not on a socket that says too much.  What a
+page has painted is counted apart: it says so with every frame that its screen shows.
+"""
+
+import asyncio
+import contextlib
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from iveg.domain.observations import Instant
+from iveg.web.security.roles import Principal
+
+SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
+MESSAGES_PER_S = 20
+PAINTED_PER_S = 300
+"""More than frames are ever sent in a second: no honest page is not heard."""
+SOCKETS = 5
+TOO_MANY_SOCKETS: Final = 4429
+"""Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
+
+_ADDRESSES = 1024
+_FAREWELL_S = 1.0
+_SILENT_S = 3.0
+"""Pages ping every second; one silent for longer hangs on a dead line."""
+
+
+class Attempts:
+    """Wrong sign-ins by address: five a minute, then one a minute.
+
+    Never a lock-out: what is tried while somebody has to wait does not make the wait
+    longer, and whoever gets in begins anew.
+    """
+
+    def __init__(self) -> None:
+        self._wrong: OrderedDict[str, deque[float]] = OrderedDict()
+
+    def wait_s(self, address: str, now: float) -> float:
+        """How long this address has to wait (s); 0 when it may try.
+
+        Args:
+            address: Where they come from.
+            now: Monotonic time (s).
+        """
+        wrong = self._wrong.get(address)
+        if wrong is None or len(wrong) < SIGN_INS:
+            return 0.0
+        return max(0.0, wrong[-1] + SIGN_INS_WITHIN_S - now)
+
+    def failed(self, address: str, now: float) -> None:
+        """One more that was wrong."""
+        wrong = self._wrong.setdefault(address, deque(maxlen=SIGN_INS))
+        self._wrong.move_to_end(address)
+        while wrong and now - wrong[0] > SIGN_INS * SIGN_INS_WITHIN_S:
+            wrong.popleft()
+        wrong.append(now)
+        if len(self._wrong) > _ADDRESSES:
+            self._wrong.popitem(last=False)
+
+    def succeeded(self, address: str) -> None:
+        """Whoever gets in has nothing to wait for."""
+        self._wrong.pop(address, None)
+
+
+class Allowance:
+    """A second's worth of messages, that fills again with time."""
+
+    def __init__(self, per_s: float, now: float) -> None:
+        self._per_s = per_s
+        self._left = per_s
+        self._at = now
+
+    def take(self, now: float) -> bool:
+        """Whether one more may pass (``now`` monotonic, s)."""
+        self._left = min(self._per_s, self._left + (now - self._at) * self._per_s)
+        self._at = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+@dataclass(eq=False, slots=True)
+class _Socket:
+    heard_at: float
+    allowance: Allowance
+    painting: Allowance
+    serving: asyncio.Task[None] | None = None
+    ended: bool = False
+
+    def end(self) -> None:
+        """Serve it no longer."""
+        self.ended = True
+        if self.serving is not None:
+            self.serving.cancel()
+
+
+class SocketLimits:
+    """Five sockets a session, twenty messages a second each (what was painted: 300).
+
+    Of more sockets the one that has been silent gives way: it is a page that lost its
+    line and came back.  When all of them are alive the new one is refused, so that the
+    pages of one person do not push each other out in turn.
+
+    Args:
+        identify: Who it is; strangers are left to the door.
+        clock: Read at each message.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        identify: Callable[[HTTPConnection], Principal | None],
+        clock: Callable[[], Instant],
+    ) -> None:
+        self._app = app
+        self._identify = identify
+        self._clock = clock
+        self._sockets: dict[bytes, list[_Socket]] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] != "websocket":
+            await self._app(scope, receive, send)
+            return
+        who = self._identify(HTTPConnection(scope))
+        if who is None or who.session is None:
+            await self._app(scope, receive, send)
+            return
+        now = self._clock().mono
+        sockets = self._sockets.setdefault(who.session, [])
+        if not _make_room(sockets, now):
+            await _refuse(scope, receive, send)
+            return
+        socket = _Socket(
+            now, Allowance(MESSAGES_PER_S, now), Allowance(PAINTED_PER_S, now)
+        )
+        sockets.append(socket)
+        try:
+            await self._serve(socket, scope, receive, send)
+        finally:
+            sockets.remove(socket)
+            if not sockets:
+                self._sockets.pop(who.session, None)
+
+    async def _serve(
+        self, socket: _Socket, scope: Scope, receive: Receive, send: Send
+    ) -> None:
+        async def run() -> None:
+            await self._app(scope, self._listening(socket, receive), send)
+
+        socket.serving = asyncio.create_task(run(), name="live-socket")
+        try:
+            await socket.serving
+        except asyncio.CancelledError:
+            if not socket.ended:
+                raise
+            # Its line is dead, so this may not arrive; the server ends it all the same.
+            with contextlib.suppress(TimeoutError, OSError, RuntimeError):
+                async with asyncio.timeout(_FAREWELL_S):
+                    await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})
+
+    def _listening(self, socket: _Socket, receive: Receive) -> Receive:
+        """What the page says, without what is too much."""
+
+        async def receive_limited() -> Message:
+            while True:
+                message = await receive()
+                now = self._clock().mono
+                socket.heard_at = now
+                if message["type"] != "websocket.receive" or _is_stop(message):
+                    return message
+                of = socket.painting if _is_painted(message) else socket.allowance
+                if of.take(now):
+                    return message
+
+        return receive_limited
+
+
+def _make_room(sockets: list[_Socket], now: float) -> bool:
+    """Whether one more may come in; ends a silent one where it must."""
+    served = [socket for socket in sockets if not socket.ended]
+    if len(served) < SOCKETS:
+        return True
+    silent = min(served, key=lambda socket: socket.heard_at)
+    if now - silent.heard_at < _SILENT_S:
+        return False
+    silent.end()
+    return True
+
+
+def _is_painted(message: Message) -> bool:
+    """Whether this says that a frame was painted, as pages write it."""
+    return (message.get("text") or "").startswith('{"type":"painted"')
+
+
+def _is_stop(message: Message) -> bool:
+    """Whether this may be a STOP; the reader tells for sure."""
+    return '"stop"' in (message.get("text") or "")
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:
+    # A browser sees close codes only after the handshake.
+    await receive()
+    subprotocol = next(iter(scope.get("subprotocols", ())), None)
+    await send({"type": "websocket.accept", "subprotocol": subprotocol})
+    await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})

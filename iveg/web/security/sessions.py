@@ -1,0 +1,137 @@
+"""Sessions of people: who holds which token, and what is left of it by now.
+
+Only digests of the tokens are kept, in memory and in a store that outlives a restart.
+Ages are told by the wall clock, because no other goes on counting while iVeg is down::
+
+    signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
+        └──────── signed out ─────────────────────────────────────> gone
+"""
+
+import hashlib
+import secrets
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Protocol, cast
+
+from iveg.adapters.sessions import Session
+from iveg.domain.observations import Instant
+from iveg.web.security.roles import Principal, Role
+
+IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
+_MOST_SESSIONS = 1000
+_PEOPLE = frozenset({"viewer", "operator", "admin"})
+_KEEP_SEEN_S = 60.0
+"""A crash forgets at most this much of a sign of life."""
+
+
+class SessionStore(Protocol):
+    """Where sessions outlive a restart; ``adapters.sessions`` is one."""
+
+    def load(self) -> Sequence[Session]:
+        """All that were kept."""
+
+    def keep(self, sessions: Iterable[Session]) -> None:
+        """Keep these from now on; must not block."""
+
+
+class Sessions:
+    """Who is signed in.
+
+    Bounded: when it is full, the session that was idle longest ends.
+
+    Args:
+        clock: Read at each question.
+        store: Where they outlive this process; None forgets them with it.
+        most: How many there may be.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], Instant],
+        store: SessionStore | None = None,
+        most: int = _MOST_SESSIONS,
+    ) -> None:
+        self._clock = clock
+        self._store = store
+        self._most = most
+        self._sessions: dict[bytes, Session] = {}
+        self._kept_at = 0.0
+        if store is not None:
+            self._remember(store.load())
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    def open(self, name: str, role: Role) -> str:
+        """Begin a session; returns its token, which is known to nobody else."""
+        if len(self._sessions) >= self._most:
+            del self._sessions[min(self._sessions, key=self._last_seen)]
+        token = secrets.token_urlsafe(32)
+        now = self._clock().wall
+        digest = _digest(token)
+        self._sessions[digest] = Session(digest.hex(), name, role, now, now)
+        self._keep()
+        return token
+
+    def find(self, token: str) -> Principal | None:
+        """Who holds this token; counts as a sign of life."""
+        return self._principal(_digest(token), touch=True)
+
+    def current(self, principal: Principal) -> Principal | None:
+        """The same person as of now: with the role that is left, or gone."""
+        if principal.session is None:
+            return principal
+        return self._principal(principal.session, touch=False)
+
+    def revoke(self, principal: Principal) -> None:
+        """End a session at once, STOP included."""
+        if principal.session is not None:
+            self._sessions.pop(principal.session, None)
+            self._keep()
+
+    def _principal(self, digest: bytes, *, touch: bool) -> Principal | None:
+        session = self._sessions.get(digest)
+        if session is None:
+            return None
+        now = self._clock().wall
+        role = _role_at(session, now)
+        if role is None:
+            del self._sessions[digest]
+            self._keep()
+            return None
+        if touch and role != "expired":
+            self._sessions[digest] = replace(session, seen=now)
+            if abs(now - self._kept_at) >= _KEEP_SEEN_S:
+                self._keep()
+        return Principal(session.name, role, digest)
+
+    def _last_seen(self, digest: bytes) -> float:
+        return self._sessions[digest].seen
+
+    def _remember(self, kept: Iterable[Session]) -> None:
+        """Take in those of earlier runs that are not over; the newest of too many."""
+        now = self._clock().wall
+        newest = sorted(kept, key=lambda session: session.seen)[-self._most :]
+        for session in newest:
+            # A clock that was ahead must not have made a session that never ends.
+            began, seen = min(session.began, now), min(session.seen, now)
+            known = replace(session, began=began, seen=seen)
+            if session.role in _PEOPLE and _role_at(known, now) is not None:
+                self._sessions[bytes.fromhex(session.digest)] = known
+
+    def _keep(self) -> None:
+        self._kept_at = self._clock().wall
+        if self._store is not None:
+            self._store.keep(self._sessions.values())
+
+
+def _role_at(session: Session, now: float) -> Role | None:
+    """The role that is left at ``now`` (Unix s); None when all is over."""
+    over = now - min(session.seen + IDLE_S, session.began + ABSOLUTE_S)
+    if over <= 0:
+        return cast("Role", session.role)
+    return "expired" if over <= STOP_ONLY_S else None
+
+
+def _digest(token: str) -> bytes:
+    return hashlib.sha256(token.encode()).digest()

@@ -1,0 +1,230 @@
+"""The life of an alert after ISA-18.2."""
+
+from dataclasses import replace
+
+from iveg.domain.alerts.alert_book import (
+    GROUPING_S,
+    MEMBERS_KEPT,
+    MOST_KEPT,
+    AlertBook,
+    Condition,
+)
+from tests.builders import at
+
+LOST = Condition("P1", "alert.moving_robot_lost", "AGI", "AGI")
+SLOWED = Condition("P2", "alert.person_slowed", "AGI/P1", "AGI")
+
+
+def test_what_is_wrong_is_raised_once() -> None:
+    book = AlertBook()
+
+    first = book.sync([LOST, SLOWED], at(0), "a")
+    again = book.sync([LOST, SLOWED], at(1), "b")
+
+    assert [one.condition for one in first] == [LOST, SLOWED]
+    assert again == []
+    assert len(book.waiting) == 2
+
+
+def test_two_of_a_kind_are_told_apart_by_their_subject() -> None:
+    book = AlertBook()
+    other = Condition("P1", LOST.key, "AGII", "AGII")
+
+    raised = book.sync([LOST, other], at(0), "a")
+
+    assert len({one.alert_id for one in raised}) == 2
+
+
+def test_what_is_no_longer_wrong_clears() -> None:
+    book = AlertBook()
+    book.sync([LOST], at(0), "a")
+
+    (cleared,) = book.sync([], at(5), "b")
+
+    assert cleared.cleared == at(5)
+
+
+def test_what_is_over_and_not_grave_waits_for_nobody() -> None:
+    book = AlertBook()
+    book.sync([replace(LOST, priority="P2")], at(0), "a")
+
+    book.sync([], at(5), "b")
+
+    assert book.waiting == []
+
+
+def test_a_p1_that_is_over_waits_until_somebody_has_seen_it() -> None:
+    book = AlertBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+    book.sync([], at(6 + 2 * GROUPING_S), "c")
+
+    (waiting,) = book.waiting
+    book.acknowledge(raised.alert_id, "ana", "", at(7 + 2 * GROUPING_S))
+
+    assert (waiting.priority, waiting.cleared) == ("P1", at(5))
+    assert book.waiting == []
+
+
+def test_p1s_that_nobody_ever_sees_do_not_fill_the_memory() -> None:
+    book = AlertBook()
+
+    for second in range(0, 10 * MOST_KEPT, 10):
+        wrong = [replace(LOST, subject=f"AGI/{second}")]
+        book.sync(wrong, at(second * GROUPING_S), f"{second}")
+
+    assert len(book.waiting) <= MOST_KEPT + 1
+
+
+def test_what_comes_back_soon_is_the_same_alert_counted() -> None:
+    book = AlertBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+
+    (again,) = book.sync([LOST], at(20), "c")
+
+    assert (again.alert_id, again.count, again.raised) == (first.alert_id, 2, at(0))
+
+
+def test_what_comes_back_later_is_a_new_alert() -> None:
+    book = AlertBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(first.alert_id, "ana", "", at(3))
+    book.sync([], at(5), "b")
+    book.sync([], at(5.1 + GROUPING_S), "c")
+
+    (again,) = book.sync([LOST], at(5.2 + GROUPING_S), "d")
+
+    assert again.alert_id != first.alert_id
+    assert again.count == 1
+
+
+def test_acknowledging_keeps_who_when_and_note_and_hides_nothing() -> None:
+    book = AlertBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+
+    book.acknowledge(raised.alert_id, "ana", "on my way", at(3))
+
+    (active,) = book.waiting
+    assert active.last.acknowledged == at(3)
+    assert (active.last.acknowledged_by, active.last.note) == ("ana", "on my way")
+    assert active.unseen is None
+
+
+def test_only_the_first_acknowledgement_counts() -> None:
+    book = AlertBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "mine", at(3))
+
+    again = book.acknowledge(raised.alert_id, "ben", "no, mine", at(4))
+
+    assert again is not None
+    assert again.last.acknowledged_by == "ana"
+
+
+def test_a_new_occurrence_needs_a_new_acknowledgement() -> None:
+    book = AlertBook()
+    (raised,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "", at(1))
+    book.sync([], at(2), "b")
+
+    (again,) = book.sync([LOST], at(3), "c")
+
+    assert again.last.acknowledged is None
+    assert again.unseen == "P1"
+
+
+def test_an_alert_that_nobody_knows_cannot_be_acknowledged() -> None:
+    assert AlertBook().acknowledge("none", "ana", "", at(0)) is None
+
+
+def test_what_changes_about_a_condition_is_shown_without_raising_it_again() -> None:
+    book = AlertBook()
+    book.sync([SLOWED], at(0), "a")
+    nearer = Condition("P2", SLOWED.key, SLOWED.subject, "AGI", {"distance": 0.9})
+
+    assert book.sync([nearer], at(1), "b") == []
+    assert book.waiting[0].condition.slots == {"distance": 0.9}
+
+
+def test_an_alert_tells_its_occurrences_one_by_one() -> None:
+    book = AlertBook()
+    (first,) = book.sync([LOST], at(0), "a")
+    book.acknowledge(first.alert_id, "ana", "battery", at(1))
+    book.sync([], at(5), "b")
+    book.sync([LOST], at(20), "c")
+
+    (alert,) = book.waiting
+    earlier, last = alert.members
+    assert (earlier.raised, earlier.cleared) == (at(0), at(5))
+    assert (earlier.acknowledged_by, earlier.note) == ("ana", "battery")
+    assert (last.raised, last.cleared) == (at(20), None)
+
+
+def test_of_many_occurrences_the_newest_are_kept_and_all_are_counted() -> None:
+    book = AlertBook()
+    for number in range(MEMBERS_KEPT + 5):
+        book.sync([LOST], at(2 * number), "a")
+        book.sync([], at(2 * number + 1), "b")
+    book.sync([LOST], at(100), "c")
+
+    (alert,) = book.waiting
+    assert (alert.count, len(alert.members)) == (MEMBERS_KEPT + 6, MEMBERS_KEPT)
+    assert alert.raised == at(0)
+
+
+def test_a_condition_that_gets_graver_is_raised_again_though_it_was_seen() -> None:
+    book = AlertBook()
+    (raised,) = book.sync([replace(LOST, priority="P3")], at(0), "a")
+    book.acknowledge(raised.alert_id, "ana", "", at(1))
+
+    (graver,) = book.sync([LOST], at(2), "b")
+
+    assert (graver.alert_id, graver.priority) == (raised.alert_id, "P1")
+    assert graver.last.acknowledged is None
+    assert [one.priority for one in graver.members] == ["P3", "P1"]
+
+
+def test_what_nobody_saw_is_shown_as_grave_as_it_was() -> None:
+    book = AlertBook()
+    book.sync([LOST], at(0), "a")
+    book.sync([], at(5), "b")
+
+    (again,) = book.sync([replace(LOST, priority="P3")], at(9), "c")
+    seen = book.acknowledge(again.alert_id, "ana", "", at(10))
+
+    assert again.priority == "P1"
+    assert seen is not None
+    assert seen.priority == "P3"
+
+
+def test_of_two_conditions_of_one_kind_and_subject_the_graver_counts() -> None:
+    book = AlertBook()
+
+    (raised,) = book.sync([LOST, replace(LOST, priority="P3")], at(0), "a")
+
+    assert raised.priority == "P1"
+
+
+def test_13_6_a_p1_of_an_earlier_run_waits_on_and_joins_what_still_holds() -> None:
+    earlier, book = AlertBook(), AlertBook()
+    earlier.sync([LOST], at(0), "a")
+    (over,) = earlier.sync([], at(5), "b")
+
+    book.remember([over])
+    book.sync([LOST], at(8), "c")
+
+    (waiting,) = book.waiting
+    assert (waiting.alert_id, waiting.count) == (over.alert_id, 2)
+
+
+def test_13_6_what_is_raised_before_the_history_answers_hides_nothing_earlier() -> None:
+    earlier, book = AlertBook(), AlertBook()
+    earlier.sync([LOST], at(0), "a")
+    (over,) = earlier.sync([], at(5), "b")
+
+    (now,) = book.sync([LOST], at(8), "c")
+    book.remember([over])
+    book.acknowledge(now.alert_id, "ana", "", at(9))
+
+    assert over.alert_id in {one.alert_id for one in book.waiting}

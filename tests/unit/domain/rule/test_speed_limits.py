@@ -1,0 +1,471 @@
+"""Who must drive slower and why, at the borders and over time."""
+
+import pytest
+
+from iveg.domain.feedback import CLEAR
+from tests.unit.domain.scene import HEDGE, Scene, machine, person
+
+
+def watching(scene: Scene) -> Scene:
+    """Both robots are fresh and look; nobody is near anybody."""
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGI")
+    scene.look("AGII")
+    return scene
+
+
+def step(scene: Scene, x: float, *, at_x: float = 0.0) -> tuple[float, str]:
+    """AGI drives at ``at_x`` and AGII sees somebody at ``x``; what AGI must do."""
+    scene.drive("AGI", at_x)
+    scene.drive("AGII", 50.0)
+    scene.look("AGI")
+    scene.look("AGII", person(x))
+    speed_limit = scene.judge()["AGI"]
+    return speed_limit.speed_factor, speed_limit.reason
+
+
+# --- the ring ---------------------------------------------------------------------
+
+
+def test_a_robot_far_from_everybody_is_free() -> None:
+    assert watching(Scene()).judge() == {"AGI": CLEAR, "AGII": CLEAR}
+
+
+@pytest.mark.parametrize(
+    ("distance", "factor"), [(0.0, 0.5), (1.999, 0.5), (2.0, 0.5), (2.0001, 1.0)]
+)
+def test_f47_the_ring_is_two_metres_inclusive(distance: float, factor: float) -> None:
+    assert step(Scene(), distance)[0] == factor
+
+
+def test_distance_is_horizontal_from_base_link_to_the_centre() -> None:
+    scene = watching(Scene())
+    scene.look("AGII", person(1.2, 1.6))
+
+    assert scene.judge()["AGI"].distance_m == pytest.approx(2.0)
+
+
+def test_the_trigger_is_immediate() -> None:
+    scene = Scene()
+
+    assert step(scene, 1.5) == (0.5, "person")
+    (change,) = scene.changes
+    assert change.began
+    assert change.crossing.entered_m == 1.5
+
+
+def test_the_speed_limit_names_its_cause_distance_and_decision() -> None:
+    scene = Scene()
+    step(scene, 1.5)
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert (speed_limit.cause, speed_limit.distance_m) == ("P1", 1.5)
+    assert speed_limit.decision_id == scene.changes[0].crossing.decision_id
+
+
+def test_of_one_person_seen_at_two_places_the_nearer_counts() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5))
+    scene.look("AGII", person(1.9))
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert len(scene.everyone) == 1
+    assert speed_limit.distance_m == pytest.approx(1.5)
+
+
+def test_two_decisions_of_one_moment_have_different_names() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 3.0)
+    scene.look("AGI", person(1.5, 0.0), person(1.5, 1.0))
+    scene.judge()
+
+    names = [change.crossing.decision_id for change in scene.changes]
+
+    assert len(names) == 4
+    assert len(set(names)) == 4
+
+
+def test_the_ring_of_an_old_sighting_reaches_further() -> None:
+    scene = Scene()
+    assert step(scene, 3.0) == (1.0, "clear")
+    for _ in range(10):
+        scene.now += 0.1
+        watching(scene)
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_the_observer_itself_is_slowed_too() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.5))
+
+    assert scene.judge()["AGI"].speed_factor == 0.5
+
+
+def test_who_does_not_see_is_slowed_and_it_is_known() -> None:
+    scene = Scene(greenhouse=HEDGE)
+    scene.drive("AGI", 2.5)
+    scene.drive("AGII", 10.0)
+    scene.look("AGI")
+    scene.look("AGII", person(4.0))
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.robot_id == "AGI"
+    assert not change.crossing.in_sight
+
+
+# --- release ----------------------------------------------------------------------
+
+
+def leave(scene: Scene, x: float, seconds: float) -> list[float]:
+    """The person stays at ``x``; AGI's factors every tenth."""
+    factors = []
+    for _ in range(round(seconds * 10)):
+        scene.now = round(scene.now + 0.1, 6)
+        factors.append(step(scene, x)[0])
+    return factors
+
+
+def test_the_release_comes_a_second_after_the_robot_is_030_m_outside() -> None:
+    scene = Scene()
+    step(scene, 1.9)
+
+    factors = leave(scene, 2.35, 1.2)
+
+    assert factors == [0.5] * 10 + [1.0] * 2
+    assert [change.began for change in scene.changes] == [True, False]
+
+
+def test_between_ring_and_release_nothing_ends() -> None:
+    scene = Scene()
+    step(scene, 1.9)
+
+    assert set(leave(scene, 2.29, 5.0)) == {0.5}
+
+
+def test_coming_back_within_the_second_is_the_same_decision() -> None:
+    scene = Scene()
+    step(scene, 1.9)
+    leave(scene, 2.4, 0.8)
+    leave(scene, 2.1, 0.3)
+
+    assert set(leave(scene, 2.4, 0.8)) == {0.5}
+    assert len(scene.changes) == 1
+
+
+def test_somebody_who_was_cleared_lets_go_a_second_later() -> None:
+    scene = Scene()
+    step(scene, 1.9)
+    known = scene.everyone[0]
+    scene.people.drop_sighting(known.person_id, known.newest)
+
+    watching(scene).judge()
+    scene.now = 0.9
+    assert watching(scene).judge()["AGI"].speed_factor == 0.5
+    scene.now = 1.0
+    assert watching(scene).judge()["AGI"].speed_factor == 1.0
+
+
+# --- several reasons --------------------------------------------------------------
+
+
+def test_f48_two_rings_are_half_speed_and_not_a_quarter() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 1.0)
+    scene.look("AGI", person(1.5), person(-1.5))
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].speed_factor == 0.5
+
+
+def test_a_person_is_the_reason_that_is_told_before_a_nearer_peer() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 1.0)
+    scene.look("AGI", person(1.9))
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_of_two_people_the_nearer_is_the_cause() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", person(1.9), person(-1.0))
+
+    assert scene.judge()["AGI"].distance_m == 1.0
+
+
+# --- peers ------------------------------------------------------------------------
+
+
+def test_a_moving_peer_slows_who_comes_near() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.9)
+
+    speed_limits = scene.judge()
+
+    assert {name: one.reason for name, one in speed_limits.items()} == {
+        "AGI": "robot",
+        "AGII": "robot",
+    }
+    assert speed_limits["AGI"].cause == "AGII"
+
+
+def test_a_standing_peer_slows_nobody() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0, linear=0.0)
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+def test_a_peer_that_stood_and_has_fallen_silent_slows_again() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0, linear=0.0)
+    scene.now = 1.1
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == "robot"
+
+
+def test_a_peer_that_a_robot_sees_is_no_second_reason() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0, linear=0.0)
+    scene.look("AGI", machine(1.2))
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+def test_a_robot_that_is_none_of_the_fleet_slows_like_a_person() -> None:
+    scene = watching(Scene())
+    scene.look("AGI", machine(1.5))
+
+    assert scene.judge()["AGI"].reason == "robot"
+
+
+def test_a_peer_not_heard_for_ten_seconds_has_no_ring() -> None:
+    scene = watching(Scene())
+    scene.drive("AGII", 1.0)
+    scene.now = 10.1
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+# --- silence ----------------------------------------------------------------------
+
+
+def test_a_robot_whose_pose_was_never_seen_is_slowed() -> None:
+    scene = Scene()
+    scene.look("AGI")
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert (speed_limit.speed_factor, speed_limit.reason) == (0.5, "stale")
+    assert speed_limit.cause == "AGI"
+
+
+@pytest.mark.parametrize(("age", "reason"), [(1.0, "clear"), (1.01, "stale")])
+def test_a_robot_whose_pose_is_silent_for_a_second_is_slowed(
+    age: float, reason: str
+) -> None:
+    scene = watching(Scene())
+    scene.now = age
+    scene.look("AGI")
+    scene.look("AGII")
+
+    assert scene.judge()["AGI"].reason == reason
+
+
+@pytest.mark.parametrize(("age", "reason"), [(1.0, "clear"), (1.01, "stale")])
+def test_every_robot_is_slowed_while_an_observer_is_silent(
+    age: float, reason: str
+) -> None:
+    scene = watching(Scene())
+    scene.now = age
+    scene.drive("AGI", 0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGI")
+
+    speed_limits = scene.judge()
+
+    assert [one.reason for one in speed_limits.values()] == [reason] * 2
+
+
+def test_it_is_told_whose_eyes_are_shut() -> None:
+    scene = watching(Scene())
+    scene.now = 2.0
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert scene.judge()["AGI"].cause == "AGII"
+
+
+def test_while_nobody_looks_at_all_everybody_is_slowed() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+
+    speed_limit = scene.judge()["AGI"]
+
+    assert (speed_limit.reason, speed_limit.cause) == ("stale", None)
+
+
+def test_a_robot_that_has_not_looked_for_ten_minutes_is_no_observer_any_more() -> None:
+    scene = watching(Scene())
+    scene.now = 601.0
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+@pytest.mark.parametrize(("age", "reason"), [(1.0, "stale"), (1.01, "clear")])
+def test_an_unreadable_detection_slows_its_observer_for_a_second(
+    age: float, reason: str
+) -> None:
+    scene = watching(Scene())
+    scene.look("AGI", unreadable=1)
+    scene.now = age
+    watching(scene)
+
+    speed_limits = scene.judge()
+
+    assert (speed_limits["AGI"].reason, speed_limits["AGII"]) == (reason, CLEAR)
+
+
+# --- recordings -------------------------------------------------------------------
+
+RECORDED = ("AGI", "AGII:recording")
+
+
+def test_what_a_recording_saw_slows_no_live_robot() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+def test_a_recording_that_drives_past_slows_no_live_robot() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.drive("AGII", 1.0)
+
+    speed_limits = scene.judge()
+
+    assert speed_limits["AGI"] == CLEAR
+    assert speed_limits["AGII"].reason == "robot"
+
+
+def test_a_live_robot_whose_task_is_called_replay_keeps_its_protection() -> None:
+    scene = watching(Scene())
+    for name in ("AGI", "AGII"):
+        scene.navigate(name, "replay")
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"].reason == "person"
+    assert {one.robot_id for one in scene.world.live_robots()} == {"AGI", "AGII"}
+
+
+def test_whom_one_recording_saw_slows_no_other_robot() -> None:
+    scene = watching(Scene(robots=("AGI:recording", "AGII:recording")))
+    scene.look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+def test_recordings_that_share_a_map_slow_for_each_others_people() -> None:
+    scene = Scene(robots=("AGI:recording", "AGII:recording"), replay="shared")
+    watching(scene).look("AGII", person(1.0))
+
+    assert scene.judge()["AGI"].reason == "person"
+
+
+def test_what_a_recording_saw_slows_the_recording() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.look("AGII", person(50.5))
+
+    assert scene.judge()["AGII"].reason == "person"
+
+
+def test_a_recordings_silence_shuts_nobodys_eyes() -> None:
+    scene = watching(Scene(robots=RECORDED))
+    scene.now = 5.0
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert scene.judge()["AGI"] == CLEAR
+
+
+# --- a robot that is slow already -------------------------------------------------
+
+
+def test_a_robot_that_is_slow_for_another_reason_will_show_no_slow_down() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5, decision_id="another")
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.already_slow
+
+
+@pytest.mark.parametrize(("speed", "already_slow"), [(0.8, False), (0.4, True)])
+def test_a_robot_that_judged_this_very_alert_first_and_is_fast_is_still_to_slow_down(
+    speed: float, already_slow: bool
+) -> None:
+    scene = watching(Scene())
+    scene.drive("AGI", 0.0, linear=speed)
+    scene.look("AGII", person(1.5))
+    (somebody,) = scene.everyone
+    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.already_slow is already_slow
+
+
+def test_a_robot_that_had_judged_this_very_alert_itself_was_ahead() -> None:
+    scene = watching(Scene())
+    scene.look("AGII", person(1.5))
+    (somebody,) = scene.everyone
+    scene.report("AGI", factor=0.5, decision_id=somebody.decision_id)
+    scene.judge()
+
+    (change,) = scene.changes
+    assert change.crossing.ahead
+
+
+def test_a_robot_that_names_no_alert_was_not_ahead_of_a_peers_own_ring() -> None:
+    scene = watching(Scene())
+    scene.report("AGI", factor=0.5)
+    scene.drive("AGI", 49.0)
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert mine.crossing.already_slow
+    assert not mine.crossing.ahead
+
+
+@pytest.mark.parametrize(
+    ("speeds", "speeding_up"),
+    [([0.8] * 7, False), ([0.4, 0.5, 0.6, 0.7, 0.8], True), ([1.0, 0.9, 0.8], False)],
+)
+def test_half_of_a_speed_that_still_grows_is_not_what_will_be_seen(
+    speeds: list[float], speeding_up: bool
+) -> None:
+    scene = watching(Scene())
+    for speed in speeds:
+        scene.now += 0.2
+        scene.drive("AGI", 0.0, linear=speed)
+    scene.look("AGII", person(1.5))
+    scene.judge()
+
+    mine, *_ = (one for one in scene.changes if one.crossing.robot_id == "AGI")
+    assert mine.crossing.speeding_up is speeding_up

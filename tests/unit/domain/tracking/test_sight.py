@@ -1,0 +1,155 @@
+"""A ring ends because somebody has looked there in vain, never for one empty frame."""
+
+import pytest
+
+from iveg.domain.tracking.sight import can_see
+from tests.builders import at, detection
+from tests.unit.domain.scene import HEDGE, Scene, person
+
+
+def watched(
+    scene: Scene, seconds: float, *, x: float = 0.0, yaw: float = 0.0
+) -> list[str]:
+    """AGI looks ahead ten times a second; returns whose rings went, in order."""
+    gone = []
+    end = scene.now + seconds
+    while scene.now < end - 1e-9:
+        scene.drive("AGI", x, yaw=yaw, linear=0.0)
+        scene.look("AGI")
+        gone += [one.person_id for one in scene.sweep()]
+        scene.now = round(scene.now + 0.1, 6)
+    return gone
+
+
+def remembered(scene: Scene, x: float = 4.0) -> Scene:
+    """AGII has seen somebody 1.1 s ago."""
+    scene.look("AGII", person(x))
+    scene.now = 1.1
+    return scene
+
+
+def test_a_spot_looked_at_in_vain_for_a_second_is_clear() -> None:
+    scene = remembered(Scene())
+
+    assert watched(scene, 0.95) == []
+    assert watched(scene, 0.2) == ["P1"]
+    assert scene.everyone[0].sightings == ()
+
+
+def test_a_look_that_was_interrupted_begins_anew() -> None:
+    scene = remembered(Scene())
+    watched(scene, 0.8)
+    watched(scene, 0.2, yaw=3.0)
+
+    assert watched(scene, 0.9) == []
+
+
+def test_somebody_who_is_still_seen_keeps_the_ring() -> None:
+    scene = Scene()
+    scene.look("AGII", person(4.0))
+    for _ in range(30):
+        scene.now = round(scene.now + 0.1, 6)
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI", person(4.0))
+        assert not [one for one in scene.sweep() if not one.sightings]
+
+    assert scene.everyone[0].sightings
+
+
+def test_somebody_who_is_seen_faintly_keeps_the_ring() -> None:
+    scene = remembered(Scene())
+    for _ in range(30):
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI", person(4.0, probability=0.6))
+        assert scene.sweep() == []
+        scene.now = round(scene.now + 0.1, 6)
+
+
+def test_something_else_at_that_spot_does_not_keep_the_ring() -> None:
+    scene = remembered(Scene())
+    gone = []
+    for _ in range(15):
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI", detection("crate", 4.0))
+        gone += scene.sweep()
+        scene.now = round(scene.now + 0.1, 6)
+
+    assert len(gone) == 1
+
+
+def test_a_spot_behind_crop_cannot_be_cleared() -> None:
+    scene = remembered(Scene(greenhouse=HEDGE))
+
+    assert watched(scene, 3.0) == []
+
+
+def test_a_recording_clears_nothing() -> None:
+    scene = remembered(Scene(robots=("AGI:recording", "AGII")))
+
+    assert watched(scene, 3.0) == []
+
+
+def test_whom_a_recording_saw_no_look_of_today_clears() -> None:
+    scene = remembered(Scene(robots=("AGI", "AGII:recording")))
+
+    assert watched(scene, 3.0) == []
+
+
+def test_a_robot_that_nobody_described_clears_nothing() -> None:
+    scene = Scene(robots=("AG3", "AGII"))
+    scene.look("AGII", person(4.0))
+    scene.now = 1.1
+    scene.drive("AG3", 0.0)
+    scene.look("AG3")
+
+    assert not can_see(scene.world.robot("AG3"), 4.0, 0.0, scene.greenhouse, at(1.1))
+
+
+def test_only_the_circles_that_were_looked_at_go() -> None:
+    scene = Scene(robots=("AGI", "AGII", "AG3"))
+    scene.look("AGII", person(4.0))
+    scene.now = 0.5
+    scene.look("AG3", person(4.5))
+    scene.now = 1.1
+
+    watched(scene, 1.1)
+
+    assert [one.observer for one in scene.everyone[0].sightings] == ["AG3"]
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "sees"),
+    [
+        (4.0, 0.0, True),
+        (1.3, 0.0, False),  # too near to be seen whole
+        (6.3, 0.0, True),
+        (6.5, 0.0, False),  # beyond three quarters of the range
+        (-4.0, 0.0, False),
+        (4.0, 1.9, True),
+        (4.0, 2.3, False),  # at the edge of the picture
+    ],
+)
+def test_a_camera_vouches_for_what_it_sees_well(x: float, y: float, sees: bool) -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert can_see(scene.world.robot("AGI"), x, y, scene.greenhouse, at(0.0)) is sees
+
+
+@pytest.mark.parametrize(("age", "sees"), [(0.4, True), (0.6, False), (2.0, False)])
+def test_an_old_look_vouches_for_nothing(age: float, sees: bool) -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+    scene.look("AGI")
+
+    assert (
+        can_see(scene.world.robot("AGI"), 4.0, 0.0, scene.greenhouse, at(age)) is sees
+    )
+
+
+def test_a_robot_that_never_looked_vouches_for_nothing() -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0)
+
+    assert not can_see(scene.world.robot("AGI"), 4.0, 0.0, scene.greenhouse, at(0.0))

@@ -1,0 +1,566 @@
+"""The rule at work: feedback, log, alerts and the heartbeat of the fleet."""
+
+import json
+
+import pytest
+
+from iveg.domain.detection_rule import Rule
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Hold, Origin
+from iveg.domain.records import (
+    AlertRecord,
+    DecisionRecord,
+    DetectionRecord,
+    OdometryRecord,
+)
+from iveg.models.decision import Decision
+from tests.builders import detection, detection_frame, odometry, origin
+from tests.fakes.records import alert_record
+from tests.unit.pipeline.desk import Desk, conditions_of
+
+HEDGE = Greenhouse(
+    "hedge", Rectangle(-100, -100, 100, 100), rows=(Rectangle(2.9, -50, 3.1, 50),)
+)
+
+
+def watched(desk: Desk) -> Desk:
+    """Both robots are there, look, and report that they drive."""
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+    desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
+    desk.report("AGII", factor=1.0, reason="clear", linear=0.5)
+    return desk
+
+
+def meet(desk: Desk, x: float = 1.5) -> None:
+    """AGII sees a farmer ``x`` metres before AGI."""
+    desk.look("AGII", detection("farmer", x))
+
+
+def test_13_13_a_decision_remembers_where_the_robots_were() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    view = Decision.of_record(desk.records(DecisionRecord)[-1])
+    assert {one.robot_id for one in view.places} == {"AGI", "AGII"}
+    assert isinstance(view.rule.parameters, dict)
+    assert "places" not in view.rule.parameters
+
+
+# --- feedback ---------------------------------------------------------------------
+
+
+def test_a_sighting_is_told_to_the_fleet_at_once() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+
+    meet(desk)
+
+    told = {one.robot_id: one for one in desk.fleet.told}
+    assert set(told) == {"AGI", "AGII"}
+    assert told["AGI"].speed_limits["AGI"].reason == "person"
+    assert told["AGII"].alert is not None
+    assert told["AGII"].alert.class_id == "farmer"
+    assert told["AGII"].alert.radius_m == pytest.approx(2.0)
+    assert told["AGI"].alert is None
+    assert len(told["AGI"].alerts) == 1
+
+
+def test_feedback_says_where_iveg_believes_each_robot_to_be() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    newest = {one.robot_id: one for one in desk.fleet.told}
+    assert newest["AGII"].pose is not None
+    assert newest["AGII"].pose.x == 50.0
+    assert newest["AGII"].pose_stamp is not None
+
+
+def test_feedback_says_which_report_of_each_robot_was_seen() -> None:
+    desk = watched(Desk())
+    desk.report("AGI", factor=0.5, reason="stale")
+    seen = desk.seq
+
+    meet(desk)
+
+    assert desk.fleet.told[-1].seen["AGI"] == seen
+
+
+def test_every_message_to_the_fleet_has_a_number_of_its_own() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    numbers = [one.origin.seq for one in desk.fleet.told]
+    assert len(set(numbers)) == len(numbers)
+    assert {one.origin.boot for one in desk.fleet.told} == {"iveg-boot"}
+
+
+def test_every_robot_is_told_how_far_orion_is_behind() -> None:
+    desk = watched(Desk())
+    desk.health_monitor.sent(Origin("iveg-boot", 1), desk.clock())
+    desk.clock.now += 7.0
+
+    desk.evaluator.tell(desk.clock())
+
+    assert [one.backlog_s for one in desk.fleet.told[-2:]] == [7.0, 7.0]
+
+
+def test_another_confident_object_is_told_as_a_stamp_alone() -> None:
+    desk = watched(Desk())
+    desk.look("AGII", detection("crate", 9.0))
+    desk.evaluator.tell(desk.clock())
+
+    alert = next(one for one in desk.fleet.told[::-1] if one.robot_id == "AGII").alert
+    assert alert is not None
+    assert (alert.class_, alert.position) == (None, None)
+    assert alert.stamp
+
+
+async def test_the_heartbeat_comes_ten_times_a_second_and_from_the_loop_alone() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+
+    await desk.wait(2.0)
+
+    to_agi = [one for one in desk.fleet.told if one.robot_id == "AGI"]
+    assert 20 <= len(to_agi) <= 24
+
+
+async def test_f14_a_loop_that_hangs_sends_nothing() -> None:
+    desk = watched(Desk())
+    desk.fleet.told.clear()
+    desk.clock.now += 2.0
+
+    assert desk.fleet.told == []
+
+
+# --- decisions --------------------------------------------------------------------
+
+
+def test_a_decision_is_written_down_with_its_feedback() -> None:
+    desk = watched(Desk())
+
+    meet(desk)
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert (newest.robot_id, newest.observer) == ("AGI", "AGII")
+    assert newest.feedback_at is not None
+    assert json.loads(newest.rule_parameters)["threshold"] == 0.8
+    verdicts = {one["link"]: one["verdict"] for one in json.loads(newest.links)}
+    assert verdicts["feedback"] == "ok"
+
+
+def test_what_the_robot_applies_and_shows_completes_the_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    speed_limit = desk.evaluator.speed_limits["AGI"]
+
+    desk.report(
+        "AGI",
+        factor=0.5,
+        reason="person",
+        decision_id=speed_limit.decision_id,
+        linear=0.5,
+    )
+    desk.drive("AGI", 0.0, linear=0.2)
+
+    decision = desk.evaluator.decisions.get(speed_limit.decision_id or "")
+    assert decision is not None
+    assert decision.applied is not None
+    assert decision.speed_after == 0.2
+
+
+async def test_the_end_of_a_crossing_ends_its_decision() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for tenth in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0)
+        desk.drive("AGII", 50.0)
+        desk.look("AGI")
+        desk.look("AGII", detection("farmer", 1.5 + 0.1 * tenth))
+
+    assert list(desk.evaluator.decisions.every_open()) == []
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert newest.ended_at is not None
+
+
+def test_a_robot_that_slows_for_somebody_it_cannot_see_is_counted() -> None:
+    desk = Desk(greenhouse=HEDGE)
+    desk.drive("AGI", 2.0)
+    desk.drive("AGII", 50.0)
+
+    desk.look("AGII", detection("farmer", 3.9))
+
+    assert desk.evaluator.protected_unseen == 1
+
+
+# --- alerts -----------------------------------------------------------------------
+
+
+async def test_13_10_a_slow_down_that_the_rule_asked_for_is_no_alert() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(0.1)
+
+    assert conditions_of(desk) == []
+    assert "log.alert.raised" not in desk.sentences()
+
+
+async def test_a_robot_that_does_not_slow_down_raises_a_grave_alert() -> None:
+    desk = watched(Desk())
+    for _ in range(22):
+        meet(desk)
+        desk.drive("AGI", 0.0)
+        desk.drive("AGII", 50.0)
+        desk.look("AGI")
+        await desk.wait(0.1)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert "log.alert.raised" in desk.sentences()
+
+
+async def test_a_moving_robot_that_is_lost_raises_and_its_return_clears() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    assert "alert.moving_robot_lost" in conditions_of(desk)
+
+    watched(desk)
+    await desk.wait(0.1)
+
+    assert all(one.cleared for one in desk.evaluator.alerts.waiting)
+    assert desk.sentences().count("log.alert.cleared") == 2
+
+
+async def test_acknowledging_is_written_down_and_told() -> None:
+    desk = watched(Desk())
+    await desk.wait(3.2)
+    (first, *_) = desk.evaluator.alerts.waiting
+
+    desk.evaluator.alerts.acknowledge(first.alert_id, "ana", "seen", desk.clock())
+
+    newest = desk.records(AlertRecord)[-1]
+    assert isinstance(newest, AlertRecord)
+    assert (newest.acknowledged_by, newest.note) == ("ana", "seen")
+    assert desk.sentences()[-1] == "log.alert.acknowledged"
+
+
+def test_an_alert_that_nobody_knows_is_acknowledged_by_nobody() -> None:
+    desk = Desk()
+
+    assert desk.evaluator.alerts.acknowledge("none", "ana", "", desk.clock()) is None
+    assert desk.sentences() == []
+
+
+async def test_a_flood_is_told_when_it_begins() -> None:
+    desk = Desk()
+    for number in range(11):
+        desk.report("AGI", factor=1.0, reason="clear", linear=0.5)
+        desk.drive("AGI", float(number), linear=0.5)
+        await desk.wait(3.2)
+
+    assert desk.evaluator.alerts.flood.since is not None
+    assert desk.sentences().count("log.flood.began") == 1
+
+
+# --- what is stored ---------------------------------------------------------------
+
+
+def stored_verdicts(desk: Desk) -> set[str]:
+    """Verdicts of the newest row of the newest decision."""
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    return {one["verdict"] for one in json.loads(newest.links)}
+
+
+async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    assert "open" in stored_verdicts(desk)
+
+    for _ in range(5):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert "alert.person_not_slowing" in conditions_of(desk)
+    assert desk.evaluator.decisions.every_open()
+    assert stored_verdicts(desk) == {"ok", "missing"}
+
+
+async def test_a_decision_that_waits_is_not_stored_again_and_again() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    for _ in range(10):
+        desk.drive("AGI", 0.0)
+        meet(desk)
+        await desk.wait(0.45)
+
+    assert len(desk.records(DecisionRecord)) <= 4
+
+
+def test_a_decision_that_is_open_when_iveg_goes_away_says_so() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    desk.evaluator.leave(desk.clock())
+
+    newest = desk.records(DecisionRecord)[-1]
+    assert isinstance(newest, DecisionRecord)
+    assert newest.ended_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+
+
+def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
+    crashed, desk = watched(Desk()), Desk()
+    meet(crashed)
+    left = crashed.records(DecisionRecord)[-1]
+    assert isinstance(left, DecisionRecord)
+
+    desk.evaluator.close_earlier([left], [alert_record()], desk.clock())
+
+    (closed,), (cleared,) = desk.records(DecisionRecord), desk.records(AlertRecord)
+    assert isinstance(closed, DecisionRecord)
+    assert isinstance(cleared, AlertRecord)
+    assert closed.decision_id == left.decision_id
+    assert closed.ended_at == cleared.cleared_at == desk.clock().wall
+    assert stored_verdicts(desk) == {"ok", "unknown"}
+    assert json.loads(closed.links)[-1]["link"] == "interrupted"
+
+
+async def test_what_this_run_has_open_is_left_alone() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    await desk.wait(2.5)
+    decisions, alerts = desk.records(DecisionRecord), desk.records(AlertRecord)
+    before = len(desk.sink.records)
+
+    desk.evaluator.close_earlier(
+        [one for one in decisions if isinstance(one, DecisionRecord)],
+        [one for one in alerts if isinstance(one, AlertRecord)],
+        desk.clock(),
+    )
+
+    assert alerts
+    assert len(desk.sink.records) == before
+
+
+# --- the log ----------------------------------------------------------------------
+
+
+async def test_a_link_that_comes_and_goes_is_told_once_each_time() -> None:
+    desk = watched(Desk())
+    await desk.wait(4.0)
+
+    links = [line.key for line in desk.event_log.lines if line.robot_id == "AGI"]
+    assert [key for key in links if key.startswith("log.link")] == [
+        "log.link.live",
+        "log.link.late",
+        "log.link.lost",
+    ]
+
+
+def test_a_speed_change_is_told_with_who_saw_whom() -> None:
+    desk = watched(Desk())
+    meet(desk)
+    speed_limit = desk.evaluator.speed_limits["AGI"]
+
+    desk.report("AGI", factor=0.5, reason="person", decision_id=speed_limit.decision_id)
+
+    line = desk.event_log.lines[-1]
+    slots = json.loads(line.slots)
+    assert line.key == "log.speed_down.person"
+    assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
+
+
+def test_a_robot_that_reports_nothing_is_told_by_its_speed_limit() -> None:
+    desk = Desk()
+    desk.drive("AGI", 0.0)
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    desk.look("AGII")
+
+    meet(desk)
+
+    assert desk.sentences()[-1] == "log.speed_down.person"
+
+
+def test_a_long_sighting_is_one_line_and_a_row_every_two_seconds() -> None:
+    desk = watched(Desk())
+    for _ in range(50):
+        desk.clock.now = round(desk.clock.now + 0.1, 6)
+        desk.look("AGII", detection("farmer", 80.0))
+
+    assert desk.sentences().count("log.detection") == 1
+    assert len(desk.records(DetectionRecord)) == 3
+
+
+@pytest.mark.parametrize(
+    ("class_id", "probability", "key"),
+    [
+        ("farmer", 0.6, "log.detection_faint"),
+        ("crate", 0.9, "log.detection_unmapped"),
+    ],
+)
+def test_faint_and_unmapped_detections_are_never_silently_ignored(
+    class_id: str, probability: float, key: str
+) -> None:
+    desk = watched(Desk())
+
+    desk.look("AGII", detection(class_id, 80.0, probability=probability))
+
+    assert desk.sentences()[-1] == key
+
+
+async def test_a_person_who_is_not_seen_any_more_is_remembered_then_expired() -> None:
+    desk = watched(Desk())
+    meet(desk, 80.0)
+    await desk.wait(11.0)
+
+    told = [key for key in desk.sentences() if key.startswith("log.person")]
+    assert told == ["log.person_remembered", "log.person_expired"]
+
+
+async def test_who_is_gone_leaves_the_page() -> None:
+    desk = watched(Desk())
+    meet(desk, 80.0)
+    desk.clock.now = 601.0
+    await desk.wait(0.05)
+
+    assert desk.evaluator.people.known == {}
+
+
+async def test_a_spot_that_was_looked_at_in_vain_is_told() -> None:
+    desk = watched(Desk())
+    desk.look("AGII", detection("farmer", 4.0))
+    for _ in range(30):
+        await desk.wait(0.1)
+        desk.drive("AGI", 0.0, linear=0.0)
+        desk.look("AGI")
+
+    assert "log.person_cleared" in desk.sentences()
+
+
+def test_a_person_beyond_the_walls_slows_who_saw_them_and_is_told_as_doubtful() -> None:
+    desk = watched(Desk())
+
+    desk.look("AGI", detection("farmer", 150.0))
+
+    assert "log.detection_doubtful" in desk.sentences()
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+    alert = desk.fleet.told[-1].alerts[0]
+    assert alert.position is not None
+    assert alert.position[:2] == (0.0, 0.0)
+    assert alert.radius_m == 8.0
+
+
+def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
+    desk = watched(Desk())
+    desk.evaluator.rule = Rule(possible_people=True)
+    # Faint looks at one spot are told once; the possible one is another line.
+    for _ in range(3):
+        desk.clock.now += 0.1
+        desk.look("AGI", detection("farmer", 5.0, probability=0.7))
+
+    assert desk.sentences().count("log.detection_faint") == 1
+    assert desk.sentences().count("log.detection_possible") == 1
+
+
+def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
+    desk = watched(Desk())
+    for number in range(5):
+        things = [detection(f"thing-{number}-{n}", 80.0) for n in range(220)]
+        desk.look("AGII", *things)
+    desk.clock.now = 60.0
+
+    desk.loop.step([], desk.clock())
+
+    assert desk.evaluator.looks.subjects == 0
+
+
+# --- what counts ------------------------------------------------------------------
+
+
+def test_poses_are_written_down_twice_a_second() -> None:
+    desk = Desk()
+    for tenth in range(100):
+        desk.clock.now = tenth / 10
+        desk.drive("AGI", 0.1 * tenth)
+
+    assert 19 <= len(desk.records(OdometryRecord)) <= 24
+
+
+def test_the_same_look_on_the_other_transport_is_one_sighting() -> None:
+    desk = watched(Desk())
+    frame = detection_frame("AGII", detection("farmer", 9.0), origin=desk.next_origin())
+    desk.hear(frame, "mqtt")
+    desk.hear(frame, "orion")
+
+    assert desk.world.counters["DetectionFrame.duplicate"] == 1
+    assert len(desk.records(DetectionRecord)) == 1
+
+
+def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> None:
+    desk = watched(Desk())
+    late = desk.next_origin()
+    desk.look("AGII")
+
+    desk.hear(detection_frame("AGII", detection("farmer", 1.0), origin=late))
+    desk.loop.step([], desk.clock())
+    desk.clock.now = 0.1
+    desk.loop.step([], desk.clock())
+
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+    assert desk.evaluator.placed["AGII"] == []
+
+
+def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
+    desk = watched(Desk())
+    kept = Origin("yesterday", 5, None, None)
+
+    desk.hear(
+        detection_frame("AGII", detection("farmer", 1.0), origin=kept), asked=True
+    )
+
+    assert desk.evaluator.people.known == {}
+
+
+def test_f46_somebody_whose_observer_died_still_slows_who_comes_near() -> None:
+    desk = watched(Desk())
+    meet(desk, 5.5)
+    desk.clock.now = 2.9
+    desk.drive("AGI", 0.0)
+    desk.look("AGI")
+
+    assert desk.evaluator.speed_limits["AGI"].reason == "person"
+
+
+def test_who_crosses_whom_is_known() -> None:
+    desk = watched(Desk())
+    meet(desk)
+
+    assert [one.robot_id for one in desk.evaluator.crossings] == ["AGI"]
+
+
+def test_a_held_robot_says_so_in_the_log_once() -> None:
+    desk = watched(Desk())
+    for _ in range(3):
+        desk.report("AGI", Hold("hw-1", "hw", "local"), factor=0.0, reason="hold")
+
+    assert desk.sentences().count("log.speed_down.hold") == 1
+
+
+def test_older_odometry_moves_nobody() -> None:
+    desk = watched(Desk())
+
+    desk.hear(odometry("AGI", 99.0, origin=origin(0)))
+
+    pose = desk.world.robot("AGI").odometry
+    assert pose is not None
+    assert pose.pose.x == 0.0

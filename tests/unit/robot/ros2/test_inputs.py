@@ -1,0 +1,365 @@
+"""Algorithm 1 on a ROS 2 robot: the newest of each, in map, or named and unplaced."""
+
+import math
+
+import numpy as np
+import pytest
+
+from iveg.domain.geometry import Twist2D
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Unplaced,
+)
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from tests.unit.robot.ros2 import said
+from tests.unit.robot.ros2.said import Arrived, Bench, link, look, seen, tf
+
+# --- odometry -----------------------------------------------------------------------
+
+
+def test_odometry_is_moved_into_map() -> None:
+    (found,) = Bench().hear("odometry", said.odometry(2.0, 0.4, w=0.1)).tick()
+
+    assert isinstance(found, Odometry)
+    assert (found.pose.x, found.pose.y) == (12.0, 0.0)
+    assert (found.twist.linear_x, found.twist.angular_z) == (0.4, 0.1)
+
+
+def test_odometry_of_another_frame_of_the_robot_is_moved_to_base_link() -> None:
+    bench = Bench().hear("tf_static", tf(link("footprint", "base_link", -0.2)))
+
+    (found,) = bench.hear("odometry", said.odometry(2.0, child="footprint")).tick()
+
+    assert isinstance(found, Odometry)
+    assert found.pose.x == pytest.approx(11.8)
+
+
+def test_of_what_waited_only_the_newest_goes_out() -> None:
+    bench = Bench()
+    waited = [said.odometry(float(n), after=n / 100) for n in range(5)]
+
+    bench.inputs.hear("odometry", [Arrived(cdr.write(o)) for o in waited], said.MONO)
+    (found,) = bench.tick()
+
+    assert isinstance(found, Odometry)
+    assert found.pose.x == 14.0
+    assert bench.tick() == []
+
+
+def test_without_a_transform_odometry_is_unplaced_and_the_link_is_named() -> None:
+    bench = Bench(tree=False)
+
+    found = bench.hear("odometry", said.odometry(2.0, 0.4)).tick()
+
+    assert [(one.kind, one.twist) for one in found if isinstance(one, Unplaced)] == [
+        ("odometry", Twist2D(0.4, 0.0))
+    ]
+    assert bench.faults() == {"no_transform": "map → odom"}
+
+
+def test_an_old_transform_is_named_with_its_age_and_places_nothing() -> None:
+    bench = Bench().hear("odometry", said.odometry(after=2.1), 2.1)
+
+    (found,) = bench.tick(2.1)
+
+    assert isinstance(found, Unplaced)
+    (fault,) = bench.inputs.input_faults.faults(said.MONO + 2.1)
+    assert (fault.code, fault.about) == ("no_transform", "map → odom")
+    assert fault.for_s == pytest.approx(2.1)
+    assert bench.inputs.place is None
+
+
+def test_a_transform_that_comes_back_places_again_and_the_fault_goes() -> None:
+    bench = Bench().hear("odometry", said.odometry(after=2.1), 2.1)
+    bench.tick(2.1)
+
+    bench.hear("tf", tf(link("map", "odom", 10.0, after=2.2)), 2.2)
+    bench.hear("odometry", said.odometry(after=2.2), 2.2)
+    (found,) = bench.tick(2.2)
+
+    assert isinstance(found, Odometry)
+    assert bench.faults(2.3) == {"no_transform": "map → odom"}
+    assert bench.faults(4.2) == {}
+
+
+def test_silence_of_odometry_is_named_from_the_start() -> None:
+    bench = Bench()
+    bench.tick(0.0)
+    bench.tick(1.5)
+
+    assert bench.faults(1.5) == {"no_data": "/odom"}
+    assert bench.inputs.input_faults.factor(said.MONO + 1.5) == (0.5, "no_data")
+
+
+def test_the_same_message_again_is_no_news() -> None:
+    bench = Bench().hear("odometry", said.odometry())
+    bench.tick()
+
+    assert bench.hear("odometry", said.odometry()).tick() == []
+
+
+# --- numbers that cannot be meant ---------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "code"),
+    [
+        (said.odometry(math.nan), "not_a_number"),
+        (said.odometry(v=math.nan), "not_a_number"),
+        (said.odometry(v=math.inf), "not_a_number"),
+        (said.odometry(v=1e6), "absurd"),
+        (said.odometry(1e9), "not_a_number"),
+    ],
+)
+def test_odometry_that_cannot_be_is_named_counted_and_slows(
+    message: m.Odometry, code: str
+) -> None:
+    bench = Bench()
+
+    assert bench.hear("odometry", message).tick() == []
+    assert bench.faults() == {code: "/odom"}
+    assert bench.inputs.input_faults.counters[code] == 1
+    assert bench.inputs.input_faults.factor(said.MONO) == (0.5, code)
+
+
+def test_time_that_goes_back_is_named_and_its_message_is_dropped() -> None:
+    bench = Bench().hear("odometry", said.odometry(1.0, after=0.1))
+    bench.tick()
+
+    assert bench.hear("odometry", said.odometry(after=0.05)).tick() == []
+    assert bench.faults() == {"time_back": "/odom"}
+
+
+def test_a_clock_that_was_set_back_is_believed_after_five_messages() -> None:
+    bench = Bench().hear("odometry", said.odometry(after=0.1))
+    bench.tick()
+    hour = -3600.0
+    heard = [
+        bench.hear("odometry", said.odometry(after=hour + n / 30)).tick()
+        for n in range(5)
+    ]
+    bench.hear("tf", tf(link("map", "odom", 10.0, after=hour + 0.2)))
+    bench.hear("odometry", said.odometry(1.0, after=hour + 0.2))
+
+    (found,) = bench.tick()
+
+    assert heard[:4] == [[], [], [], []]
+    assert [type(one) for one in heard[4]] == [Unplaced]
+    assert isinstance(found, Odometry)
+    assert bench.inputs.input_faults.counters["time_back"] == 5
+
+
+def test_a_clock_that_is_off_by_an_hour_is_named() -> None:
+    bench = Bench(tree=False)
+    bench.hear("tf", tf(link("map", "odom", 10.0, after=3600.0)))
+
+    (found,) = bench.hear("odometry", said.odometry(after=3600.0)).tick()
+
+    assert isinstance(found, Odometry)
+    assert bench.faults() == {"clock_off": "/odom"}
+
+
+def test_a_flood_is_named() -> None:
+    bench = Bench()
+    waited = [Arrived(cdr.write(said.odometry(after=n / 1000))) for n in range(50)]
+
+    bench.inputs.hear("odometry", waited, said.MONO, 50)
+
+    assert bench.faults() == {"flood": "/odom"}
+
+
+def test_bytes_of_another_layout_are_named() -> None:
+    bench = Bench()
+    bench.inputs.hear("odometry", [Arrived(b"\0\1\0\0short")], said.MONO)
+
+    assert bench.tick() == []
+    assert bench.faults() == {"unreadable": "/odom"}
+
+
+# --- the laser ----------------------------------------------------------------------
+
+
+def test_a_scan_is_sent_with_its_mount_from_the_tree() -> None:
+    bench = Bench().hear("odometry", said.odometry()).hear("scan", said.scan())
+
+    found = bench.tick()[1]
+
+    assert isinstance(found, LaserScan)
+    assert found.mount.x == pytest.approx(0.3)
+    assert (found.angle_min, found.angle_increment) == (-0.5, 0.5)
+
+
+def test_a_scan_is_placed_by_where_the_laser_was_when_it_swept() -> None:
+    """The robot moved on by 0.1 m between the sweep and its odometry."""
+    bench = Bench()
+    bench.hear("tf", tf(link("odom", "base_link", 1.0)))
+    bench.hear("tf", tf(link("odom", "base_link", 1.2, after=0.2)))
+    bench.hear("odometry", said.odometry(1.2, after=0.2))
+    bench.hear("scan", said.scan(after=0.1))
+
+    found = bench.tick(0.2)[1]
+
+    assert isinstance(found, LaserScan)
+    assert found.mount.x == pytest.approx(0.3 - 0.1)
+
+
+def test_a_laser_upside_down_turns_the_other_way() -> None:
+    bench = Bench()
+    rolled = m.Transform(m.Vector3(0.3), m.Quaternion(1.0, 0.0, 0.0, 0.0))
+    header = m.Header(said.stamp(), "base_link")
+    bench.hear("tf_static", tf(m.TransformStamped(header, "laser", rolled)))
+    bench.hear("odometry", said.odometry()).hear("scan", said.scan())
+
+    found = bench.tick()[1]
+
+    assert isinstance(found, LaserScan)
+    assert (found.angle_min, found.angle_increment) == (0.5, -0.5)
+
+
+@pytest.mark.parametrize(
+    ("message", "code"),
+    [
+        (said.scan(()), "no_beams"),
+        (said.scan(np.zeros(100_000).tolist()), "too_many_beams"),
+        (said.scan(frame="elsewhere"), "no_transform"),
+    ],
+)
+def test_a_scan_that_cannot_be_used_is_named(message: m.LaserScan, code: str) -> None:
+    bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
+
+    found = bench.tick()
+
+    assert not [one for one in found if isinstance(one, LaserScan)]
+    assert code in bench.faults()
+
+
+def test_what_is_no_distance_is_no_return() -> None:
+    message = said.scan((math.nan, -1.0, math.inf, 2.0))
+    bench = Bench().hear("odometry", said.odometry()).hear("scan", message)
+
+    found = bench.tick()[1]
+
+    assert isinstance(found, LaserScan)
+    assert found.ranges.tolist() == [math.inf, math.inf, math.inf, 2.0]
+
+
+def test_a_scan_of_a_robot_that_has_no_place_is_unplaced() -> None:
+    bench = Bench(tree=False)
+    bench.hear("tf_static", tf(link("base_link", "laser")))
+    bench.hear("odometry", said.odometry()).hear("scan", said.scan())
+
+    kinds = [one.kind for one in bench.tick() if isinstance(one, Unplaced)]
+
+    assert kinds == ["odometry", "scan"]
+
+
+def test_a_scan_long_after_the_last_odometry_is_unplaced() -> None:
+    bench = Bench().hear("odometry", said.odometry())
+    bench.tick()
+
+    (found,) = bench.hear("scan", said.scan(after=0.8), 0.8).tick(0.8)
+
+    assert isinstance(found, Unplaced)
+
+
+# --- detections ---------------------------------------------------------------------
+
+
+def test_a_box_is_moved_into_map_and_stays_a_hull() -> None:
+    bench = Bench(tree=False)
+    bench.hear("tf", tf(link("map", "base_link", 10.0, 5.0, math.pi / 2)))
+
+    (found,) = bench.hear("detections_3d", look(seen(x=2.0))).tick()
+
+    assert isinstance(found, DetectionFrame)
+    (one,) = found.detections
+    assert (one.class_id, one.frame_id, one.det_id) == ("farmer", "map", "7")
+    assert one.box.centre == pytest.approx((10.0, 7.0, 0.9))
+    assert one.box.xmax - one.box.xmin == pytest.approx(0.6)
+
+
+def test_a_look_that_saw_nobody_says_so() -> None:
+    (found,) = Bench().hear("detections_3d", look()).tick()
+
+    assert found == DetectionFrame("", found.origin, ())
+
+
+def test_who_was_seen_without_a_place_is_counted_and_not_placed() -> None:
+    (found,) = Bench(tree=False).hear("detections_3d", look(seen(), seen())).tick()
+
+    assert isinstance(found, DetectionFrame)
+    assert (found.detections, found.unreadable) == ((), 2)
+
+
+@pytest.mark.parametrize(
+    "bad", [seen(score=math.nan), seen(score=1.5), seen(x=math.nan), seen("()")]
+)
+def test_a_detection_that_cannot_be_is_counted_beside_the_others(
+    bad: m.Detection3D,
+) -> None:
+    bench = Bench().hear("tf", tf(link("odom", "base_link")))
+
+    (found,) = bench.hear("detections_3d", look(seen(), bad)).tick()
+
+    assert isinstance(found, DetectionFrame)
+    assert (len(found.detections), found.unreadable) == (1, 1)
+
+
+def test_a_class_list_gives_numbers_their_names() -> None:
+    bench = Bench(classes=("tomato", "farmer"))
+    bench.hear("tf", tf(link("odom", "base_link")))
+
+    (found,) = bench.hear("detections_3d", look(seen("1"), seen("9"))).tick()
+
+    assert isinstance(found, DetectionFrame)
+    assert [one.class_id for one in found.detections] == ["farmer", "9"]
+
+
+# --- path and battery ---------------------------------------------------------------
+
+
+def test_a_plan_is_moved_into_map() -> None:
+    bench = Bench().hear("odometry", said.odometry())
+    bench.tick()
+    header = m.Header(said.stamp(), "odom")
+    poses = tuple(m.PoseStamped(header, m.Pose(m.Point(float(n)))) for n in range(3000))
+
+    (found,) = bench.hear("path", m.Path(header, poses)).tick()
+
+    assert isinstance(found, Navigation)
+    assert (found.path[0], found.goal) == ((10.0, 0.0), (3009.0, 0.0))
+    assert len(found.path) <= 1024
+
+
+def test_an_empty_plan_is_an_idle_robot() -> None:
+    header = m.Header(said.stamp(), "map")
+
+    (found,) = Bench().hear("path", m.Path(header)).tick()
+
+    assert isinstance(found, Navigation)
+    assert (found.task, found.path) == ("idle", ())
+
+
+@pytest.mark.parametrize(
+    ("told", "share"), [(0.8, 0.8), (80.0, 0.8), (math.nan, None), (-1.0, None)]
+)
+def test_a_battery_is_read_as_a_share(told: float, share: float | None) -> None:
+    bench = Bench().hear("battery", m.BatteryState(percentage=told, voltage=25.5))
+    bench.tick()
+
+    battery = bench.inputs.battery
+    assert battery is not None
+    assert battery.percentage == (None if share is None else pytest.approx(share))
+    assert battery.voltage == 25.5
+
+
+def test_a_foreign_frame_cannot_say_what_orion_refuses() -> None:
+    bench = Bench(tree=False).hear("tf_static", tf(link("a<b>;('c')", "odom")))
+
+    bench.hear("odometry", said.odometry()).tick()
+
+    assert bench.faults() == {"no_transform": "map → abc"}

@@ -1,0 +1,104 @@
+"""The costmap over HTTP, as numbers and as a picture."""
+
+import struct
+import zlib
+
+import numpy as np
+
+from iveg.web.api.costmap import write_png
+from tests.builders import scan
+from tests.unit.web.desk import WebDesk
+
+
+def swept() -> WebDesk:
+    desk = WebDesk()
+    desk.drive("AGI", 0.05)
+    desk.hear(scan("AGI", [2.0] * 4, origin=desk.next_origin()))
+    desk.mapper.tick(desk.clock())
+    return desk
+
+
+async def test_before_the_first_scan_the_costmap_is_empty() -> None:
+    async with WebDesk().browser("viewer") as browser:
+        answer = await browser.get("/api/v1/costmap")
+
+    told = answer.json()
+    assert answer.status_code == 200
+    assert (told["width"], told["height"], told["data"]) == (0, 0, [])
+
+
+async def test_the_costmap_is_rows_from_the_south_western_corner() -> None:
+    desk = swept()
+
+    async with desk.browser("viewer") as browser:
+        told = (await browser.get("/api/v1/costmap")).json()
+
+    data = np.array(told["data"]).reshape(told["height"], told["width"])
+    column = int((2.05 - told["origin"]["x"]) / told["resolution"])
+    row = int((0.05 - told["origin"]["y"]) / told["resolution"])
+    assert told["resolution"] * told["width"] <= 200.0
+    assert data[row, column] > 0
+    assert data[0, 0] == -1
+
+
+async def test_a_robot_s_own_view_is_asked_for_by_its_name() -> None:
+    desk = swept()
+
+    async with desk.browser("viewer") as browser:
+        agi = (await browser.get("/api/v1/costmap?robot=AGI")).json()
+        agii = (await browser.get("/api/v1/costmap?robot=AGII")).json()
+        nobody = await browser.get("/api/v1/costmap?robot=AGIII")
+
+    assert agi["width"] > 0
+    assert agii["width"] == 0
+    assert nobody.status_code == 404
+
+
+async def test_who_accepts_a_picture_gets_one_with_the_north_up() -> None:
+    desk = swept()
+
+    async with desk.browser("viewer") as browser:
+        answer = await browser.get("/api/v1/costmap", headers={"Accept": "image/png"})
+        told = (await browser.get("/api/v1/costmap")).json()
+
+    assert answer.headers["content-type"] == "image/png"
+    assert answer.headers["vary"] == "Accept"
+    shades = read_png(answer.content)
+    data = np.array(told["data"]).reshape(told["height"], told["width"])
+    assert ((shades[::-1] == 205) == (data == -1)).all()
+    assert (shades[::-1][data == 0] == 255).all()
+
+
+async def test_a_picture_of_nothing_is_one_unknown_dot() -> None:
+    async with WebDesk().browser("viewer") as browser:
+        answer = await browser.get("/api/v1/costmap", headers={"Accept": "image/png"})
+
+    assert read_png(answer.content).tolist() == [[205]]
+
+
+def test_a_picture_holds_every_shade_where_it_was() -> None:
+    shades = np.arange(12, dtype=np.uint8).reshape(3, 4)
+
+    assert (read_png(write_png(shades)) == shades).all()
+
+
+async def test_strangers_see_no_costmap() -> None:
+    async with WebDesk().stranger() as stranger:
+        answer = await stranger.get("/api/v1/costmap")
+
+    assert answer.status_code == 401
+
+
+def read_png(body: bytes) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    """The shades of a grey, unfiltered PNG, every chunk's checksum tried."""
+    assert body[:8] == b"\x89PNG\r\n\x1a\n"
+    chunks, at = {}, 8
+    while at < len(body):
+        (length,) = struct.unpack_from(">I", body, at)
+        kind, data = body[at + 4 : at + 8], body[at + 8 : at + 8 + length]
+        (check,) = struct.unpack_from(">I", body, at + 8 + length)
+        assert check == zlib.crc32(kind + data)
+        chunks[kind], at = data, at + 12 + length
+    width, height = struct.unpack_from(">II", chunks[b"IHDR"])
+    lines = np.frombuffer(zlib.decompress(chunks[b"IDAT"]), np.uint8)
+    return lines.reshape(height, width + 1)[:, 1:]

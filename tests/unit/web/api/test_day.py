@@ -1,0 +1,99 @@
+"""Issue 13.22: the evening sheet as numbers and on paper, in both languages."""
+
+from collections.abc import AsyncIterator
+from datetime import date
+from pathlib import Path
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.store import Store
+from iveg.domain.geometry import Rectangle
+from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.observations import Instant
+from iveg.domain.records import Record
+from iveg.pipeline.record import Waiting
+from iveg.web.api import day
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.local_time import start_of
+from iveg.web.pages.routes import Pages
+from iveg.web.security.authentication import Authenticator
+from tests.fakes.records import (
+    alert_record,
+    command_record,
+    decision_record,
+    detection_record,
+    odometry_record,
+)
+
+GREENHOUSE = Greenhouse(
+    "house", Rectangle(0, 0, 20, 20), lanes=(Lane("1", Rectangle(0, 0, 20, 4)),)
+)
+MORNING = start_of(date(2026, 11, 20)) + 9 * 3600.0
+RECORDS: tuple[Record, ...] = (
+    *(odometry_record(at=MORNING + n / 2, x=5.0, y=2.0) for n in range(240)),
+    detection_record(at=MORNING + 10.0, x=6.0, y=2.0, person_id="P1"),
+    decision_record(x=6.0, y=2.0, started_at=MORNING, ended_at=MORNING + 90.0),
+    command_record(requested_at=MORNING, standing_at=MORNING, standstill_ms=412.0),
+    command_record(command_id="C2", kind="release", requested_at=MORNING + 5.0),
+    alert_record(priority="P1", acknowledged_at=None, raised_at=MORNING),
+)
+
+
+@pytest.fixture
+async def browser(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
+    url = f"sqlite:///{tmp_path / 'history.db'}"
+    store, queries = Store(url), Queries(url)
+    store.write([Waiting(one, n, 0.0) for n, one in enumerate(RECORDS, 1)])
+    store.close()
+
+    def now() -> Instant:
+        return Instant(0.0, MORNING + 3600.0)
+
+    app = FastAPI()
+    app.state.authenticator = Authenticator(
+        sign_in_token="cd" * 32, api_token="", clock=now
+    )
+    pages = Pages(Site("house", ("AGI",), "1", demo=False))
+    app.include_router(day.router(day.Days(queries, GREENHOUSE, 30.0), pages, now))
+    cookie = {
+        "Cookie": f"iveg={app.state.authenticator.sessions.open('ana', 'viewer')}"
+    }
+    transport = httpx.ASGITransport(app=app)
+    async with httpx.AsyncClient(
+        transport=transport, base_url="http://iveg", headers=cookie
+    ) as client:
+        yield client
+    queries.close()
+
+
+async def test_a_day_is_told_in_numbers(browser: httpx.AsyncClient) -> None:
+    told = (await browser.get("/api/v1/day", params={"day": "2026-11-20"})).json()
+
+    assert told["worked"] == [{"lane": "1", "robot_id": "AGI", "minutes": 2.0}]
+    assert told["slowed"] == [{"cause": "person", "lane": "1", "minutes": 1.5}]
+    assert [one["distance_m"] for one in told["passes"]] == [1.0]
+    assert [one["standstill_ms"] for one in told["stops"]] == [412.0]
+    assert told["unseen"] == 1
+
+
+async def test_another_day_has_none_of_it(browser: httpx.AsyncClient) -> None:
+    told = (await browser.get("/api/v1/day", params={"day": "2026-11-19"})).json()
+
+    assert (told["worked"], told["passes"], told["stops"]) == ([], [], [])
+
+
+@pytest.mark.parametrize(
+    ("language", "sentence"),
+    [("es", "parado a los 412 ms"), ("en", "stood after 412 ms")],
+)
+async def test_the_sheet_is_one_page_in_the_readers_language(
+    browser: httpx.AsyncClient, language: str, sentence: str
+) -> None:
+    sheet = await browser.get("/day", headers={"Accept-Language": language})
+
+    assert sheet.status_code == 200
+    assert sentence in sheet.text
+    assert 'class="sheet__map"' in sheet.text

@@ -1,0 +1,184 @@
+"""Reading and changing the rule: versions, authors, and who may."""
+
+import asyncio
+from typing import Any
+
+import httpx
+import pytest
+
+from iveg.domain.records import DecisionRecord
+from iveg.web.security.authentication import Role
+from tests.builders import detection
+from tests.unit.web.desk import WebDesk
+
+
+async def put(
+    desk: WebDesk, role: Role = "operator", **parameters: object
+) -> httpx.Response:
+    async with desk.browser(role) as browser:
+        return await browser.put("/api/v1/rule", json=parameters)
+
+
+async def get(desk: WebDesk, path: str = "") -> Any:
+    async with desk.browser("viewer") as browser:
+        answer = await browser.get(f"/api/v1/rule{path}")
+    assert answer.status_code == 200
+    return answer.json()
+
+
+async def test_the_first_version_is_that_of_the_settings() -> None:
+    told = await get(WebDesk())
+
+    assert (told["version"], told["author"], told["since"]) == (1, "settings", None)
+    assert (told["confidence_threshold"], told["radius_m"]) == (0.8, 2.0)
+    assert told["factor"] == 0.5
+    assert told["aliases"]["farmer"] == "person"
+    assert told["possible_people"] is False
+
+
+async def test_a_change_is_a_new_version_with_author_and_time() -> None:
+    desk = WebDesk()
+
+    answer = await put(desk, confidence_threshold=0.6)
+
+    assert answer.status_code == 200
+    told = await get(desk)
+    assert answer.json() == told
+    assert (told["version"], told["author"]) == (2, "ana")
+    assert told["since"] == "2023-11-14T22:13:20.000Z"
+    assert (told["confidence_threshold"], told["radius_m"]) == (0.6, 2.0)
+
+
+async def test_every_version_is_listed_newest_first() -> None:
+    desk = WebDesk()
+    await put(desk, radius_m=3)
+    await put(desk, radius_m=2.5)
+
+    listed = await get(desk, "/versions")
+
+    assert [one["radius_m"] for one in listed["items"]] == [2.5, 3.0, 2.0]
+    assert [one["version"] for one in listed["items"]] == [3, 2, 1]
+
+
+async def test_a_change_counts_at_once_and_every_later_decision_carries_it() -> None:
+    desk = WebDesk()
+    desk.drive("AGI")
+    desk.look("AGII", detection("farmer", 1.5, probability=0.7))
+    assert list(desk.evaluator.crossings) == []
+
+    await put(desk, confidence_threshold=0.7)
+    desk.look("AGII", detection("farmer", 1.5, probability=0.7))
+
+    record = desk.records(DecisionRecord)[-1]
+    assert isinstance(record, DecisionRecord)
+    assert record.rule_version == "2"
+    assert '"threshold": 0.7' in (record.rule_parameters or "")
+
+
+async def test_a_class_may_have_a_threshold_of_its_own() -> None:
+    desk = WebDesk()
+    desk.drive("AGI")
+
+    await put(desk, class_thresholds={"person": 0.6})
+    desk.look("AGII", detection("farmer", 9.0, probability=0.6))
+    desk.look("AGII", detection("husky", 19.0, probability=0.6))
+
+    assert [one.class_ for one in desk.evaluator.people.known.values()] == ["person"]
+
+
+async def test_an_alias_is_learnt() -> None:
+    desk = WebDesk()
+
+    await put(desk, aliases={" Abuela ": "person"})
+    desk.look("AGII", detection("abuela", 9.0))
+
+    assert len(desk.evaluator.people.known) == 1
+    told = await get(desk)
+    assert told["aliases"] == {
+        "abuela": "person",
+        "person": "person",
+        "robot": "robot",
+    }
+
+
+async def test_a_change_is_written_down_and_logged() -> None:
+    desk = WebDesk()
+
+    await put(desk, radius_m=3.0)
+
+    assert [one.radius_m for one in desk.rule_store.written] == [3.0]
+    assert desk.sentences()[-1] == "log.rule_changed"
+
+
+async def test_what_cannot_be_written_down_does_not_count() -> None:
+    desk = WebDesk()
+    desk.rule_store.full = True
+
+    answer = await put(desk, radius_m=3.0)
+
+    assert answer.status_code == 503
+    assert (await get(desk))["version"] == 1
+
+
+async def test_a_change_of_an_older_version_is_refused() -> None:
+    desk = WebDesk()
+    await put(desk, version=1, radius_m=3.0)
+
+    answer = await put(desk, version=1, radius_m=4.0)
+
+    assert answer.status_code == 409
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert (await get(desk))["radius_m"] == 3.0
+
+
+async def test_two_changes_at_once_are_two_versions() -> None:
+    desk = WebDesk()
+
+    await asyncio.gather(put(desk, radius_m=3.0), put(desk, radius_m=4.0))
+
+    versions = [one.version for one in desk.rules.versions]
+    assert versions == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"confidence_threshold": 1.01},
+        {"confidence_threshold": -0.1},
+        {"confidence_threshold": "0.8"},
+        {"confidence_threshold": True},
+        {"class_thresholds": {"crate": 0.5}},
+        {"class_thresholds": {"person": 2}},
+        {"radius_m": 0.4},
+        {"radius_m": 6.1},
+        {"aliases": {"crate": "crate"}},
+        {"aliases": {"person": "robot"}},
+        {"aliases": {" ": "person"}},
+        {"aliases": {str(n): "person" for n in range(201)}},
+        {"possible_people": "yes"},
+        {"factor": 0.9},
+    ],
+    ids=str,
+)
+async def test_what_makes_no_sense_is_refused(parameters: dict[str, object]) -> None:
+    desk = WebDesk()
+
+    async with desk.browser("operator") as browser:
+        answer = await browser.put("/api/v1/rule", json=parameters)
+
+    assert answer.status_code == 422
+    assert (await get(desk))["version"] == 1
+
+
+@pytest.mark.parametrize(("role", "status"), [("viewer", 403), ("admin", 200)])
+async def test_who_may_change_the_rule(role: Role, status: int) -> None:
+    assert (await put(WebDesk(), role, radius_m=3.0)).status_code == status
+
+
+async def test_a_program_may_read_the_rule_and_not_change_it() -> None:
+    desk = WebDesk()
+    async with desk.program() as program:
+        read = await program.get("/api/v1/rule")
+        changed = await program.put("/api/v1/rule", json={"radius_m": 3.0})
+
+    assert (read.status_code, changed.status_code) == (200, 403)

@@ -1,0 +1,105 @@
+"""What is remembered of STOP: how long it took, and the drills."""
+
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.domain.records import CommandRecord
+from iveg.domain.stop.latency import Spread, spread
+from iveg.web.api import stop_records
+from tests.builders import START
+from tests.unit.web.desk import WebDesk
+
+T = START.wall
+
+
+def record(number: int, **fields: object) -> CommandRecord:
+    usual: dict[str, object] = {
+        "command_id": f"C{number}",
+        "robot_id": "AGI",
+        "kind": "stop",
+        "state": "STANDING",
+        "requested_by": "ana",
+        "requested_at": T - 100.0 + number,
+        "pressed_at": T - 100.0 + number - 0.01 * number,
+        "answer_direct_at": T - 100.0 + number + 0.02,
+        "standstill_ms": 1000.0 * number,
+        "standing_at": T - 100.0 + 2 * number,
+    }
+    return CommandRecord(**(usual | fields))  # type: ignore[arg-type]
+
+
+ROWS = [
+    *(record(number) for number in range(1, 5)),
+    record(5, robot_id="AGII", pressed_at=None, standstill_ms=None, standing_at=None),
+    record(6, drill=True),
+    record(7, drill=True, standstill_ms=None, standing_at=None),
+]
+
+
+@pytest.fixture
+async def asking(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
+    url = f"sqlite:///{tmp_path / 'history.sqlite'}"
+    desk = WebDesk()
+    recorder = Recorder(url, journal_file(url, tmp_path))
+    for row in ROWS:
+        recorder.offer(row)
+    await recorder.close()
+    queries = Queries(url)
+    desk.app.include_router(
+        stop_records.router(queries, desk.clock, desk.views.find_command)
+    )
+    async with desk.browser() as browser:
+        yield browser
+    queries.close()
+
+
+async def test_each_step_is_summarised_for_each_robot(
+    asking: httpx.AsyncClient,
+) -> None:
+    answer = (await asking.get("/api/v1/commands/latency")).json()
+
+    agi, agii = answer["robots"]
+    assert (agi["robot_id"], agi["stops"]) == ("AGI", 6)
+    assert agi["accepted"]["max_ms"] == pytest.approx(70.0, abs=0.2)
+    assert agi["answer_direct"]["p50_ms"] == pytest.approx(50.0, abs=0.2)
+    assert agi["standing"] == {
+        "count": 5,
+        "p50_ms": 3000.0,
+        "p95_ms": 6000.0,
+        "max_ms": 6000.0,
+    }
+    assert agii["accepted"]["count"] == agii["standing"]["count"] == 0
+    assert agii["standing"]["p50_ms"] is None
+
+
+async def test_drills_are_listed_with_their_verdict(asking: httpx.AsyncClient) -> None:
+    items = (await asking.get("/api/v1/drills")).json()["items"]
+
+    assert [(one["command_id"], one["passed"]) for one in items] == [
+        ("C7", False),
+        ("C6", False),
+    ]
+    assert items[1]["standstill_ms"] == 6000.0
+    assert items[1]["command"]["drill"] is True
+
+
+async def test_a_command_of_an_earlier_run_is_found_in_the_history(
+    asking: httpx.AsyncClient,
+) -> None:
+    found = await asking.get("/api/v1/commands/C3")
+    missing = await asking.get("/api/v1/commands/C9")
+
+    assert found.json()["times"]["pressed"] is not None
+    assert missing.status_code == 404
+
+
+def test_a_spread_is_of_what_was_measured() -> None:
+    values = [float(number) for number in range(1, 101)]
+
+    assert spread([*values, None]) == Spread(100, 50.0, 95.0, 100.0)
+    assert spread([None]) == Spread(0, None, None, None)

@@ -1,0 +1,80 @@
+"""Credit: how much telemetry is on its way to one page, whatever the page does."""
+
+import pytest
+
+from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, CreditWindow
+
+NOW = 1000.0
+
+
+def filled(count: int = FRAMES, heavy: int = 0) -> CreditWindow:
+    """A window with that many frames on their way, all sent now."""
+    window = CreditWindow()
+    for _ in range(count):
+        window.sent(heavy, NOW)
+    return window
+
+
+def test_a_page_that_paints_nothing_gets_one_window_and_no_more() -> None:
+    window = filled(FRAMES)
+
+    assert window.opens_at == float("inf")
+
+
+def test_what_is_painted_makes_room_for_as_much() -> None:
+    window = filled(FRAMES, heavy=BYTES // FRAMES)
+
+    assert window.painted(3, NOW + 0.02)
+
+    assert window.unpainted == FRAMES - 3
+    assert window.room == 3 * (BYTES // FRAMES)
+    assert window.opens_at < float("inf")
+
+
+def test_frames_keep_a_little_apart() -> None:
+    window = filled(1)
+
+    assert window.opens_at == NOW + GAP_S
+
+
+def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() -> None:
+    window, now = CreditWindow(), NOW
+    for number in range(1, 30):
+        window.sent(0, now)
+        window.painted(number, now + 0.3)
+        now += 1.0
+
+    window.sent(0, now)
+
+    assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
+
+
+def test_a_round_trip_that_becomes_short_again_is_forgotten() -> None:
+    window, now = CreditWindow(), NOW
+    for number in range(1, 30):
+        window.sent(0, now)
+        window.painted(number, now + (0.3 if number < 15 else 0.001))
+        now += 1.0
+
+    window.sent(0, now)
+
+    assert window.opens_at - now == pytest.approx(GAP_S)
+
+
+@pytest.mark.parametrize("word", [9, -1, 0, "1", True, 1.0, None, [1], 10**30])
+def test_what_no_page_can_have_painted_gives_no_credit(word: object) -> None:
+    window = filled(FRAMES)
+
+    assert not window.painted(word, NOW)
+
+    assert window.unpainted == FRAMES
+
+
+def test_a_frame_is_painted_once() -> None:
+    window = filled(FRAMES)
+    window.painted(2, NOW)
+
+    assert not window.painted(2, NOW)
+    assert not window.painted(1, NOW)
+
+    assert window.unpainted == FRAMES - 2

@@ -1,0 +1,48 @@
+"""Sentences for files and paper are those of the page."""
+
+from datetime import date
+
+import pytest
+
+from iveg.web.pages.local_time import in_madrid, start_of
+from iveg.web.pages.sentences import Sentences
+from iveg.web.pages.translations import read_translations
+
+ES, EN = Sentences(read_translations("es")), Sentences(read_translations("en"))
+
+
+def test_formats_are_those_of_the_page() -> None:
+    slots = {"robot": "AGII", "factor": 0.5, "reason": "person"}
+
+    assert EN.say("log.speed_down.default", slots) == (
+        "AGII slowed to 50% (person near)"
+    )
+    assert ES.number(1.43, 2) == "1,43"
+    assert ES.lane("Cabecera norte") == "Cabecera norte"
+    assert EN.lane("Pasillo 3") == "Aisle 3"
+    assert EN.lane("Tomates de Ana") == "Tomates de Ana"
+
+
+def test_what_is_unknown_is_a_dash_and_an_unknown_sentence_its_key() -> None:
+    assert "—" in EN.say("log.speed_down.default", {"robot": "AGII"})
+    assert EN.say("log.of_another_version.x", {}) == "log.of_another_version.x"
+
+
+@pytest.mark.parametrize(
+    ("utc", "wall"),
+    [
+        (1_774_746_000.0 - 1.0, "2026-03-29 01:59:59"),
+        (1_774_746_000.0, "2026-03-29 03:00:00"),
+        (1_792_890_000.0 - 1.0, "2026-10-25 02:59:59"),
+        (1_792_890_000.0, "2026-10-25 02:00:00"),
+    ],
+)
+def test_clocks_change_when_those_of_madrid_do(utc: float, wall: str) -> None:
+    assert f"{in_madrid(utc):%Y-%m-%d %H:%M:%S}" == wall
+
+
+@pytest.mark.parametrize(
+    "day", [date(2026, 3, 29), date(2026, 7, 1), date(2026, 12, 1)]
+)
+def test_a_day_begins_at_its_midnight(day: date) -> None:
+    assert in_madrid(start_of(day)).isoformat() == f"{day.isoformat()}T00:00:00"

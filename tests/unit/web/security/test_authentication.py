@@ -1,0 +1,647 @@
+"""Who the door lets in, and to what."""
+
+import logging
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from http.cookies import SimpleCookie
+from typing import Annotated, Any
+
+import httpx
+import pytest
+from fastapi import APIRouter, Depends, FastAPI, WebSocket
+from starlette.requests import Request
+from starlette.types import Message
+
+from iveg.domain.observations import Instant
+from iveg.web import problems
+from iveg.web.security.authentication import (
+    MAY,
+    Action,
+    Authenticator,
+    NotifySecret,
+    Principal,
+    declared_action,
+    require,
+    undeclared,
+)
+from iveg.web.security.sessions import Sessions
+from iveg.web.security.signin import SignInLink
+
+SIGN_IN = "0123456789abcdef" * 2
+API = "a-program-and-its-token"
+HOUR = 3600.0
+
+
+@dataclass
+class Clock:
+    now: float = 1000.0
+
+    def __call__(self) -> Instant:
+        return Instant(self.now, 1e9 + self.now)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def authenticator(clock: Clock) -> Authenticator:
+    return Authenticator(sign_in_token=SIGN_IN, api_token=API, clock=clock)
+
+
+def build_app(authenticator: Authenticator) -> FastAPI:
+    app = FastAPI(openapi_url=None)
+    app.state.authenticator = authenticator
+    problems.install(app)
+
+    def add(action: Action) -> None:
+        @app.api_route(f"/{action}", methods=["GET", "POST"])
+        async def route(
+            who: Annotated[Principal, Depends(require(action))],
+        ) -> dict[str, str]:
+            return {"name": who.name, "role": who.role}
+
+    for action in MAY["admin"]:
+        add(action)
+
+    @app.websocket("/live")
+    async def live(
+        websocket: WebSocket, who: Annotated[Principal, Depends(require("read"))]
+    ) -> None:
+        await websocket.accept()
+        await websocket.send_text(who.role)
+        await websocket.close()
+
+    return app
+
+
+@pytest.fixture
+async def client(authenticator: Authenticator) -> AsyncIterator[httpx.AsyncClient]:
+    transport = httpx.ASGITransport(SignInLink(build_app(authenticator), authenticator))
+    async with httpx.AsyncClient(
+        transport=transport, base_url="http://iveg.test"
+    ) as client:
+        yield client
+
+
+@pytest.fixture
+async def operator(client: httpx.AsyncClient) -> httpx.AsyncClient:
+    """A browser that has followed the link."""
+    await client.get("/", params={"token": SIGN_IN})
+    return client
+
+
+OWN = {"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"}
+BEARER = {"Authorization": f"Bearer {API}"}
+
+
+# --- the link -----------------------------------------------------------------------
+
+
+async def test_the_link_signs_a_browser_in_as_operator_and_hides_itself(
+    client: httpx.AsyncClient,
+) -> None:
+    answer = await client.get("/", params={"token": SIGN_IN})
+
+    assert answer.status_code == 303
+    assert answer.headers["location"] == "/"
+    assert answer.headers["cache-control"] == "no-store"
+    assert answer.headers["referrer-policy"] == "no-referrer"
+    assert (await client.get("/read")).json()["role"] == "operator"
+
+
+async def test_the_cookie_over_plain_http_is_bound_to_this_site_and_hidden_from_scripts(
+    client: httpx.AsyncClient,
+) -> None:
+    answer = await client.get("/", params={"token": SIGN_IN})
+
+    cookie = SimpleCookie(answer.headers["set-cookie"])["iveg"]
+    assert len(cookie.value) >= 43
+    assert cookie["httponly"] is True
+    assert cookie["samesite"] == "strict"
+    assert cookie["path"] == "/"
+    assert cookie["secure"] == ""
+
+
+async def test_the_cookie_over_https_is_host_bound_and_secure(
+    client: httpx.AsyncClient,
+) -> None:
+    answer = await client.get("https://iveg.test/", params={"token": SIGN_IN})
+
+    cookie = SimpleCookie(answer.headers["set-cookie"])["__Host-iveg"]
+    assert cookie["secure"] is True
+    assert (await client.get("https://iveg.test/read")).status_code == 200
+
+
+@pytest.mark.parametrize("token", ["f" * 32, SIGN_IN[:-1], SIGN_IN + "0", "é"])
+async def test_a_wrong_token_signs_nobody_in(
+    client: httpx.AsyncClient, token: str
+) -> None:
+    answer = await client.get("/", params={"token": token})
+
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
+    assert (await client.get("/read")).status_code == 401
+
+
+async def test_a_wrong_token_is_told_once_a_minute_and_never_quoted(
+    client: httpx.AsyncClient,
+    authenticator: Authenticator,
+    clock: Clock,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    for _ in range(5):
+        await client.get("/", params={"token": "guess-after-guess"})
+    clock.now += 61.0
+    await client.get("/", params={"token": "guess-after-guess"})
+
+    records = [r for r in caplog.records if r.levelno == logging.WARNING]
+    assert authenticator.refused == 6
+    assert len(records) == 2
+    assert "guess" not in caplog.text
+
+
+async def test_the_sixth_wrong_link_in_a_minute_has_to_wait(
+    client: httpx.AsyncClient, clock: Clock
+) -> None:
+    for _ in range(5):
+        await client.get("/", params={"token": "wrong"})
+    answer = await client.get("/", params={"token": "wrong"})
+    clock.now += 45.5
+    later = await client.get("/", params={"token": "wrong"})
+
+    assert answer.status_code == 429
+    assert answer.headers["retry-after"] == "60"
+    assert later.headers["retry-after"] == "15"
+
+
+async def test_trying_while_one_has_to_wait_does_not_make_the_wait_longer(
+    client: httpx.AsyncClient, clock: Clock
+) -> None:
+    for _ in range(5):
+        await client.get("/", params={"token": "wrong"})
+    for _ in range(30):
+        clock.now += 2.0
+        await client.get("/", params={"token": "wrong"})
+    clock.now += 60.0
+
+    assert (await client.get("/", params={"token": SIGN_IN})).status_code == 303
+
+
+async def test_whoever_has_to_wait_to_sign_in_can_stop_all_the_same(
+    operator: httpx.AsyncClient,
+) -> None:
+    for _ in range(6):
+        await operator.get("/", params={"token": "wrong"})
+
+    answers = {
+        (await operator.post("/stop", headers=OWN)).status_code for _ in range(50)
+    }
+
+    assert answers == {200}
+
+
+async def test_the_query_with_the_token_is_gone_before_a_server_can_log_it(
+    authenticator: Authenticator,
+) -> None:
+    scope = request_scope("/", f"token={SIGN_IN}".encode())
+
+    await SignInLink(build_app(authenticator), authenticator)(
+        scope, receive_nothing, drop
+    )
+
+    assert scope["query_string"] == b""
+
+
+async def test_signing_out_ends_the_session(
+    operator: httpx.AsyncClient, authenticator: Authenticator
+) -> None:
+    request = operator.build_request("GET", "/read")
+    scope = request_scope(
+        "/", headers=[(b"cookie", request.headers["cookie"].encode())]
+    )
+
+    answer = authenticator.sign_out(Request(scope))
+
+    assert answer.status_code == 303
+    assert (await operator.get("/read")).status_code == 401
+
+
+# --- roles --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("action", "status"),
+    [("open", 200), ("read", 200), ("stop", 200), ("release", 403), ("admin", 403)],
+)
+async def test_a_program_reads_and_stops_and_never_releases(
+    client: httpx.AsyncClient, action: str, status: int
+) -> None:
+    assert (await client.post(f"/{action}", headers=BEARER)).status_code == status
+
+
+@pytest.mark.parametrize(
+    ("action", "status"),
+    [("read", 200), ("stop", 200), ("release", 200), ("admin", 403)],
+)
+async def test_an_operator_also_releases(
+    operator: httpx.AsyncClient, action: str, status: int
+) -> None:
+    assert (await operator.post(f"/{action}", headers=OWN)).status_code == status
+
+
+@pytest.mark.parametrize(
+    ("action", "status"), [("read", 200), ("stop", 200), ("release", 403)]
+)
+async def test_i8_a_viewer_can_stop_and_cannot_release(
+    client: httpx.AsyncClient, authenticator: Authenticator, action: str, status: int
+) -> None:
+    client.cookies.set(
+        "iveg", authenticator.sessions.open("Ana", "viewer"), domain="iveg.test"
+    )
+
+    assert (await client.post(f"/{action}", headers=OWN)).status_code == status
+
+
+@pytest.mark.parametrize("action", ["read", "stop", "release", "admin"])
+async def test_a_stranger_is_told_how_to_sign_in(
+    client: httpx.AsyncClient, action: str
+) -> None:
+    answer = await client.post(f"/{action}", headers=OWN)
+
+    assert answer.status_code == 401
+    assert answer.headers["www-authenticate"] == "Bearer"
+    assert answer.json()["type"] == "urn:iveg:not-signed-in"
+
+
+async def test_an_open_route_serves_a_stranger(client: httpx.AsyncClient) -> None:
+    assert (await client.get("/open")).json()["name"] == "nobody"
+
+
+@pytest.mark.parametrize(
+    "header", ["Bearer", "Bearer ", "Bearer wrong", f"Basic {API}", f"Bearer {API}x"]
+)
+async def test_a_wrong_bearer_token_is_a_stranger(
+    client: httpx.AsyncClient, header: str
+) -> None:
+    answer = await client.get("/read", headers={"Authorization": header})
+
+    assert answer.status_code == 401
+
+
+async def test_without_the_setting_no_token_is_accepted(clock: Clock) -> None:
+    authenticator = Authenticator(sign_in_token="", api_token="", clock=clock)
+    transport = httpx.ASGITransport(SignInLink(build_app(authenticator), authenticator))
+    async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
+        bearer = await client.get("/read", headers={"Authorization": "Bearer "})
+        link = await client.get("/?token=")
+
+    assert bearer.status_code == 401
+    assert "set-cookie" not in link.headers
+
+
+# --- sessions -----------------------------------------------------------------------
+
+
+def test_only_a_digest_of_the_token_is_kept(clock: Clock) -> None:
+    sessions = Sessions(clock)
+    token = sessions.open("Ana", "viewer")
+
+    assert token not in repr(vars(sessions))
+
+
+def test_an_idle_session_can_still_stop_for_twelve_hours_and_then_nothing(
+    clock: Clock,
+) -> None:
+    sessions = Sessions(clock)
+    token = sessions.open("Ana", "operator")
+
+    clock.now += 12 * HOUR + 1
+    stale = sessions.find(token)
+    clock.now += 12 * HOUR
+    gone = sessions.find(token)
+
+    assert stale is not None
+    assert stale.may("stop")
+    assert not stale.may("read")
+    assert not stale.may("release")
+    assert gone is None
+    assert len(sessions) == 0
+
+
+def test_use_keeps_a_session_alive_but_not_beyond_a_day(clock: Clock) -> None:
+    sessions = Sessions(clock)
+    token = sessions.open("Ana", "operator")
+
+    roles = []
+    for _ in range(6):
+        clock.now += 5 * HOUR
+        found = sessions.find(token)
+        assert found is not None
+        roles.append(found.role)
+
+    assert roles == ["operator"] * 4 + ["expired"] * 2
+
+
+def test_watching_alone_does_not_keep_a_session_alive(clock: Clock) -> None:
+    sessions = Sessions(clock)
+    principal = sessions.find(sessions.open("Ana", "operator"))
+    assert principal is not None
+
+    clock.now += 11 * HOUR
+    before = sessions.current(principal)
+    clock.now += 2 * HOUR
+    after = sessions.current(principal)
+
+    assert before == principal
+    assert after is not None
+    assert after.role == "expired"
+
+
+def test_a_revoked_session_is_gone_at_once(clock: Clock) -> None:
+    sessions = Sessions(clock)
+    token = sessions.open("Ana", "operator")
+    principal = sessions.find(token)
+    assert principal is not None
+
+    sessions.revoke(principal)
+
+    assert sessions.find(token) is None
+    assert sessions.current(principal) is None
+
+
+def test_a_program_has_no_session_to_lose(clock: Clock) -> None:
+    program = Principal("program", "program")
+
+    assert Sessions(clock).current(program) == program
+
+
+def test_sessions_are_bounded_and_the_longest_idle_gives_way(clock: Clock) -> None:
+    sessions = Sessions(clock, most=2)
+    first, second = sessions.open("a", "viewer"), sessions.open("b", "viewer")
+    clock.now += 1
+    sessions.find(first)
+
+    third = sessions.open("c", "viewer")
+
+    assert [sessions.find(token) is None for token in (first, second, third)] == [
+        False,
+        True,
+        False,
+    ]
+
+
+async def test_f42_a_stop_of_an_ended_session_is_written_to_the_log(
+    operator: httpx.AsyncClient, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    clock.now += 13 * HOUR
+    with caplog.at_level(logging.INFO):
+        answer = await operator.post("/stop", headers=OWN)
+
+    assert answer.status_code == 200
+    assert "STOP by operator, whose session is over" in caplog.text
+
+
+async def test_f42_an_ended_session_stops_from_our_own_page_alone(
+    operator: httpx.AsyncClient, clock: Clock
+) -> None:
+    clock.now += 13 * HOUR
+
+    statuses = [
+        (await operator.post("/stop")).status_code,
+        (await operator.post("/release", headers=OWN)).status_code,
+        (await operator.get("/read")).status_code,
+    ]
+
+    assert statuses == [403, 403, 403]
+
+
+# --- forgery ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {},
+        {"Sec-Fetch-Site": "same-origin"},
+        {"X-IVEG": "1"},
+        {"X-IVEG": "1", "Sec-Fetch-Site": "cross-site"},
+        {"X-IVEG": "1", "Sec-Fetch-Site": "same-site"},
+        {"X-IVEG": "1", "Origin": "http://evil.test"},
+        {"X-IVEG": "1", "Origin": "null"},
+        {"X-IVEG": "1", "Origin": "http://iveg.test:81"},
+    ],
+)
+async def test_a_cookie_alone_proves_nothing_on_a_post(
+    operator: httpx.AsyncClient, headers: dict[str, str]
+) -> None:
+    answer = await operator.post("/stop", headers=headers)
+
+    assert answer.status_code == 403
+    assert answer.json()["type"] == "urn:iveg:foreign-origin"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        OWN,
+        {"X-IVEG": "1", "Sec-Fetch-Site": "none"},
+        {"X-IVEG": "1", "Origin": "http://iveg.test"},
+        {"X-IVEG": "1", "Origin": "https://IVEG.test"},
+    ],
+)
+async def test_the_own_page_may_post(
+    operator: httpx.AsyncClient, headers: dict[str, str]
+) -> None:
+    assert (await operator.post("/stop", headers=headers)).status_code == 200
+
+
+async def test_reading_needs_no_proof_of_origin(operator: httpx.AsyncClient) -> None:
+    assert (await operator.get("/read")).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "content_type",
+    ["text/plain", "application/x-www-form-urlencoded", "application/jsonp", ""],
+)
+async def test_a_body_that_is_not_json_is_refused(
+    client: httpx.AsyncClient, content_type: str
+) -> None:
+    headers = {**BEARER, "Content-Type": content_type}
+
+    answer = await client.post("/stop", content=b"{}", headers=headers)
+
+    assert answer.status_code == 415
+
+
+async def test_a_body_without_a_type_is_refused(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/stop", content=b"{}", headers=BEARER)
+
+    assert answer.status_code == 415
+
+
+async def test_a_json_body_and_no_body_are_both_taken(
+    client: httpx.AsyncClient,
+) -> None:
+    headers = {**BEARER, "Content-Type": "application/json; charset=utf-8"}
+
+    answers = [
+        await client.post("/stop", content=b"{}", headers=headers),
+        await client.post("/stop", headers=BEARER),
+    ]
+
+    assert [answer.status_code for answer in answers] == [200, 200]
+
+
+# --- WebSocket ----------------------------------------------------------------------
+
+
+async def test_a_websocket_of_the_own_page_is_let_in(
+    authenticator: Authenticator,
+) -> None:
+    cookie = f"iveg={authenticator.sessions.open('Ana', 'viewer')}"
+
+    sent = await dial(authenticator, origin="http://iveg.test", cookie=cookie)
+
+    assert [message["type"] for message in sent] == [
+        "websocket.accept",
+        "websocket.send",
+        "websocket.close",
+    ]
+    assert sent[1]["text"] == "viewer"
+
+
+@pytest.mark.parametrize("origin", ["http://evil.test", "null", None])
+async def test_a_websocket_of_another_site_is_refused_before_the_handshake(
+    authenticator: Authenticator, origin: str | None
+) -> None:
+    cookie = f"iveg={authenticator.sessions.open('Ana', 'viewer')}"
+
+    sent = await dial(authenticator, origin=origin, cookie=cookie)
+
+    assert [message["type"] for message in sent] == ["websocket.close"]
+    assert sent[0]["code"] == 4403
+
+
+@pytest.mark.parametrize("cookie", [None, "iveg=stolen"])
+async def test_a_websocket_without_a_session_closes_with_a_code_that_browsers_see(
+    authenticator: Authenticator, cookie: str | None
+) -> None:
+    sent = await dial(authenticator, origin="http://iveg.test", cookie=cookie)
+
+    assert [message["type"] for message in sent] == [
+        "websocket.accept",
+        "websocket.close",
+    ]
+    assert sent[1]["code"] == 4401
+
+
+async def test_a_websocket_of_a_program_needs_no_origin(
+    authenticator: Authenticator,
+) -> None:
+    sent = await dial(authenticator, authorization=f"Bearer {API}")
+
+    assert sent[1]["text"] == "program"
+
+
+async def test_a_foreign_page_cannot_use_a_bearer_token_either(
+    authenticator: Authenticator,
+) -> None:
+    sent = await dial(
+        authenticator, origin="http://evil.test", authorization=f"Bearer {API}"
+    )
+
+    assert sent[0]["code"] == 4403
+
+
+# --- the notification secret --------------------------------------------------------
+
+
+def test_both_secrets_are_taken_while_they_are_changed() -> None:
+    secret = NotifySecret("a" * 64, previous="b" * 64)
+
+    assert secret.admits("a" * 64)
+    assert secret.admits("b" * 64)
+
+
+@pytest.mark.parametrize("given", [None, "", "a", "c" * 64, "á" * 64])
+def test_any_other_secret_is_refused(given: str | None) -> None:
+    assert not NotifySecret("a" * 64, previous="").admits(given)
+
+
+# --- declarations -------------------------------------------------------------------
+
+
+def test_a_route_or_websocket_that_declares_nothing_is_found() -> None:
+    router = APIRouter(prefix="/api")
+    guarded = APIRouter(dependencies=[Depends(require("read"))])
+
+    for owner in (router, guarded):
+        owner.add_api_route("/forgot", lambda: None)
+        owner.add_api_websocket_route("/live", forgetful_socket)
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+    app.include_router(router)
+    app.include_router(guarded)
+    app.add_api_route("/healthz", lambda: None)
+
+    assert undeclared(app, {"/healthz"}) == ["/api/forgot", "/api/live"]
+
+
+def test_the_strictest_declaration_is_the_one_that_is_told() -> None:
+    router = APIRouter(dependencies=[Depends(require("read"))])
+    router.add_api_route("/a", lambda: None, dependencies=[Depends(require("release"))])
+
+    assert declared_action(router.routes[0]) == "release"
+
+
+# --- small helpers ------------------------------------------------------------------
+
+
+def request_scope(
+    path: str, query: bytes = b"", headers: list[tuple[bytes, bytes]] | None = None
+) -> dict[str, Any]:
+    return {
+        "type": "http",
+        "method": "GET",
+        "scheme": "http",
+        "path": path,
+        "query_string": query,
+        "headers": headers or [],
+        "server": ("iveg.test", 80),
+    }
+
+
+async def forgetful_socket(websocket: WebSocket) -> None:
+    """A WebSocket whose author forgot to declare a role."""
+
+
+async def receive_nothing() -> Message:
+    return {"type": "http.request", "body": b""}
+
+
+async def drop(message: Message) -> None:
+    """Take a message and forget it."""
+
+
+async def dial(authenticator: Authenticator, **headers: str | None) -> list[Message]:
+    """Open ``/live`` with these headers; returns what the server sent."""
+    sent: list[Message] = []
+
+    async def receive() -> Message:
+        return {"type": "websocket.connect"}
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    given = [(b"host", b"iveg.test")]
+    given += [
+        (name.encode(), value.encode())
+        for name, value in headers.items()
+        if value is not None
+    ]
+    scope = request_scope("/live", headers=given)
+    scope.update(type="websocket", scheme="ws", subprotocols=[])
+    del scope["method"]
+    await build_app(authenticator)(scope, receive, send)
+    return sent

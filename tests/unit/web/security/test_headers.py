@@ -1,0 +1,140 @@
+"""What binds browsers and what is too large."""
+
+from collections.abc import AsyncIterator
+
+import httpx
+import pytest
+from fastapi import FastAPI, Request, Response
+
+from iveg.web import problems
+from iveg.web.security.headers import (
+    CONTENT_SECURITY_POLICY,
+    BodyLimit,
+    SecurityHeaders,
+)
+
+LIMIT = 1000
+
+
+def build_app() -> FastAPI:
+    app = FastAPI()
+    problems.install(app)
+
+    @app.api_route("/api/v1/size", methods=["GET", "POST"])
+    @app.post("/ngsi/notifications")
+    @app.get("/")
+    @app.get("/static/js/main.js")
+    async def size(request: Request) -> int:
+        return len(await request.body())
+
+    @app.get("/vendor/library.js")
+    async def library(response: Response) -> None:
+        response.headers["Cache-Control"] = "private"
+
+    return app
+
+
+@pytest.fixture
+async def client() -> AsyncIterator[httpx.AsyncClient]:
+    app = SecurityHeaders(BodyLimit(build_app(), LIMIT))
+    transport = httpx.ASGITransport(app)
+    async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
+        yield client
+
+
+async def test_every_answer_binds_the_browser(client: httpx.AsyncClient) -> None:
+    for path in ("/", "/nowhere", "/static/js/main.js", "/api/v1/size"):
+        headers = (await client.get(path)).headers
+
+        assert headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["referrer-policy"] == "no-referrer"
+        assert headers["cross-origin-opener-policy"] == "same-origin"
+        assert headers["cross-origin-resource-policy"] == "same-origin"
+        assert "strict-transport-security" not in headers
+
+
+def test_the_policy_allows_nothing_inline_and_no_other_host() -> None:
+    policy = CONTENT_SECURITY_POLICY
+
+    assert "script-src 'self';" in policy
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "require-trusted-types-for 'script'" in policy
+    assert "http" not in policy
+    assert "unsafe" not in policy
+    assert "blob:" not in policy
+
+
+async def test_an_answer_may_set_a_header_of_its_own(client: httpx.AsyncClient) -> None:
+    headers = (await client.get("/vendor/library.js")).headers
+
+    assert headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+    assert headers["cache-control"] == "private"
+    assert headers["x-content-type-options"] == "nosniff"
+
+
+async def test_data_is_never_stored_and_files_are_asked_for_again(
+    client: httpx.AsyncClient,
+) -> None:
+    data = await client.get("/api/v1/size")
+    file = await client.get("/static/js/main.js")
+
+    assert data.headers["cache-control"] == "no-store"
+    assert file.headers["cache-control"] == "no-cache"
+
+
+async def test_https_is_remembered_only_where_it_is_spoken(
+    client: httpx.AsyncClient,
+) -> None:
+    answer = await client.get("https://i/")
+
+    assert answer.headers["strict-transport-security"] == "max-age=31536000"
+
+
+async def test_a_notification_pays_for_no_headers(client: httpx.AsyncClient) -> None:
+    answer = await client.post("/ngsi/notifications", content=b"{}")
+
+    assert "content-security-policy" not in answer.headers
+
+
+@pytest.mark.parametrize("path", ["/api/v1/size", "/ngsi/notifications"])
+async def test_a_body_at_the_limit_is_taken(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    answer = await client.post(path, content=b"x" * LIMIT)
+
+    assert answer.json() == LIMIT
+
+
+@pytest.mark.parametrize("path", ["/api/v1/size", "/ngsi/notifications"])
+async def test_a_declared_body_over_the_limit_is_refused_unread(
+    client: httpx.AsyncClient, path: str
+) -> None:
+    answer = await client.post(path, content=b"x" * (LIMIT + 1))
+
+    assert answer.status_code == 413
+    assert answer.headers["connection"] == "close"
+    assert answer.headers["content-type"] == "application/problem+json"
+
+
+async def test_a_streamed_body_over_the_limit_is_refused_while_it_comes(
+    client: httpx.AsyncClient,
+) -> None:
+    async def stream() -> AsyncIterator[bytes]:
+        for _ in range(11):
+            yield b"x" * (LIMIT // 10)
+
+    answer = await client.post("/api/v1/size", content=stream())
+
+    assert answer.status_code == 413
+    assert answer.json()["title"] in ("Content Too Large", "Request Entity Too Large")
+
+
+async def test_a_streamed_body_under_the_limit_is_taken(
+    client: httpx.AsyncClient,
+) -> None:
+    async def stream() -> AsyncIterator[bytes]:
+        yield b"x" * LIMIT
+
+    assert (await client.post("/api/v1/size", content=stream())).json() == LIMIT
