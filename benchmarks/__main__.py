@@ -10,7 +10,7 @@ BENCHMARKS = (
     "latency_cost",
     "lidar_cost",
     "emulator_cost",
-    "fiware_road",
+    "fiware_transport",
     "notify_cost",
     "paint",
     "ros2_cost",

@@ -1,9 +1,10 @@
-// Says whether the IoT Agent hears, and ends one that does not.
+// Reports whether the IoT Agent receives measures, and ends an agent that does not.
 //
-// A poisoned agent answers /iot/about with 200 and hears no robot any more.  iVeg sends
-// a canary through broker and agent every two seconds; while iVeg and the broker are up
-// and no canary has reached Orion for ten seconds, the agent is deaf.  Seen so for ten
-// seconds more it is ended, and the restart policy starts it afresh.  Runs as the
+// An agent with a broken subscription answers /iot/about with 200 and receives no robot
+// any more.  iVeg sends a heartbeat probe through broker and agent every two seconds;
+// while iVeg and the broker are up and no probe has reached Orion for ten seconds, the
+// agent has stopped receiving.  After ten seconds more it is ended, and the restart
+// policy starts it afresh.  Runs as the
 // container's health check; exit code 0 is healthy.
 
 import fs from "node:fs";
@@ -36,8 +37,8 @@ function listens(host, port) {
   });
 }
 
-/** Age of the last canary at Orion (ms); null where that says nothing of the agent. */
-async function canaryAge() {
+/** Age of the last heartbeat probe at Orion (ms); null where that says nothing of the agent. */
+async function probeAge() {
   const singer = await get(`${env.AGENT_SINGER_URL}/healthz`);
   if (!singer?.ok || !(await listens(env.IOTA_MQTT_HOST, env.IOTA_MQTT_PORT))) {
     return null;
@@ -80,13 +81,13 @@ function end() {
 
 async function main() {
   const about = await get(`http://127.0.0.1:${env.IOTA_NORTH_PORT}/iot/about`);
-  const age = about?.ok ? await canaryAge() : LIMIT_MS + 1;
+  const age = about?.ok ? await probeAge() : LIMIT_MS + 1;
   if (age === null || age <= LIMIT_MS) {
     fs.rmSync(SILENT_SINCE, { force: true });
     return 0;
   }
   const silent = silentFor();
-  console.log(`deaf: ${about?.ok ? `no canary for ${age} ms` : "no answer"}`);
+  console.log(`stopped receiving: ${about?.ok ? `no probe for ${age} ms` : "no answer"}`);
   if (silent >= LIMIT_MS) end();
   return 1;
 }

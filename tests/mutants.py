@@ -131,19 +131,19 @@ MUTANTS = (
         "rule: exactly on the ring is outside",
         "elif depth <= 0.0:",
         "elif depth < 0.0:",
-        ("unit/domain/test_mandates.py",),
+        ("unit/domain/rule/test_speed_limits.py",),
     ),
     Mutant(
         "rule: two rings slow a robot by the one that is farther away",
         "if cause not in nearest or depth < nearest[cause][0]:",
         "if cause not in nearest or depth > nearest[cause][0]:",
-        ("unit/domain/test_mandates.py",),
+        ("unit/domain/rule/test_speed_limits.py",),
     ),
     Mutant(
         "rule: a robot is let go on the border, at every flutter",
         "    if depth > LIMITS.release_beyond_m:",
         "    if depth > 0.0:",
-        ("unit/domain/test_mandates.py",),
+        ("unit/domain/rule/test_speed_limits.py",),
     ),
     Mutant(
         "freshness: any feedback is fresh when it comes, however old its evidence",
@@ -167,7 +167,7 @@ MUTANTS = (
         "freshness: a robot that is not seen keeps its speed",
         "if age is None or age > LIMITS.silence_s:",
         "if age is None:",
-        ("unit/domain/test_mandates.py",),
+        ("unit/domain/rule/test_speed_limits.py",),
     ),
     Mutant(
         "freshness: feedback of another start of iVeg proves an age",

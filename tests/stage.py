@@ -44,7 +44,7 @@ class Faults:
 
     Attributes:
         mute: Nothing that it says arrives.
-        deaf: It drives as it likes whatever iVeg speed limits; holds still bite.
+        deaf: It drives as it likes whatever speed limit iVeg sets; holds still bite.
         clock_offset_s: Its wall clock is this far ahead (s).
     """
 

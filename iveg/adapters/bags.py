@@ -1,4 +1,4 @@
-"""The adapter for ROS bags: odometry and laser scans out of recordings of ROS 1 and ROS 2.
+"""The adapter for ROS bags: odometry and laser scans, recorded by ROS 1 or ROS 2.
 
 Reads ``.db3`` and ``.mcap`` files, directories of ROS 2 and ``.bag`` files through
 rosbags.  The two messages are alike in all releases of ROS, so their usual definitions

@@ -19,7 +19,7 @@ from iveg.domain.observations import LaserScan
 
 RESOLUTION_M = 0.1
 MAX_CELLS = 400_000
-"""A larger greenhouse gets coarser cells, so that no greenhouse costs more than this."""
+"""A larger greenhouse gets coarser cells, so that none costs more than this."""
 UNKNOWN = -1
 _HIT, _MISS = 0.85, -0.4
 _LEAST, _MOST = -2.0, 3.5

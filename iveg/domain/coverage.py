@@ -20,7 +20,7 @@ from iveg.domain.world import RobotState
 
 CELL_M = 1.0
 MOST_CELLS = 4000
-"""A larger greenhouse gets coarser cells, so that no greenhouse costs more than this."""
+"""A larger greenhouse gets coarser cells, so that none costs more than this."""
 RECENT_S = 10.0
 """A look that is younger counts as seen now: a ring is remembered as long."""
 

@@ -1,4 +1,4 @@
-"""The greenhouse that robots drive in: one description for emulator, occlusion and map."""
+"""The greenhouse: one description for emulator, occlusion and map."""
 
 from dataclasses import dataclass
 

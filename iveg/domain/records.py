@@ -12,7 +12,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionRecord:
-    """Why one alert or speed limit came to be and what it led to (product.md section 6).
+    """Why an alert or speed limit came to be and what it led to (product.md section 6).
 
     Attributes:
         kind: ``alert`` (somebody was confirmed) or ``speed_limit`` (a robot was told).
@@ -181,7 +181,7 @@ class OdometryRecord:
 
     Attributes:
         linear: (m/s); ``angular`` (rad/s).
-        mandated_factor: What iVeg limited to; ``applied_factor`` what the robot reported.
+        mandated_factor: What iVeg asked for; ``applied_factor`` what was reported.
         link: ``LIVE``, ``LATE`` or ``LOST``.
     """
 

@@ -92,7 +92,8 @@ async def run_emulator(
         truth: Where it is written down what was really in view.
 
     Raises:
-        DataFileError: no such scenario or profile, or too many robots for the greenhouse.
+        DataFileError: no such scenario or profile, or too many robots for the
+            greenhouse.
         SettingsError: somebody listens on the fault port already.
     """
     if profile not in DETECTORS:

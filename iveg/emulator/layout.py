@@ -1,7 +1,7 @@
 """Fits a scenario to a fleet and a greenhouse.
 
 In the testbed, AGI and AGII drive their scripts and any other fleet shares one round.
-In another greenhouse each robot drives up and down a lane of its own and people walk beside
+In another greenhouse each robot drives in a lane of its own and people walk beside
 it; in an open field each drives a square.
 """
 
@@ -50,13 +50,14 @@ def lay_out(
         fleet: What each robot is; None: iVeg's own.
 
     Raises:
-        DataFileError: the greenhouse has no room for so many robots, or is not the one that
+        DataFileError: the greenhouse has no room for so many robots, or is not what
             the scenario is about.
     """
     extra = scenario.incidents, scenario.detector
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
     if scenario.greenhouse not in (TESTBED, greenhouse.name):
-        reason = f"is about {scenario.greenhouse}, not {greenhouse.name}: see IVEG_GREENHOUSE."
+        about = f"is about {scenario.greenhouse}, not {greenhouse.name}"
+        reason = f"{about}: see IVEG_GREENHOUSE."
         raise DataFileError(f"scenario {scenario.name!r}", "", reason)
     if greenhouse.name == scenario.greenhouse and set(robots) <= set(scenario.robots):
         scripts = {robot_id: scenario.robots[robot_id] for robot_id in robots}

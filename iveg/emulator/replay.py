@@ -1,7 +1,7 @@
 """Plays recorded runs as robots: the log moves, the safety node decides how fast.
 
 The node's drive output is the pace of the log: full speed plays it as recorded, a
-speed limit of 0.5 at half the pace, a hold not at all, and the replayed robot then reports
+limit of 0.5 at half the pace, a hold not at all, and the replayed robot then reports
 that it stands.  Poses between two recorded ones are interpolated, because a safety node
 wants odometry more often than logs have it.  While the log pauses, the newest scan and
 detections are told again, as a robot that stands goes on seeing what it saw.

@@ -2,7 +2,7 @@
 
 All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
 corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
-y = 3.5 to 16.5 m.  ``layout.py`` fits a scenario to another fleet or another greenhouse.
+y = 3.5 to 16.5 m.  ``layout.py`` fits a scenario to other fleets and greenhouses.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 from typing import Any, Literal
 
-from iveg.domain import observations
-from iveg.domain.feedback import SpeedLimit
+from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold as DomainHold
@@ -92,7 +91,7 @@ class Applied(Model):
 
 
 class SpeedLimit(Model):
-    """What iVeg tells the robot; the key is ``mandate``."""
+    """How fast a robot may drive at most, and why."""
 
     speed_factor: float
     reason: str
@@ -101,14 +100,14 @@ class SpeedLimit(Model):
     decision_id: str | None
 
     @classmethod
-    def of(cls, mandate: SpeedLimit) -> "SpeedLimit":
+    def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
         """What is in force."""
         return cls(
-            speed_factor=mandate.speed_factor,
-            reason=mandate.reason,
-            cause=mandate.cause,
-            distance_m=rounded(mandate.distance_m),
-            decision_id=mandate.decision_id,
+            speed_factor=limit.speed_factor,
+            reason=limit.reason,
+            cause=limit.cause,
+            distance_m=rounded(limit.distance_m),
+            decision_id=limit.decision_id,
         )
 
 
@@ -197,6 +196,7 @@ class Robot(Model):
     speed_factor: float | None
     """What the robot says it applies."""
     applied: Applied | None
+    speed_limit: SpeedLimit
     mandate: SpeedLimit
     holds: list[Hold]
     stop: Command | None

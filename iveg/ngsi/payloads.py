@@ -221,7 +221,7 @@ class FeedbackValue(OriginFields):
     alert: AlertValue | None = None
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
-    speed_limits: dict[str, SpeedLimitValue] = {}
+    speed_limits: Annotated[dict[str, SpeedLimitValue], Field(alias="mandates")] = {}
     seen: dict[str, int] = {}
     backlog: Any = None
 

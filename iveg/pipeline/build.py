@@ -87,8 +87,7 @@ def build(
 ) -> Pipeline:
     """All parts, wired."""
     start, hub = ports.clock(), Hub()
-    event_log = EventLog(hub, ports.sink, start)
-    health_monitor = HealthMonitor(start)
+    event_log, health_monitor = EventLog(hub, ports.sink, start), HealthMonitor(start)
     world = World(fleet, health_monitor.probe)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)

@@ -98,7 +98,7 @@ KINDS = (
     Kind(CommandStatus, ordered="by arrival", lands="command_status"),
     Kind(CommandAnswer, may_drop=False, lands="commander", direct="safety", qos=1),
     Kind(Climate, ordered="by arrival", lands="climate", touches=(topics.CLIMATE,)),
-    Kind(HeartbeatProbe, ordered="by arrival", lands="canary_at"),
+    Kind(HeartbeatProbe, ordered="by arrival", lands="heartbeat_at"),
     Kind(
         Battery,
         touches=(topics.ROBOT,),

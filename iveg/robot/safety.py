@@ -13,8 +13,8 @@ r"""The safety machine of one robot, pure: facts and times in, frozen effects ou
              feedback was fresh for 2.0 s, three times a minute, if no other hold came
 
 The state is never stored: it follows from the holds, the measured speed and whether
-somebody resumed.  Algorithm 3 of the paper is in ``peer_feedback``; here silence is added,
-which the paper takes for permission and iVeg does not.
+somebody resumed.  The paper's Algorithm 3 is in ``peer_feedback``; here silence is
+added, which the paper takes for permission and iVeg does not.
 """
 
 from collections.abc import Callable

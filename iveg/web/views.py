@@ -95,6 +95,7 @@ class Views:
         robot = self._world.robot(robot_id)
         machine = self._commander.machine(robot_id)
         odometry, safety, age = robot.odometry, robot.safety, robot.age_s(now)
+        limit = SpeedLimit.of(self._evaluator.speed_limits[robot_id])
         return Robot(
             robot_id=robot_id,
             link=robot.link(now),
@@ -107,7 +108,8 @@ class Views:
             age_estimated=robot.estimated_since is not None,
             speed_factor=None if safety is None else safety.speed_factor,
             applied=Applied.of(robot, now),
-            speed_limit=SpeedLimit.of(self._evaluator.speed_limits[robot_id]),
+            speed_limit=limit,
+            mandate=limit,
             holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,

@@ -41,7 +41,7 @@ LARGE_FUNCTIONS = {
     "iveg/emulator/fleet.py run_emulator": LIST,
     "iveg/emulator/replay.py run_replay": LIST,
     "iveg/robot/node.py RobotNode.__init__": LIST,
-    "iveg/static/js/core/i18n.js createWords": STATE,
+    "iveg/static/js/core/i18n.js createI18n": STATE,
     "iveg/static/js/map/map.js createMap": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
     "iveg/static/js/core/socket.js connect": STATE,

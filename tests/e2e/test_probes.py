@@ -1,6 +1,6 @@
 """Names that are markup: refused at the door, or text on every page, never more.
 
-The greenhouse has a lane of such a name, and its detectors, robots and people try the rest.
+A lane of the greenhouse has such a name; detectors, robots and people try the rest.
 """
 
 import json

@@ -567,7 +567,7 @@ async def test_a_deaf_agent_is_ended_and_not_on_the_first_look(
         await patient.init.wait()
 
     assert len(lived) == 1
-    assert "deaf: no canary for" in patient.said
+    assert "stopped receiving: no probe for" in patient.said
 
 
 async def test_an_agent_that_hears_again_starts_with_a_clean_slate(
@@ -592,7 +592,7 @@ async def test_a_hung_agent_is_unhealthy_whatever_the_heartbeat_says(
     patient.environment["IOTA_NORTH_PORT"] = str(free_ports(1)[0])
 
     assert await patient.check() == 1
-    assert "deaf: no answer" in patient.said
+    assert "stopped receiving: no answer" in patient.said
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,14 @@
 
 export const STAMP = "2026-11-20T09:00:00.000Z";
 
+const CLEAR = {
+  speed_factor: 1,
+  reason: "clear",
+  cause: null,
+  distance_m: null,
+  decision_id: null,
+};
+
 /** @param {Partial<Robot>} [changes] @returns {Robot} */
 export function robot(changes = {}) {
   return {
@@ -26,13 +34,8 @@ export function robot(changes = {}) {
     age_estimated: false,
     speed_factor: 1,
     applied: null,
-    mandate: {
-      speed_factor: 1,
-      reason: "clear",
-      cause: null,
-      distance_m: null,
-      decision_id: null,
-    },
+    speed_limit: CLEAR,
+    mandate: CLEAR,
     holds: [],
     stop: null,
     stop_state: "RUNNING",

@@ -46,7 +46,7 @@ function alert(differs = {}) {
   });
 }
 
-const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
+const i18n = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
   /** @type {unknown} */ ({
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
@@ -66,11 +66,11 @@ test("a robot's card says what the robot finds wrong with its own data", () => {
     })
   );
   const known = (/** @type {string} */ key) => key === "robot.fault.no_transform";
-  equal(faultsSaid(robot, { ...words, has: known }), [
+  equal(faultsSaid(robot, { ...i18n, has: known }), [
     "robot.fault_for robot.fault.no_transform no_transform map → odom 2.1",
     "robot.fault.other unheard_of /scan",
   ]);
-  equal(faultsSaid({ ...robot, applied: null }, words), []);
+  equal(faultsSaid({ ...robot, applied: null }, i18n), []);
 });
 
 test("a tape is laid with two taps, and a third begins anew", () => {
@@ -177,7 +177,7 @@ test("a browser that refuses the lock is asked again, not complained of", async 
 
 test("notes and names in alerts are text, whatever they hold", () => {
   const list = document.createElement("ul");
-  const draw = createAlertList(list, words).draw;
+  const draw = createAlertList(list, i18n).draw;
   draw([alert({ note: PROBE, acknowledged_by: PROBE, slots: { robot: PROBE } })]);
   equal(list.querySelectorAll("img").length, 0);
   equal(list.textContent?.includes(PROBE), true);
@@ -185,7 +185,7 @@ test("notes and names in alerts are text, whatever they hold", () => {
 
 test("only who may acknowledge is asked to", () => {
   const list = document.createElement("ul");
-  const { draw } = createAlertList(list, words);
+  const { draw } = createAlertList(list, i18n);
   document.body.dataset.role = "viewer";
   draw([alert()]);
   equal(list.querySelector("form")?.hidden, true);
@@ -196,7 +196,7 @@ test("only who may acknowledge is asked to", () => {
 
 test("an alert that did not change is not drawn again when another did", () => {
   let told = 0;
-  const counting = { ...words, t: (/** @type {string} */ key) => `${key}${told++}` };
+  const counting = { ...i18n, t: (/** @type {string} */ key) => `${key}${told++}` };
   const { draw } = createAlertList(document.createElement("ul"), counting);
   draw([alert({ alert_id: "a" })]);
   const once = told;
@@ -209,7 +209,7 @@ test("an alert that did not change is not drawn again when another did", () => {
 test("an acknowledgement that failed says so and can be tried again", async () => {
   document.body.dataset.role = "operator";
   const list = document.body.appendChild(document.createElement("ul"));
-  createAlertList(list, words, async () => 503).draw([alert()]);
+  createAlertList(list, i18n, async () => 503).draw([alert()]);
   list.querySelector("form")?.requestSubmit();
   // The list redraws a microtask or two after the answer.
   for (let i = 0; i < 5; i += 1) await Promise.resolve();
@@ -220,7 +220,7 @@ test("an acknowledgement that failed says so and can be tried again", async () =
 
 test("13.10 the gravest stands first, of these the oldest", () => {
   const list = document.createElement("ul");
-  createAlertList(list, words).draw([
+  createAlertList(list, i18n).draw([
     alert({ alert_id: "p2", priority: "P2", key: "late" }),
     alert({ alert_id: "p1", key: "young", raised_at: "2026-11-20T12:05:00Z" }),
     alert({ alert_id: "over", key: "old", cleared_at: "2026-11-20T12:01:00Z" }),
@@ -234,7 +234,7 @@ test("13.10 after an acknowledgement nothing slides under the finger", async () 
   const list = document.createElement("ul");
   document.body.append(list);
   const both = [alert({ alert_id: "a" }), alert({ alert_id: "b", priority: "P2" })];
-  const { draw } = createAlertList(list, words, async () => 200, 150);
+  const { draw } = createAlertList(list, i18n, async () => 200, 150);
   draw(both);
   list.querySelector("button")?.click();
   draw([both[1], alert({ alert_id: "c" })]);
@@ -270,7 +270,7 @@ test("an alert that repeats is one row that tells each time", () => {
     occurrence("2026-11-20T12:00:00Z", { note: PROBE }),
     occurrence("2026-11-20T12:07:00Z"),
   ];
-  createAlertList(list, words).draw([alert({ count: 2, members })]);
+  createAlertList(list, i18n).draw([alert({ count: 2, members })]);
   const said = [...list.querySelectorAll(".members li")].map((one) => one.textContent);
   equal(list.children.length, 1);
   equal(
@@ -281,7 +281,7 @@ test("an alert that repeats is one row that tells each time", () => {
 
 test("whoever reads the occurrences keeps reading while more come", () => {
   const list = document.createElement("ul");
-  const { draw } = createAlertList(list, words);
+  const { draw } = createAlertList(list, i18n);
   const members = [
     occurrence("2026-11-20T12:00:00Z"),
     occurrence("2026-11-20T12:07:00Z"),
@@ -298,16 +298,16 @@ test("whoever reads the occurrences keeps reading while more come", () => {
 
 test("what happened once has nothing to open", () => {
   const list = document.createElement("ul");
-  createAlertList(list, words).draw([alert()]);
+  createAlertList(list, i18n).draw([alert()]);
   equal(list.querySelector("details")?.hidden, true);
 });
 
 test("a flood is told apart from a rate that a person can bear", () => {
   const calm = { count: 3, limit: 10, window_s: 600, since: null };
-  equal(floodSaid(calm, words), "alert.rate 3 10 10 ");
+  equal(floodSaid(calm, i18n), "alert.rate 3 10 10 ");
   const flood = { ...calm, count: 12, since: "2026-11-20T12:00:00Z" };
-  equal(floodSaid(flood, words), "alert.flood 12 10 10 2026-11-20T12:00:00Z");
-  equal(floodSaid(undefined, words), "");
+  equal(floodSaid(flood, i18n), "alert.flood 12 10 10 2026-11-20T12:00:00Z");
+  equal(floodSaid(undefined, i18n), "");
 });
 
 /** The bell over a store; what sounded is in `heard`. */
@@ -345,7 +345,7 @@ function bell() {
   const heardBy = /** @type {import("../../iveg/static/js/main.js").App} */ (
     /** @type {unknown} */ ({
       store,
-      words: { ...words, onChange: () => {} },
+      i18n: { ...i18n, onChange: () => {} },
     })
   );
   createAlertsPanel(heardBy, tone);
@@ -385,14 +385,14 @@ function nothing() {
 }
 
 test("what was not measured is no zero", () => {
-  const values = Object.values(tilesOf(nothing(), 0, words)).map(({ value }) => value);
+  const values = Object.values(tilesOf(nothing(), 0, i18n)).map(({ value }) => value);
   equal(values, ["—", "—", "—", "—"]);
 });
 
 test("an order that nobody missed is a zero of so many", () => {
   const safety = nothing();
   safety.not_echoed = { count: 0, of: 7, within_s: 1, window_s: 300, age_s: 2 };
-  const { value } = tilesOf(safety, 0, words).echo;
+  const { value } = tilesOf(safety, 0, i18n).echo;
   equal(value.startsWith("tiles.echo_value 0 7 "), true);
 });
 
@@ -402,7 +402,7 @@ test("the age of a tile grows while the server is silent", () => {
     ...{ p50_ms: 120, p95_ms: 240, p99_ms: 310 },
     ...{ count: 8, window_s: 300, age_s: 3 },
   };
-  const { of } = tilesOf(safety, 4, words).latency;
+  const { of } = tilesOf(safety, 4, i18n).latency;
   equal(of, "tiles.latency_of 120 240 310 8 300 3 5 7 20");
 });
 
@@ -411,7 +411,7 @@ test("13.11 quantiles are told of twenty values or more", () => {
   const some = { p50_ms: 120, p95_ms: 240, p99_ms: 310, window_s: 300, age_s: 3 };
   const said = [19, 20].map((count) => {
     safety.alert_latency = { ...some, count };
-    return tilesOf(safety, 0, words).latency.value.split(" ")[0];
+    return tilesOf(safety, 0, i18n).latency.value.split(" ")[0];
   });
   equal(said, ["tiles.too_few", "tiles.latency_value"]);
 });

@@ -40,7 +40,7 @@ event = st.one_of(
     st.tuples(st.just("wait"), st.integers(1, 30)),
     st.tuples(st.just("stop"), st.integers(0, 3)),
     st.tuples(st.just("let_go")),
-    st.tuples(st.just("mandate"), st.sampled_from([0.0, 0.3, 0.5, 1.0])),
+    st.tuples(st.just("speed_limit"), st.sampled_from([0.0, 0.3, 0.5, 1.0])),
     st.tuples(st.just("person"), st.floats(0.0, 5.0)),
     st.tuples(st.just("speaks"), st.booleans()),
     st.tuples(st.just("odometry"), st.booleans()),

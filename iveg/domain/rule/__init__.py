@@ -1,1 +1,1 @@
-"""The detection rule at work: zones round people and peers, and the speed limits of robots."""
+"""The detection rule at work: zones round people and peers, and speed limits."""

@@ -10,7 +10,7 @@ export type Acting = {
   in_sight: boolean;
 };
 
-/** A notice to people: all occurrences of one kind and subject as one. */
+/** A alert to people: all occurrences of one kind and subject as one. */
 export type Alert = {
   alert_id: string;
   priority: "P1" | "P2" | "P3";
@@ -434,7 +434,7 @@ export type NegativeMargin = {
 };
 
 /** Alerts that a robot did not answer in time, of those that it should have. */
-export type NotEchoed = {
+export type NotAcknowledged = {
   count: number;
   of: number;
   within_s: number;
@@ -555,6 +555,7 @@ export type Robot = {
   /** What the robot says it applies. */
   speed_factor: number | null;
   applied: Applied | null;
+  speed_limit: SpeedLimit;
   mandate: SpeedLimit;
   holds: Hold[];
   stop: Command | null;
@@ -604,7 +605,7 @@ export type Rule = {
 /** How soon the fleet obeys and how close it comes to people; never "safe". */
 export type Safety = {
   alert_latency: AlertLatency;
-  not_echoed: NotEchoed;
+  not_echoed: NotAcknowledged;
   negative_margin: NegativeMargin;
   worst_margin: WorstMargin;
 };
@@ -653,7 +654,7 @@ export type Snapshot = {
   climate: Climate | null;
 };
 
-/** What iVeg tells the robot; the key is ``mandate``. */
+/** How fast a robot may drive at most, and why. */
 export type SpeedLimit = {
   speed_factor: number;
   reason: string;

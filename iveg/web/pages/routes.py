@@ -220,7 +220,7 @@ def _add_supervision(routes: APIRouter, pages: Pages, who: Any) -> None:
 
 
 def _identified(request: Request) -> Visitor | None:
-    authenticator = getattr(request.app.state, "door", None)
+    authenticator = getattr(request.app.state, "authenticator", None)
     visitor: Visitor | None = (
         None if authenticator is None else authenticator.identify(request)
     )

@@ -1,6 +1,6 @@
 """Sentences as the page says them, for files and paper: templates, slots and formats.
 
-The formats are those of ``static/js/core/i18n.js``; a template that is missing shows its
+The formats are those of ``static/js/core/i18n.js``; a missing template shows its
 key, so that a row of an older version is never lost.
 """
 

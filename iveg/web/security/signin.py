@@ -1,4 +1,4 @@
-"""The link that signs a browser in, taken out of the address before anything can keep it."""
+"""The sign-in link: its token is removed from the address before it can be kept."""
 
 from collections.abc import Callable
 from urllib.parse import parse_qs

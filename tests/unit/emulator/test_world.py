@@ -65,7 +65,7 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robots", "house"),
+    ("robots", "greenhouse"),
     [
         (TEN, "mvsim-20x20"),
         (("AGI", "AGII", "R1"), "agroconnect"),

@@ -329,7 +329,7 @@ EVENTS = st.lists(
         _event("again", st.integers(0, 40)),
         _event("hear_again", st.integers(0, 400)),
         _event(
-            "keep_level",
+            "keep_desired_state",
             st.sampled_from(["stopped", "run"]),
             st.lists(NAMES, max_size=2),
         ),
@@ -340,7 +340,7 @@ EVENTS = st.lists(
         _event("push", st.sampled_from([0.0, 0.01, 0.3, -0.3])),
         _event("upstream", st.sampled_from([None, REST, AHEAD, SLOWLY])),
         _event("meet", st.sampled_from([None, 0.5, 1.9, 2.2, 2.4, 5.0])),
-        _event("mandate", st.sampled_from([0.0, 0.5, 1.0])),
+        _event("speed_limit", st.sampled_from([0.0, 0.5, 1.0])),
         _event("reboot"),
         _event("cut", NAMES, st.integers(0, 4)),
     ),

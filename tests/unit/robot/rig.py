@@ -131,7 +131,7 @@ class Rig:
             "robot_id": "AGII",
             "origin": Origin("cloud", self.feedback_seq),
             "alerts": self.alerts,
-            "mandates": self.speed_limits,
+            "speed_limits": self.speed_limits,
             "seen": {"AGI": self.report_seq},
         }
         return Feedback(**(values | parts))  # type: ignore[arg-type]

@@ -498,7 +498,7 @@ def test_a_crew_that_releases_a_running_robot_does_not_halt_it() -> None:
     assert rig.twist == AHEAD
 
 
-# --- the retained desired state -------------------------------------------------------------
+# --- the retained desired state -----------------------------------------------------
 
 
 def test_a_retained_stopped_holds_and_run_releases_nothing() -> None:
@@ -702,7 +702,7 @@ def test_odometry_that_is_no_number_is_no_odometry() -> None:
     assert rig.factor == 0.0
 
 
-# --- speed limits and rings -------------------------------------------------------------
+# --- speed limits and rings -----------------------------------------------------
 
 
 def test_a_speed_limit_for_me_halves_forward_reverse_and_turning() -> None:

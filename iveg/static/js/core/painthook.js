@@ -61,7 +61,7 @@ function createPaintHook(tell) {
       const kind = kindOf(topic);
       if (!kind || !data?.stamp) return;
       const name = `${kind}/${data.robot_id}`;
-      // The same pose comes again when only a mandate changed; it was drawn already.
+      // The same pose comes again when only a speed limit changed; it was drawn already.
       if (told.get(name) === data.stamp) return;
       arrived.set(name, { robot: data.robot_id, kind, stamp: data.stamp });
     },

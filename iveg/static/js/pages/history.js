@@ -27,7 +27,7 @@ class AnswerError extends Error {
 async function start() {
   const i18n = await loadI18n();
   const decision = createDecisionPanel(
-    /** @type {any} */ ({ words, dialogs: besideOthers() }),
+    /** @type {any} */ ({ i18n, dialogs: besideOthers() }),
   );
   /** @type {Asked | null} */
   let asked = null;

@@ -1,6 +1,6 @@
 /**
  * Speed on a half circle: the needle is what was observed, the mark outside the scale
- * is the mandated limit, on the same scale (product section 1, widget 3).
+ * is the limit that iVeg asks for, on the same scale (product section 1, widget 3).
  *
  * Fleets drive backwards, too; the needle shows how fast, the read-out beside it which
  * way.  A small card has the same on a straight line.
@@ -20,7 +20,7 @@ const DEFAULT_MAX = 1;
  * @typedef {{
  *   speed: number | null, max: number, factor: number | null,
  *   name: string, said: string, limitSaid: string, speedSaid: string,
- * }} Reading `speed` (m/s, signed), `max` full scale (m/s), `factor` mandated 0–1; the
+ * }} Reading `speed` (m/s, signed), `max` full scale (m/s), `factor` asked for 0–1; the
  *   rest is written already
  */
 
@@ -32,7 +32,7 @@ const DEFAULT_MAX = 1;
  * @returns {{speed: number | null, max: number, factor: number | null}}
  */
 export function readingOf(robot) {
-  const told = robot?.mandate?.speed_factor ?? null;
+  const told = robot?.speed_limit?.speed_factor ?? null;
   const applied = robot?.applied ? (robot.speed_factor ?? null) : null;
   const known = [told, applied].filter((factor) => factor !== null);
   const speed = robot?.twist?.linear ?? null;

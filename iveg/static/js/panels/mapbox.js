@@ -75,8 +75,8 @@ export function createMapbox(app, decision) {
    * @param {string} personId
    */
   function decisionAbout(personId) {
-    for (const { mandate } of store.robots().values()) {
-      if (mandate?.cause === personId) return mandate.decision_id;
+    for (const { speed_limit: limit } of store.robots().values()) {
+      if (limit?.cause === personId) return limit.decision_id;
     }
     const told = store.log().filter(({ slots }) => slots.person === personId);
     return told.findLast(({ decision_id }) => decision_id)?.decision_id ?? null;

@@ -47,9 +47,9 @@ export function whySaid(robot, i18n) {
     );
     return i18n.t("robot.why.held", { sources: [...new Set(names)].join(", ") });
   }
-  const isMandated = (robot.mandate?.speed_factor ?? 1) < 1;
-  const reason = isMandated ? robot.mandate?.reason : robot.applied?.reason;
-  const distance = robot.mandate?.distance_m ?? null;
+  const isLimited = (robot.speed_limit?.speed_factor ?? 1) < 1;
+  const reason = isLimited ? robot.speed_limit?.reason : robot.applied?.reason;
+  const distance = robot.speed_limit?.distance_m ?? null;
   if (distance === null && (reason === "person" || reason === "robot")) {
     return i18n.t(`why.${reason}`);
   }

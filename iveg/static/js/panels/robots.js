@@ -87,7 +87,7 @@ export function createRobotsPanel(app) {
    * @param {Robot} robot
    */
   function take(robot) {
-    const does = `${robot.mode} ${robot.stop?.state} ${robot.mandate?.reason}`;
+    const does = `${robot.mode} ${robot.stop?.state} ${robot.speed_limit?.reason}`;
     if (did.get(robot.robot_id) !== does) drawSeen(robot);
     did.set(robot.robot_id, does);
   }

@@ -11,7 +11,7 @@ from tests.builders import detection, odometry
 from tests.unit.web.api.test_latency import drive
 from tests.unit.web.desk import WebDesk
 
-DASHBOARD = Path(__file__).parents[3] / "deploy/grafana/iveg.json"
+DASHBOARD = Path(__file__).parents[4] / "deploy/grafana/iveg.json"
 AGI = 'robot="AGI",data="odometry"'
 SAMPLE = re.compile(r"^(iveg_\w+)(\{[^}]*\})? (\S+)$")
 

@@ -16,7 +16,7 @@ from iveg.web.security.headers import CONTENT_SECURITY_POLICY
 from tests.browsers import running_browser
 from tests.builders import START
 
-STATIC = Path(__file__).parents[3] / "iveg" / "static"
+STATIC = Path(__file__).parents[4] / "iveg" / "static"
 _PAGE = (
     b"<!doctype html><link rel=icon href=data:,><script type=module"
     b" src=/static/js/register.js></script><p>open</p>"

@@ -1,9 +1,9 @@
 """How fast the embedded FIWARE carries measures: MQTT publish → notification received.
 
-``python -m benchmarks.fiware_transport [--robots 2 20 …] [--seconds 6]``; each robot sends
-odometry, a 720-beam scan and two boxes at 30 Hz.  The embedded FIWARE, the robots and
-the receiver are three processes; what each costs is told, so that one sees who was the
-limit.  ``--profile FILE`` writes where the embedded process spends its time.
+``python -m benchmarks.fiware_transport [--robots 2 20 …] [--seconds 6]``: each robot
+sends odometry, a 720-beam scan and two boxes at 30 Hz.  The embedded FIWARE, the robots
+and the receiver are three processes; what each costs is told, so that one sees who was
+the limit.  ``--profile FILE`` writes where the embedded process spends its time.
 """
 
 import argparse
@@ -118,8 +118,9 @@ def _run(
 
 def run(fleets: list[int], seconds: float, profile: str) -> None:
     """Print the table."""
+    serve = "--serve", "--profile", profile
     with (
-        _child("benchmarks.fiware_road", "--serve", "--profile", profile) as fiware,
+        _child("benchmarks.fiware_transport", *serve) as fiware,
         _child("benchmarks.fiware_ends", "receive") as receiver,
     ):
         mqtt, orion, iota = _said(fiware)

@@ -25,7 +25,7 @@ function robot(differs = {}) {
       twist: { linear: 0.5, angular: 0 },
       speed_factor: 1,
       applied: { reason: "clear", faults: [] },
-      mandate: { speed_factor: 1, reason: "clear", distance_m: null },
+      speed_limit: { speed_factor: 1, reason: "clear", distance_m: null },
       holds: [],
       stop: null,
       profile: { max_speed: 2 },
@@ -35,7 +35,7 @@ function robot(differs = {}) {
 }
 
 test("13.8 the gauge draws the stricter of what was ordered and what is applied", () => {
-  const ordered = { mandate: { speed_factor: 0.5, reason: "person" } };
+  const ordered = { speed_limit: { speed_factor: 0.5, reason: "person" } };
   equal(readingOf(robot()).factor, 1);
   equal(readingOf(robot(ordered)).factor, 0.5);
   equal(readingOf(robot({ speed_factor: 0 })).factor, 0);
