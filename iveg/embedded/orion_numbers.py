@@ -76,11 +76,11 @@ def _nine_decimals(given: Floats) -> Floats:
     product = given * _SCALE
     whole = np.rint(product)
     doubt = np.abs(product - whole) + np.abs(product) * _DOUBT >= 0.5
-    # Adding zero makes a plain zero of the negative one.
-    rounded: Floats = whole / _SCALE + 0.0
+    rounded: Floats = whole / _SCALE
     for index in np.flatnonzero(doubt):
         rounded[index] = round(float(given[index]), 9)
-    return rounded
+    # Adding zero makes a plain zero of the negative one.
+    return rounded + 0.0
 
 
 def _without_point(text: bytes) -> bytes:

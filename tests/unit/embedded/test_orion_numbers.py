@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import orjson
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from iveg.embedded.orion_numbers import print_value
@@ -62,6 +62,7 @@ def test_a_scan_is_printed_as_its_numbers(ranges: list[float | None]) -> None:
 
 
 @given(st.lists(TIES | NEARLY_TIES | FLOATS, **LONG))
+@example([0.0] * 15 + [-5e-10])
 def test_a_half_at_the_tenth_decimal_is_rounded_as_alone(numbers: list[float]) -> None:
     assert print_value(numbers) == orjson.dumps(one_by_one(numbers))
 
