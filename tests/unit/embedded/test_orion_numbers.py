@@ -62,7 +62,7 @@ def test_a_scan_is_printed_as_its_numbers(ranges: list[float | None]) -> None:
 
 
 @given(st.lists(TIES | NEARLY_TIES | FLOATS, **LONG))
-@example([0.0] * 15 + [-5e-10])
+@example([0.0] * 15 + [-4.9999999999999996e-10])
 def test_a_half_at_the_tenth_decimal_is_rounded_as_alone(numbers: list[float]) -> None:
     assert print_value(numbers) == orjson.dumps(one_by_one(numbers))
 
