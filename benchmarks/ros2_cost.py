@@ -186,7 +186,7 @@ class Times:
         """Take what came back."""
         for one in self._reader.take():
             now = time.perf_counter()
-            speed = cdr.read(m.Twist, one.payload).linear.x
+            speed = cdr.read(m.Twist, one).linear.x
             if speed in self._sent:
                 self.took.append(now - self._sent.pop(speed))
 

@@ -15,6 +15,8 @@ from types import TracebackType
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+# Its own reader and writer make objects of every sample; these leave it in bytes.
+from cyclonedds._clayer import ddspy_take, ddspy_write
 from cyclonedds.builtin import (
     BuiltinDataReader,
     BuiltinTopicDcpsPublication,
@@ -47,6 +49,7 @@ _MOST_PARTICIPANTS = 60
 _WAIT_MS = 250
 _REARM_S = 0.002
 _MOST_TAKEN = 200
+_ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,14 +91,6 @@ class DdsNetwork:
             f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
             f"<Discovery>{discovery}</Discovery></Domain></CycloneDDS>"
         )
-
-
-@dataclass(frozen=True, slots=True)
-class Arrived:
-    """One message; ``sent_s`` is its writer's clock (Unix s)."""
-
-    payload: bytes
-    sent_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,12 +172,12 @@ class Dds:
     def writer(self, name: str, message: type[Message], qos: Qos) -> "DdsWriter":
         """Publish on a topic by its full ROS name."""
         topic = self._topic(name, message)
-        return DdsWriter(DataWriter(self._participant, topic, write_qos(qos)), topic)
+        return DdsWriter(DataWriter(self._participant, topic, write_qos(qos)))
 
     def _topic(self, name: str, message: type[Message]) -> Topic:
         key = name, message.ROS
         if key not in self._topics:
-            kind = _raw(message)
+            kind = _announced(message)
             self._topics[key] = Topic(self._participant, dds_topic(name), kind)
         return self._topics[key]
 
@@ -229,21 +224,16 @@ class DdsReader:
     def __init__(self, reader: DataReader) -> None:
         self.entity = reader
 
-    def take(self) -> list[Arrived]:
-        """Everything that waits, oldest first.
+    def take(self) -> list[bytes]:
+        """Everything that waits, with its encapsulation, oldest first.
 
         Raises:
             HopError: DDS refuses.
         """
-        try:
-            samples = self.entity.take(_MOST_TAKEN)
-        except DDSException as error:
-            raise HopError("dds", error.msg) from error
-        return [
-            Arrived(sample.payload, sample.sample_info.source_timestamp / 1e9)
-            for sample in samples
-            if sample.sample_info.valid_data
-        ]
+        found = ddspy_take(self.entity._ref, _ANY, _MOST_TAKEN)
+        if isinstance(found, int):
+            raise HopError("dds", DDSException(found, "taking").msg)
+        return [payload for payload, about in found if about.valid_data]
 
     @property
     def writers(self) -> int:
@@ -254,9 +244,8 @@ class DdsReader:
 class DdsWriter:
     """A publication."""
 
-    def __init__(self, writer: DataWriter, topic: Topic) -> None:
+    def __init__(self, writer: DataWriter) -> None:
         self._writer = writer
-        self._new = topic.data_type
 
     def write(self, payload: bytes) -> None:
         """Send a message with its encapsulation.
@@ -264,10 +253,10 @@ class DdsWriter:
         Raises:
             HopError: DDS refuses.
         """
-        try:
-            self._writer.write(self._new(payload))
-        except DDSException as error:
-            raise HopError("dds", error.msg) from error
+        whole = payload + bytes(-len(payload) % 4)
+        code = ddspy_write(self._writer._ref, whole)
+        if code < 0:
+            raise HopError("dds", DDSException(code, "writing").msg)
 
     @property
     def readers(self) -> int:
@@ -290,32 +279,9 @@ def _configure(network: DdsNetwork) -> None:
         raise HopError("dds", f"domain {network.domain} is configured otherwise")
 
 
-class _Payload:
-    """What Cyclone's Python takes for a sample: the bytes, as they are on the wire."""
-
-    def __init__(self, payload: bytes) -> None:
-        self.payload = payload
-        self.sample_info: Any = None
-
-    def serialize(self, **_: object) -> bytes:
-        return self.payload
-
-    @classmethod
-    def deserialize(cls, data: bytes, **_: object) -> "_Payload":
-        return cls(data)
-
-    @classmethod
-    def deserialize_key(cls, data: bytes, **_: object) -> "_Payload":
-        return cls(data)
-
-
 @cache
-def _raw(message: type[Message]) -> type[IdlStruct]:
-    """A type that DDS announces and checks, and whose samples stay bytes."""
-    kind = announced(message)
-    for name in ("__init__", "serialize", "deserialize", "deserialize_key"):
-        setattr(kind, name, _Payload.__dict__[name])
-    return kind
+def _announced(message: type[Message]) -> type[IdlStruct]:
+    return announced(message)
 
 
 def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:

@@ -284,7 +284,7 @@ async def _check(
             await asyncio.sleep(0.05)
             for topic, reader in readers.items():
                 for one in reader.take():
-                    newest = max(newest, _hear(topic, one.payload, heard, transforms))
+                    newest = max(newest, _hear(topic, one, heard, transforms))
         broker = None if link.connected else _no_broker(settings)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)

@@ -167,7 +167,7 @@ class Ros2Base:
         if not waited:
             return
         try:
-            twist = read_twist(cdr.read(m.Twist, waited[-1].payload))
+            twist = read_twist(cdr.read(m.Twist, waited[-1]))
         except UnreadableError as error:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return

@@ -45,7 +45,8 @@ def known_reason(reason: str) -> str:
 
 def lowest(caps: Iterable[Cap]) -> Cap:
     """The cap that counts: the lowest factor, people before robots before silence."""
-    return min((*caps, FREE), key=Cap._order)
+    asked = [cap for cap in caps if cap is not FREE]
+    return min((*asked, FREE), key=Cap._order) if asked else FREE
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,8 @@ class Applied:
 
     def settle(self, raw: Cap, now: float) -> "Applied":
         """Take the raw cap of this moment: down at once, up after 1.0 s."""
+        if raw is self.cap and self.waiting is None:
+            return self
         if raw.factor <= self.cap.factor:
             return Applied(raw)
         if self.waiting is None:

@@ -100,7 +100,7 @@ class RobotNode:
         self._nobody_there = held
         self._loop: asyncio.AbstractEventLoop | None = None
         self._told: tuple[Twist2D, float] = REST, 0.0
-        self._tick_due = asyncio.Event()
+        self._broken: asyncio.Future[None] | None = None
         self._next_tick: asyncio.TimerHandle | None = None
         self._command_topic = names.command_topic(apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
@@ -189,17 +189,18 @@ class RobotNode:
                 self._next_tick.cancel()
             self._drive(REST)
 
-    def sense(self, observation: Sensed) -> None:
-        """Take what the robot's own sensors say; the origin is filled in here."""
+    def sense(self, *observations: Sensed) -> None:
+        """Take what the robot's own sensors say; origins are filled in here."""
         now = self._read_clock()
-        if isinstance(observation, Odometry):
-            self._perform(
-                self._machine.odometry(observation.pose, observation.twist, now.mono)
-            )
-        elif isinstance(observation, Unplaced) and observation.twist is not None:
-            self._perform(self._machine.odometry(None, observation.twist, now.mono))
+        for one in observations:
+            if isinstance(one, Odometry):
+                self._perform(self._machine.odometry(one.pose, one.twist, now.mono))
+            elif isinstance(one, Unplaced) and one.twist is not None:
+                self._perform(self._machine.odometry(None, one.twist, now.mono))
         if self._link.connected:
-            self._uplink.send(observation, self._own(now))
+            own = self._own(now)
+            for one in observations:
+                self._uplink.send(one, own)
 
     def wish(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
@@ -228,18 +229,24 @@ class RobotNode:
     async def _tick_forever(self) -> None:
         """Tick whenever the drive was told nothing for 40 ms."""
         self._loop = asyncio.get_running_loop()
-        while True:
-            self._tick_due.clear()
-            self._put_off_tick()
+        self._broken = self._loop.create_future()
+        self._tick()
+        await self._broken
+
+    def _tick(self) -> None:
+        self._put_off_tick()
+        try:
             self._perform(self._machine.tick(self._read_clock().mono))
-            await self._tick_due.wait()
+        except Exception as error:  # ends ``run``, wherever it was called
+            if self._broken is not None and not self._broken.done():
+                self._broken.set_exception(error)
 
     def _put_off_tick(self) -> None:
         if self._loop is None:
             return
         if self._next_tick is not None:
             self._next_tick.cancel()
-        self._next_tick = self._loop.call_later(_GATE_EVERY_S, self._tick_due.set)
+        self._next_tick = self._loop.call_later(_GATE_EVERY_S, self._tick)
 
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono

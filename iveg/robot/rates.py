@@ -92,6 +92,8 @@ class Rates:
 
     def _interval_s(self, suffix: str) -> float:
         """The least time between two measures of a device (s); 0: every one."""
+        if self.level == 0.0:
+            return 0.0
         for place, (device, floor_hz) in enumerate(FLOOR_HZ.items()):
             # From the sensor's own rate (0) to its floor (1).
             share = min(1.0, self.level - place)

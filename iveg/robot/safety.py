@@ -38,6 +38,9 @@ REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 """Below the contract's 0.5 s and 0.1 s, so that a late timer still keeps them.  The
 second is for iVeg alone: ten a second would be most of what one agent can carry."""
 
+_Applied = tuple[float, str, str | None, str | None, tuple[Hold, ...], str]
+"""What makes a report news; speeds and ages alone do not."""
+
 
 class SafetyMachine:
     """Decides whether and how fast one robot may drive.
@@ -75,7 +78,7 @@ class SafetyMachine:
         self._attempts = Attempts()
         self._holds = (stored or HoldSet()).after_reboot()
         self._persisted: HoldSet | None = None
-        self._reported: SafetyReport | None = None
+        self._said: _Applied | None = None
         self._reported_at = self._measured_at = now
         if stored is None:
             self._latch(self._nameless_stop(), now)
@@ -342,57 +345,38 @@ class SafetyMachine:
             self._persisted = self._holds
             effects.append(Persist(self._holds))
         effects += [Answer(answer) for answer in answers]
-        report = self._report(now)
-        if self._report_is_due(report, now):
-            effects.append(self._say(report, now))
+        applied = self._applied()
+        is_news = applied != self._said
+        every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
+        if is_news or now - self._reported_at >= every:
+            self._said, self._reported_at = applied, now
+            is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
+            if is_measure:  # news and two a second are for the agent as well
+                self._measured_at = now
+            effects.append(Report(self._report(applied, now), is_measure))
         return tuple(effects)
 
-    def _say(self, report: SafetyReport, now: float) -> Report:
-        """The report; news and two a second are for the agent as well."""
-        is_measure = self._is_news(report) or now - self._measured_at >= REPORT_EVERY_S
-        self._reported, self._reported_at = report, now
-        if is_measure:
-            self._measured_at = now
-        return Report(report, is_measure)
+    def _applied(self) -> _Applied:
+        """What is in force; a robot that waits for resume says 0, ``hold``, none."""
+        cap, holds, challenge = self.cap, self._holds.holds, self._challenge
+        if self._free:
+            return cap.factor, cap.reason, cap.cause, cap.decision_id, holds, challenge
+        return 0.0, "hold", holds[0].id if holds else None, None, holds, challenge
 
-    def _report(self, now: float) -> SafetyReport:
-        """What is applied; a robot that waits for resume reports 0, ``hold``, none."""
-        cap, holds = self.cap, self._holds.holds
-        if not self._free:
-            cap = Cap(0.0, "clear", holds[0].id if holds else None)
+    def _report(self, applied: _Applied, now: float) -> SafetyReport:
+        factor, reason, cause, decision_id, holds, challenge = applied
         twist = self._judgement.twist
         return SafetyReport(
             self._id,
             Origin(),
-            cap.factor,
-            cap.reason if self._free else "hold",
-            cap.cause,
-            cap.decision_id,
+            factor,
+            reason,
+            cause,
+            decision_id,
             holds,
             self._holds.released,
-            self._challenge,
+            challenge,
             twist.linear_x,
             twist.angular_z,
             self._judgement.watchdog.age(now),
         )
-
-    def _report_is_due(self, report: SafetyReport, now: float) -> bool:
-        if self._is_news(report):
-            return True
-        every = REPORT_HELD_EVERY_S if self._holds.holds else REPORT_EVERY_S
-        return now - self._reported_at >= every
-
-    def _is_news(self, report: SafetyReport) -> bool:
-        return self._reported is None or _said(report) != _said(self._reported)
-
-
-def _said(report: SafetyReport) -> tuple[object, ...]:
-    """What makes a report news; speeds and ages alone do not."""
-    return (
-        report.speed_factor,
-        report.reason,
-        report.cause,
-        report.decision_id,
-        report.holds,
-        report.challenge,
-    )

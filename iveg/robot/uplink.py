@@ -6,9 +6,11 @@ the broker could not take is not sent later, because by then it is no longer tru
 While Orion is behind, what the agent is spared goes straight to iVeg (``rates``).
 """
 
+import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
+from operator import attrgetter
 from typing import Literal
 
 from iveg.domain.observations import (
@@ -42,6 +44,11 @@ _SUFFIX: dict[type, str] = {
 }
 _UNPLACED = {"odometry": "_odom", "scan": "_lidar2D"}
 _ANSWERS = "cmdexe"
+_SAID = {
+    kind: attrgetter(*(one.name for one in fields(kind) if one.name != "robot_id"))
+    for kind in (*_SUFFIX, Unplaced)
+}
+"""What an observation says besides whose it is; its origin first."""
 
 
 class Uplink:
@@ -82,6 +89,7 @@ class Uplink:
         self._single = SinglePayload(robot_id) if form == "single" else None
         self._next: Counter[str] = Counter({"_safety": first_report - 1})
         self._looked: tuple[tuple[str, int], ...] = ()
+        self._stamp = math.nan, ""
         self.rates = Rates()
         self.sent: Counter[str] = Counter()
         """Measures made, by device suffix; the single payload's is empty."""
@@ -97,10 +105,13 @@ class Uplink:
             return
         news = isinstance(observation, DetectionFrame) and self._is_news(observation)
         suffix = _suffix_of(observation)
-        stamped = replace(
-            observation, robot_id=self._id, origin=self._origin(suffix, at)
-        )
+        stamped = self._stamped(observation, self._origin(suffix, at))
         self._emit(suffix, _written(stamped), at.mono, news=news)
+
+    def _stamped(self, observation: Sensed, origin: Origin) -> Sensed:
+        """What ``replace`` would give, at a third of its price."""
+        kind = type(observation)
+        return kind(self._id, origin, *_SAID[kind](observation)[1:])
 
     def _is_news(self, frame: DetectionFrame) -> bool:
         """Whether other things are seen than before, or with another confidence."""
@@ -151,6 +162,12 @@ class Uplink:
             self.spared[suffix] += 1
             self._offer(names.direct_topic(self._id, suffix), payload)
 
+    def _stamp_of(self, wall: float) -> str:
+        """What is sensed together has one stamp, written once."""
+        if self._stamp[0] != wall:
+            self._stamp = wall, codec.format_stamp(wall)
+        return self._stamp[1]
+
     def _topic(self, suffix: str) -> str:
         return names.measure_topic(self._apikey, self._id + suffix)
 
@@ -160,7 +177,7 @@ class Uplink:
         return Origin(
             self._boot,
             self._next[suffix],
-            codec.format_stamp(at.wall),
+            self._stamp_of(at.wall),
             at.wall,
             at.mono,
             acknowledgements=echo is not None,

@@ -6,22 +6,26 @@ the end of the four bytes of encapsulation; a string has its length (with the ze
 its end) before it, a sequence its count.  XCDR2 and parameter lists are left out: ROS 2
 sends neither.
 
-Primitives that follow each other in every message of a type are read by one ``struct``
-call, prepared for each of the eight ways in which they can lie.
+Primitives that follow each other in every message of a type are written by one
+``struct`` call, prepared for each of the eight ways in which they can lie; ``decoder``
+reads them so.
 """
 
+import itertools
+import operator
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import count
-from typing import Any, Literal, Protocol, TypeVar, cast
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from iveg.domain.errors import UnreadableError
+from iveg.ros2.decoder import ByteOrder, Fields, decoder_of, layout
 from iveg.ros2.schema import (
     PRIMITIVES,
+    Kind,
     Many,
     Message,
     One,
@@ -30,18 +34,23 @@ from iveg.ros2.schema import (
     fields_of,
 )
 
-ByteOrder = Literal["<", ">"]
 _ORDERS: dict[bytes, ByteOrder] = {b"\x00\x00": ">", b"\x00\x01": "<"}
 _HEADS: dict[ByteOrder, bytes] = {">": b"\x00\x00\x00\x00", "<": b"\x00\x01\x00\x00"}
 _COUNT: dict[ByteOrder, struct.Struct] = {
     order: struct.Struct(order + "I") for order in _HEADS
 }
+_ALL: Fields = frozenset()
 
 _M = TypeVar("_M", bound=Message)
 
 
-def read(message: type[_M], payload: bytes) -> _M:
+def read(message: type[_M], payload: bytes, left_out: Fields = _ALL) -> _M:
     """Read one message; what follows it is padding and not looked at.
+
+    Args:
+        message: Its type.
+        payload: With its encapsulation.
+        left_out: Fields that nobody looks at; they keep their default.
 
     Raises:
         UnreadableError: bytes that this type does not describe.
@@ -49,19 +58,19 @@ def read(message: type[_M], payload: bytes) -> _M:
     order = _ORDERS.get(payload[:2])
     if order is None or len(payload) < 4:
         raise UnreadableError("bad_encapsulation", payload[:4].hex())
-    cursor = _Cursor(memoryview(payload)[4:], order)
-    codec = _codec_of(message)
-    codec.read(cursor)
-    return cast("_M", codec.build(cursor.values))
+    try:
+        decoded: _M = decoder_of(message, order, left_out)(memoryview(payload)[4:])
+    except struct.error as error:
+        raise UnreadableError("too_short", f"{len(payload)} bytes") from error
+    except UnicodeDecodeError as error:
+        raise UnreadableError("bad_text", error.reason) from error
+    return decoded
 
 
 def write(message: Message, order: ByteOrder = "<") -> bytes:
     """The bytes of one message, with its encapsulation."""
-    values: list[Any] = []
-    codec = _codec_of(type(message))
-    codec.flatten(message, values)
     out = _Out(order)
-    codec.write(out, iter(values))
+    _codec_of(type(message)).write(out, message)
     return _HEADS[order] + bytes(out.data)
 
 
@@ -74,103 +83,35 @@ def _codec_of(message: type[Message]) -> "_Codec":
 
 
 class _Codec:
-    """Steps over the wire, and how a message comes apart into values and together."""
+    """Steps over the wire, and how a message comes apart into values."""
 
     def __init__(self, message: type[Message]) -> None:
-        self._message = message
-        self._fields = [(name, _nested(kind)) for name, kind in fields_of(message)]
-        self._steps = _merged(self.leaves())
-        names: dict[str, Any] = {}
-        words = self._words(names, count())
-        # As dataclasses makes __init__: one expression is twice as fast as a recursion.
-        self.build: Callable[[list[Any]], Any] = eval(f"lambda v: {words}", names)  # noqa: S307
-        """The message of its values."""
+        leaves = list(_leaves(message))
+        self._steps = _merged(kind for _, kind in leaves)
+        # With a name too many it gives a tuple of one leaf as well.
+        self._values = operator.attrgetter(*(name for name, _ in leaves), "ROS")
 
-    def _words(self, names: dict[str, Any], at: "count[int]") -> str:
-        """What makes a message: ``m1(m0(v[0], v[1]), v[2])``."""
-        parts = [
-            f"v[{next(at)}]" if nested is None else nested._words(names, at)
-            for _, nested in self._fields
-        ]
-        name = f"m{len(names)}"
-        names[name] = self._message
-        return f"{name}({', '.join(parts)})"
-
-    def leaves(self) -> Iterator["One | _Step"]:
-        """What lies on the wire in order, structures dissolved."""
-        for (_, nested), (_, kind) in zip(
-            self._fields, fields_of(self._message), strict=True
-        ):
-            if nested is not None:
-                yield from nested.leaves()
-            else:
-                yield kind if isinstance(kind, One) else _step(kind)
-
-    def read(self, cursor: "_Cursor") -> None:
-        """Append this message's values to those of the cursor."""
-        for step in self._steps:
-            step.read(cursor)
-
-    def write(self, out: "_Out", values: Iterator[Any]) -> None:
-        """Write as many values as this message has."""
+    def write(self, out: "_Out", message: Message) -> None:
+        """Write its values in order."""
+        values = iter(self._values(message))
         for step in self._steps:
             step.write(out, values)
 
-    def flatten(self, message: Any, values: list[Any]) -> None:
-        """The values of this message, in order."""
-        for name, nested in self._fields:
-            value = getattr(message, name)
-            if nested is None:
-                values.append(value)
-            else:
-                nested.flatten(value, values)
 
-
-def _nested(kind: object) -> _Codec | None:
-    if isinstance(kind, Structure) and not kind.many:
-        return _codec_of(kind.message)
-    return None
+def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kind]]:
+    """What lies on the wire in order, by dotted name; structures dissolved."""
+    for name, kind in fields_of(message):
+        if isinstance(kind, Structure) and not kind.many:
+            yield from _leaves(kind.message, f"{within}{name}.")
+        else:
+            yield within + name, kind
 
 
 # --- steps over the wire -----------------------------------------------------------
 
 
 class _Step(Protocol):
-    def read(self, cursor: "_Cursor") -> None: ...
     def write(self, out: "_Out", values: Iterator[Any]) -> None: ...
-
-
-@dataclass(slots=True)
-class _Cursor:
-    """Where reading stands, and what was read."""
-
-    data: memoryview
-    order: ByteOrder
-    at: int = 0
-    values: list[Any] = field(default_factory=list)
-
-    def numbers(self, layout: struct.Struct) -> tuple[Any, ...]:
-        """Numbers at this place."""
-        try:
-            numbers = layout.unpack_from(self.data, self.at)
-        except struct.error as error:
-            raise UnreadableError("too_short", f"at byte {self.at}") from error
-        self.at += layout.size
-        return numbers
-
-    def count(self) -> int:
-        """A length or count."""
-        self.at += -self.at % 4
-        (count,) = self.numbers(_COUNT[self.order])
-        return int(count)
-
-    def take(self, size: int) -> memoryview:
-        """Bytes at this place."""
-        taken = self.data[self.at : self.at + size]
-        if len(taken) < size:
-            raise UnreadableError("too_short", f"at byte {self.at}")
-        self.at += size
-        return taken
 
 
 @dataclass(slots=True)
@@ -195,40 +136,18 @@ class _Run:
 
     def __init__(self, primitives: list[str]) -> None:
         self._size = len(primitives)
+        run = [(*PRIMITIVES[one], 1) for one in primitives]
         self._layouts = {
-            order: [struct.Struct(order + _layout(primitives, n)) for n in range(8)]
+            order: [struct.Struct(order + layout(run, n)) for n in range(8)]
             for order in _HEADS
         }
 
-    def read(self, cursor: _Cursor) -> None:
-        cursor.values += cursor.numbers(self._layouts[cursor.order][cursor.at % 8])
-
     def write(self, out: _Out, values: Iterator[Any]) -> None:
-        numbers = [next(values) for _ in range(self._size)]
-        layout = self._layouts[out.order][len(out.data) % 8]
-        out.data += layout.pack(*numbers)
-
-
-def _layout(primitives: list[str], start: int) -> str:
-    """``struct``'s words for primitives that begin at ``start`` modulo eight."""
-    at, layout = start, ""
-    for primitive in primitives:
-        code, size = PRIMITIVES[primitive]
-        gap = -at % size
-        layout += "x" * gap + code
-        at += gap + size
-    return layout
+        prepared = self._layouts[out.order][len(out.data) % 8]
+        out.data += prepared.pack(*itertools.islice(values, self._size))
 
 
 class _String:
-    def read(self, cursor: _Cursor) -> None:
-        raw = cursor.take(cursor.count())
-        try:
-            # One byte is the zero at its end; some senders leave an empty text without.
-            cursor.values.append(str(raw[:-1], "utf-8"))
-        except UnicodeDecodeError as error:
-            raise UnreadableError("bad_text", f"at byte {cursor.at}") from error
-
     def write(self, out: _Out, values: Iterator[Any]) -> None:
         raw = str(next(values)).encode() + b"\x00"
         out.count(len(raw))
@@ -242,15 +161,6 @@ class _Numbers:
         code, self._size = PRIMITIVES[kind.primitive]
         self._count = kind.count
         self._types = {order: np.dtype(order + code) for order in _HEADS}
-        self._native = self._types["<"].newbyteorder("=")
-
-    def read(self, cursor: _Cursor) -> None:
-        count = cursor.count() if self._count is None else self._count
-        if count:
-            cursor.at += -cursor.at % self._size
-        raw = cursor.take(count * self._size)
-        numbers = np.frombuffer(raw, self._types[cursor.order])
-        cursor.values.append(numbers.astype(self._native, copy=False))
 
     def write(self, out: _Out, values: Iterator[Any]) -> None:
         numbers = np.asarray(next(values), self._types[out.order])
@@ -269,25 +179,11 @@ class _Messages:
     def __init__(self, kind: Structure) -> None:
         self._codec = _codec_of(kind.message)
 
-    def read(self, cursor: _Cursor) -> None:
-        count = cursor.count()
-        if count > len(cursor.data) - cursor.at:
-            raise UnreadableError("too_short", f"{count} items at byte {cursor.at}")
-        outer, found = cursor.values, []
-        for _ in range(count):
-            cursor.values = []
-            self._codec.read(cursor)
-            found.append(self._codec.build(cursor.values))
-        cursor.values = outer
-        outer.append(tuple(found))
-
     def write(self, out: _Out, values: Iterator[Any]) -> None:
         items = next(values)
         out.count(len(items))
         for item in items:
-            flat: list[Any] = []
-            self._codec.flatten(item, flat)
-            self._codec.write(out, iter(flat))
+            self._codec.write(out, item)
 
 
 def _step(kind: Many | Text | Structure) -> _Step:
@@ -300,17 +196,17 @@ def _step(kind: Many | Text | Structure) -> _Step:
             return _Messages(kind)
 
 
-def _merged(leaves: Iterator[One | _Step]) -> list[_Step]:
+def _merged(kinds: Iterable[Kind]) -> list[_Step]:
     steps: list[_Step] = []
     run: list[str] = []
-    for leaf in leaves:
-        if isinstance(leaf, One):
-            run.append(leaf.primitive)
+    for kind in kinds:
+        if isinstance(kind, One):
+            run.append(kind.primitive)
             continue
         if run:
             steps.append(_Run(run))
             run = []
-        steps.append(leaf)
+        steps.append(_step(kind))
     if run:
         steps.append(_Run(run))
     return steps

@@ -55,7 +55,7 @@ class Witness:
         while not self._ended.wait(0.01):
             for one in self._reader.take():
                 try:
-                    said = cdr.read(m.Odometry, one.payload)
+                    said = cdr.read(m.Odometry, one)
                 except UnreadableError:
                     continue
                 speed = said.twist.twist.linear.x

@@ -11,13 +11,6 @@ from iveg.ros2.schema import Message
 
 
 @dataclass(frozen=True, slots=True)
-class Arrived:
-    """One message."""
-
-    payload: bytes
-
-
-@dataclass(frozen=True, slots=True)
 class Endpoint:
     """Somebody else's writer, unless ``own``."""
 
@@ -32,9 +25,9 @@ class Endpoint:
 class Reader:
     """A subscription."""
 
-    waiting: list[Arrived] = field(default_factory=list)
+    waiting: list[bytes] = field(default_factory=list)
 
-    def take(self) -> list[Arrived]:
+    def take(self) -> list[bytes]:
         found, self.waiting = self.waiting, []
         return found
 
@@ -81,7 +74,7 @@ class FakeNetwork:
 
     def publish(self, topic: str, message: Message, times: int = 1) -> None:
         """Somebody else publishes."""
-        arrived = Arrived(cdr.write(message))
+        arrived = cdr.write(message)
         self.readers[topic].waiting += [arrived] * times
         for readers, on_data in self._watched:
             if self.readers[topic] in readers:

@@ -47,7 +47,7 @@ def dds(domain: int, talker: subprocess.Popen[bytes]) -> Iterator[Dds]:
 
 def heard(reader: DdsReader) -> list[float] | None:
     """Numbers that wait; None when there are none."""
-    found = [cdr.read(m.Twist, one.payload).linear.x for one in reader.take()]
+    found = [cdr.read(m.Twist, one).linear.x for one in reader.take()]
     return found or None
 
 

@@ -72,8 +72,12 @@ def write_detections(value: DetectionFrame) -> bytes:
                 "class_id": detection.class_id,
                 "probability": round(detection.probability, 4),
                 "position": {
-                    side: round(getattr(detection.box, side), 4)
-                    for side in ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
+                    "xmin": round(detection.box.xmin, 4),
+                    "xmax": round(detection.box.xmax, 4),
+                    "ymin": round(detection.box.ymin, 4),
+                    "ymax": round(detection.box.ymax, 4),
+                    "zmin": round(detection.box.zmin, 4),
+                    "zmax": round(detection.box.zmax, 4),
                 },
                 "frame_id": detection.frame_id,
                 "det_id": detection.det_id,

@@ -5,6 +5,7 @@ is slow, or stands where driving on would be a guess.
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
@@ -59,6 +60,8 @@ class InputFaults:
 
     def faults(self, now: float) -> tuple[RobotFault, ...]:
         """What lasts, in the order in which it began."""
+        if not self._noted:
+            return ()
         self._noted = {
             key: one for key, one in self._noted.items() if now - one.last <= LASTS_S
         }
@@ -67,11 +70,12 @@ class InputFaults:
             for (code, about), one in self._noted.items()
         )
 
-    def factor(self, now: float) -> tuple[float, str | None]:
-        """The fastest that is still no guess, and because of what."""
-        codes = [one.code for one in self.faults(now)]
-        for code in codes:
-            if code in STANDS:
-                return 0.0, code
-        slow = next((code for code in codes if code not in HARMLESS), None)
-        return (FULL_SPEED if slow is None else HALF_SPEED), slow
+
+def speed_of(faults: Iterable[RobotFault]) -> tuple[float, str | None]:
+    """The factor that is still no guess with these faults, and because of which."""
+    codes = [one.code for one in faults]
+    for code in codes:
+        if code in STANDS:
+            return 0.0, code
+    slow = next((code for code in codes if code not in HARMLESS), None)
+    return (FULL_SPEED if slow is None else HALF_SPEED), slow

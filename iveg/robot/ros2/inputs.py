@@ -8,7 +8,7 @@ message is read, so a flood costs no more than its bytes.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Battery as BatterySaid
@@ -25,7 +25,8 @@ from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import Battery
-from iveg.robot.ros2.transforms import NoTransformError, Rigid, TransformBuffer
+from iveg.robot.ros2.rigid import Rigid
+from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
@@ -45,6 +46,14 @@ TOPICS: dict[str, type[Message]] = {
     "path": m.Path,
 }
 """What is listened to, in the order in which it is read."""
+_UNREAD = frozenset(
+    {
+        (m.PoseWithCovariance, "covariance"),
+        (m.TwistWithCovariance, "covariance"),
+        (m.ObjectHypothesisWithPose, "pose"),
+    }
+)
+"""What nothing here looks at; a box says where a thing is."""
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
@@ -73,15 +82,6 @@ def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
         for key, message in TOPICS.items()
         if (name := getattr(topics, key)) and key not in camera
     }
-
-
-class Payload(Protocol):
-    """One message as DDS gave it."""
-
-    @property
-    def payload(self) -> bytes:
-        """With its encapsulation."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,19 +165,17 @@ class SensorInputs:
     # --- what came ----------------------------------------------------------------
 
     def hear(
-        self, topic: str, arrived: Sequence[Payload], now: float, most: int = 0
+        self, topic: str, arrived: Sequence[bytes], now: float, most: int = 0
     ) -> None:
         """Take what waited on one of ``TOPICS``; ``most`` is how much could have."""
-        if not arrived:
-            return
         self._heard_at[topic] = now
         if most and len(arrived) >= most:
             self.input_faults.note("flood", self._name(topic), now)
         if topic in ("tf", "tf_static"):
             for one in arrived:
-                self._hear_transforms(topic, one.payload, now)
+                self._hear_transforms(topic, one, now)
         else:
-            self._newest[topic] = arrived[-1].payload
+            self._newest[topic] = arrived[-1]
 
     def _hear_transforms(self, topic: str, payload: bytes, now: float) -> None:
         message = self._read(topic, m.TFMessage, payload, now)
@@ -225,7 +223,7 @@ class SensorInputs:
         self, topic: str, message: type[_M], payload: bytes, now: float
     ) -> _M | None:
         try:
-            return cdr.read(message, payload)
+            return cdr.read(message, payload, _UNREAD)
         except UnreadableError:
             self.input_faults.note("unreadable", self._name(topic), now)
             return None

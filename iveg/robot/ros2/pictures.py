@@ -19,7 +19,7 @@ from iveg.robot.grounding.cloud import DepthPicture, Pinhole, top_left
 from iveg.robot.grounding.locate import Grounded, Grounding, Segment, ground
 from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
 from iveg.robot.ros2.reading import hull_of, read_hypothesis
-from iveg.robot.ros2.transforms import Rigid
+from iveg.robot.ros2.rigid import Rigid
 from iveg.ros2 import messages as m
 
 _SQUARE = 0.02

@@ -6,6 +6,7 @@ raise ``UnreadableError`` with a short, stable reason, which is what gets counte
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,13 +14,12 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Navigation, Origin
 from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
-from iveg.robot.ros2.transforms import Rigid, matrix_of, parts_of, rigid_of
+from iveg.robot.ros2.rigid import Rigid, rigid_of
 from iveg.ros2 import messages as m
 
 FASTEST_M_S = 20.0
 """Faster than anything that drives between crop rows: a number that cannot be meant."""
 _FARTHEST_M = 1e6
-_UNTURNED = (0.0, 0.0, 0.0, 1.0)
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
@@ -33,7 +33,7 @@ def read_pose(odometry: m.Odometry) -> Rigid:
     """
     pose = odometry.pose.pose
     rigid = rigid_of(pose.position, pose.orientation)
-    if rigid is None or not (np.abs(rigid.move) <= _FARTHEST_M).all():
+    if rigid is None or max(map(abs, rigid.move)) > _FARTHEST_M:
         raise UnreadableError("not_a_number", "a pose")
     return rigid
 
@@ -116,18 +116,19 @@ def read_detection(
     """
     class_id, probability = read_hypothesis(detection.results, classes)
     centre, size = detection.bbox.center, detection.bbox.size
-    box = parts_of(centre.position, centre.orientation)
+    box = rigid_of(centre.position, centre.orientation)
     sides = size.x, size.y, size.z
     if box is None or not all(0.0 <= side < math.inf for side in sides):
         raise UnreadableError("not_a_number", "a box")
-    move, turn = box
-    # Most detectors turn no boxes.
-    axes = place.turn if turn == _UNTURNED else place.turn @ matrix_of(turn)
-    middle = place.turn @ np.array(move) + place.move
+    placed = place.compose(box)
     # A turned box reaches as far as its half sides do together, along each axis.
-    reach = np.abs(axes) @ (0.5 * np.array(sides))
+    (x, y, z), (along, across, up) = placed.move, sides
+    (a, b, c), (d, e, f), (g, h, i) = placed.rows
+    dx = 0.5 * (abs(a) * along + abs(b) * across + abs(c) * up)
+    dy = 0.5 * (abs(d) * along + abs(e) * across + abs(f) * up)
+    dz = 0.5 * (abs(g) * along + abs(h) * across + abs(i) * up)
+    hull = _within_world(Box3D(x - dx, x + dx, y - dy, y + dy, z - dz, z + dz))
     det_id = clean(detection.id) or None
-    hull = _box_of(middle - reach, middle + reach)
     return Detection(class_id, probability, hull, "map", det_id)
 
 
@@ -141,7 +142,9 @@ def read_hypothesis(
     """
     if not results:
         raise UnreadableError("no_class", "a detection without a hypothesis")
-    best = max(results, key=lambda one: _score(one.hypothesis)).hypothesis
+    best = results[0].hypothesis
+    if len(results) > 1:
+        best = max((one.hypothesis for one in results), key=_score)
     if not 0.0 <= best.score <= 1.0:
         raise UnreadableError("bad_probability", f"{best.score}")
     name = clean(best.class_id)
@@ -162,14 +165,22 @@ def hull_of(points: np.ndarray) -> Box3D:
     Raises:
         UnreadableError: ``not_a_number``, ``absurd``.
     """
-    return _box_of(points.min(axis=0), points.max(axis=0))
+    (x, y, z), (right, up, far) = points.min(axis=0), points.max(axis=0)
+    return _within_world(
+        Box3D(float(x), float(right), float(y), float(up), float(z), float(far))
+    )
 
 
-def _box_of(least: np.ndarray, most: np.ndarray) -> Box3D:
-    low, high = least.tolist(), most.tolist()
-    if not all(abs(side) <= _FARTHEST_M for side in (*low, *high)):
-        raise UnreadableError("absurd", "a box outside of the world")
-    return Box3D(low[0], high[0], low[1], high[1], low[2], high[2])
+def _within_world(box: Box3D) -> Box3D:
+    most = _FARTHEST_M
+    # What is no number is in no order either.
+    if (
+        -most <= box.xmin <= box.xmax <= most
+        and -most <= box.ymin <= box.ymax <= most
+        and -most <= box.zmin <= box.zmax <= most
+    ):
+        return box
+    raise UnreadableError("absurd", "a box outside of the world")
 
 
 def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigation:
@@ -219,6 +230,7 @@ def read_battery(state: m.BatteryState) -> Battery:
     return Battery(share, volts, charging.get(state.power_supply_status))
 
 
+@lru_cache(1024)
 def clean(text: str) -> str:
     """A text that Orion takes."""
     return clean_text(text.translate(_FORBIDDEN)).strip()

@@ -22,7 +22,8 @@ from iveg.robot.node import RobotNode
 from iveg.robot.ros2 import neighbours
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.drive import DriveTopics, message_of
-from iveg.robot.ros2.inputs import PICTURES, Payload, SensorInputs, listened
+from iveg.robot.ros2.input_faults import speed_of
+from iveg.robot.ros2.inputs import PICTURES, SensorInputs, listened
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
@@ -42,7 +43,7 @@ _MET_WITHIN_S = 5.0
 class Reader(Protocol):
     """A subscription."""
 
-    def take(self) -> Sequence[Payload]:
+    def take(self) -> Sequence[bytes]:
         """Everything that waits, oldest first."""
         ...
 
@@ -210,32 +211,52 @@ class Ros2Robot:
 
     async def _sense_forever(self) -> None:
         """One timer for all: each that wakes the process costs as much as its work."""
-        due = clock.now().mono
-        for tick in itertools.count():
-            self._sense()
-            if tick % _LOOK_ROUND_TICKS == 0:
-                self._look_round()
-            if tick % _TELL_TICKS == 0:
-                self._tell_neighbours()
-            due = max(due + 1 / RATE_HZ, clock.now().mono)
-            await asyncio.sleep(max(0.0, due - clock.now().mono))
+        loop, ticks = asyncio.get_running_loop(), itertools.count()
+        broken: asyncio.Future[None] = loop.create_future()
+        due, timer = clock.now().mono, None
+
+        def tick() -> None:
+            nonlocal due, timer
+            try:
+                self._tick(next(ticks))
+            except Exception as error:  # ends ``run``
+                broken.set_exception(error)
+                return
+            now = clock.now().mono
+            due = max(due + 1 / RATE_HZ, now)
+            timer = loop.call_later(due - now, tick)
+
+        tick()
+        try:
+            await broken
+        finally:
+            if timer is not None:
+                timer.cancel()
+
+    def _tick(self, number: int) -> None:
+        self._sense()
+        if number % _LOOK_ROUND_TICKS == 0:
+            self._look_round()
+        if number % _TELL_TICKS == 0:
+            self._tell_neighbours()
 
     # --- in -----------------------------------------------------------------------
 
     def _sense(self) -> None:
         now = clock.now()
         for topic, one in self._ins.items():
-            self.inputs.hear(topic, one.reader.take(), now.mono, one.most)
-        for observation in self.inputs.tick(now):
-            self.node.sense(observation)
+            waited = one.reader.take()
+            if waited:
+                self.inputs.hear(topic, waited, now.mono, one.most)
+        self.node.sense(*self.inputs.tick(now))
         self._judge(now.mono)
 
     def _judge(self, now: float) -> None:
         faults = self._input_faults.faults(now)
-        factor, cause = self._input_faults.factor(now)
-        self.node.limit(factor, cause)
+        self.node.limit(*speed_of(faults))
         self.node.tell_faults(faults)
-        self._log(faults)
+        if faults or self._said:
+            self._log(faults)
 
     def _log(self, faults: tuple[RobotFault, ...]) -> None:
         """Each trouble once when it begins and once when it is over."""
@@ -253,7 +274,7 @@ class Ros2Robot:
             self._input_faults.note("flood", self._names.cmd_vel_in, now)
         if not waited:
             return
-        wish = self._topics.read(waited[-1].payload, now)
+        wish = self._topics.read(waited[-1], now)
         if wish is not None:
             self.node.wish(wish)
 

@@ -20,7 +20,7 @@ from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import messages as m
-from tests.fakes.ros2_network import Arrived, FakeNetwork
+from tests.fakes.ros2_network import FakeNetwork
 
 AHEAD = Twist2D(0.5, 0.1)
 
@@ -79,7 +79,7 @@ class Emulated:
         for topic in TOPICS:
             writer = self.network.writers.get(getattr(self.config.full_topics, topic))
             if writer is not None:
-                senses.hear(topic, [Arrived(one) for one in writer.sent], now.mono)
+                senses.hear(topic, writer.sent, now.mono)
         return senses.tick(now)
 
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,13 +15,6 @@ from iveg.ros2.schema import Message
 
 WALL = 1_700_000_000.0
 MONO = 1000.0
-
-
-@dataclass(frozen=True, slots=True)
-class Arrived:
-    """One message as DDS gives it."""
-
-    payload: bytes
 
 
 def at(seconds: float) -> Instant:
@@ -117,7 +109,7 @@ class Bench:
             self.hear("tf", tf(link("map", "odom", 10.0)))
 
     def hear(self, topic: str, message: Message, after: float = 0.0) -> "Bench":
-        self.inputs.hear(topic, [Arrived(cdr.write(message))], MONO + after)
+        self.inputs.hear(topic, [cdr.write(message)], MONO + after)
         return self
 
     def tick(self, after: float = 0.0) -> list[Sensed]:

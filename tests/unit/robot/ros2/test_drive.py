@@ -8,7 +8,7 @@ from iveg.domain.geometry import Twist2D
 from iveg.robot.gate import REST
 from iveg.robot.ros2.config import Drive
 from iveg.robot.ros2.drive import DriveTopics
-from iveg.robot.ros2.input_faults import InputFaults
+from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2.said import stamp
@@ -51,7 +51,7 @@ def test_a_twist_that_nobody_can_mean_is_a_wish_to_rest(
 
     assert wish == REST
     assert input_faults.counters == {code: 1}
-    assert input_faults.factor(5.0) == (0.5, code)
+    assert speed_of(input_faults.faults(5.0)) == (0.5, code)
 
 
 def test_bytes_that_are_no_twist_are_a_wish_to_rest() -> None:

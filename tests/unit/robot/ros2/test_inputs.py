@@ -13,10 +13,11 @@ from iveg.domain.observations import (
     Odometry,
     Unplaced,
 )
+from iveg.robot.ros2.input_faults import speed_of
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
-from tests.unit.robot.ros2.said import Arrived, Bench, link, look, seen, tf
+from tests.unit.robot.ros2.said import Bench, link, look, seen, tf
 
 # --- odometry -----------------------------------------------------------------------
 
@@ -42,7 +43,7 @@ def test_of_what_waited_only_the_newest_goes_out() -> None:
     bench = Bench()
     waited = [said.odometry(float(n), after=n / 100) for n in range(5)]
 
-    bench.inputs.hear("odometry", [Arrived(cdr.write(o)) for o in waited], said.MONO)
+    bench.inputs.hear("odometry", [cdr.write(o) for o in waited], said.MONO)
     (found,) = bench.tick()
 
     assert isinstance(found, Odometry)
@@ -92,7 +93,10 @@ def test_silence_of_odometry_is_named_from_the_start() -> None:
     bench.tick(1.5)
 
     assert bench.faults(1.5) == {"no_data": "/odom"}
-    assert bench.inputs.input_faults.factor(said.MONO + 1.5) == (0.5, "no_data")
+    assert speed_of(bench.inputs.input_faults.faults(said.MONO + 1.5)) == (
+        0.5,
+        "no_data",
+    )
 
 
 def test_the_same_message_again_is_no_news() -> None:
@@ -123,7 +127,7 @@ def test_odometry_that_cannot_be_is_named_counted_and_slows(
     assert bench.hear("odometry", message).tick() == []
     assert bench.faults() == {code: "/odom"}
     assert bench.inputs.input_faults.counters[code] == 1
-    assert bench.inputs.input_faults.factor(said.MONO) == (0.5, code)
+    assert speed_of(bench.inputs.input_faults.faults(said.MONO)) == (0.5, code)
 
 
 def test_time_that_goes_back_is_named_and_its_message_is_dropped() -> None:
@@ -165,7 +169,7 @@ def test_a_clock_that_is_off_by_an_hour_is_named() -> None:
 
 def test_a_flood_is_named() -> None:
     bench = Bench()
-    waited = [Arrived(cdr.write(said.odometry(after=n / 1000))) for n in range(50)]
+    waited = [cdr.write(said.odometry(after=n / 1000)) for n in range(50)]
 
     bench.inputs.hear("odometry", waited, said.MONO, 50)
 
@@ -174,7 +178,7 @@ def test_a_flood_is_named() -> None:
 
 def test_bytes_of_another_layout_are_named() -> None:
     bench = Bench()
-    bench.inputs.hear("odometry", [Arrived(b"\0\1\0\0short")], said.MONO)
+    bench.inputs.hear("odometry", [b"\0\1\0\0short"], said.MONO)
 
     assert bench.tick() == []
     assert bench.faults() == {"unreadable": "/odom"}

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.geometry import Pose2D
-from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer, rigid_of
+from iveg.robot.ros2.rigid import rigid_of
+from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2.said import WALL, link, stamp, tf
 
@@ -154,4 +155,5 @@ def test_a_quaternion_of_any_length_is_a_turn() -> None:
 
     assert rigid is not None
     assert rigid.flat().yaw == pytest.approx(math.pi / 2)
-    assert np.allclose(rigid.turn @ rigid.turn.T, np.eye(3))
+    turn = np.array(rigid.rows)
+    assert np.allclose(turn @ turn.T, np.eye(3))

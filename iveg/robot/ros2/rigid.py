@@ -1,0 +1,123 @@
+"""Where one frame is in another: a move and a turn, in plain numbers.
+
+For so few numbers NumPy only slows; a matrix is made where many points are moved.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.geometry import Pose2D
+from iveg.ros2 import messages as m
+
+Three = tuple[float, float, float]
+Four = tuple[float, float, float, float]
+Rows = tuple[Three, Three, Three]
+
+
+@dataclass(frozen=True, slots=True)
+class Rigid:
+    """Where one frame is in another: p_outer = turn · p_inner + move (m).
+
+    Attributes:
+        move: Of the inner frame's origin (m).
+        q: Unit quaternion of the turn: x, y, z, w.
+    """
+
+    move: Three = (0.0, 0.0, 0.0)
+    q: Four = (0.0, 0.0, 0.0, 1.0)
+
+    @property
+    def rows(self) -> Rows:
+        """The turn as the rows of a matrix."""
+        x, y, z, w = self.q
+        return (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+        )
+
+    def of(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points of the inner frame in the outer; shape (n, 3), (m)."""
+        moved: NDArray[np.float64] = points @ np.array(self.rows).T + self.move
+        return moved
+
+    def compose(self, inner: "Rigid") -> "Rigid":
+        """Where the inner one's inner frame is in this one's outer."""
+        x, y, z, w = self.q
+        a, b, c, d = inner.q
+        turned = (
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        )
+        u, v, t = self._turned(inner.move)
+        right, up, out = self.move
+        return Rigid((u + right, v + up, t + out), turned)
+
+    def inverse(self) -> "Rigid":
+        """Where the outer frame is in the inner."""
+        x, y, z, w = self.q
+        back = Rigid(q=(-x, -y, -z, w))
+        u, v, t = back._turned(self.move)
+        return Rigid((-u, -v, -t), back.q)
+
+    def _turned(self, point: Three) -> Three:
+        """Turned: v + 2 w (q × v) + 2 q × (q × v)."""
+        x, y, z, w = self.q
+        u, v, t = point
+        a, b, c = 2 * (y * t - z * v), 2 * (z * u - x * t), 2 * (x * v - y * u)
+        return (
+            u + w * a + y * c - z * b,
+            v + w * b + z * a - x * c,
+            t + w * c + x * b - y * a,
+        )
+
+    def flat(self) -> Pose2D:
+        """Seen from above."""
+        x, y, z, w = self.q
+        yaw = math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        return Pose2D(self.move[0], self.move[1], yaw)
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the two z axes (rad)."""
+        return math.acos(max(-1.0, min(1.0, self.rows[2][2])))
+
+    def towards(self, later: "Rigid", part: float) -> "Rigid":
+        """A part (0 to 1) of the way: straight, and turning least at an even pace."""
+        ends = zip(self.move, later.move, strict=True)
+        x, y, z = (a + part * (b - a) for a, b in ends)
+        return Rigid((x, y, z), _slerp(self.q, later.q, part))
+
+
+HERE = Rigid()
+
+
+def rigid_of(translation: m.Vector3 | m.Point, rotation: m.Quaternion) -> Rigid | None:
+    """A translation and a quaternion of any length; None for what is no turn."""
+    move = translation.x, translation.y, translation.z
+    x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    if not (1e-6 < length < math.inf and all(map(math.isfinite, move))):
+        return None
+    return Rigid(move, (x / length, y / length, z / length, w / length))
+
+
+def _slerp(a: Four, b: Four, part: float) -> Four:
+    cosine = sum(one * other for one, other in zip(a, b, strict=True))
+    side = -1.0 if cosine < 0.0 else 1.0
+    cosine = abs(cosine)
+    if cosine > 0.9995:
+        of_a, of_b = 1.0 - part, part
+    else:
+        angle = math.acos(cosine)
+        of_a, of_b = math.sin((1.0 - part) * angle), math.sin(part * angle)
+    x, y, z, w = (
+        of_a * one + side * of_b * other for one, other in zip(a, b, strict=True)
+    )
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return x / length, y / length, z / length, w / length

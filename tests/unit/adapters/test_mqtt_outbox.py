@@ -1,0 +1,31 @@
+"""The bytes of telemetry, spelled out by the rules of MQTT 3.1.1."""
+
+import pytest
+
+from iveg.adapters.mqtt_outbox import packet_of
+
+
+def test_a_packet_is_a_publish_that_nobody_confirms() -> None:
+    packet = packet_of("/iveg/AGI_odom/attrs", b"{}")
+
+    assert packet == b"\x30\x18\x00\x14/iveg/AGI_odom/attrs{}"
+
+
+@pytest.mark.parametrize(
+    ("size", "length"),
+    [
+        (127, "7f"),
+        (128, "8001"),
+        (16_383, "ff7f"),
+        (16_384, "808001"),
+        (2_097_152, "80808001"),
+    ],
+)
+def test_a_length_takes_seven_bits_a_byte(size: int, length: str) -> None:
+    packet = packet_of("t", bytes(size - 3))
+
+    assert packet[1:].hex().startswith(length + "0001")
+
+
+def test_a_topic_is_counted_in_bytes() -> None:
+    assert packet_of("ä", b"").hex() == "300400" + "02" + "c3a4"
