@@ -9,9 +9,10 @@ from fastapi.routing import iter_route_contexts
 from iveg.app import Dss, create_app
 from iveg.settings import Settings
 from iveg.web.security.authentication import Action, declared_action, undeclared
-from tests.processes import ROOT
+from tests.architecture import documents
 
-INTERFACES = (ROOT / "docs/interfaces.md").read_text()
+INTERFACES = documents.interfaces()
+HEADINGS = documents.named_headings(INTERFACES)
 STATIC_FILES = "/static"
 OPEN_TO_STRANGERS = {"/healthz", "/signin", "/ngsi/notifications", "/sw.js"}
 """Notifications have a secret of their own; the service worker is a file like all
@@ -45,15 +46,29 @@ def test_what_moves_a_robot_asks_for_more_than_what_stops_it(app: FastAPI) -> No
     assert asked["resume"] == "release"
 
 
-def test_every_route_has_its_mention_in_the_contract(app: FastAPI) -> None:
-    pages = {"/", "/about", "/history", "/signin", "/sw.js"}
-    unmentioned = [
-        path
-        for path, _ in _doors(app)
-        if path not in pages and _mention(path) not in INTERFACES
-    ]
+def test_every_route_of_the_api_has_its_heading_in_the_contract(app: FastAPI) -> None:
+    routes = {
+        f"{method} {_written(path)}"
+        for path, methods in _methods(app)
+        for method in methods
+        if path.startswith("/api/v1")
+    }
 
-    assert unmentioned == []
+    assert routes - HEADINGS == set()
+
+
+def test_every_other_route_is_in_the_contract(app: FastAPI) -> None:
+    others = {path for path, _ in _methods(app) if not path.startswith("/api/v1")}
+
+    assert {path for path in others if f"{_written(path)}`" not in INTERFACES} == set()
+
+
+def _methods(app: FastAPI) -> list[tuple[str, set[str]]]:
+    return [
+        (str(route.path), set(route.methods or ()))
+        for route in iter_route_contexts(app.routes)
+        if route.path != STATIC_FILES
+    ]
 
 
 def _doors(app: FastAPI) -> list[tuple[str, Action | None]]:
@@ -64,6 +79,6 @@ def _doors(app: FastAPI) -> list[tuple[str, Action | None]]:
     ]
 
 
-def _mention(path: str) -> str:
+def _written(path: str) -> str:
     """How the contract writes a path: below ``/api/v1``, every parameter ``{id}``."""
     return re.sub(r"\{\w+(?::\w+)?\}", "{id}", path.removeprefix("/api/v1"))

@@ -8,6 +8,7 @@ import pytest
 
 from iveg.models.snapshot import Snapshot
 from iveg.pipeline.topics import ROBOT_STATE, TOPICS, Topic, find, is_telemetry
+from tests.architecture import documents
 from tests.processes import ROOT
 
 TABLE = ROOT / "iveg/pipeline/topics.py"
@@ -49,8 +50,8 @@ def test_no_topic_is_spelled_beside_the_table(path: Path) -> None:
 
 
 def test_every_row_is_in_the_contract_and_the_other_way_round() -> None:
-    section = (ROOT / "docs/interfaces.md").read_text().split("## 8.")[1]
-    rows = set(re.findall(r"^\| `([a-z][^`]*)` \|", section.split("\n## ")[0], re.M))
+    live = (documents.INTERFACES / "live.md").read_text()
+    rows = set(documents.keys(documents.section(live, "Topics")))
 
     assert {row.name for row in TOPICS} - _INSIDE_A_CONNECTION == rows
 

@@ -1,0 +1,41 @@
+"""The page of resources has every key of every model, and no other."""
+
+import re
+
+import pytest
+from pydantic.json_schema import models_json_schema
+
+from iveg.models.base import Model
+from iveg.models.day import Day
+from iveg.models.device import Device
+from iveg.models.typescript import TOLD
+from tests.architecture import documents
+from tests.processes import ROOT
+
+PAGE = (documents.INTERFACES / "resources.md").read_text()
+_SHOWN: tuple[type[Model], ...] = (*TOLD, Day, Device)
+_, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
+MODELS = {
+    name: set(schema["properties"])
+    for name, schema in _DOCUMENT["$defs"].items()
+    if "properties" in schema
+}
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_every_key_of_a_model_has_its_row(model: str) -> None:
+    rows = documents.keys(documents.section(PAGE, model))
+
+    assert sorted(rows) == sorted(MODELS[model])
+
+
+def test_every_resource_of_the_page_is_a_model() -> None:
+    assert set(documents.headings(PAGE)) - {"Resources"} == set(MODELS)
+
+
+def test_every_metric_has_its_row() -> None:
+    page = documents.section((documents.INTERFACES / "http.md").read_text(), "Metrics")
+    told = (ROOT / "iveg/web/api/metrics.py").read_text()
+    metrics = {f"iveg_{name}" for name in re.findall(r'_family\("([a-z_]+)"', told)}
+
+    assert metrics - set(documents.keys(page)) == set()
