@@ -2,7 +2,7 @@
 
 All of it also comes through Orion, or used to; whichever copy is first counts.  The
 agent drops a whole message for one apostrophe and falls seconds behind under load
-(fiware.md), and neither people nor poses must vanish for that.
+(docs/fiware.md), and neither people nor poses must vanish for that.
 """
 
 from collections.abc import Callable, Iterable

@@ -1,7 +1,8 @@
 """The adapter for the IoT Agent's north port, and provisioning a fleet through it.
 
 Provisioning looks first and changes only what is not as it should be, so it can run at
-every start.  It leaves commands a way to the robot: the traps are in fiware.md §4.
+every start.  It leaves commands a way to the robot: the traps are in
+docs/fiware.md, "Provisioning".
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,7 @@
 """The adapter for Orion, for commands and for reading once after a gap.
 
 Orion's 204 to a command proves nothing: it also answers so when the command went
-nowhere (fiware.md §4).  Who wants to know waits for the robot's own answer.
+nowhere (docs/fiware.md).  Who wants to know waits for the robot's own answer.
 """
 
 import asyncio
@@ -207,7 +207,7 @@ class OrionClient:
 
         Args:
             robot_id: The robot.
-            value: The command (interfaces.md §3).
+            value: The command (docs/interfaces/commands.md).
             timeout_s: How long Orion may take (s).
 
         Raises:

@@ -1,4 +1,4 @@
-"""The command line: words and settings to parts (docs/interfaces.md §6)."""
+"""The command line: words and settings to parts (docs/interfaces/cli.md)."""
 
 import argparse
 import logging

@@ -1,4 +1,4 @@
-"""How soon the fleet does as it is told (safety.md §6.3).
+"""How soon the fleet does as it is told (docs/safety.md).
 
 Timed is the whole way of an alert: from the notification of the look that a slow-down
 rests on to the robot's own report that it applies the factor.  Both are read on our

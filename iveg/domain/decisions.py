@@ -2,7 +2,7 @@
 
 One ``Decision`` opens when a robot enters a ring and closes when it is let go.  Every
 link has a time and a verdict; a link that does not come in time is itself an alert
-(product.md §6)::
+(docs/dashboard.md, "Decisions")::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed
 

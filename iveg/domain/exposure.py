@@ -1,4 +1,4 @@
-"""How long today the fleet was closer to people than stopping takes (safety.md §6.3).
+"""How long today the fleet was closer to people than stopping takes (docs/safety.md).
 
 Margins are looked at a few times a second; each look stands for the time since the one
 before.  What nobody could know is counted apart: it is neither margin nor danger.

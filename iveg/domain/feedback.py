@@ -1,7 +1,7 @@
 """What iVeg tells the fleet (Algorithm 2) and every robot reads (Algorithm 3).
 
 One ``Feedback`` goes out for each robot that observes; it carries the alerts that are
-alive and the speed limits of the whole fleet (interfaces.md §4).
+alive and the speed limits of the whole fleet (docs/interfaces/mqtt.md).
 """
 
 from collections.abc import Mapping

@@ -17,7 +17,7 @@ Kind = Literal["live", "recording"]
 
 ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
-"""Ids of devices that are no robots (docs/interfaces.md §1)."""
+"""Ids of devices that are no robots (docs/interfaces/README.md)."""
 
 
 @dataclass(frozen=True, slots=True)

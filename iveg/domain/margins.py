@@ -1,7 +1,7 @@
 """The safety margin of a robot and a person: the gap, less what stopping takes.
 
 The protective separation distance of ISO 13855 and ISO/TS 15066 with constant speeds
-and a constant deceleration (safety.md §6.1)::
+and a constant deceleration (docs/safety.md, "Margins")::
 
     S_p = v_h (T + v/a)  +  v T    +  v²/2a   +  Z
           person walks     reaction   braking    uncertainty

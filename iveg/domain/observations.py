@@ -39,7 +39,7 @@ class FeedbackRef:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Who counts this message and where it stands in the count (interfaces.md §1).
+    """The count that orders a message (docs/interfaces/mqtt.md).
 
     Attributes:
         boot: Random, new at every start of the robot; None when the sender is silent.
@@ -160,7 +160,7 @@ class DetectionFrame:
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """A reason why a robot may not move (safety.md §2.1)."""
+    """A reason why a robot may not move (docs/safety.md, "Holds")."""
 
     id: str
     source: Literal["iveg", "boot", "hw", "bumper", "link"]
@@ -169,7 +169,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class RobotFault:
-    """What a robot finds wrong with its own data (docs/interfaces.md §1).
+    """What a robot finds wrong with its own data (docs/interfaces/mqtt.md).
 
     Attributes:
         code: A short, stable name, such as ``no_transform``.

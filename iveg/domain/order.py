@@ -1,4 +1,4 @@
-"""Order of what one robot sends (docs/interfaces.md §1).
+"""Order of what one robot sends (docs/interfaces/mqtt.md).
 
 Newest wins: nothing waits for a message that is late, and no stamp ever decides which
 is newer.

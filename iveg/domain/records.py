@@ -12,7 +12,7 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionRecord:
-    """Why an alert or speed limit came to be and what it led to (product.md section 6).
+    """Why an alert or speed limit came to be and what it led to (docs/dashboard.md).
 
     Attributes:
         kind: ``alert`` (somebody was confirmed) or ``speed_limit`` (a robot was told).

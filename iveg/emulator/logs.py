@@ -1,4 +1,4 @@
-"""Recorded runs as files: JSON lines, plain or gzipped (interfaces.md §7).
+"""Recorded runs as files: JSON lines, plain or gzipped (docs/interfaces/replay.md).
 
 A file is read line by line and never held in memory.  A line that cannot be used is
 reported once with file and line number and skipped; a file that cannot be used at all

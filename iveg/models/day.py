@@ -1,4 +1,4 @@
-"""The evening sheet: one day of the fleet (docs/interfaces.md §5)."""
+"""The evening sheet: one day of the fleet (docs/interfaces/resources.md)."""
 
 from iveg.models.base import Model
 from iveg.models.command import Command

@@ -73,7 +73,7 @@ ROBOT_DEVICES = (
     *(Device(sensor.suffix, ((sensor.attribute, "object"),)) for sensor in SENSORS),
 )
 """The command device sorts before its sensors, and is provisioned last where the agent
-keeps its registry in memory, so that either registry picks it (fiware.md §4)."""
+keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
 
 
 DIRECT_SUFFIXES = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")

@@ -19,7 +19,7 @@ class FeedbackPublisher:
     """Writes the feedback and hands it to the fleet.
 
     One count goes over all topics of a boot of iVeg, so that what a robot echoes names
-    one message (docs/interfaces.md §4).
+    one message (docs/interfaces/mqtt.md).
 
     Args:
         other: The stamp of each robot's newest confident object of another class.

@@ -2,7 +2,7 @@
 
 Each hop is judged by what went through it, never by what it says of itself: a probe
 measure goes out over MQTT every two seconds and must come back as a notification
-(safety.md §0.3, fault F4).  Where it was seen last tells which hop lost it::
+(docs/faults.md, F4).  Where it was seen last tells which hop lost it::
 
     broker says "taken"  →  the broker lives
     it is stored at Orion →  the agent hears and Orion takes

@@ -80,7 +80,7 @@ class Topic:
     """One row.
 
     Attributes:
-        name: As docs/interfaces.md writes it; ``{id}`` is the key.
+        name: As docs/interfaces/live.md writes it; ``{id}`` is the key.
         model: What its data are; None for what concerns one connection alone.
         read: The newest value of one key; None for an event.
         tell: The data of an event.
@@ -115,7 +115,7 @@ ROBOT = Topic(
 ROBOT_STATE = Topic("robots/{id}/state", Robot, pace="read-out")
 """Within frames alone: what of a robot is not its motion."""
 SCAN = Topic("robots/{id}/scan", Scan, pace="picture")
-"""Binary, so that ``web`` writes it (docs/interfaces.md §8)."""
+"""Binary, so that ``web`` writes it (docs/interfaces/live.md)."""
 PEOPLE = Topic(
     "people",
     list[Person],

@@ -1,6 +1,6 @@
 """What a robot may drive at most: the lowest of its caps, lowered at once, raised late.
 
-Factors are 0, 0.5 or 1 and never multiplied (safety.md §6.2): two zones that overlap
+Factors are 0, 0.5 or 1 and never multiplied (docs/safety.md): two zones that overlap
 still halve.  A raw cap that goes down counts immediately; one that goes up must stay up
 for a second first, and what came lower in that second counts.
 """

@@ -1,7 +1,7 @@
 """What this robot has heard of iVeg, told back so that iVeg can prove our age.
 
 Every message of ours names the newest feedback that we had heard when we measured;
-what is in it was measured after that feedback left iVeg (docs/interfaces.md §1).
+what is in it was measured after that feedback left iVeg (docs/interfaces/mqtt.md).
 """
 
 from iveg.domain.observations import FeedbackRef, Origin

@@ -1,7 +1,7 @@
 """The last word before the drive: what upstream wishes, capped, ramped or zero.
 
 After a resume upstream must first ask for nothing for half a second, so that a wish
-which waited behind the hold cannot lurch the robot (neutral interlock, safety.md §2.2).
+which waited behind the hold cannot lurch the robot (neutral interlock, docs/safety.md).
 """
 
 import math

@@ -1,7 +1,7 @@
 """What keeps a robot from moving: a set of holds, and the holds that are no more.
 
 A robot drives only with an empty set.  Every hold has a name; a release must name what
-it lifts, and a name that was released once never holds again (safety.md §2.1).
+it lifts, and a name that was released once never holds again (docs/safety.md).
 """
 
 from collections.abc import Iterable

@@ -1,7 +1,7 @@
 """How fast a robot may drive at this moment, by all that it knows; holds apart.
 
 Own pose, iVeg's silence, and what others told: each is a cap, the lowest counts, and
-what is unknown is slow (safety.md §3.3, §3.5).
+what is unknown is slow (docs/safety.md).
 """
 
 import math

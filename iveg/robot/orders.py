@@ -1,7 +1,7 @@
 """What a robot reads from its ``cmd`` topic: generous towards STOP, strict elsewhere.
 
 Whatever smells of a STOP is one; a release or resume must be exactly what the contract
-says, or it is refused with a reason (safety.md §2.2).
+says, or it is refused with a reason (docs/safety.md).
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 Algorithm 3 of the paper, judged against the robot's own pose.  It differs in four
 ways: a person who is missing from a message ages out instead of vanishing, a ring grows
-while its topic is silent (safety.md §3.4), a peer that is known to stand slows nobody,
+while its topic is silent (docs/safety.md), a peer that is known to stand slows nobody,
 and an alert about the robot itself is ignored, or it would slow for ever.
 """
 

@@ -1,7 +1,7 @@
 """How old iVeg's word is, judged by what iVeg says it has seen of us.
 
 An old message that arrives again is not fresh: feedback is as old as the moment when we
-sent the report that it says it has seen (interfaces.md §4), not as its arrival.
+sent the report that it says it has seen (docs/interfaces/mqtt.md), not as its arrival.
 """
 
 from collections import OrderedDict, deque

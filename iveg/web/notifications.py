@@ -1,4 +1,4 @@
-"""Orion → iVeg: authenticate, read, queue, answer at once (interfaces.md §2).
+"""Orion → iVeg: authenticate, read, queue, answer at once (docs/interfaces/ngsi.md).
 
 Hundreds come in a second, so this is plain ASGI beside the layers that pages need, with
 its own limit and secret.  What does not belong here, and everything that goes wrong, is

@@ -1,6 +1,6 @@
 """What a page says of a press, read so that nothing it says can refuse a STOP.
 
-The same three words come over HTTP and over the socket (docs/interfaces.md §5, §8).
+The keys are the same over HTTP and WebSocket (docs/interfaces/http.md).
 """
 
 import asyncio

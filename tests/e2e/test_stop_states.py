@@ -1,4 +1,4 @@
-"""Every state of the STOP control (product.md §4), each by a fault that is real.
+"""Every state of the STOP control (docs/dashboard.md), each by a fault that is real.
 
 AGI is the emulator's; AGV is a puppet whose brakes and words obey the test.
 One stack serves all tests, so each leaves it as it found it.

@@ -169,7 +169,7 @@ DEVICES = ("", "_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety", "_nav")
 
 
 def of_robot(robot: str) -> set[str]:
-    """What safety.md 5.2.8 lets a robot write, written out once more by hand."""
+    """What a robot may write, written out once more by hand."""
     plain = {f"/iveg/{robot}{suffix}/attrs" for suffix in DEVICES}
     plain.add(f"/iveg/{robot}/cmdexe")
     return plain | {f"/json{topic}" for topic in plain} | straight(robot)

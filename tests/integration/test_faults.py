@@ -3,7 +3,7 @@
 Everything runs for real: Mosquitto in front, ``iveg fiware`` bridged behind it (its
 agent is a call away from its own broker), the dashboard and two robots.  Gates
 before Orion, the agent and the dashboard break what cannot be broken alone.  One stack
-serves all tests, so each leaves it whole; the numbers are those of safety.md §4.4.
+serves all tests, so each leaves it whole; the numbers are those of docs/faults.md.
 """
 
 import os

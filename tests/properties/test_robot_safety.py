@@ -1,4 +1,4 @@
-"""The robot's invariants R1-R10 (safety.md §2.6), under everything a network can do."""
+"""The robot's invariants R1-R10 (docs/safety.md), under everything a network can do."""
 # ruff: noqa: N802 - each test bears the name of its invariant
 
 import itertools

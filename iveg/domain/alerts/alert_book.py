@@ -1,4 +1,4 @@
-"""Alerts to people, after ISA-18.2: raised, acknowledged, cleared (product.md §3).
+"""Alerts to people, after ISA-18.2: raised, acknowledged, cleared (docs/dashboard.md).
 
 What is wrong is a set of conditions, found anew each time; the book compares it with
 what it holds.  A condition that goes clears its alert; one that comes back is the same

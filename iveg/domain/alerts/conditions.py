@@ -1,4 +1,4 @@
-"""What is wrong now, found anew each time from decisions and robots (product.md §3)."""
+"""The alert conditions that hold now, from decisions and robots (docs/dashboard.md)."""
 
 from collections.abc import Iterable
 from math import inf

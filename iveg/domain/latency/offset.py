@@ -7,8 +7,9 @@ before it arrived (R).  Its stamp S therefore bounds the offset θ = robot − s
 
 The narrowest bounds of the last one to two minutes count.  A clock that they do not
 disprove is taken to be in step, as clocks are that follow NTP: from one side a delay on
-the way up and a clock that is behind look alike (safety.md, "Age"), and the bounds say
-how wrong that may be.  Where they rule zero out, the middle counts, if they are narrow.
+the way up and a clock that is behind look alike (docs/safety.md, "Age"), and the bounds
+say how wrong that may be.  Where they rule zero out, the middle counts, if they are
+narrow.
 
 ::
 

@@ -2,8 +2,9 @@
 
 A robot inside the ring of a person or of a moving peer is limited to half speed;
 it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap
-(safety.md §6.2).  The least factor counts, never the product.  Silence is a reason of
-its own: a robot that is not seen, or a fleet whose eyes are shut, drives at half.
+(docs/safety.md, "The rule").  The least factor counts, never the product.  Silence is a
+reason of its own: a robot that is not seen, or a fleet with a silent detector, drives
+at half speed.
 """
 
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,7 @@
 """One STOP, RELEASE or RESUME as it is at one moment, with the time of each step.
 
 A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
-answered on each transport, and standing (docs/interfaces.md §8).
+answered on each transport, and standing (docs/interfaces/resources.md).
 """
 
 from collections.abc import Mapping
@@ -101,7 +101,7 @@ class Command:
         tries: How often it was sent before the robot stood; all transports at once
             count once.
         transports: Each ``pending``, ``ok``, ``failed``, ``unknown`` or ``off``
-            (docs/interfaces.md §8).
+            (docs/interfaces/resources.md).
         drill: A STOP that somebody pressed to prove that it works.
         held_as: The hold of an earlier STOP that this one holds on to.
         agent_lag_s: How far the IoT Agent was behind when it was sent (s); None where

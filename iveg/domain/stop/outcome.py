@@ -1,4 +1,4 @@
-"""How an order ended, for whoever reads of it later (docs/interfaces.md §5).
+"""How an order ended, for whoever reads of it later (docs/interfaces/resources.md).
 
 A row keeps the state of the machine when the order was followed no more, and that is
 the robot's state: "running" is no answer to what became of a STOP.

@@ -133,7 +133,7 @@ class People:
     def _doubt(
         self, one: Placed, frame: DetectionFrame, observer: RobotState
     ) -> Placed:
-        """Mark what cannot be where it was said to be (safety.md §3.4)."""
+        """Mark what cannot be where it was said to be (docs/safety.md, "The rule")."""
         x, y, _ = one.position
         if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
             return one

@@ -1,4 +1,4 @@
-"""Faint people who are seen again and again (safety.md §3.4).
+"""Faint people who are seen again and again (docs/safety.md, "The rule").
 
 Whoever is at 0.50 or more in three of five looks within 1 s and 1 m counts as a
 possible person: a setting, off by default, since it costs false slow-downs.

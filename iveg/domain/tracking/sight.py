@@ -1,7 +1,7 @@
 """Who can see what: cameras, crop, and the all-clear of an empty spot.
 
 A ring goes by time or because a robot has looked at its centre for a second and found
-nobody, not even faintly; never for one missing frame (safety.md §3.4).
+nobody, not even faintly; never for one missing frame (docs/safety.md, "Age").
 """
 
 import math

@@ -245,7 +245,7 @@ def _command_info(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswer
 
 
 def command_answer(robot_id: str, attributes: Mapping[str, Any]) -> CommandAnswer:
-    """A robot's own answer to a command (interfaces.md §3)."""
+    """A robot's own answer to a command (docs/interfaces/commands.md)."""
     value = payloads.AnswerValue.model_validate(attributes.get(names.COMMAND))
     return CommandAnswer(
         robot_id,

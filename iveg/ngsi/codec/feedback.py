@@ -23,7 +23,7 @@ def read_feedback(payload: bytes) -> Feedback:
     """Read ``/{robot}/mqtt_feedback``.
 
     Raises:
-        UnreadableError: not a feedback; counts as no feedback (safety.md §3.5).
+        UnreadableError: not a feedback; counts as no feedback (docs/safety.md).
     """
     try:
         value = payloads.FeedbackValue.model_validate(load_json(payload))

@@ -1,4 +1,4 @@
-"""STOP, release, resume (docs/interfaces.md §5).
+"""STOP, release, resume (docs/interfaces/http.md).
 
 STOP is accepted from everyone who is signed in, in any state, without limit.  Release
 and resume are refused unless the robot stands and its report is fresh.

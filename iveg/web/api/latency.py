@@ -1,4 +1,4 @@
-"""Latency by hop: the paper's table live, beside what it printed (interfaces.md §5)."""
+"""The paper's latency table, live, beside its own numbers (docs/interfaces/http.md)."""
 
 import asyncio
 import csv

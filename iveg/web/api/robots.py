@@ -1,4 +1,4 @@
-"""REST twins of what is live: robots, people, map, climate (docs/interfaces.md §5)."""
+"""REST twins of live topics: robots, people, map, climate (docs/interfaces/http.md)."""
 
 from collections.abc import Callable
 

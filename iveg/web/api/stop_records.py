@@ -1,4 +1,4 @@
-"""How long STOP took, and the drills that prove it (docs/interfaces.md §5).
+"""How long STOP took, and the drills that prove it (docs/interfaces/http.md).
 
 Both are read from the history, so they outlive a restart and can be printed.
 """
@@ -29,7 +29,7 @@ from iveg.web.api.history_filters import Range, range_of
 from iveg.web.security.authentication import require
 
 DRILL_DEADLINE_MS = 5000.0
-"""Press to STANDING, safety.md §2.4."""
+"""Press to STANDING, docs/safety.md, "Times of a STOP"."""
 _DRILLS_SHOWN = 100
 
 

@@ -1,7 +1,7 @@
 """Telemetry in the parts that frames are made of, each version encoded once for all.
 
-A part is JSON, and for a scan the integers that it counts; docs/interfaces.md, section
-8, has their shapes.  Browsers differ in when they take a part, never in its bytes: it
+A part is JSON, and for a scan the integers that it counts; docs/interfaces/live.md has
+their shapes.  Browsers differ in when they take a part, never in its bytes: it
 says itself when it was true (``at``, the server's monotonic clock).
 """
 

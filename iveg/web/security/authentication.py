@@ -8,7 +8,7 @@ those that forgot::
     bearer token ─────────────────────────> program:  read, stop
     session past its age ─────────────────> expired:  stop, 12 h longer
 
-STOP outlives the session (safety.md §5.2): whoever was let in once can still stop.
+STOP outlives the session (SECURITY.md): whoever was let in once can still stop.
 """
 
 import hmac

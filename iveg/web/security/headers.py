@@ -34,7 +34,7 @@ _TLS = ("strict-transport-security", "max-age=31536000")
 
 
 class SecurityHeaders:
-    """Adds the headers of safety.md §5.2 that a response has not set itself."""
+    """Adds the headers of SECURITY.md that a response has not set itself."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -1,4 +1,4 @@
-"""How often somebody may try the door, and how much a page may say (safety.md §5.2).
+"""How often somebody may try the door, and how much a page may say (SECURITY.md).
 
 STOP is never limited: not over HTTP, and not on a socket that says too much.  What a
 page has painted is counted apart: it says so with every frame that its screen shows.

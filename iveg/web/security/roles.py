@@ -1,4 +1,4 @@
-"""Who somebody is and what they may do (safety.md §5.1)."""
+"""Who somebody is and what they may do (SECURITY.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MAY: Final[Mapping[Role, frozenset[Action]]] = {
     "program": frozenset({"open", "read", "stop"}),
     "expired": frozenset({"open", "stop"}),
 }
-"""The table of safety.md §5.1; what is not here is refused."""
+"""The table of SECURITY.md, "Roles"; what is not here is refused."""
 
 
 @dataclass(frozen=True, slots=True)

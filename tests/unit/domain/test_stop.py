@@ -1,4 +1,4 @@
-"""Every row of the state table of safety.md §2.3 but the releases'."""
+"""Every row of the state table of docs/safety.md but the releases'."""
 
 from typing import get_args
 

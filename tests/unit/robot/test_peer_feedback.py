@@ -1,4 +1,4 @@
-"""What a robot keeps of feedback, and for how long (safety.md §3.4, Algorithm 3)."""
+"""What a robot keeps of feedback, and for how long (docs/safety.md, Algorithm 3)."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The safety machine, sentence by sentence (safety.md §2.2, §3.5)."""
+"""The safety machine, sentence by sentence (docs/safety.md)."""
 
 from itertools import pairwise
 

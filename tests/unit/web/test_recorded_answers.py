@@ -1,4 +1,4 @@
-"""What other programs were told before they are told still (docs/interfaces.md)."""
+"""Recorded answers keep their old keys and values (docs/interfaces/README.md)."""
 
 from typing import Any
 

@@ -1,7 +1,7 @@
 /**
  * A frame of telemetry: the newest of everything that has changed, in one message.
  *
- * docs/interfaces.md, section 8.  A move is an array, because it comes most often; a
+ * docs/interfaces/live.md.  A move is an array, because it comes most often; a
  * scan's ranges follow the head as integers.
  *
  * @typedef {{topic: string, at: number, data: any}} Told `at`: when it was true, on the

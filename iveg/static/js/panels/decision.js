@@ -1,5 +1,5 @@
 /**
- * One decision from sighting to slower wheels, link by link (product section 6): in a
+ * One decision from sighting to slower wheels, link by link (docs/dashboard.md): in a
  * panel over any page, and on a page of its own that can be shared and printed.
  */
 

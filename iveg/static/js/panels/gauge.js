@@ -1,6 +1,6 @@
 /**
  * Speed on a half circle: the needle is what was observed, the mark outside the scale
- * is the limit that iVeg asks for, on the same scale (product section 1, widget 3).
+ * is the limit that iVeg asks for, on the same scale (docs/dashboard.md).
  *
  * Fleets drive backwards, too; the needle shows how fast, the read-out beside it which
  * way.  A small card has the same on a straight line.

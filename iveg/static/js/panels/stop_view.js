@@ -1,5 +1,5 @@
 /**
- * What a STOP control says, as a pure function of what is known (product section 4).
+ * What a STOP control says, as a pure function of what is known (docs/dashboard.md).
  *
  * A wish is never shown as a result: *asked*, *acknowledged* and *standing* are three
  * different words, and a control without a line does not look like one that works.
