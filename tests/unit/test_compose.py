@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml  # type: ignore[import-untyped]
 
+from iveg.adapters.fleet_files import load_fleet
 from iveg.settings import Settings
 from tests.processes import ROOT
 
@@ -18,7 +19,8 @@ COMPOSE = (ROOT / "compose.yaml").read_text()
 SERVICES: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["services"]
 NETWORKS: dict[str, dict[str, Any]] = yaml.safe_load(COMPOSE)["networks"]
 KNOWN = {row.metadata["variable"] for row in fields(Settings)}
-ASKED = set(re.findall(r"(?<!\$)\$\{(\w+)(:-|:\?|\})", COMPOSE))
+ASKED = set(re.findall(r"(?<!\$)\$\{(\w+)(:-|:\?|:\+|-|\})", COMPOSE))
+MAY_BE_EMPTY = {"IVEG_FLEET"}
 PRIVATE = ("mongodb", "orion", "iot-agent", "postgresql", "iveg-migrate", "emulator")
 DOCKERFILE = (ROOT / "Dockerfile").read_text()
 
@@ -86,14 +88,45 @@ def test_what_iveg_is_told_can_be_read(made: Path) -> None:
 
 
 def filled(text: str, env: dict[str, str]) -> str:
-    return re.sub(r"\$\{(\w+)[^}]*\}", lambda found: env[found[1]], text)
+    """A text with its variables, as Compose fills it."""
+
+    def value(found: re.Match[str]) -> str:
+        name, how, other = found.groups()
+        told = env.get(name)
+        if how == ":+":
+            return other if told else ""
+        return other if told is None or (how == ":-" and not told) else told
+
+    return re.sub(r"\$\{(\w+)(:-|:\?|:\+|-)([^}]*)\}", value, text)
+
+
+@pytest.mark.parametrize("service", ["iveg", "emulator"])
+@pytest.mark.parametrize("file", ["", "deploy/fleet.example.toml"])
+def test_a_fleet_file_is_mounted_where_the_service_reads_it(
+    service: str, file: str, made: Path
+) -> None:
+    env = {**env_of(made), "IVEG_FLEET": file}
+    told = {name: filled(value, env) for name, value in environment(service).items()}
+    (mount,) = [one for one in SERVICES[service]["volumes"] if isinstance(one, dict)]
+
+    settings = Settings.from_environment(told)
+
+    assert settings.fleet == (mount["target"] if file else "")
+    assert load_fleet(str(ROOT / filled(mount["source"], env))).ids
+    assert mount["read_only"] is True
+
+
+def test_without_a_choice_the_whole_fleet_file_takes_part(made: Path) -> None:
+    env = {**env_of(made), "IVEG_ROBOTS": ""}
+
+    assert filled(environment("iveg")["IVEG_ROBOTS"], env) == ""
 
 
 def test_every_variable_is_made_or_has_a_default(made: Path) -> None:
     env = env_of(made)
 
     for name, how in ASKED:
-        assert env.get(name), f"{name} is in no env file"
+        assert env.get(name) or name in MAY_BE_EMPTY, f"{name} is in no env file"
         assert how != "}", f"{name} may be missing in silence"
 
 
@@ -215,7 +248,7 @@ def test_mounted_files_are_there_or_are_made(made: Path) -> None:
         mount.split(":")[0]
         for one in SERVICES.values()
         for mount in one.get("volumes", [])
-        if mount.startswith("./")
+        if isinstance(mount, str) and mount.startswith("./")
     ]
     deploy = made.parent
 
@@ -244,7 +277,11 @@ def test_no_secret_gets_into_the_image() -> None:
     allowed = [line[1:] for line in ignore if line.startswith("!")]
 
     assert not any(fnmatch.fnmatch("deploy/secrets/env", one) for one in allowed)
-    assert (ROOT / "deploy/.gitignore").read_text().split() == ["secrets/", "state/"]
+    assert (ROOT / "deploy/.gitignore").read_text().split() == [
+        "secrets/",
+        "state/",
+        "fleet.toml",
+    ]
 
 
 def test_the_image_takes_postgresqls_driver_from_the_lock_file() -> None:
@@ -311,6 +348,19 @@ def test_users_follow_the_fleet(tmp_path: Path) -> None:
     assert list(users) == ["AGI", "NEW", "climate"]
     assert users["AGI"] == kept
     assert "AGII" not in (secrets / "mosquitto/acl").read_text()
+
+
+def test_users_are_those_of_the_fleet_file(tmp_path: Path) -> None:
+    secrets = make_secrets(tmp_path)
+    env = (secrets / "env").read_text().replace("IVEG_ROBOTS=AGI,AGII", "IVEG_ROBOTS=")
+    (secrets / "env").write_text(
+        env.replace("IVEG_FLEET=", "IVEG_FLEET=deploy/fleet.example.toml")
+    )
+
+    make_secrets(tmp_path)
+
+    lines = (secrets / "mqtt-users").read_text().splitlines()
+    assert [line.split()[0] for line in lines] == ["AGI", "CARRIER-2", "D1", "climate"]
 
 
 def test_secrets_are_closed_to_others(made: Path) -> None:
