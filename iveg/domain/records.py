@@ -15,7 +15,7 @@ class DecisionRecord:
     """Why an alert or speed limit came to be and what it led to (docs/dashboard.md).
 
     Attributes:
-        kind: ``alert`` (somebody was confirmed) or ``speed_limit`` (a robot was told).
+        kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
         robot_id: The robot that was told; for an alert its observer.
         class_: Canonical (``person``, ``robot``); ``class_id`` as the detector said.
         confidence: 0 to 1.
