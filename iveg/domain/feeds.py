@@ -8,7 +8,8 @@ is a fallback and the proof that the chain lives, and Orion may throttle it::
     FULL ─────────────────────────────────────> THINNED
          <─────────────────────────────────────
               the broker is lost, or FIWARE still brings what the direct transport
-              does not: nothing for 1 s, or only older messages for 1 s
+              does not: nothing for 1 s, or only messages that are older by 0.2 s
+              and more for 1 s
 
 A robot that is silent on both transports changes nothing.
 """
@@ -24,7 +25,8 @@ Copied = type[Odometry] | type[LaserScan]
 SILENT_S = 1.0
 """A direct copy older than this is missed."""
 OVERTAKES_S = 0.2
-"""What comes through FIWARE that much after the last direct message is no twin."""
+"""What comes through FIWARE that much after the last direct message is no twin; a
+direct twin that comes no later than that is not behind, whichever was first."""
 STEADY_S = 5.0
 
 
@@ -45,11 +47,18 @@ class Feed:
     _behind_since: float | None = None
 
     def heard(self, transport: TransportId, at: float, *, news: bool) -> None:
-        """A message came; ``news`` when it was newer than all before."""
+        """A message came.
+
+        ``news``: it was newer than all before; of a direct one also, that none newer
+        has come before it.
+        """
         if transport != FIWARE.id:
             if at - self.direct_at > SILENT_S:
                 self._steady_since = at
             self.direct_at, self._direct = at, transport
+            since = self._behind_since
+            if news and since is not None and at - since <= OVERTAKES_S:
+                self._behind_since = None
             return
         self.fiware_at = at
         if not news or at - self.direct_at > SILENT_S:

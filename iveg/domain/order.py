@@ -33,7 +33,9 @@ class Order:
     _old: dict[str, int] = field(default_factory=dict)
     _returning: str | None = None
     _grown: int = 0
-    _recent: deque[int] = field(default_factory=lambda: deque(maxlen=_REMEMBERED_SEQS))
+    _recent: deque[int] = field(default_factory=deque)
+    _known: set[int] = field(default_factory=set)
+    """The same, to look them up: what FIWARE brings is a copy nearly always."""
 
     def knows_better_than(self, origin: Origin) -> bool:
         """Whether an old record must not even be judged: it is of another boot."""
@@ -42,6 +44,10 @@ class Order:
     def is_past(self, boot: str, seq: int) -> bool:
         """Whether :meth:`judge` will never call this message new."""
         return boot == self.boot and seq <= self.seq
+
+    def is_twin(self, boot: str, seq: int) -> bool:
+        """Whether :meth:`judge` will call this message a duplicate."""
+        return boot == self.boot and seq in self._known
 
     def judge(self, origin: Origin) -> Verdict:
         """Say whether a message is newer than all before, and remember it.
@@ -56,9 +62,9 @@ class Order:
             self._begin(origin.boot, origin.seq)
             return "new"
         self._returning = None
-        if origin.seq in self._recent:
+        if origin.seq in self._known:
             return "duplicate"
-        self._recent.append(origin.seq)
+        self._remember(origin.seq)
         if origin.seq <= self.seq:
             return "late"
         self.seq = origin.seq
@@ -82,4 +88,11 @@ class Order:
             del self._old[next(iter(self._old))]
         self.boot, self.seq, self._returning = boot, seq, None
         self._recent.clear()
+        self._known.clear()
+        self._remember(seq)
+
+    def _remember(self, seq: int) -> None:
         self._recent.append(seq)
+        self._known.add(seq)
+        if len(self._recent) > _REMEMBERED_SEQS:
+            self._known.discard(self._recent.popleft())

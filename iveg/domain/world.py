@@ -212,6 +212,14 @@ class RobotState:
         order = self._orders.get(kind)
         return order is not None and order.is_past(boot, seq)
 
+    def is_newest(self, kind: type[Observation], origin: Origin) -> bool:
+        """Whether nothing newer than this message is known."""
+        order = self._orders.get(kind)
+        return order is not None and (order.boot, order.seq) == (
+            origin.boot,
+            origin.seq,
+        )
+
     def forget_poses(self) -> None:
         """Nothing that was kept for ``pose_at_stamp`` counts any more."""
         self._poses.clear()
@@ -389,7 +397,9 @@ class World:
         at, counted = received.at.mono, origin.seq is not None
         if received.transport == FIWARE.id and not counted and feed.is_direct(at):
             verdict = "duplicate"
-        feed.heard(received.transport, at, news=verdict == "new")
+        is_direct = received.transport != FIWARE.id
+        abreast = is_direct and robot.is_newest(kind, origin)
+        feed.heard(received.transport, at, news=verdict == "new" or abreast)
         return verdict
 
     def live_robots(self) -> Iterable[RobotState]:

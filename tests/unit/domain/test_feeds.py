@@ -33,7 +33,7 @@ class Bench:
         for _ in range(round(seconds * HZ)):
             self.now = round(self.now + 1 / HZ, 6)
             if direct:
-                self.feed.heard("direct", self.now, news=True)
+                self.feed.heard("direct", self.now, news=not fiware_leads)
             if fiware:
                 self.feed.heard("fiware", self.now, news=fiware_leads or not direct)
             judged = self.feed.judge(self.now, connected=connected)
@@ -97,6 +97,25 @@ def test_after_a_loss_five_good_seconds_come_first() -> None:
     assert bench.run(0.5).thinned is True
 
 
+def test_a_fallback_that_is_first_by_a_moment_changes_nothing() -> None:
+    feed = Feed()
+    for tenth in range(200):
+        if tenth % 10 == 5:
+            feed.heard("fiware", tenth / HZ - 0.01, news=True)
+        feed.heard("direct", tenth / HZ, news=True)
+        feed.judge(tenth / HZ, connected=True)
+    assert feed.thinned is True
+
+
+def test_a_direct_copy_that_follows_late_is_missed() -> None:
+    feed = Bench().run(8.0).feed
+    for tenth in range(80, 110):
+        if tenth % 10 == 5:
+            feed.heard("fiware", tenth / HZ - 0.29, news=True)
+        feed.heard("direct", tenth / HZ, news=tenth % 10 == 5)
+    assert feed.judge(11.0, connected=True) is False
+
+
 def test_a_short_burst_of_orions_copies_is_no_loss() -> None:
     bench = Bench().run(8.0).run(0.5, fiware_leads=True).run(2.0)
     assert bench.thinned is True
@@ -125,6 +144,15 @@ def test_the_newest_by_count_wins_whatever_brought_it() -> None:
     pose = world.robot("AGI").odometry
     assert pose is not None
     assert pose.pose.x == 3.0
+
+
+def test_a_direct_twin_of_the_newest_is_not_behind() -> None:
+    world, feed_of = World(["AGI"]), lambda: world.feeds.of("AGI")
+    for seq in range(30):
+        after = 0.1 * seq
+        heard(world, "fiware", seq, after)
+        heard(world, "direct", seq, after + 0.02)
+    assert feed_of().judge(at(2.95).mono, connected=True) is None
 
 
 def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:
