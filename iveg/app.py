@@ -129,6 +129,7 @@ class Dss:
             lambda received: self.ingest.offer(received),
             lambda *told: self.ingest.reject(*told),
             settings.direct_read,
+            lambda *identity: self.ingest.is_past(*identity),
         )
         self.link = MqttLink(
             broker_of(settings),
@@ -386,6 +387,7 @@ def create_app(dss: Dss) -> FastAPI:
         dss.notified,
         dss.is_thinned,
     )
+    app.state.orion = orion
     app.router.routes.append(orion.route())
     watch = dss.latency.watch
     app.include_router(

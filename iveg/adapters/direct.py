@@ -16,6 +16,7 @@ from iveg.domain.observations import (
     Odometry,
     Received,
     SafetyReport,
+    kind_of,
 )
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
@@ -38,6 +39,7 @@ class DirectReader:
     Args:
         offer: Where observations go; ``reject`` where the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
+        is_past: Tells by its identity what FIWARE has already brought.
     """
 
     def __init__(
@@ -48,10 +50,12 @@ class DirectReader:
         offer: Callable[[Received], None],
         reject: Callable[[str, str, str], None],
         scope: Scope = "all",
+        is_past: codec.IsPast | None = None,
     ) -> None:
         self._clock = clock
         self._offer = offer
         self._reject = reject
+        self._is_past = is_past
         kinds = read_directly(scope)
         self._kinds = tuple(kinds)
         self._devices: dict[str, str] = {}
@@ -86,7 +90,7 @@ class DirectReader:
         """Take one message."""
         at = self._clock()
         if topic in self._devices:
-            reading = codec.read_measure(self._devices[topic], payload)
+            reading = codec.read_measure(self._devices[topic], payload, self._is_past)
         elif topic in self._answers:
             reading = codec.read_answer(self._answers[topic], payload)
         else:
@@ -94,6 +98,6 @@ class DirectReader:
         for problem in reading.problems:
             self._reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
-            if isinstance(observation, self._kinds):
+            if issubclass(kind_of(observation), self._kinds):
                 sparse = topic not in self._dense
                 self._offer(Received(observation, at, DIRECT.id, sparse=sparse))

@@ -17,7 +17,6 @@ from urllib.parse import unquote, urlsplit
 import aiomqtt
 
 from iveg.adapters.log_filter import quiet
-from iveg.adapters.mqtt_inbox import Inbox
 from iveg.adapters.mqtt_outbox import PromptClient
 from iveg.domain.errors import HopError
 
@@ -85,6 +84,7 @@ class MqttLink:
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._wake = asyncio.Event()
         self._loss_told = False
+        self._mistake: Exception | None = None
         self.replaced = 0
         """Offered messages that a newer one overtook."""
         self.connects = 0
@@ -107,6 +107,8 @@ class MqttLink:
                 await self._session()
             except (aiomqtt.MqttError, OSError) as error:
                 _heed_cancellation()
+                if self._mistake is not None:
+                    raise self._mistake from None
                 if not self._loss_told:
                     _log.warning("%s: broker lost: %s", self._name, error)
                     self._loss_told = True
@@ -119,7 +121,7 @@ class MqttLink:
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _session(self) -> None:
-        address, inbox = self._address, Inbox(_MAX_INCOMING)
+        address = self._address
         async with PromptClient(
             address.host,
             address.port,
@@ -130,7 +132,7 @@ class MqttLink:
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=_NODELAY,
             max_queued_incoming_messages=_MAX_INCOMING,
-            queue_type=lambda maxsize: inbox,  # noqa: ARG005
+            take=self._hand_telemetry,
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
@@ -146,16 +148,23 @@ class MqttLink:
             )
             try:
                 async for message in client.messages:
-                    self._hand(message)
-                    # Waiting for each would cost more than most of them do.
-                    for _ in range(inbox.qsize()):
-                        self._hand(inbox.get_nowait())
+                    if isinstance(message.payload, bytes):
+                        self._hand({message.topic.value: message.payload})
             finally:
                 sender.cancel()
 
-    def _hand(self, message: aiomqtt.Message) -> None:
-        if self._on_message is not None and isinstance(message.payload, bytes):
-            self._on_message(message.topic.value, message.payload)
+    def _hand_telemetry(self, messages: Mapping[str, bytes]) -> None:
+        """A mistake of ours in here must end ``run``, and not the connection alone."""
+        try:
+            self._hand(messages)
+        except Exception as error:
+            self._mistake = error
+            raise
+
+    def _hand(self, messages: Mapping[str, bytes]) -> None:
+        if self._on_message is not None:
+            for topic, payload in messages.items():
+                self._on_message(topic, payload)
 
     async def _send_offered(self, client: PromptClient) -> None:
         while True:

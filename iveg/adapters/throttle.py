@@ -31,6 +31,7 @@ class Throttle:
 
     Attributes:
         copies: Id of each subscription that may be throttled, and whether it is.
+        ids: The copies' subscriptions.
         switches: How often something was switched.
         allowed: Whether anything may be throttled at all.
     """
@@ -53,6 +54,8 @@ class Throttle:
         self._clock = read_clock
         self._reread = reread
         self._must_read = False
+        self._thinned: frozenset[str] = frozenset()
+        self.ids: frozenset[str] = frozenset()
         self.copies: dict[Wanted, tuple[str, bool]] = {}
         self.switches = 0
         self.allowed = True
@@ -63,18 +66,17 @@ class Throttle:
         """Take what stood at Orion, unless something was switched since then."""
         if switches == self.switches:
             self.copies = dict(copies)
+            self._index()
 
-    @property
-    def ids(self) -> frozenset[str]:
-        """The copies' subscriptions."""
-        return frozenset(known for known, _ in self.copies.values())
+    def _index(self) -> None:
+        """Asked for each notification; the copies change once in minutes."""
+        known = self.copies.values()
+        self.ids = frozenset(one for one, _ in known)
+        self._thinned = frozenset(one for one, throttled in known if throttled)
 
     def is_throttled(self, subscription_id: str) -> bool:
         """Whether what this subscription brings is only now and then."""
-        return any(
-            known == subscription_id and throttled
-            for known, throttled in self.copies.values()
-        )
+        return subscription_id in self._thinned
 
     async def run(self) -> None:
         """Until cancelled; who watches Orion tells what fails."""
@@ -119,6 +121,7 @@ class Throttle:
         seconds = THROTTLING_S if throttled else 0
         await self._orion.update_subscription(known, {"throttling": seconds})
         self.copies[want] = known, throttled
+        self._index()
 
     async def _verify(self, changes: Mapping[Wanted, bool]) -> None:
         """An Orion that takes the change and does nothing gets a new subscription."""
@@ -134,4 +137,5 @@ class Throttle:
             document["throttling"] = THROTTLING_S
         made = await self._orion.create_subscription(document)
         self.copies[want] = made, throttled
+        self._index()
         await self._orion.delete_subscription(known)

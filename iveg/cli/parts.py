@@ -27,6 +27,7 @@ from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.fleet import FleetDescription
 from iveg.settings import Settings
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.prompt import prompt_http
 
 if TYPE_CHECKING:
     from iveg.adapters.dds import Dds
@@ -76,9 +77,11 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
     """The DSS and its page."""
     await _upgrade_history(settings, data)
     dss = Dss(settings, data, demo=demo)
+    app = create_app(dss)
     server = _Server(
         uvicorn.Config(
-            create_app(dss),
+            app,
+            http=prompt_http(app.state.orion),
             host=settings.host,
             port=settings.port,
             log_config=None,

@@ -301,13 +301,13 @@ class HeartbeatProbe:
 class Overtaken:
     """A message that its stream is past: who said it, and nothing of what was said.
 
-    A twin or straggler changes no pose and no scan, so its numbers are not read.  Only
-    these two kinds: what a late detection saw may still protect somebody.
+    A twin or straggler changes no pose and no scan, so its numbers are not read.  Of
+    looks that holds for a twin alone: what a late one saw may still protect somebody.
     """
 
     robot_id: str
     origin: Origin
-    kind: "type[Odometry | LaserScan]"
+    kind: "type[Odometry | LaserScan | DetectionFrame]"
 
 
 Observation = (

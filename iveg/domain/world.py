@@ -208,9 +208,15 @@ class RobotState:
         return order.judge(origin)
 
     def is_past(self, kind: type[Observation], boot: str, seq: int) -> bool:
-        """Whether a message of this identity cannot be news."""
+        """Whether a message of this identity cannot be news.
+
+        What a late look saw may still protect somebody: only its twin is past.
+        """
         order = self._orders.get(kind)
-        return order is not None and order.is_past(boot, seq)
+        if order is None:
+            return False
+        is_look = kind is DetectionFrame
+        return order.is_twin(boot, seq) if is_look else order.is_past(boot, seq)
 
     def is_newest(self, kind: type[Observation], origin: Origin) -> bool:
         """Whether nothing newer than this message is known."""

@@ -2,7 +2,8 @@
 
 Hundreds come in a second, so this is plain ASGI beside the layers that pages need, with
 its own limit and secret.  What does not belong here, and everything that goes wrong, is
-answered as the rest of the application would.
+answered as the rest of the application would.  ``web/prompt`` hands plain ones over
+without any of that.
 """
 
 from collections.abc import Callable, Mapping
@@ -79,12 +80,30 @@ class NotificationEndpoint:
                 body = await _body(receive)
             except _GoneError:
                 return
-            problem = self._take(body, at)
+            problem = Problem(413, _TOO_LONG) if body is None else self._take(body, at)
         if problem is None:
             for message in _TAKEN:
                 await send(message)
         else:
             await problem.response()(scope, receive, send)
+
+    def takes_at_once(self, headers: Mapping[bytes, bytes]) -> bool:
+        """Whether nothing but the body can be wrong; names are in lower case.
+
+        A body that does not say how long it is goes to those who count.
+        """
+        length = headers.get(b"content-length", b"")
+        return (
+            length.isdigit()
+            and int(length) <= MAX_BODY
+            and b"transfer-encoding" not in headers
+            and _tenant_of(headers) == self._tenant
+            and self._is_admitted(headers)
+        )
+
+    def take(self, body: bytes) -> Problem | None:
+        """Take a body that has just come; what is wrong with it, or None."""
+        return self._take(body, self._clock())
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
         """Why the body is not even read."""
@@ -92,25 +111,24 @@ class NotificationEndpoint:
         if declared.isdigit() and int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.
             return Problem(413, _TOO_LONG, headers={"Connection": "close"})
-        given = headers.get(b"x-iveg-notify-token")
-        if self._secret.admits(None if given is None else given.decode("latin-1")):
+        if self._is_admitted(headers):
             return None
         client = scope.get("client")
         self._ingest.reject(client[0] if client else "?", "forged_notification")
         return _FORGED
 
+    def _is_admitted(self, headers: Mapping[bytes, bytes]) -> bool:
+        given = headers.get(b"x-iveg-notify-token")
+        return self._secret.admits(None if given is None else given.decode("latin-1"))
+
     def _is_foreign(self, headers: Mapping[bytes, bytes]) -> bool:
         """Whether it is of another tenant: taken, counted and ignored."""
-        service = headers.get(b"fiware-service", b"").decode("latin-1")
-        path = headers.get(b"fiware-servicepath", b"").decode("latin-1")
-        if (service, path) == self._tenant:
+        if _tenant_of(headers) == self._tenant:
             return False
-        self._ingest.reject(service or "?", "foreign_tenant")
+        self._ingest.reject(_tenant_of(headers)[0] or "?", "foreign_tenant")
         return True
 
-    def _take(self, body: bytes | None, at: Instant) -> Problem | None:
-        if body is None:
-            return Problem(413, _TOO_LONG)
+    def _take(self, body: bytes, at: Instant) -> Problem | None:
         try:
             subscription_id, reading = read_notification(body, self._ingest.is_past)
         except UnreadableError as error:
@@ -147,6 +165,11 @@ class NotificationsFirst:
             await self._endpoint(scope, receive, send)
         else:
             await self._app(scope, receive, send)
+
+
+def _tenant_of(headers: Mapping[bytes, bytes]) -> tuple[str, str]:
+    service = headers.get(b"fiware-service", b"").decode("latin-1")
+    return service, headers.get(b"fiware-servicepath", b"").decode("latin-1")
 
 
 class _GoneError(Exception):

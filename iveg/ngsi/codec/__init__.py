@@ -4,7 +4,7 @@
 """
 
 from iveg.domain.stamps import format_stamp, parse_stamp
-from iveg.ngsi.codec.attributes import read_attributes
+from iveg.ngsi.codec.attributes import IsPast, read_attributes
 from iveg.ngsi.codec.commands import (
     write_command,
     write_desired,
@@ -36,6 +36,7 @@ from iveg.ngsi.codec.untrusted import MAX_DEPTH, Problem, Reading, load_json
 __all__ = [
     "MAX_DEPTH",
     "FeedbackWriter",
+    "IsPast",
     "Problem",
     "Reading",
     "format_stamp",

@@ -334,9 +334,10 @@ _READERS: Mapping[str, _Reader] = {
 }
 
 
-_IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan], str]] = {
+_IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]] = {
     names.ODOMETRY: (Odometry, names.ODOMETRY),
     names.LIDAR: (LaserScan, names.LIDAR_HEADER),
+    names.BOXES: (DetectionFrame, names.BOXES_HEADER),
 }
 """Where telemetry says who counts it and how far."""
 

@@ -2,19 +2,22 @@
 
 import asyncio
 import contextlib
+import itertools
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
-import aiomqtt
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.adapters.mqtt_inbox import Inbox, ReadAhead
+from iveg.adapters.mqtt_inbox import ReadAhead, sort_packets
 from iveg.embedded.mqtt_telemetry import publish_packet
 
 MANY = 300
 CONNACK = b"\x20\x02\x00\x00"
+PONG = b"\xd0\x00"
 
 
 @pytest.fixture
@@ -22,29 +25,29 @@ def line() -> Iterator[tuple[socket.socket, ReadAhead]]:
     far, near = socket.socketpair()
     with far, near:
         near.setblocking(False)
-        yield far, ReadAhead(near)
+        yield far, ReadAhead(near, lambda _: None)
 
 
 def test_an_event_takes_from_the_wire_once_however_much_there_is(
     line: tuple[socket.socket, ReadAhead],
 ) -> None:
     far, near = line
-    far.sendall(b"abcd")
-    assert near.recv(1) == b"a"
-    far.sendall(b"efgh")
+    far.sendall(2 * PONG)
+    assert near.recv(1) == PONG[:1]
+    far.sendall(PONG)
     assert near.pending() == 3
-    assert near.recv(9) == b"bcd"
+    assert near.recv(9) == PONG[1:] + PONG
     with pytest.raises(BlockingIOError):
         near.recv(1)
     assert near.pending() == 0
-    assert near.recv(9) == b"efgh"
+    assert near.recv(9) == PONG
 
 
 def test_an_end_of_the_line_is_an_end(line: tuple[socket.socket, ReadAhead]) -> None:
     far, near = line
-    far.sendall(b"a")
+    far.sendall(PONG)
     far.close()
-    assert near.recv(9) == b"a"
+    assert near.recv(9) == PONG
     assert near.pending() == 0
     assert near.recv(9) == b""
 
@@ -90,47 +93,60 @@ async def test_a_busy_loop_reads_all_that_has_come_and_not_a_packet_a_turn() -> 
     assert turns < MANY / 3
 
 
-def letter(topic: str, payload: str, qos: int = 0) -> aiomqtt.Message:
-    return aiomqtt.Message(
-        aiomqtt.Topic(topic),
-        payload.encode(),
-        qos,
-        retain=False,
-        mid=1,
-        properties=None,
-    )
+def confirmed_packet(topic: str, payload: bytes) -> bytes:
+    body = len(topic).to_bytes(2, "big") + topic.encode() + b"\x00\x07" + payload
+    return b"\x32" + bytes((len(body),)) + body
 
 
-def emptied(inbox: Inbox) -> list[tuple[str, bytes]]:
-    read = [inbox.get_nowait() for _ in range(inbox.qsize())]
-    return [(one.topic.value, bytes(one.payload)) for one in read]
+def test_of_telemetry_that_has_come_the_newest_of_each_topic_is_read() -> None:
+    came = b"".join(publish_packet(f"t/{n % 2}", b"%d" % n) for n in range(3000))
 
-
-def test_of_telemetry_that_waits_the_newest_of_each_topic_is_read() -> None:
-    inbox = Inbox()
-
-    for number in range(3000):
-        inbox.put_nowait(letter(f"t/{number % 2}", str(number)))
-
-    assert emptied(inbox) == [("t/0", b"2998"), ("t/1", b"2999")]
+    assert sort_packets(came) == ({"t/0": b"2998", "t/1": b"2999"}, b"", b"")
 
 
 def test_what_was_sent_with_a_receipt_is_all_read_in_its_order() -> None:
-    inbox = Inbox()
+    letters = [confirmed_packet("t", b"answer %d" % n) for n in range(3)]
+    looks = [publish_packet("t", b"look %d" % n) for n in range(3)]
+    came = b"".join(itertools.chain(*zip(looks, letters, strict=True)))
 
-    for number in range(3):
-        inbox.put_nowait(letter("t", f"look {number}"))
-        inbox.put_nowait(letter("t", f"answer {number}", qos=1))
-
-    read = [payload for _, payload in emptied(inbox)]
-    assert read == [b"look 2", b"answer 0", b"answer 1", b"answer 2"]
+    assert sort_packets(came) == ({"t": b"look 2"}, b"".join(letters), b"")
 
 
-def test_an_inbox_that_was_emptied_takes_the_same_topic_again() -> None:
-    inbox = Inbox()
-    inbox.put_nowait(letter("t", "first"))
-    inbox.get_nowait()
+@pytest.mark.parametrize("packet", [publish_packet, confirmed_packet])
+async def test_a_mistake_of_who_listens_ends_the_link_and_not_its_connection_alone(
+    packet: Callable[[str, bytes], bytes],
+) -> None:
+    def mistake(topic: str, _: bytes) -> None:
+        raise LookupError(topic)
 
-    inbox.put_nowait(letter("t", "second"))
+    with talking(packet("t", b"x")) as port:
+        link = MqttLink(BrokerAddress("127.0.0.1", port), "test", {"t": 1}, mistake)
+        with pytest.raises(LookupError):
+            async with asyncio.timeout(20.0):
+                await link.run()
 
-    assert emptied(inbox) == [("t", b"second")]
+
+@given(st.data())
+def test_packets_may_come_in_any_pieces(data: st.DataObject) -> None:
+    sent = [
+        publish_packet("scan", b"x" * 300),
+        CONNACK,
+        publish_packet("odom", b""),
+        confirmed_packet("answer", b"LATCHED"),
+        publish_packet("ü", b"y" * 20_000),
+    ]
+    whole = b"".join(sent)
+    cuts = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1), max_size=6)))
+    telemetry: dict[str, bytes] = {}
+    others = begun = b""
+    for start, end in itertools.pairwise([0, *cuts, len(whole)]):
+        told, more, begun = sort_packets(begun + whole[start:end])
+        telemetry |= told
+        others += more
+
+    assert telemetry == {"scan": b"x" * 300, "odom": b"", "ü": b"y" * 20_000}
+    assert (others, begun) == (sent[1] + sent[3], b"")
+
+
+def test_a_packet_of_no_proper_length_is_left_to_the_library() -> None:
+    assert sort_packets(b"\x30\xff\xff\xff\xffrest")[1] == b"\x30\xff\xff\xff\xffrest"

@@ -147,12 +147,12 @@ def test_the_newest_by_count_wins_whatever_brought_it() -> None:
 
 
 def test_a_direct_twin_of_the_newest_is_not_behind() -> None:
-    world, feed_of = World(["AGI"]), lambda: world.feeds.of("AGI")
+    world = World(["AGI"])
     for seq in range(30):
         after = 0.1 * seq
         heard(world, "fiware", seq, after)
         heard(world, "direct", seq, after + 0.02)
-    assert feed_of().judge(at(2.95).mono, connected=True) is None
+    assert world.feeds.of("AGI").judge(at(2.95).mono, connected=True) is None
 
 
 def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:

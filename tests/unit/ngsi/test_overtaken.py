@@ -39,9 +39,12 @@ def written(observation: Odometry | LaserScan | DetectionFrame) -> tuple[str, by
             return "AGI_yolox_bounding_boxes", codec.write_detections(observation)
 
 
-@pytest.mark.parametrize("sent", [odometry(origin=BEFORE), scan(origin=BEFORE)])
+@pytest.mark.parametrize(
+    "sent",
+    [odometry(origin=BEFORE), scan(origin=BEFORE), detection_frame(origin=BEFORE)],
+)
 def test_telemetry_that_is_past_is_known_by_its_identity_alone(
-    sent: Odometry | LaserScan,
+    sent: Odometry | LaserScan | DetectionFrame,
 ) -> None:
     device, payload = written(sent)
     reading = codec.read_measure(device, payload, all_past)
@@ -54,10 +57,19 @@ def test_a_notification_asks_too() -> None:
     assert [type(one) for one in reading.observations] == [Overtaken]
 
 
-def test_a_detection_is_read_even_when_it_is_past() -> None:
-    device, payload = written(detection_frame(origin=BEFORE))
-    (frame,) = codec.read_measure(device, payload, all_past).observations
-    assert isinstance(frame, DetectionFrame)
+@pytest.mark.parametrize(
+    ("seq", "read_as"), [(5, DetectionFrame), (6, Overtaken), (7, Overtaken)]
+)
+def test_a_look_is_read_even_when_it_is_late_but_its_twin_is_not(
+    seq: int, read_as: type[Observation]
+) -> None:
+    world = World(("AGI",))
+    for taken in (6, 7):
+        look = detection_frame(origin=replace(BEFORE, seq=taken))
+        world.apply(Received(look, START))
+    device, payload = written(detection_frame(origin=replace(BEFORE, seq=seq)))
+    (read,) = codec.read_measure(device, payload, world.is_past).observations
+    assert type(read) is read_as
 
 
 @pytest.mark.parametrize(

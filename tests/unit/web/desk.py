@@ -30,6 +30,7 @@ from iveg.web.api import (
 )
 from iveg.web.live import socket
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.prompt import prompt_http
 from iveg.web.security import headers
 from iveg.web.security.authentication import (
     Authenticator,
@@ -86,6 +87,7 @@ class WebDesk(Desk):
             "thinned".__eq__,
         )
         self.app.router.routes.append(orion.route())
+        self.notifications = orion
         self.app.add_middleware(notifications.NotificationsFirst, endpoint=orion)
 
     def _routers(self) -> list[Any]:
@@ -164,6 +166,7 @@ class WebDesk(Desk):
             port=0,
             log_config=None,
             lifespan="off",
+            http=prompt_http(self.notifications),
             ws=BoundedSocket,
             timeout_graceful_shutdown=1,
         )
