@@ -22,6 +22,7 @@ from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.app import Dss, broker_of, create_app
+from iveg.cli.memory import settle_memory
 from iveg.cli.running import LOOPBACK, run_until_told, tell_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.fleet import FleetDescription
@@ -96,6 +97,7 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
         ),
         on_start=tell_ready if demo else lambda: _print_link(settings, dss),
     )
+    settle_memory()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
     serving = asyncio.create_task(server.serve(), name="http")
     try:
@@ -128,6 +130,7 @@ async def fiware(settings: Settings) -> None:
     """The embedded broker, Orion and IoT Agent."""
     from iveg.embedded.server import serve_fiware
 
+    settle_memory()
     await serve_fiware(
         _address(settings.mqtt_url, 1883),
         _address(settings.orion_url, 1026),

@@ -106,4 +106,7 @@ class Feeds:
 
     def of(self, robot_id: str, kind: Copied = Odometry) -> Feed:
         """One feed."""
-        return self._known.setdefault((robot_id, kind), Feed())
+        feed = self._known.get((robot_id, kind))
+        if feed is None:
+            feed = self._known[robot_id, kind] = Feed()
+        return feed

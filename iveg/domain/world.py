@@ -202,7 +202,10 @@ class RobotState:
 
         What Orion kept of an earlier boot must not make the present one look old.
         """
-        order = self._orders.setdefault(kind_of(observation), Order())
+        kind = kind_of(observation)
+        order = self._orders.get(kind)
+        if order is None:
+            order = self._orders[kind] = Order()
         if asked and order.knows_better_than(origin):
             return "late"
         return order.judge(origin)

@@ -4,11 +4,8 @@ A sighting is logged at its start and written down once in two seconds, so that 
 person who stands before a camera for an hour does not fill the log.
 """
 
-from collections.abc import Callable
-
 from iveg.domain.detection_rule import Rule
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.feedback import FeedbackAlert
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
 from iveg.domain.order import Verdict
@@ -34,7 +31,7 @@ class DetectionTracking:
 
     Attributes:
         placed: What each robot's newest look found, faint ones included.
-        other: The stamp of the newest confident object of another class, by robot.
+        other: When the newest confident object of another class came, by robot.
     """
 
     def __init__(
@@ -44,17 +41,15 @@ class DetectionTracking:
         event_log: EventLog,
         hub: Hub,
         new_id: Ids,
-        stamp: Callable[[float], str],
         overload: Overload,
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
-        self.other: dict[str, FeedbackAlert] = {}
+        self.other: dict[str, Instant] = {}
         self._world = world
         self._people = people
         self._event_log = event_log
         self._hub = hub
         self._new_id = new_id
-        self._stamp = stamp
         self._overload = overload
         self._told: dict[tuple[str, str], float] = {}
 
@@ -113,7 +108,7 @@ class DetectionTracking:
         last = self._told.get((robot_id, subject))
         self._told[robot_id, subject] = at.mono
         if one.kind == "other":
-            self.other[robot_id] = FeedbackAlert("", self._stamp(at.wall))
+            self.other[robot_id] = at
         if last is not None and at.mono - last < _LOGGED_S:
             # Keep the first moment, so that a long sighting gets a row every so often.
             self._told[robot_id, subject] = last

@@ -83,7 +83,7 @@ class Evaluator:
         self._speed_limits = SpeedLimits(greenhouse)
         overload = self._speed_limits.overload
         self.looks = DetectionTracking(
-            world, self.people, event_log, hub, new_id, stamp, overload
+            world, self.people, event_log, hub, new_id, overload
         )
         self._staleness = Staleness(world, self.people, greenhouse, event_log, hub)
         other = self.looks.other
@@ -166,6 +166,11 @@ class Evaluator:
         for one in self.placed.get(robot_id, ()):
             if one.person is not None:
                 self._first_reports.seen(one.person.person_id, at)
+
+    @property
+    def is_unjudged(self) -> bool:
+        """Whether something was taken that :meth:`settle` has not judged yet."""
+        return self._unjudged is not None
 
     def settle(self) -> None:
         """Judge the fleet once for everything that was taken since the last time."""

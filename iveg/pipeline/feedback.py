@@ -22,7 +22,7 @@ class FeedbackPublisher:
     one message (docs/interfaces/mqtt.md).
 
     Args:
-        other: The stamp of each robot's newest confident object of another class.
+        other: When each robot's newest confident object of another class came.
         stamp: Writes a wall-clock moment the way the wire does.
         boot: Random, new at each start: identity of our feedback.
         backlog: How far Orion is behind (s); None where nobody knows.
@@ -32,7 +32,7 @@ class FeedbackPublisher:
         self,
         world: World,
         people: People,
-        other: Mapping[str, FeedbackAlert],
+        other: Mapping[str, Instant],
         fleet: Fleet,
         stamp: Callable[[float], str],
         boot: str,
@@ -88,11 +88,14 @@ class FeedbackPublisher:
     ) -> Feedback:
         mine = [one for one in alerts if one.observer == robot.robot_id]
         newest = max(mine, key=lambda one: one.stamp, default=None)
+        if newest is None and robot.robot_id in self._other:
+            stamp = self._stamp(self._other[robot.robot_id].wall)
+            newest = FeedbackAlert("", stamp)
         odometry = None if robot.is_replay else robot.odometry
         return Feedback(
             robot.robot_id,
             Origin(self._boot, self._seq, self._stamp(now.wall)),
-            newest or self._other.get(robot.robot_id),
+            newest,
             alerts,
             None if odometry is None else odometry.pose,
             None if odometry is None else odometry.twist,

@@ -45,7 +45,7 @@ class Ingest:
         self._passed = passed
         self.is_past = is_past
         self._rejected = rejected
-        self._queue: deque[Received] = deque()
+        self._queue: deque[tuple[Received, _Stream | None]] = deque()
         self._waiting: Counter[_Stream] = Counter()
         """How much telemetry waits, by robot and kind."""
         self._wake = asyncio.Event()
@@ -66,7 +66,7 @@ class Ingest:
         stream = _stream(received)
         if len(self._queue) >= MAX_QUEUED and not self._make_room(stream):
             return
-        self._queue.append(received)
+        self._queue.append((received, stream))
         if stream is not None:
             self._waiting[stream] += 1
         self._wake.set()
@@ -90,8 +90,7 @@ class Ingest:
     def drain(self) -> Iterable[Received]:
         """Everything that waits, oldest first."""
         while self._queue:
-            received = self._queue.popleft()
-            stream = _stream(received)
+            received, stream = self._queue.popleft()
             if stream is not None:
                 self._left(stream)
             yield received
@@ -120,7 +119,7 @@ class Ingest:
             self._dropped(stream)
             return stream is None
         index = next(
-            number for number, one in enumerate(self._queue) if _stream(one) == victim
+            number for number, (_, one) in enumerate(self._queue) if one == victim
         )
         del self._queue[index]
         self._left(victim)

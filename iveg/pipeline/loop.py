@@ -20,7 +20,9 @@ from iveg.pipeline.publish import Hub
 
 TICK_S = 0.05
 APART_S = 0.00025
-"""Least time between two judgements for each robot of the fleet: 5 ms with twenty."""
+"""Least time between two takings for each robot of the fleet: 5 ms with twenty."""
+JUDGED_APART_S = 2 * APART_S
+"""The same between two judgements: what robots are shown to be needs none."""
 _HEALTH_PERIOD_S = 1.0
 
 
@@ -48,32 +50,44 @@ class RuleLoop:
         self._clock = clock
         self._database_state = database_state
         self._latency = latency
-        self._apart_s = APART_S * len(evaluator.world.robots)
         self._ticked = float("-inf")
         self._health_at = float("-inf")
+        self._taken: list[Received] = []
+        """What the fleet has not been judged with yet."""
         self._states: dict[str, HopState] = {}
         self._broken: set[str] = set()
 
     async def run(self) -> None:
         """Until cancelled."""
-        taken_at = float("-inf")
+        taken_at = judged_at = float("-inf")
+        robots = len(self._evaluator.world.robots)
         while True:
-            await self._ingest.wait(TICK_S)
-            # What comes close together is judged together.
-            early = taken_at + self._apart_s - self._clock().mono
+            waits_s = TICK_S
+            if self._evaluator.is_unjudged:
+                waits_s = judged_at + JUDGED_APART_S * robots - self._clock().mono
+            await self._ingest.wait(max(0.0, waits_s))
+            # What comes close together is taken together.
+            early = taken_at + APART_S * robots - self._clock().mono
             if early > 0.0:
                 await asyncio.sleep(early)
             now = self._clock()
             taken_at = now.mono
-            self.step(self._ingest.drain(), now)
+            judges = taken_at - judged_at >= JUDGED_APART_S * robots
+            self.step(self._ingest.drain(), now, judges=judges)
+            if judges:
+                judged_at = taken_at
 
-    def step(self, arrived: Iterable[Received], now: Instant) -> None:
-        """Take everything that arrived, then let time pass if it is due."""
-        taken = []
+    def step(
+        self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
+    ) -> None:
+        """Take everything that arrived, then let time pass if it is due.
+
+        ``judges``: the fleet now, too; else with the next step that does.
+        """
         for received in arrived:
             fresh = self._evaluator.take(received)
             if fresh:
-                taken.append(received)
+                self._taken.append(received)
             if isinstance(received.observation, HeartbeatProbe):
                 self._health_monitor.received(received.observation.origin, received.at)
             if received.asked or self._evaluator.world.refuses(received):
@@ -81,9 +95,11 @@ class RuleLoop:
             # The second transport's answer is no news, but its time is kept.
             if fresh or isinstance(received.observation, CommandAnswer):
                 self._commander.take(received, self._evaluator.world.age_then(received))
-        self._evaluator.settle()
-        if taken:
-            self._latency.decided(taken, self._clock())
+        if judges:
+            self._evaluator.settle()
+        if self._taken and not self._evaluator.is_unjudged:
+            self._latency.decided(self._taken, self._clock())
+            self._taken.clear()
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)

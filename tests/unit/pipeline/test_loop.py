@@ -4,7 +4,7 @@ import asyncio
 
 from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Origin, Received
 from iveg.pipeline.publish import MAX_PENDING
-from tests.builders import odometry, origin
+from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.pipeline.desk import Desk, settle
 
 
@@ -21,6 +21,25 @@ async def test_the_loop_takes_what_waits_without_being_called() -> None:
 
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
+
+
+def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> None:
+    desk = Desk()
+    desk.drive("AGI")
+    desk.drive("AGII", 50.0)
+    desk.look("AGI")
+    near = detection_frame("AGI", detection(x=1.0), origin=desk.next_origin())
+    desk.hub.versions.clear()
+
+    desk.loop.step([Received(near, desk.clock())], desk.clock(), judges=False)
+    shown, mandated = (
+        "detections/AGI" in desk.hub.versions,
+        desk.evaluator.speed_limits["AGI"],
+    )
+    desk.loop.step([], desk.clock())
+
+    assert (shown, mandated.speed_factor) == (True, 1.0)
+    assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
 
 
 def test_time_passes_once_in_a_tick_however_much_arrives() -> None:

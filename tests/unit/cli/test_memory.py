@@ -1,0 +1,34 @@
+"""What a program that runs for months does about memory."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+
+from iveg.cli.memory import settle_memory
+
+
+@pytest.fixture(autouse=True)
+def as_it_was() -> Iterator[None]:
+    before = gc.get_threshold()
+    yield
+    gc.unfreeze()
+    gc.set_threshold(*before)
+
+
+def test_what_was_built_by_then_is_looked_at_no_more() -> None:
+    often, _, _ = gc.get_threshold()
+    built = [[number] for number in range(100)]
+    settle_memory()
+
+    assert gc.get_freeze_count() >= len(built)
+    assert gc.get_threshold()[0] > 10 * often
+
+
+def test_what_comes_later_is_still_found() -> None:
+    settle_memory()
+    ring: list[object] = []
+    ring.append(ring)
+    del ring
+
+    assert gc.collect() >= 1
