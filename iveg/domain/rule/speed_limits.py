@@ -88,8 +88,10 @@ class SpeedLimits:
         near = zones_near(world, people, rule, now, self._open)
         changes: list[Change] = []
         for robot in world.robots.values():
-            zones = near(robot)
-            changes += self._cross(robot, zones, now, f"{new_id}-{len(changes)}")
+            zones = list(near(robot))
+            if zones or self._open.get(robot.robot_id):
+                name = f"{new_id}-{len(changes)}"
+                changes += self._cross(robot, zones, now, name)
         silent = _silent_observer(world, now)
         bounds = self._greenhouse.bounds
         flooded = self.overload.slowed(world, bounds.xmax - bounds.xmin)

@@ -72,6 +72,12 @@ def _zones_of(person: Person, world: World, rule: Rule, now: Instant) -> Iterato
 
 
 def _peers(world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
+    for peer, age in _moving(world, now):
+        yield _circle_of(peer, rule.radius_at(age))
+
+
+def _moving(world: World, now: Instant) -> Iterator[tuple[RobotState, float]]:
+    """Peers that one gives way to, and how old their poses are (s)."""
     for peer in world.robots.values():
         since = peer.likely_pose_at()
         # A recording cannot yield, and nobody yields to it.
@@ -80,17 +86,14 @@ def _peers(world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
         age = max(0.0, now.mono - since)
         known = peer.age_s(now)
         at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
-        if at_rest or age > LIMITS.ring_lasts_s:
-            continue
-        pose = peer.odometry.pose
-        yield Zone(
-            "robot",
-            peer.robot_id,
-            peer.robot_id,
-            pose.x,
-            pose.y,
-            rule.radius_at(age),
-        )
+        if not at_rest and age <= LIMITS.ring_lasts_s:
+            yield peer, age
+
+
+def _circle_of(peer: RobotState, radius_m: float) -> Zone:
+    assert peer.odometry is not None  # noqa: S101 - it moves
+    pose, name = peer.odometry.pose, peer.robot_id
+    return Zone("robot", name, name, pose.x, pose.y, radius_m)
 
 
 Near = Callable[[RobotState], Iterable[Zone]]
@@ -116,14 +119,16 @@ def zones_near(
     if len(world.robots) * (len(people.known) + len(world.robots)) <= _FEW_PAIRS:
         everything = list(zones_of(world, people, rule, now))
         return lambda _: everything
-    near = _people_near(world, people, rule, now)
-    peers = _peers_near(world, list(_peers(world, rule, now)), inside)
+    placed = _Placed.of(world)
+    near = _people_near(placed, people, rule, now)
+    peers = _peers_near(placed, world, rule, now, inside)
     order = {person_id: place for place, person_id in enumerate(people.known)}
     circles: dict[str, list[Zone]] = {}
 
     def found(robot: RobotState) -> Iterable[Zone]:
-        mine = inside.get(robot.robot_id, {})
-        wanted = near.get(robot.robot_id, set()) | (mine.keys() & order.keys())
+        mine, wanted = inside.get(robot.robot_id), near.get(robot.robot_id, set())
+        if mine:
+            wanted = wanted | (mine.keys() & order.keys())
         for person_id in sorted(wanted, key=order.__getitem__):
             if person_id not in circles:
                 person = people.known[person_id]
@@ -134,8 +139,34 @@ def zones_near(
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """Robots of which it is known where they are; ``places`` has shape (n, 2) (m)."""
+
+    names: list[str]
+    places: Floats
+
+    @classmethod
+    def of(cls, world: World) -> "_Placed":
+        """As the world knows them now."""
+        placed = [
+            (robot.robot_id, robot.odometry.pose)
+            for robot in world.robots.values()
+            if robot.odometry is not None
+        ]
+        places = np.array([(pose.x, pose.y) for _, pose in placed]).reshape(-1, 2)
+        return cls([name for name, _ in placed], places)
+
+    def within(self, x: Floats, y: Floats, limit: Floats) -> Iterator[tuple[str, int]]:
+        """Which robots are within ``limit`` (m) of which places."""
+        dx, dy = x - self.places[:, :1], y - self.places[:, 1:]
+        rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+            yield self.names[row], column
+
+
 def _people_near(
-    world: World, people: People, rule: Rule, now: Instant
+    placed: _Placed, people: People, rule: Rule, now: Instant
 ) -> dict[str, set[str]]:
     """Robot → everybody whom it may be near."""
     spots = people.spots
@@ -144,42 +175,39 @@ def _people_near(
     ring = ring_radius(rule.radius_m, age, np.minimum, np.maximum)
     ring = np.maximum(reach, ring) + 2 * NOT_FAR_M
     limit = np.where(age <= LIMITS.ring_lasts_s, ring, -1.0)
-    robots, columns = _pairs(world, x, y, limit)
     near: dict[str, set[str]] = {}
-    for robot_id, column in zip(robots, columns, strict=True):
+    for robot_id, column in placed.within(x, y, limit):
         near.setdefault(robot_id, set()).add(spots.owners[column][0])
     return near
 
 
 def _peers_near(
-    world: World, peers: list[Zone], inside: Mapping[str, Mapping[str, Any]]
+    placed: _Placed,
+    world: World,
+    rule: Rule,
+    now: Instant,
+    inside: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, list[Zone]]:
     """Robot → the peers that it may be near or is slow for."""
-    x, y = np.array([(one.x, one.y) for one in peers]).reshape(-1, 2).T
-    limit = np.array([one.radius_m for one in peers]) + 2 * NOT_FAR_M
+    peers = list(_moving(world, now))
+    rows = {name: row for row, name in enumerate(placed.names)}
+    places = placed.places[[rows[peer.robot_id] for peer, _ in peers]]
+    ages = np.array([age for _, age in peers])
+    limit = ring_radius(rule.radius_m, ages, np.minimum, np.maximum) + 2 * NOT_FAR_M
     chosen: dict[str, set[int]] = {}
-    for robot_id, column in zip(*_pairs(world, x, y, limit), strict=True):
-        chosen.setdefault(robot_id, set()).add(column)
-    place = {one.cause: column for column, one in enumerate(peers)}
+    for robot_id, column in placed.within(places[:, 0], places[:, 1], limit):
+        # Everybody is near itself, which slows nobody.
+        if peers[column][0].robot_id != robot_id:
+            chosen.setdefault(robot_id, set()).add(column)
+    place = {peer.robot_id: column for column, (peer, _) in enumerate(peers)}
     for robot_id, causes in inside.items():
-        known = {place[cause] for cause in causes.keys() & place.keys()}
-        chosen[robot_id] = chosen.get(robot_id, set()) | known
+        if known := {place[cause] for cause in causes.keys() & place.keys()}:
+            chosen[robot_id] = chosen.get(robot_id, set()) | known
+
+    def circle(column: int) -> Zone:
+        peer, age = peers[column]
+        return _circle_of(peer, rule.radius_at(age))
+
     return {
-        robot_id: [peers[column] for column in sorted(columns)]
-        for robot_id, columns in chosen.items()
+        name: [circle(one) for one in sorted(mine)] for name, mine in chosen.items()
     }
-
-
-def _pairs(
-    world: World, x: Floats, y: Floats, limit: Floats
-) -> tuple[list[str], list[int]]:
-    """Which robots are within ``limit`` (m) of which places."""
-    placed = [
-        (robot.robot_id, robot.odometry.pose)
-        for robot in world.robots.values()
-        if robot.odometry is not None
-    ]
-    own = np.array([(pose.x, pose.y) for _, pose in placed]).reshape(-1, 2)
-    dx, dy = x - own[:, :1], y - own[:, 1:]
-    rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
-    return [placed[row][0] for row in rows.tolist()], columns.tolist()
