@@ -111,6 +111,8 @@ class Tracker:
         ]
         for is_live in (True, False):
             wanting = [index for index, old in enumerate(out) if old is None]
+            if not wanting:
+                break
             offered = [
                 (person, look)
                 for person, look in own
@@ -164,6 +166,8 @@ class Tracker:
     ) -> None:
         """Give detections without a track one of those that nobody has taken."""
         wanting = [index for index, track in enumerate(tracks) if track is None]
+        if not wanting:
+            return
         taken = set(tracks)
         offered = [
             person

@@ -33,6 +33,7 @@ from iveg.ngsi.sensors import SENSORS, Sensor
 
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
+_BOXES: TypeAdapter[list[payloads.BoxValue]] = TypeAdapter(list[payloads.BoxValue])
 _Reader = Callable[[str, Any], Observation]
 IsPast = Callable[[str, type[Observation], str, int], bool]
 """Whether robot, kind, boot and seq tell that a message cannot be news."""
@@ -49,9 +50,11 @@ def read_attributes(
         is_past: Tells by its identity what need not be read; None reads all.
     """
     readings = []
-    for name, reader in _READERS.items():
-        if attributes.get(name) is None:
+    # In the order of the table: where a robot is counts for what it sees there.
+    for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__):
+        if attributes[name] is None:
             continue
+        reader = _READERS[name]
         old = (
             None if is_past is None else _overtaken(robot_id, name, attributes, is_past)
         )
@@ -187,16 +190,22 @@ def _detections(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
         origin = read_origin(
             payloads.OriginFields.model_validate(attributes[names.BOXES_HEADER])
         )
-    read = [_detection(box) for box in boxes]
-    found = tuple(detection for detection in read if detection is not None)
-    return DetectionFrame(robot_id, origin, found, unreadable=len(read) - len(found))
+    try:
+        found = tuple(_detection_of(box) for box in _BOXES.validate_python(boxes))
+    except ValidationError:
+        read = [_detection(box) for box in boxes]
+        found = tuple(detection for detection in read if detection is not None)
+    return DetectionFrame(robot_id, origin, found, unreadable=len(boxes) - len(found))
 
 
 def _detection(raw: Any) -> Detection | None:
     try:
-        box = payloads.BoxValue.model_validate(raw)
+        return _detection_of(payloads.BoxValue.model_validate(raw))
     except ValidationError:
         return None
+
+
+def _detection_of(box: payloads.BoxValue) -> Detection:
     sides = box.position
     position = Box3D(
         sides.xmin, sides.xmax, sides.ymin, sides.ymax, sides.zmin, sides.zmax
@@ -333,6 +342,7 @@ _READERS: Mapping[str, _Reader] = {
     **{sensor.attribute: _reader_of(sensor) for sensor in SENSORS},
 }
 
+_RANK = {name: rank for rank, name in enumerate(_READERS)}
 
 _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]] = {
     names.ODOMETRY: (Odometry, names.ODOMETRY),
