@@ -2,7 +2,7 @@
 
 from iveg.domain.observations import Hold
 from iveg.ngsi import codec
-from tests.builders import odometry, safety_report
+from tests.builders import odometry, origin, safety_report
 from tests.chaos.witness import Witness
 
 
@@ -12,9 +12,15 @@ def tell(witness: Witness, *speeds: float) -> None:
         witness.take("/iveg/AGI_odom/attrs", payload)
 
 
-def hold(witness: Witness) -> None:
-    report = safety_report("AGI", Hold("01A", "iveg", "remote"))
+def hold(witness: Witness, seq: int = 1) -> None:
+    held = Hold("01A", "iveg", "remote")
+    report = safety_report("AGI", held, origin=origin(seq))
     witness.take("/iveg/AGI_safety/attrs", codec.write_safety(report))
+
+
+def free(witness: Witness, seq: int) -> None:
+    report = safety_report("AGI", origin=origin(seq))
+    witness.take("/AGI/iveg/safety", codec.write_safety(report))
 
 
 def test_a_motion_that_nobody_allowed_is_counted_once() -> None:
@@ -29,9 +35,10 @@ def test_a_motion_that_nobody_allowed_is_counted_once() -> None:
 def test_a_resume_allows_motions_until_the_robot_is_held_again() -> None:
     witness = Witness(0)
     hold(witness)
+    free(witness, 2)
     witness.allow("AGI")
     tell(witness, 0.0, 0.3, 0.0, 0.3, 0.0)
-    hold(witness)
+    hold(witness, 3)
 
     tell(witness, 0.3)
 
@@ -56,3 +63,27 @@ def test_a_robot_that_still_brakes_keeps_its_allowance() -> None:
     hold(witness)
 
     assert witness.of("AGI").allowed
+
+
+def test_a_robot_that_comes_to_rest_while_it_is_held_may_not_start_again() -> None:
+    witness = Witness(0)
+    witness.allow("AGI")
+    tell(witness, 0.4)
+    hold(witness)
+
+    tell(witness, 0.0, 0.3)
+
+    assert (witness.starts, witness.unlicensed) == (2, 1)
+
+
+def test_a_report_that_comes_again_takes_nothing_back() -> None:
+    witness = Witness(0)
+    hold(witness, 1)
+    free(witness, 2)
+    witness.allow("AGI")
+
+    hold(witness, 1)
+    tell(witness, 0.3)
+
+    assert witness.of("AGI").words == 2
+    assert witness.unlicensed == 0

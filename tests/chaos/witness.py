@@ -17,6 +17,7 @@ class Seen:
     Attributes:
         allowed: Whether a person has resumed it since it last reported a hold.
         starts: Times it began to move; ``unlicensed`` those that nobody allowed.
+        report: Boot and count of its newest report.
     """
 
     speed: float = 0.0
@@ -26,6 +27,7 @@ class Seen:
     unlicensed: int = 0
     factor: float = 0.0
     words: int = 0
+    report: tuple[str | None, int] = (None, 0)
 
 
 @dataclass
@@ -75,16 +77,27 @@ class Witness:
             if isinstance(word, Odometry):
                 self._moves(self.of(word.robot_id), abs(word.twist.linear_x))
             elif isinstance(word, SafetyReport):
-                seen = self.of(word.robot_id)
-                seen.words += 1
-                seen.factor = word.speed_factor
-                seen.held = any(hold.ack != "auto" for hold in word.holds)
-                # Only a robot at rest: one that brakes has not been stopped yet.
-                if seen.held and seen.speed < LIMITS.standing_speed:
-                    seen.allowed = False
+                self._reports(self.of(word.robot_id), word)
+
+    def _reports(self, seen: Seen, report: SafetyReport) -> None:
+        """Each counts once: it comes on two topics, and again after a lost line."""
+        boot, seq = report.origin.boot, report.origin.seq or 0
+        if boot == seen.report[0] and seq <= seen.report[1]:
+            return
+        seen.report = boot, seq
+        seen.words += 1
+        seen.factor = report.speed_factor
+        seen.held = any(hold.ack != "auto" for hold in report.holds)
+        self._forbid_at_rest(seen)
+
+    def _forbid_at_rest(self, seen: Seen) -> None:
+        # Only a robot at rest: one that brakes has not been stopped yet.
+        if seen.held and seen.speed < LIMITS.standing_speed:
+            seen.allowed = False
 
     def _moves(self, seen: Seen, speed: float) -> None:
         begins = seen.speed < LIMITS.standing_speed <= speed
         seen.starts += begins
         seen.unlicensed += begins and not seen.allowed
         seen.speed = speed
+        self._forbid_at_rest(seen)
