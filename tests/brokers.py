@@ -10,13 +10,15 @@ from pathlib import Path
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.embedded.mqtt_broker import mqtt_broker
+from tests.bonds import bound
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ['PATH']}:/usr/sbin")
 PLAIN = """listener {port} 127.0.0.1
 allow_anonymous true
 set_tcp_nodelay true
 log_type none
-"""
+""" + ("user root\n" if os.geteuid() == 0 else "")
+"""A plain one on a port; root's stays root's, so that it ends with who started it."""
 
 
 @contextlib.asynccontextmanager
@@ -29,7 +31,8 @@ async def broker_on(port: int, folder: Path) -> AsyncIterator[BrokerAddress]:
         return
     conf = folder / "mosquitto.conf"
     conf.write_text(PLAIN.format(port=port))
-    process = await asyncio.create_subprocess_exec(MOSQUITTO, "-c", str(conf))
+    words = bound(MOSQUITTO, "-c", str(conf))
+    process = await asyncio.create_subprocess_exec(*words)
     try:
         await _listening(port)
         yield address

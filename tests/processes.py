@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import httpx
 
+from tests.bonds import bound
 from tests.ports import free_ports
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -135,7 +136,7 @@ class Site:
         log = self.directory / f"{len(self.programs)}-{words[0]}.log"
         with log.open("wb") as output:
             process = subprocess.Popen(
-                [sys.executable, "-m", module, *words],
+                bound(sys.executable, "-m", module, *words),
                 cwd=self.directory,
                 env=self._environment(),
                 stdin=subprocess.DEVNULL,

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.ports import free_ports
 from tests.processes import EMULATOR, Program, Site, until
@@ -100,7 +101,7 @@ class Field:
         conf = Path(self.place.directory) / "field.conf"
         bridge = _BRIDGE if self.bridged else ""
         conf.write_text((PLAIN + bridge).format(port=self.port, south=self.south))
-        self._broker = subprocess.Popen([MOSQUITTO, "-c", str(conf)])
+        self._broker = subprocess.Popen(bound(MOSQUITTO, "-c", str(conf)))
         until(self._listens, 10.0, "mosquitto listens")
 
     def _listens(self) -> bool:

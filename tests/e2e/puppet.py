@@ -61,6 +61,10 @@ class Puppet:
         topics = {self._orders: 1, names.FEEDBACK_FILTER: 1}
         self._link = MqttLink(self.address, self.robot_id, topics, self._hear)
 
+    def behave(self) -> None:
+        """Obey, brake and report, as robots should."""
+        self.brakes = self.answers = self.speaks = True
+
     async def live(self) -> None:
         """Report ten times a second until cancelled."""
         async with asyncio.TaskGroup() as tasks:

@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from iveg.web.live.pacing import FRAMES
+from tests.bonds import bound
 from tests.chaos.radio import Radio, Weather
 from tests.e2e.reading import evaluate
 from tests.fleet import names
@@ -70,9 +71,8 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         place.wait_until_whole()
         port = urlsplit(place.settings["IVEG_MQTT_URL"]).port
         words = ["--port", str(port), "--robots", "20", "--hz", "2", "--beams", "360"]
-        fleet = subprocess.Popen(
-            [sys.executable, "-m", "tests.fleet", *words], cwd=ROOT
-        )
+        talking = bound(sys.executable, "-m", "tests.fleet", *words)
+        fleet = subprocess.Popen(talking, cwd=ROOT)
         yield place
         fleet.terminate()
         fleet.wait(10)

@@ -49,6 +49,7 @@ def page(open_page: OpenPage) -> Page:
 def agv(scene: tuple[Site, Puppet], page: Page, stack: Site) -> Puppet:
     """The robot, free and at rest."""
     robot = scene[1]
+    robot.behave()
     let_go(page, stack, "AGV")
     robot.speed = 0.0
     return robot

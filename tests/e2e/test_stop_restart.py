@@ -41,6 +41,7 @@ def page(open_page: OpenPage) -> Page:
 def agv(scene: tuple[Site, Puppet], page: Page, stack: Site) -> Puppet:
     """The robot, driving and obedient."""
     robot = scene[1]
+    robot.behave()
     let_go(page, stack, "AGV")
     robot.speed = CRUISE
     return robot

@@ -65,7 +65,7 @@ def page(open_page: OpenPage) -> Page:
 @pytest.fixture
 def agv(strings: Puppet, page: Page, stack: Site) -> Puppet:
     """The puppet, driving and obedient."""
-    strings.brakes = strings.answers = strings.speaks = True
+    strings.behave()
     _make_ready(page, stack, "AGV")
     strings.speed = CRUISE
     return strings

@@ -12,6 +12,7 @@ from iveg.domain.errors import HopError
 from iveg.ros2 import cdr, names
 from iveg.ros2 import messages as m
 from iveg.ros2.names import Qos
+from tests.bonds import bound
 from tests.dds import Dds, DdsReader, free_domain, loopback
 from tests.processes import ROOT, until
 
@@ -27,7 +28,7 @@ def domain() -> int:
 @pytest.fixture(scope="module")
 def talker(domain: int) -> Iterator[subprocess.Popen[bytes]]:
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.integration.dds_talker", str(domain)],
+        bound(sys.executable, "-m", "tests.integration.dds_talker", str(domain)),
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         start_new_session=True,

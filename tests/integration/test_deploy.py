@@ -25,6 +25,7 @@ from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
 from iveg.settings import Settings
+from tests.bonds import bound
 from tests.ports import free_ports
 from tests.processes import ROOT, children_of
 
@@ -77,7 +78,7 @@ def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
     encrypted.write_text(local(ROOT / "deploy/mosquitto-tls.conf", broker))
     with (folder / "log").open("w") as log:
         process = subprocess.Popen(
-            [mosquitto, "-c", str(conf)], stdout=log, stderr=subprocess.STDOUT
+            bound(mosquitto, "-c", str(conf)), stdout=log, stderr=subprocess.STDOUT
         )
     try:
         wait_for(port)

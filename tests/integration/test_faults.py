@@ -21,6 +21,7 @@ import pytest
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.adapters.subscriptions import wanted_for
+from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.faulty_fiware import MODULE
 from tests.integration.gate import Gate, Mood, bridge, gate
@@ -58,7 +59,7 @@ class Stack:
     # --- parts ----------------------------------------------------------------------
 
     def start_broker(self) -> None:
-        command = [str(MOSQUITTO), "-c", str(self.conf)]
+        command = bound(str(MOSQUITTO), "-c", str(self.conf))
         self.broker = subprocess.Popen(command, stdout=subprocess.DEVNULL)
 
     def start_fiware(self) -> None:
@@ -195,8 +196,7 @@ def _wire(stack: ExitStack, place: Site) -> Stack:
         "IVEG_NOTIFY_URL": f"http://127.0.0.1:{page.port}/ngsi/notifications",
     }
     conf = place.directory / "mosquitto.conf"
-    root = "user root\n" if os.geteuid() == 0 else ""
-    conf.write_text(PLAIN.format(port=front) + root)
+    conf.write_text(PLAIN.format(port=front))
     here, there = BrokerAddress("127.0.0.1", front), BrokerAddress("127.0.0.1", behind)
     stack.enter_context(bridge(here, there))
     return Stack(place, orion, agent, page, own, conf)

@@ -16,6 +16,7 @@ import httpx
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress
+from tests.bonds import bound
 from tests.brokers import MOSQUITTO, PLAIN
 from tests.integration.gate import Gate, bridge, gate
 from tests.ports import free_ports
@@ -44,9 +45,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Ga
     with ExitStack() as stack:
         place = stack.enter_context(site(tmp_path_factory.mktemp("overload")))
         conf = place.directory / "mosquitto.conf"
-        root = "user root\n" if os.geteuid() == 0 else ""
-        conf.write_text(PLAIN.format(port=front) + root)
-        broker = subprocess.Popen([str(MOSQUITTO), "-c", str(conf)])
+        conf.write_text(PLAIN.format(port=front))
+        broker = subprocess.Popen(bound(str(MOSQUITTO), "-c", str(conf)))
         stack.callback(broker.wait, 10.0)
         stack.callback(broker.kill)
         place.settings["IVEG_MQTT_URL"] = f"mqtt://127.0.0.1:{behind}"
