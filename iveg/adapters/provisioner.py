@@ -24,7 +24,7 @@ from iveg.domain.feeds import Feeds
 from iveg.domain.observations import HeartbeatProbe, Instant, Origin, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi import codec, names
-from iveg.pipeline.health_monitor import PROBE_PERIOD_S, SLOW_S, HealthMonitor
+from iveg.pipeline.health_monitor import PROBE_PERIOD_S, HealthMonitor, Pace
 from iveg.pipeline.ingest import Ingest
 
 _log = logging.getLogger(__name__)
@@ -78,6 +78,7 @@ class Provisioner:
         self._clock = read_clock
         self._probe_seq = 0
         self._devices_at = self._devices_wait_s = 0.0
+        self._paces = {"orion": Pace(), "iot_agent": Pace()}
         self._broken: set[str] = set()
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
@@ -193,11 +194,9 @@ class Provisioner:
         return self._health_monitor.agent_error or self._health_monitor.agent_silent
 
     def _slow(self, hop: str, spent_s: float) -> str:
-        if spent_s <= SLOW_S:
-            self._tell(f"{hop}'s speed", None)
-            return ""
-        detail = f"answers take {spent_s:.1f} s"
-        self._tell(f"{hop}'s speed", HopError(hop, detail))
+        pace = self._paces[hop]
+        detail = pace.took(spent_s)
+        self._tell(f"{hop}'s speed", HopError(hop, detail) if pace.is_fault else None)
         return detail
 
     # --- devices, subscriptions, reads --------------------------------------------

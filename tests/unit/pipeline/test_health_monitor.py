@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.observations import Origin
-from iveg.pipeline.health_monitor import HealthMonitor, Hop
+from iveg.pipeline.health_monitor import HealthMonitor, Hop, Pace
 from tests.builders import START, at
 
 
@@ -228,3 +228,17 @@ def test_what_never_came_is_down_after_the_first_seconds() -> None:
     health_monitor.orion_ok_at = at(6.0).mono
 
     assert states(health_monitor, 6.1)["iot_agent"] == "down"
+
+
+def test_one_slow_answer_is_shown_and_two_in_a_row_are_a_fault() -> None:
+    pace = Pace()
+
+    told = [(pace.took(spent), pace.is_fault) for spent in (1.2, 0.2, 1.3, 2.0, 0.1)]
+
+    assert told == [
+        ("answers take 1.2 s", False),
+        ("", False),
+        ("answers take 1.3 s", False),
+        ("answers take 2.0 s", True),
+        ("", False),
+    ]
