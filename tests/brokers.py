@@ -42,7 +42,7 @@ async def broker_on(port: int, folder: Path) -> AsyncIterator[BrokerAddress]:
 
 
 async def _listening(port: int) -> None:
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:
         with contextlib.suppress(OSError):
             _, writer = await asyncio.open_connection("127.0.0.1", port)

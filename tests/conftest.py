@@ -2,10 +2,12 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
 from playwright.sync_api import expect
+from xdist.scheduler import LoadScopeScheduling
 
 # A helper's failed assertion shows its values as a test's own does.
 pytest.register_assert_rewrite("tests.processes")
@@ -18,16 +20,16 @@ expect.set_options(timeout=20_000)
 settings.load_profile(os.environ.get("IVEG_HYPOTHESIS", "iveg"))
 
 _FOLDERS = ("chaos", "e2e", "integration", "properties", "contract", "unit")
+_TOGETHER = {"e2e/driving": ("contract", "live", "supervision", "pages", "door")}
+"""Folders whose modules share a stack: one worker runs them, one after the other.
+
+At first nothing complains, then somebody asks for what does, at last robots stand.
+"""
 _BUSY = (
-    *("e2e/test_stop_states", "e2e/test_matrix", "e2e/test_pages"),
-    *("e2e/test_supervision", "e2e/test_stop", "e2e/test_live", "e2e/test_pacing"),
-    *(
-        "chaos/test_backlog",
-        "e2e/test_stop_restart",
-        "e2e/test_pictures",
-        "e2e/test_faults",
-    ),
-    *("e2e/test_probes", "e2e/test_stop_drills"),
+    *("e2e/driving", "e2e/test_stop_states", "e2e/test_matrix", "e2e/test_stop"),
+    *("e2e/test_pacing", "chaos/test_backlog", "e2e/test_stop_restart"),
+    *("e2e/test_pictures", "e2e/test_faults", "e2e/test_probes"),
+    *("e2e/test_stop_drills", "e2e/test_layout", "e2e/test_demo"),
 )
 _WAITING = (
     *("integration/test_faults", "integration/test_overload"),
@@ -41,8 +43,24 @@ _WAITING = (
 _FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
 """So browsers run beside modules that wait for processes, and no worker ends with a
 long module alone."""
+_MEEK = 5
 _REAL = {"browser", "postgresql", "postgresql_url", "database_url"}
 """Fixtures that start programs."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
+    """A module, or a folder that shares a stack, stays together in one worker."""
+    scheduler = LoadScopeScheduling(config, log)
+    module_of = scheduler._split_scope
+    scheduler._split_scope = lambda nodeid: _shared(nodeid) or module_of(nodeid)
+    return scheduler
+
+
+def _shared(nodeid: str) -> str | None:
+    module = nodeid.split("::")[0]
+    folder = module.removeprefix("tests/").rpartition("/")[0]
+    return folder if folder in _TOGETHER else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -53,10 +71,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=_turn)
 
 
-def _turn(item: pytest.Item) -> tuple[int, int]:
-    name = str(_path(item).with_suffix(""))
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """What only computes leaves the processors to programs that somebody waits for."""
+    if "PYTEST_XDIST_WORKER" in os.environ and not item.get_closest_marker("real"):
+        os.nice(max(0, _MEEK - os.nice(0)))
+
+
+def _turn(item: pytest.Item) -> tuple[int, int, int]:
+    path, place = _path(item), 0
+    name, module = str(path.parent), path.stem.removeprefix("test_")
+    if name in _TOGETHER:
+        place = _TOGETHER[name].index(module)
+    else:
+        name = str(path.with_suffix(""))
     first = _FIRST.index(name) if name in _FIRST else len(_FIRST)
-    return first, _FOLDERS.index(_folder(item))
+    return first, place, _FOLDERS.index(_folder(item))
 
 
 def _folder(item: pytest.Item) -> str:

@@ -22,10 +22,10 @@ from tests.ports import free_ports
 ROOT = Path(__file__).resolve().parents[1]
 _DIRTY = re.compile(r"^.*(?:\b(?:WARNING|ERROR|CRITICAL)\b|Traceback).*$", re.MULTILINE)
 _READY = re.compile(r"^ready$", re.MULTILINE)
-_STOP_WITHIN_S = 15.0
-EMULATOR = ("emulator", "--hz", "15")
-"""Robots for tests that are not about speed: half as often as they would speak, so that
-several stacks and browsers have room on one machine."""
+_STOP_WITHIN_S = 30.0
+EMULATOR = ("emulator", "--hz", "10")
+"""Robots for tests that are not about speed: a third as often as they would speak, so
+that several stacks and browsers have room on one machine."""
 
 T = TypeVar("T")
 
@@ -67,7 +67,7 @@ class Program:
         """All it said so far."""
         return self.log.read_text(errors="replace")
 
-    def wait_until_ready(self, deadline_s: float = 30.0) -> None:
+    def wait_until_ready(self, deadline_s: float = 60.0) -> None:
         """Until it says so; a program that has ended never will."""
 
         def is_ready() -> bool:
@@ -163,14 +163,17 @@ class Site:
         """A program's view of the API: may read and stop."""
         bearer = {"Authorization": f"Bearer {self.settings['IVEG_API_TOKEN']}"}
         return httpx.Client(
-            base_url=f"{self.url}/api/v1/", headers=bearer, timeout=5.0, trust_env=False
+            base_url=f"{self.url}/api/v1/",
+            headers=bearer,
+            timeout=30.0,
+            trust_env=False,
         )
 
-    def wait_until_served(self, deadline_s: float = 30.0) -> None:
+    def wait_until_served(self, deadline_s: float = 60.0) -> None:
         """Until the page answers."""
         until(lambda: _answers(f"{self.url}/healthz"), deadline_s, "/healthz")
 
-    def wait_until_live(self, robots: int = 2, deadline_s: float = 30.0) -> None:
+    def wait_until_live(self, robots: int = 2, deadline_s: float = 60.0) -> None:
         """Until that many robots are LIVE."""
         self.wait_until_served(deadline_s)
         with self.api() as api:
@@ -241,7 +244,7 @@ def _stat_fields(stat: Path) -> list[str] | None:
 
 def _answers(url: str) -> bool:
     try:
-        return httpx.get(url, timeout=2.0, trust_env=False).status_code == 200
+        return httpx.get(url, timeout=5.0, trust_env=False).status_code == 200
     except httpx.TransportError:
         return False
 

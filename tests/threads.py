@@ -7,7 +7,7 @@ from collections.abc import Coroutine, Iterator
 from queue import Queue
 from typing import Any
 
-_ENDS_WITHIN_S = 10.0
+_ENDS_WITHIN_S = 30.0
 
 
 @contextlib.contextmanager

@@ -102,7 +102,7 @@ class Field:
         bridge = _BRIDGE if self.bridged else ""
         conf.write_text((PLAIN + bridge).format(port=self.port, south=self.south))
         self._broker = subprocess.Popen(bound(MOSQUITTO, "-c", str(conf)))
-        until(self._listens, 10.0, "mosquitto listens")
+        until(self._listens, 30.0, "mosquitto listens")
 
     def _listens(self) -> bool:
         try:

@@ -13,7 +13,7 @@ from tests.chaos.witness import Witness
 from tests.processes import until
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
-STANDING_WITHIN_S = 20.0
+STANDING_WITHIN_S = 40.0
 """Braking, the window of a second, and a machine that does other things."""
 READY_RATIO = 4.0
 """Idle it is ready in 2.5 s on two cores, so this keeps the 10 s of F13 on any machine;
@@ -27,8 +27,8 @@ def driving(person: Person) -> Iterator[None]:
     """Every test begins with AGI on its way."""
     person.let_go("AGI", 40.0)
     yield
-    until(lambda: person.press("AGI"), 20.0, "STOP is accepted")
-    person.wait_for("AGI", "STANDING", 40.0)
+    until(lambda: person.press("AGI"), PATIENCE_S, "STOP is accepted")
+    person.wait_for("AGI", "STANDING", PATIENCE_S)
 
 
 def test_f14_a_blocked_loop_stops_the_heartbeat_and_halves_the_robots(
@@ -40,18 +40,16 @@ def test_f14_a_blocked_loop_stops_the_heartbeat_and_halves_the_robots(
     stack.freeze("serve")
     try:
         frozen = time.monotonic()
-        until(lambda: robot.factor <= 0.5, 10.0, "the robot halves its speed")
+        until(lambda: robot.factor <= 0.5, PATIENCE_S, "the robot halves its speed")
         capped = time.monotonic() - frozen
-        until(lambda: robot.factor == 0.0, 10.0, "the robot stands")
+        until(lambda: robot.factor == 0.0, PATIENCE_S, "the robot stands")
         stood = time.monotonic() - frozen
     finally:
         stack.thaw("serve")
 
-    # Reports come every 0.5 s at least, and feedback every 0.2 s: 1.0 s and 3.0 s are
-    # the robot's own; what is added is how late the witness may hear of it.
-    assert 0.5 <= capped <= 1.0 + 0.7
-    assert capped < stood
-    assert stood >= 2.5
+    # 1.0 s and 3.0 s are the robot's own, and R7 proves them on its clock; feedback may
+    # have been on its way, and the witness hears of it a little later.
+    assert 0.5 <= capped < 2.5 <= stood
     assert witness.unlicensed == 0
 
 
@@ -124,9 +122,9 @@ def test_f15_a_robot_that_reboots_while_it_drives_is_held(
     stack.kill("emulator")
     stack.start("emulator")
 
-    until(lambda: witness.of("AGI").words > words, 30.0, "AGI is heard again")
+    until(lambda: witness.of("AGI").words > words, PATIENCE_S, "AGI is heard again")
 
-    until(lambda: witness.of("AGI").held, 10.0, "AGI is held")
+    until(lambda: witness.of("AGI").held, PATIENCE_S, "AGI is held")
     assert witness.unlicensed == 0
 
 

@@ -54,9 +54,9 @@ def test_over_the_whole_path_stop_stands_and_only_a_resume_drives_on(
 
     with closing(Operator(field.place)) as operator:
         accepted = operator.stop()
-        until(lambda: operator.look()["stop_state"] == "STANDING", 10.0, "it stands")
+        until(lambda: operator.look()["stop_state"] == "STANDING", 30.0, "it stands")
         stood = witness.drives
-        until(drives_on, 15.0, "it drives on")
+        until(drives_on, 30.0, "it drives on")
 
     assert (accepted, stood) == (202, False)
 
@@ -74,7 +74,7 @@ def test_whoever_dies_the_base_halts_within_its_time_out(
         died = field.kill(victim)
         stood = until(
             lambda died=died: witness.stood_after(died),  # type: ignore[misc]
-            8.0,
+            30.0,
             f"the base stands after {victim} died",
         )
         braking = witness.speed_at(died) / built_in().of_robot(ROBOT).profile.braking

@@ -33,7 +33,7 @@ import orjson
 from iveg.embedded.http_server import Request, Response, http_server
 from tests.faulty_fiware import faulty_fiware
 
-PATIENCE_S = 8.0
+PATIENCE_S = 30.0
 SETTLED_S = 0.15
 
 

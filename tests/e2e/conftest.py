@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,18 @@ def browser() -> Iterator[Browser]:
         yield found
 
 
+@contextmanager
+def driving_site(directory: Path, scenario: str = "demo") -> Iterator[Site]:
+    """FIWARE, dashboard and emulator, driving."""
+    with site(directory) as place:
+        place.start("fiware").wait_until_ready()
+        place.start("serve")
+        place.wait_until_served()
+        place.start(*EMULATOR, "--scenario", scenario)
+        place.wait_until_live()
+        yield place
+
+
 @pytest.fixture(scope="module")
 def scenario() -> str:
     """What the robots and people of a module do."""
@@ -29,12 +42,7 @@ def scenario() -> str:
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory, scenario: str) -> Iterator[Site]:
     """FIWARE, dashboard and emulator, driving; shared by the tests of a module."""
-    with site(tmp_path_factory.mktemp("iveg")) as place:
-        place.start("fiware").wait_until_ready()
-        place.start("serve")
-        place.wait_until_served()
-        place.start(*EMULATOR, "--scenario", scenario)
-        place.wait_until_live()
+    with driving_site(tmp_path_factory.mktemp("iveg"), scenario) as place:
         yield place
 
 
@@ -63,9 +71,9 @@ def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
         page = context.new_page()
         if not alone:
             _listen(page, complaints)
-        page.goto(stack.sign_in_link)
-        if route != "/":
-            page.goto(stack.url + route)
+        # As the link does, without the page that it ends on.
+        context.request.get(stack.sign_in_link, max_redirects=0)
+        page.goto(stack.url + route)
         return page
 
     yield open_one

@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import Any
 
 from playwright import sync_api
-from playwright.sync_api import APIResponse, Locator, Page
+from playwright.sync_api import APIResponse, BrowserContext, Locator, Page
 
 from tests.e2e.reading import card
 from tests.processes import Site, until
@@ -37,29 +37,33 @@ def press_open(page: Page, opener: Locator) -> None:
     until(is_open, 60.0, "a panel opens")
 
 
-def ask(page: Page, stack: Site, path: str, body: object) -> APIResponse:
+def ask(
+    who: Page | BrowserContext, stack: Site, path: str, body: object
+) -> APIResponse:
     """What the page would send, under its own session."""
     url = f"{stack.url}/api/v1/{path}"
-    return page.request.post(url, data=body, headers=_OWN)
+    return who.request.post(url, data=body, headers=_OWN)
 
 
-def look(page: Page, stack: Site, robot: str) -> dict[str, Any]:
+def look(who: Page | BrowserContext, stack: Site, robot: str) -> dict[str, Any]:
     """What the server says of a robot."""
-    answer = page.request.get(f"{stack.url}/api/v1/robots/{robot}")
+    answer = who.request.get(f"{stack.url}/api/v1/robots/{robot}")
     found: dict[str, Any] = answer.json()
     return found
 
 
-def let_go(page: Page, stack: Site, robot: str, within_s: float = 30.0) -> None:
+def let_go(
+    who: Page | BrowserContext, stack: Site, robot: str, within_s: float = 30.0
+) -> None:
     """Release and resume a robot until nothing stops it; a refusal is tried again."""
 
     def is_free() -> bool:
-        seen = look(page, stack, robot)
+        seen = look(who, stack, robot)
         holds = [hold["id"] for hold in seen["holds"]]
         if seen["stop_state"] == "READY":
-            ask(page, stack, f"robots/{robot}/resume", {})
+            ask(who, stack, f"robots/{robot}/resume", {})
         elif holds:
-            ask(page, stack, f"robots/{robot}/release", {"holds": holds})
+            ask(who, stack, f"robots/{robot}/release", {"holds": holds})
         return seen["stop_state"] == "RUNNING" and not holds
 
     until(is_free, within_s, f"{robot} is free")

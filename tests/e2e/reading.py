@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from axe_playwright_python.sync_playwright import Axe
+from axe_playwright_python.base import AXE_SCRIPT
 from playwright.sync_api import Locator, Page
 
 
@@ -24,7 +24,7 @@ def strip_stop(page: Page, who: str) -> Locator:
     return page.locator(f'#stops [data-stop="{who}"]')
 
 
-def wait_for_mode(page: Page, robot: str, *modes: str, seconds: float = 15.0) -> None:
+def wait_for_mode(page: Page, robot: str, *modes: str, seconds: float = 30.0) -> None:
     """Until a card shows one of these modes."""
     wanted = ", ".join(f'[data-robot="{robot}"][data-mode="{mode}"]' for mode in modes)
     page.wait_for_selector(wanted, timeout=1000 * seconds)
@@ -45,11 +45,15 @@ def serious(page: Page, *rules: str) -> list[str]:
     options: dict[str, Any] = {"resultTypes": ["violations"]}
     if rules:
         options["runOnly"] = {"type": "rule", "values": list(rules)}
-    return [
-        f"{violation['id']}: {violation['nodes'][0]['html']}"
-        for violation in Axe().run(page, options=options).response["violations"]
-        if violation["impact"] in ("serious", "critical")
-    ]
+    if not page.evaluate("() => 'axe' in window"):
+        page.evaluate(AXE_SCRIPT)
+    found: list[str] = page.evaluate(_AXE, options)
+    return found
+
+
+_AXE = """async (options) => (await axe.run(options)).violations
+  .filter(({impact}) => ['serious', 'critical'].includes(impact))
+  .map(({id, nodes}) => `${id}: ${nodes[0].html}`)"""
 
 
 def visit(page: Page, route: str) -> None:

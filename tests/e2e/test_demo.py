@@ -62,13 +62,13 @@ def test_a_clean_run_ends_with_ctrl_c_and_leaves_nothing_behind(
 
     assert status == 0
     assert demo.complaints() == []
-    until(lambda: not any(map(is_alive, family)), 5.0, "all children gone")
+    until(lambda: not any(map(is_alive, family)), 30.0, "all children gone")
 
 
 def test_a_bad_setting_stops_the_start_with_one_sentence(tmp_path: Path) -> None:
     with site(tmp_path, IVEG_CONFIDENCE_THRESHOLD="much") as wrong:
         program = wrong.start("demo")
-        status = program.process.wait(20.0)
+        status = program.process.wait(30.0)
 
     assert status != 0
     assert "IVEG_CONFIDENCE_THRESHOLD='much'" in program.text()

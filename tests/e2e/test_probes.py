@@ -86,7 +86,7 @@ def test_a_class_in_markup_is_text(open_page: OpenPage, stack: Site) -> None:
     box = {"class_id": PROBE, "probability": 0.99, "position": corners}
     _publish(stack, "AGI", "yolox_bounding_boxes", {"bounding_boxes": box})
 
-    expect(page.locator("#log")).to_contain_text("onerror", timeout=20_000)
+    expect(page.locator("#log")).to_contain_text("onerror", timeout=30_000)
     _assert_text_only(page)
 
 
@@ -102,7 +102,7 @@ def test_a_reason_that_the_contract_does_not_know_changes_nothing(
             counters = api.get("health").json()["counters"]
         return any("reject" in name and n > 0 for name, n in counters.items())
 
-    until(is_counted, 10.0, "a message that was refused and counted")
+    until(is_counted, 30.0, "a message that was refused and counted")
     _assert_text_only(page)
 
 

@@ -35,7 +35,7 @@ async def broker(folder: Path) -> AsyncIterator[BrokerAddress]:
         yield address
 
 
-async def until(true: Callable[[], object], within_s: float = 15.0) -> None:
+async def until(true: Callable[[], object], within_s: float = 30.0) -> None:
     """Wait for a fact."""
     deadline = time.monotonic() + within_s
     while not true():

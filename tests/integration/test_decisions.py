@@ -49,7 +49,7 @@ def test_an_open_decision_has_verdicts_and_a_kill_leaves_it_open_only_until_the_
     driving.wait_until_served()
 
     with driving.api() as api:
-        told = until(lambda: closed(api, left), 20.0, "the row to be closed")
+        told = until(lambda: closed(api, left), 30.0, "the row to be closed")
     assert "open" not in links_of(told).values()
 
 

@@ -279,7 +279,7 @@ async def test_a_user_reads_what_the_table_says_and_nothing_else(
 async def heard_until_end(client: aiomqtt.Client) -> dict[str, set[str]]:
     """Topics by who wrote there."""
     heard: dict[str, set[str]] = defaultdict(set)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(30):
         async for message in client.messages:
             if str(message.topic) == "end":
                 break
@@ -304,7 +304,7 @@ async def test_robot_a_cannot_speak_as_robot_b(topic: str, broker: Broker) -> No
         await dss.subscribe(topic.format("AGII"), qos=1)
         await robot.publish(topic.format("AGII"), b"lie", qos=1)
         await robot.publish(topic.format("AGI"), b"truth", qos=1)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(30):
             first = await anext(dss.messages)
 
     assert (str(first.topic), first.payload) == (topic.format("AGI"), b"truth")
@@ -319,7 +319,7 @@ async def test_iveg_stops_a_robot_and_no_robot_stops_another(broker: Broker) -> 
         await robot.subscribe("/iveg/AGI/cmd", qos=1)
         await other.publish("/iveg/AGI/cmd", b"from a robot", qos=1)
         await dss.publish("/iveg/AGI/cmd", b"stop", qos=1)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(30):
             first = await anext(robot.messages)
 
     assert first.payload == b"stop"
@@ -330,7 +330,7 @@ async def test_the_agents_shared_subscriptions_hear_robots(broker: Broker) -> No
         for topic in ("/+/+/attrs", "/+/+/attrs/+", "/+/+/cmdexe"):
             await agent.subscribe(f"$share/json/{topic}", qos=1)
         await robot.publish("/iveg/AGI/cmdexe", b"answer", qos=1)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(30):
             first = await anext(agent.messages)
 
     assert first.payload == b"answer"
@@ -367,7 +367,7 @@ async def test_a_message_over_the_limit_ends_its_sender_and_nobody_else(
                 await robot.publish("/iveg/AGI/attrs", bytes(200_000), qos=1)
         async with broker.client("AGI") as robot:
             await robot.publish("/iveg/AGI/attrs", bytes(100_000), qos=1)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(30):
             first = await anext(dss.messages)
 
     assert first.payload == bytes(100_000)
@@ -389,7 +389,7 @@ async def test_robots_may_come_encrypted(broker: Broker) -> None:
     async with broker.client("iveg_dss") as dss, client as robot:
         await dss.subscribe("/iveg/AGI/attrs", qos=1)
         await robot.publish("/iveg/AGI/attrs", b"encrypted", qos=1)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(30):
             first = await anext(dss.messages)
 
     assert first.payload == b"encrypted"

@@ -9,7 +9,6 @@ serves all tests, so each leaves it whole; the numbers are those of docs/faults.
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -36,7 +35,9 @@ pytestmark = [
     ),
 ]
 WANTED = wanted_for(["AGI", "AGII"])
-SAID_WITHIN_S, WHOLE_WITHIN_S = 6.0, 10.0
+SAID_WITHIN_S = WHOLE_WITHIN_S = 60.0
+"""End a test in which nothing comes any more: how soon each is said is judged by the
+health monitor's tests, whose clock no busy machine slows."""
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 Json = dict[str, Any]
 
@@ -125,20 +126,28 @@ class Stack:
             command = self.api.get(url).raise_for_status().json()
             return command if command["times"]["answer_direct"] else None
 
-        command = until(answered, 3.0, "the robot answered the direct STOP")
-        until(lambda: self.robot(robot_id)["holds"] != [], 2.0, "it is held")
+        command = until(answered, SAID_WITHIN_S, "the robot answered the direct STOP")
+        until(lambda: self.robot(robot_id)["holds"] != [], SAID_WITHIN_S, "it is held")
         return dict(command)
 
     def drives_again(self, robot_id: str) -> None:
         """Released and resumed by a person, which goes through FIWARE alone."""
         with operator(self.place) as person:
-            until(lambda: self._released(person, robot_id), 20.0, "it is released")
+            until(
+                lambda: self._released(person, robot_id),
+                WHOLE_WITHIN_S,
+                "it is released",
+            )
             until(
                 lambda: person.post(f"robots/{robot_id}/resume").is_success,
-                5.0,
+                WHOLE_WITHIN_S,
                 "resume is taken",
             )
-        until(lambda: self.robot(robot_id)["mode"] != "STOPPED", 8.0, "it drives")
+        until(
+            lambda: self.robot(robot_id)["mode"] != "STOPPED",
+            WHOLE_WITHIN_S,
+            "it drives",
+        )
 
     def _released(self, person: httpx.Client, robot_id: str) -> bool:
         """Whether it is; a release is sent once, so a person presses again."""
@@ -211,7 +220,7 @@ def end(process: "subprocess.Popen[bytes]") -> None:
 @pytest.fixture
 def stack(running: Stack) -> Iterator[Stack]:
     """Whole at the start; what a test has broken is mended whatever became of it."""
-    running.wait_whole(20.0)
+    running.wait_whole()
     yield running
     for door in (running.orion, running.agent, running.page):
         door.be("open")
@@ -255,9 +264,9 @@ def test_f7_a_slow_orion_is_called_slow_and_delays_no_stop(stack: Stack) -> None
 
     told = stack.blames("orion", "late")
     assert told["detail"].startswith("answers take 2")
-    pressed = time.monotonic()
-    stack.stop_latches_directly("AGII")
-    assert time.monotonic() - pressed < 2.0
+    times = stack.stop_latches_directly("AGII")["times"]
+    # Orion, whose answers take two seconds, had not taken it yet.
+    assert times["sent_fiware"] is None or times["answer_direct"] < times["sent_fiware"]
     stack.orion.be("open")
     stack.wait_whole()
     stack.drives_again("AGII")

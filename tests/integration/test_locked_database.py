@@ -16,8 +16,8 @@ from iveg.settings import Settings
 from tests.builders import odometry
 from tests.ports import free_ports
 
-SOON_S = 1.0
-"""What does not wait for a database that never answers takes no longer than this."""
+SOON_S = 4.0
+"""What does not wait for a locked database takes no longer: SQLite waits for 5 s."""
 
 
 @asynccontextmanager

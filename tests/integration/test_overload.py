@@ -109,6 +109,6 @@ def test_f52_f53_two_robots_settle_into_health_and_orion_fills_in_when_mqtt_is_l
         for kind in ("odometry", "lidar")
         for robot in ("AGI", "AGII")
     }
-    until(lambda: throttled(place) == copies, 30.0, "Orion leaves the copies out")
+    until(lambda: throttled(place) == copies, 60.0, "Orion leaves the copies out")
     straight.be("shut")
-    until(lambda: not throttled(place), 2.0, "Orion brings every copy again")
+    until(lambda: not throttled(place), 30.0, "Orion brings every copy again")

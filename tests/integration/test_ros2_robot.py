@@ -126,7 +126,7 @@ async def at_work(riding: Riding) -> AsyncIterator[tuple[Iveg, Sensors]]:
 
 async def reported(iveg: Iveg, faults: set[str], factor: float) -> None:
     """Until the robot says that it drives so fast, because of these."""
-    async with asyncio.timeout(20.0):
+    async with asyncio.timeout(30.0):
         while not (  # noqa: ASYNC110 - another process changes it
             iveg.report is not None
             and {one.code for one in iveg.report.faults} == faults

@@ -29,7 +29,8 @@ from tests.processes import until
 from tests.unit.test_js_modules import Files
 
 _ROOT = Path(__file__).parents[2]
-_RECOVERY_MS = 3000
+_PATIENCE_MS = 30_000
+"""Ends a test in which nothing comes any more; nothing is measured by it."""
 _CONNECT = """async ([url]) => {
     const {snapshot} = await import('/tests/js/builders.js');
     const {connect} = await import('/iveg/static/js/core/socket.js');
@@ -182,7 +183,7 @@ def page(browser: Browser, files: str, live: LiveServer) -> Iterator[Page]:
     opened.close()
 
 
-def _wait_for_state(page: Page, state: str, within_ms: float = 5000) -> None:
+def _wait_for_state(page: Page, state: str, within_ms: float = _PATIENCE_MS) -> None:
     page.wait_for_function(
         "state => window.line.state() === state", arg=state, timeout=within_ms
     )
@@ -194,11 +195,11 @@ def test_a_killed_server_is_noticed_and_found_again_with_a_fresh_snapshot(
     page.evaluate("() => { window.first = window.store.get('snapshot'); }")
 
     live.stop()
-    _wait_for_state(page, "lost", _RECOVERY_MS)
+    _wait_for_state(page, "lost")
     page.clock.run_for(4000)  # long enough for the slowest pace of retries
     live.start()
 
-    _wait_for_state(page, "open", _RECOVERY_MS)
+    _wait_for_state(page, "open")
     assert page.evaluate("() => window.store.get('snapshot') !== window.first")
 
 
@@ -326,7 +327,7 @@ def test_a_frame_that_was_painted_is_said_to_be(page: Page, live: LiveServer) ->
     live.tell(monotonic())
     page.wait_for_function("() => window.store.robots().get('AGI').pose?.x === 1")
 
-    until(lambda: live.heard != [], 5.0, "the page says what it has painted")
+    until(lambda: live.heard != [], 30.0, "the page says what it has painted")
     (said,) = live.heard
     assert (said["type"], said["frame"]) == ("painted", 1)
 
@@ -335,11 +336,13 @@ def test_a_page_out_of_sight_says_seldom_what_it_has_heard(
     page: Page, live: LiveServer
 ) -> None:
     page.evaluate("() => { window.requestAnimationFrame = () => 0; }")
+    began = monotonic()
     for frame in range(1, 30):
         live.tell(monotonic(), frame)
         page.wait_for_timeout(50)
 
-    assert 1 <= len(live.heard) <= 3
+    # Once a second, and what was under way when it began and ended.
+    assert 1 <= len(live.heard) <= 2 + (monotonic() - began)
 
 
 def test_what_was_long_on_its_way_is_late_although_the_server_says_it_is_fresh(

@@ -41,7 +41,7 @@ EVERYTHING = (
     odometry_record(),
 )
 KEPT = 5
-_PATIENCE_S = 20.0
+_PATIENCE_S = 30.0
 
 
 @asynccontextmanager
@@ -172,7 +172,8 @@ async def test_offering_never_waits_for_a_locked_database(
         other.close()
         await until(lambda: recorder.counters["history_written"] == 5000)
 
-    assert took < 1.0
+    # Each would have waited 0.2 s.
+    assert took < 10.0
 
 
 async def test_while_the_database_is_locked_nothing_that_matters_is_lost(

@@ -41,13 +41,13 @@ class Site:
             await self.orion.update_command(robot_id, STOP)
             # The direct message comes after the command, if the command comes at all.
             await mqtt.publish(names.command_topic("iveg", robot_id), b"end", qos=1)
-            async with asyncio.timeout(5):
+            async with asyncio.timeout(30):
                 message = await anext(aiter(mqtt.messages))
         return message.payload != b"end"
 
 
 async def read_soon(orion: OrionClient, kind: str, name: str) -> list[dict[str, Any]]:
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + 30
     found: list[dict[str, Any]] = []
     while not found and time.monotonic() < deadline:
         found = await orion.read_entities(kind, [name])

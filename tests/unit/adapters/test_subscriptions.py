@@ -199,7 +199,7 @@ async def test_an_update_is_one_request_for_each_subscription_that_is_about_it(
         await mqtt.publish(topic, payload, qos=1)
         # The agent and Orion take this one after it, and are done with it by then.
         await mqtt.publish("/iveg/climate/attrs", b'{"temperature": 21}', qos=1)
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(30):
             await heard.wait()
         kept = await orion.read_subscriptions()
 

@@ -27,7 +27,7 @@ async def other(broker: MqttBroker) -> AsyncIterator[aiomqtt.Client]:
 
 
 async def heard(client: aiomqtt.Client) -> aiomqtt.Message:
-    async with asyncio.timeout(5):
+    async with asyncio.timeout(30):
         return await anext(aiter(client.messages))
 
 

@@ -41,7 +41,7 @@ class Outcomes:
         return Delivery(post(body), timeout_s, done)
 
     async def number(self, count: int) -> list[tuple[bytes, Outcome]]:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             while len(self.known) < count:
                 self._changed.clear()
                 await self._changed.wait()

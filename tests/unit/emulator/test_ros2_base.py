@@ -94,7 +94,7 @@ async def emulated() -> AsyncIterator[Emulated]:
 
 
 async def until(true: Callable[[], object]) -> None:
-    deadline = clock.now().mono + 10.0
+    deadline = clock.now().mono + 30.0
     while not true():
         assert clock.now().mono < deadline, "did not come true in time"
         await asyncio.sleep(0.01)

@@ -141,12 +141,12 @@ def test_a_proof_of_age_that_is_none_is_refused(proof: dict[str, object]) -> Non
 @pytest.mark.parametrize("bracket", [b"[", b'{"a":'])
 def test_f28_a_hundred_thousand_brackets_are_refused_at_once(bracket: bytes) -> None:
     body = bracket * 100_000
-    started = time.perf_counter()
+    started = time.thread_time()
 
     with pytest.raises(UnreadableError):
         codec.load_json(body)
 
-    assert time.perf_counter() - started < 0.1
+    assert time.thread_time() - started < 0.1
 
 
 @pytest.mark.parametrize(("levels", "refused"), [(32, False), (33, True), (900, True)])

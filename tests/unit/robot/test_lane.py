@@ -18,7 +18,7 @@ SECOND = HoldSet((Hold("01B", "iveg", "remote"),))
 
 
 async def until(true: Callable[[], bool]) -> None:
-    deadline = asyncio.get_running_loop().time() + 10
+    deadline = asyncio.get_running_loop().time() + 30
     while not true():
         assert asyncio.get_running_loop().time() < deadline
         await asyncio.sleep(0.001)

@@ -172,7 +172,7 @@ class WebDesk(Desk):
         )
         server = uvicorn.Server(config)
         serving = asyncio.create_task(server.serve())
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(30):
             while not server.started:  # noqa: ASYNC110 - uvicorn has no event
                 await asyncio.sleep(0.01)
         try:

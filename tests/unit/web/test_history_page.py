@@ -90,7 +90,7 @@ class Server:
     def __enter__(self) -> "Server":
         self.holds()
         self._thread.start()
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 30.0
         while not self._server.started:
             assert time.monotonic() < deadline, "the server did not start"
             self._thread.join(0.02)

@@ -29,7 +29,7 @@ class Page:
 
     async def read(self) -> None:
         """The next message, whatever it is."""
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             message = await self.line.recv()
         if isinstance(message, str):
             self.others.append(orjson.loads(message))
@@ -186,7 +186,7 @@ async def test_who_does_not_ask_gets_a_message_a_topic_as_before() -> None:
     ):
         await line.recv()
         desk.drive("AGI")
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             while (told := orjson.loads(await line.recv()))["topic"] != "robots/AGI":
                 pass
 
@@ -224,7 +224,7 @@ async def _read_until(line: ClientConnection, x: float) -> list[str]:
     """What is said of AGI up to this place, as it came."""
     told: list[str] = []
     while not told or orjson.loads(told[-1])["data"]["pose"]["x"] != x:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             message = await line.recv(decode=True)
         assert isinstance(message, str)
         if orjson.loads(message)["topic"] == "robots/AGI":

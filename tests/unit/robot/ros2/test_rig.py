@@ -23,7 +23,7 @@ from tests.fakes.ros2_network import Endpoint, FakeNetwork
 from tests.ports import free_ports
 
 
-async def until(true: Callable[[], object], within_s: float = 5.0) -> None:
+async def until(true: Callable[[], object], within_s: float = 30.0) -> None:
     deadline = time.monotonic() + within_s
     while not true():
         assert time.monotonic() < deadline, "did not come true in time"

@@ -28,7 +28,7 @@ class Browser:
         self.socket = socket
 
     async def read(self) -> Any:
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             frame = await self.socket.recv()
         return frame if isinstance(frame, bytes) else orjson.loads(frame)
 
@@ -44,7 +44,7 @@ class Browser:
 
     async def close_code(self) -> int | None:
         with contextlib.suppress(ConnectionClosed):
-            async with asyncio.timeout(5):
+            async with asyncio.timeout(30):
                 while True:
                     await self.socket.recv()
         return self.socket.close_code
@@ -129,7 +129,7 @@ async def test_who_has_gone_is_forgotten() -> None:
         async with looking(desk, address) as browser:
             await browser.read()
             assert desk.hub.watchers == 1
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(30):
             while desk.hub.watchers:  # noqa: ASYNC110 - the hub has no event for it
                 await asyncio.sleep(0.01)
 

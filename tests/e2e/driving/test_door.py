@@ -155,14 +155,14 @@ def test_a_socket_without_a_session_is_closed_with_a_code_that_pages_understand(
         _dial(stack, "not-a-session", stack.url) as live,
         pytest.raises(ConnectionClosed),
     ):
-        live.recv(timeout=5)
+        live.recv(timeout=30)
 
     assert live.close_code == 4401
 
 
 def test_a_socket_of_the_own_page_speaks(stack: Site, operator: httpx.Client) -> None:
     with _dial(stack, operator.cookies["iveg"], stack.url) as live:
-        assert '"snapshot"' in str(live.recv(timeout=5))[:40]
+        assert '"snapshot"' in str(live.recv(timeout=30))[:40]
 
 
 def _routes(stack: Site) -> list[tuple[str, str]]:

@@ -46,7 +46,7 @@ def test_the_snapshot_comes_first_with_the_members_of_the_contract(
     stack: Site,
 ) -> None:
     with _dial(stack) as live:
-        first = json.loads(live.recv(timeout=10))
+        first = json.loads(live.recv(timeout=30))
 
     assert first["topic"] == "snapshot"
     assert set(first["data"]) == set(Snapshot.model_fields)
@@ -83,7 +83,7 @@ def _listen(stack: Site, wanted: set[str]) -> set[str]:
     heard: set[str] = set()
     with _dial(stack) as live:
         for _ in range(600):
-            heard.add(_topic(live.recv(timeout=10)))
+            heard.add(_topic(live.recv(timeout=30)))
             if heard >= wanted - _NOT_BY_ITSELF:
                 break
     return heard

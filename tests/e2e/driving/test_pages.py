@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from typing import Any
+from urllib.parse import urljoin
 
 import pytest
 from playwright.sync_api import Page, Route, expect
@@ -34,7 +35,7 @@ def shown(stack: Site) -> Site:
             answer = api.get(f"commands/{command_id}")
             return bool(answer.json().get("state") == "STANDING")
 
-        until(is_standing, 10.0, "AGI stands")
+        until(is_standing, 30.0, "AGI stands")
     return stack
 
 
@@ -74,7 +75,7 @@ def test_a_new_stop_appears_on_the_commands_page_by_itself(
 
     strip_stop(page, "fleet").click()
 
-    expect(rows.first).to_contain_text("operator", timeout=8000)
+    expect(rows.first).to_contain_text("operator", timeout=30_000)
     assert rows.count() > before
 
 
@@ -96,7 +97,7 @@ def test_the_fleet_page_draws_the_whole_chain_and_each_device(
 
     for hop in ("robots", "mqtt", "iot_agent", "orion", "notifications", "screen"):
         box = page.locator(f'.hop-box[data-hop="{hop}"]')
-        expect(box).to_have_attribute("data-state", "ok", timeout=15_000)
+        expect(box).to_have_attribute("data-state", "ok", timeout=30_000)
     expect(page.locator("#chain-sentence")).to_have_text(re.compile("Todo funciona"))
     expect(page.locator("#machines tbody tr")).to_have_count(2)
     lidar = page.locator("#devices tr", has_text="AGI_lidar2D")
@@ -109,7 +110,7 @@ def test_the_climate_page_shows_what_the_greenhouse_measures(
     page = open_page(route="/climate")
 
     expect(page.locator("#climate-temperature")).to_have_text(
-        re.compile(r"^\d+,\d °C$"), timeout=15_000
+        re.compile(r"^\d+,\d °C$"), timeout=30_000
     )
     expect(page.locator("#climate-sentence")).to_contain_text("al día")
     expect(page.locator("#climate-co2-age")).to_have_text(re.compile(r"^hace \d+ s$"))
@@ -126,30 +127,29 @@ def test_the_age_of_the_climate_begins_anew_with_each_reading(
     page = open_page(route="/climate")
     age = page.locator("#climate-co2-age")
 
-    expect(age).to_have_text(re.compile(r"^hace [4-9] s$"), timeout=20_000)
-    expect(age).to_have_text(re.compile(r"^hace [0-2] s$"), timeout=20_000)
+    expect(age).to_have_text(re.compile(r"^hace [4-9] s$"), timeout=30_000)
+    expect(age).to_have_text(re.compile(r"^hace [0-2] s$"), timeout=30_000)
 
 
-@pytest.mark.parametrize("theme", ["light", *THEMES])
-def test_a_day_of_the_climate_is_drawn_in_the_readers_words(
-    open_page: OpenPage, theme: str
+def test_a_day_of_the_climate_is_drawn_in_the_readers_words_and_every_theme(
+    open_page: OpenPage,
 ) -> None:
     page = open_page(390, 844, route="/about")
     page.route("**/api/v1/history/climate", _day)
-    evaluate(
-        page, "([theme]) => { document.cookie = `iveg_theme=${theme};path=/`; }", theme
-    )
 
-    visit(page, "/climate")
+    for theme in ("light", *THEMES):
+        evaluate(page, _CHOOSE, theme)
+        visit(page, "/climate")
+        expect(page.locator("#trend-temperature .main-svg").first).to_be_visible()
+        expect(page.locator("html")).to_have_attribute("data-theme", theme)
+        assert evaluate(page, OVERFLOW) <= 0
+        assert serious(page) == []
 
-    expect(page.locator("#trend-temperature .main-svg").first).to_be_visible()
     expect(page.locator("#trend-temperature")).to_contain_text("21,5")
     # Noon in Madrid, in November.
     expect(page.locator("#trend-temperature")).to_contain_text("12:00")
     expect(page.locator("#trend-temperature-says")).to_contain_text("máximo 22,0 °C")
     expect(page.locator("#trend-co2-says")).to_contain_text("ninguna lectura")
-    assert evaluate(page, OVERFLOW) <= 0
-    assert serious(page) == []
 
     page.click('[data-language="en"]')
     expect(page.locator("#trend-temperature")).to_contain_text("21.5")
@@ -206,25 +206,31 @@ def test_the_latency_page_shows_the_papers_table_live_beside_what_it_printed(
 def test_the_settings_page_shows_the_rule_in_force(
     open_page: OpenPage, stack: Site
 ) -> None:
+    with stack.api() as api:
+        rule = api.get("rule").json()
+    share, radius = (
+        f"{100 * rule['confidence_threshold']:.0f}",
+        f"{rule['radius_m']:.1f} m",
+    )
+
     page = open_page(route="/settings")
 
-    expect(page.locator("#rule-threshold")).to_have_text(re.compile(r"80\W%"))
-    expect(page.locator("#rule-radius")).to_have_text("2,0 m")
-    expect(page.locator("#rule-version")).not_to_have_text("—")
+    expect(page.locator("#rule-threshold")).to_have_text(re.compile(rf"{share}\W%"))
+    expect(page.locator("#rule-radius")).to_have_text(radius.replace(".", ","))
+    expect(page.locator("#rule-version")).to_have_text(str(rule["version"]))
 
 
 def test_every_entry_of_the_menu_leads_to_its_page(open_page: OpenPage) -> None:
-    page = open_page(390, 844)
+    page = open_page(390, 844, route="/about")
     links = page.locator("#menu nav a")
     places = [str(link.get_attribute("href")) for link in links.all()]
     assert {"/alerts", "/commands", "/fleet", "/climate", "/settings"} < set(places)
+    assert [place for place in places if not _heading(page, place)] == []
 
-    for place in places:
-        page.wait_for_selector('#mark[data-state="open"]', state="attached")
-        page.locator(".tabbar [data-opens=menu]").click()
-        page.locator(f'#menu nav a[href="{place}"]').click()
-        expect(page.locator("main h1").first).not_to_be_empty()
-        assert page.url.removeprefix("http://").partition("/")[2] == place[1:]
+    page.wait_for_selector('#mark[data-state="open"]', state="attached")
+    page.locator(".tabbar [data-opens=menu]").click()
+    page.locator('#menu nav a[href="/fleet"]').click()
+    page.wait_for_url("**/fleet")
 
 
 def test_a_page_says_when_its_list_cannot_be_read(open_page: OpenPage) -> None:
@@ -235,6 +241,13 @@ def test_a_page_says_when_its_list_cannot_be_read(open_page: OpenPage) -> None:
 
     expect(page.locator("#past-error")).to_contain_text("Sin conexión")
     expect(page.locator("#past-empty")).to_be_hidden()
+
+
+def _heading(page: Page, place: str) -> str | None:
+    """What the page of a place is called; None without one."""
+    answer = page.request.get(urljoin(page.url, place))
+    found = re.search(r"<h1[^>]*>\s*(\S[^<]*)", answer.text())
+    return found[1] if found and answer.ok else None
 
 
 def _day(route: Route) -> None:
@@ -274,6 +287,7 @@ def _violations(page: Page, route: str) -> list[str]:
     return found
 
 
+_CHOOSE = "([theme]) => { document.cookie = `iveg_theme=${theme};path=/`; }"
 _WEAR = "([theme]) => { document.documentElement.dataset.theme = theme; }"
 _LABELLED = """() => document.querySelector('[aria-busy=true]') === null
   && !document.querySelector('#time-strip:not([aria-label])')

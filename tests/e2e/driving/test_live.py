@@ -27,7 +27,7 @@ def test_a_robot_that_drives_changes_its_read_outs(page: Page, robot: str) -> No
         now = number(page, robot, "x"), number(page, robot, "y")
         return abs(now[0] - x) + abs(now[1] - y) > 0.2
 
-    until(has_moved, 20.0, f"{robot} elsewhere")
+    until(has_moved, 30.0, f"{robot} elsewhere")
 
 
 def test_every_pose_and_scan_of_both_robots_is_painted(open_page: OpenPage) -> None:
@@ -54,7 +54,7 @@ def test_the_map_changes_as_robots_drive(page: Page) -> None:
     canvas = page.locator("#map")
     before = canvas.screenshot()
 
-    until(lambda: canvas.screenshot() != before, 10.0, "a different picture")
+    until(lambda: canvas.screenshot() != before, 30.0, "a different picture")
 
 
 def test_a_person_in_the_ring_halves_the_speed_and_the_log_says_why(
@@ -66,10 +66,14 @@ def test_a_person_in_the_ring_halves_the_speed_and_the_log_says_why(
     )
 
     with stack.api() as api:
-        slowed = until(lambda: _slow_robot(api.get("robots").json()), 90.0, "SLOW")
-        limit = 0.5 * slowed["profile"]["max_speed"]
-        path = f"robots/{slowed['robot_id']}"
-        until(lambda: _obeys(api.get(path).json(), limit), 5.0, f"at most {limit} m/s")
+
+        def obeys() -> bool:
+            robots = api.get("robots").json()["items"]
+            return any(
+                robot["mode"] == "SLOW" and _is_halved(robot) for robot in robots
+            )
+
+        until(obeys, 90.0, "a robot that is SLOW at half its speed")
 
 
 def test_a_robot_in_a_ring_shows_slow_and_why(page: Page) -> None:
@@ -117,7 +121,7 @@ def test_nothing_serious_stands_in_the_way_of_assistive_technology(
         return found == []
 
     try:
-        until(has_settled, 10.0, "a page without serious violations")
+        until(has_settled, 30.0, "a page without serious violations")
     finally:
         assert found == []
 
@@ -148,10 +152,6 @@ def test_no_log_holds_a_secret(stack: Site) -> None:
     assert [name for name in names if stack.settings[name] in without_link] == []
 
 
-def _slow_robot(robots: Mapping[str, list[Json]]) -> Json | None:
-    slow = [robot for robot in robots["items"] if robot["mode"] == "SLOW"]
-    return slow[0] if slow else None
-
-
-def _obeys(robot: Json, limit: float) -> bool:
+def _is_halved(robot: Json) -> bool:
+    limit = 0.5 * robot["profile"]["max_speed"]
     return bool(abs(robot["twist"]["linear"]) <= 1.1 * limit)
