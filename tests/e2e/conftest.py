@@ -2,11 +2,11 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page
+from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
 from tests.browsers import running_browser
 from tests.processes import EMULATOR, Site, site
@@ -54,32 +54,45 @@ def open_page(browser: Browser, stack: Site) -> Iterator[OpenPage]:
     then rightly says so.
     """
     complaints: list[str] = []
-    contexts = []
+    with ExitStack() as pages:
 
-    def open_one(
-        width: int = 1440,
-        height: int = 900,
-        locale: str = "es-ES",
-        route: str = "/",
-        *,
-        alone: bool = False,
-    ) -> Page:
-        context = browser.new_context(
-            viewport={"width": width, "height": height}, locale=locale
-        )
-        contexts.append(context)
+        def open_one(
+            width: int = 1440,
+            height: int = 900,
+            locale: str = "es-ES",
+            route: str = "/",
+            *,
+            alone: bool = False,
+        ) -> Page:
+            heard = None if alone else complaints
+            size = (width, height)
+            return pages.enter_context(
+                opened(browser, stack, heard, size, locale, route)
+            )
+
+        yield open_one
+    assert complaints == []
+
+
+@contextmanager
+def opened(
+    browser: Browser,
+    stack: Site,
+    complaints: list[str] | None,
+    size: tuple[int, int] = (1440, 900),
+    locale: str = "es-ES",
+    route: str = "/",
+) -> Iterator[Page]:
+    """A signed-in page in a window of its own; what its console says is noted."""
+    viewport: ViewportSize = {"width": size[0], "height": size[1]}
+    with browser.new_context(viewport=viewport, locale=locale) as context:
         page = context.new_page()
-        if not alone:
+        if complaints is not None:
             _listen(page, complaints)
         # As the link does, without the page that it ends on.
         context.request.get(stack.sign_in_link, max_redirects=0)
         page.goto(stack.url + route)
-        return page
-
-    yield open_one
-    for context in contexts:
-        context.close()
-    assert complaints == []
+        yield page
 
 
 @pytest.fixture

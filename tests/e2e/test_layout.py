@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 
 from tests.e2e.frozen import Frozen, frozen, frozen_page, past_site, settle
 from tests.e2e.reading import COVERED_STOPS, OVERFLOW, SMALLEST_STOP, evaluate
+from tests.processes import Site
 
 pytestmark = pytest.mark.e2e
 
@@ -53,19 +54,22 @@ def snapshot(count: int) -> Frozen:
     return told
 
 
+@pytest.fixture(scope="module")
+def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A server that has no robots."""
+    with past_site(tmp_path_factory.mktemp("layout")) as place:
+        yield place
+
+
 @pytest.fixture(scope="module", params=[2, 3, 6], ids="{} robots".format)
 def fleet(
-    request: pytest.FixtureRequest,
-    browser: Browser,
-    tmp_path_factory: pytest.TempPathFactory,
+    request: pytest.FixtureRequest, browser: Browser, past: Site
 ) -> Iterator[Fleet]:
-    """A page on a server that has no robots."""
+    """A page on it that hears of so many."""
     told = snapshot(request.param)
     lines: list[WebSocketRoute] = []
-    with (
-        past_site(tmp_path_factory.mktemp("layout")) as past,
-        frozen_page(browser, past, (1440, 900), tell=lambda: told, lines=lines) as page,
-    ):
+    size = (1440, 900)
+    with frozen_page(browser, past, size, tell=lambda: told, lines=lines) as page:
         page.goto(past.url)
         settle(page, "#map-fit:enabled")
         yield Fleet(page, lines)

@@ -55,23 +55,19 @@ def driving(page: Page, stack: Site) -> None:
         let_go(page, stack, robot)
 
 
-def test_a_press_makes_the_robot_stand_and_says_how_long_it_took(page: Page) -> None:
+def test_a_press_makes_the_robot_stand_says_how_long_it_took_and_lets_others_drive(
+    page: Page,
+) -> None:
     strip_stop(page, "AGI").click()
 
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
-    # Its speed comes on a longer way than the word that it stands.
-    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
-    expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
-
-
-def test_the_other_robot_drives_on(page: Page) -> None:
-    strip_stop(page, "AGI").click()
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
-
     expect(card(page, "AGII")).to_have_attribute(
         "data-mode", re.compile("RUNNING|SLOW")
     )
+    # Its speed comes on a longer way than the word that it stands.
+    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
+    expect(page.locator('#log [data-kind="command"]').first).to_be_visible()
 
 
 def test_one_press_stops_the_fleet(page: Page) -> None:
@@ -110,9 +106,9 @@ def test_pointer_click_and_keys_are_one_press(page: Page, stack: Site) -> None:
 def test_i10_every_browser_shows_a_stop_within_a_second(
     page: Page, open_page: OpenPage
 ) -> None:
-    other = open_page(390, 844, route="/about")
-    other.wait_for_selector('[data-stop="AGI"][data-state="ready"]')
-    evaluate(other, _NOTE_WHEN, '[data-stop="AGI"]')
+    other = open_page(768, 1024, route="/about")
+    other.wait_for_selector('#stops [data-stop="AGI"][data-state="ready"]')
+    evaluate(other, _NOTE_WHEN, '#stops [data-stop="AGI"]')
     # The finger comes first; the control of this page changes in the same moment.
     evaluate(page, _NOTE_WHEN, '#stops [data-stop="AGI"]')
 
@@ -147,20 +143,7 @@ def test_i10_a_browser_whose_line_is_dead_shows_itself_stale(
     expect(control).to_have_attribute("data-state", "lost")
 
 
-def test_release_alone_moves_nothing_and_resume_drives_again(page: Page) -> None:
-    strip_stop(page, "AGI").click()
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
-
-    _release(page, "AGI")
-    expect(page.locator('[data-resume="AGI"]')).to_be_enabled(timeout=WITHIN_MS)
-    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
-
-    page.locator('[data-resume="AGI"]').click()
-    wait_for_mode(page, "AGI", "RUNNING", "SLOW")
-    until(lambda: abs(number(page, "AGI", "v")) > 0.1, 30.0, "AGI drives")
-
-
-def test_a_release_that_is_not_held_for_two_seconds_does_nothing(page: Page) -> None:
+def test_only_a_release_that_is_held_and_then_a_resume_drive_again(page: Page) -> None:
     strip_stop(page, "AGI").click()
     expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
     open_menu(page, "AGI")
@@ -168,26 +151,14 @@ def test_a_release_that_is_not_held_for_two_seconds_does_nothing(page: Page) -> 
     expect(release).to_be_enabled(timeout=WITHIN_MS)
 
     release.click(delay=1000)
-
     page.wait_for_timeout(1500)
     expect(page.locator('[data-resume="AGI"]')).to_be_disabled()
     expect(card(page, "AGI")).to_have_attribute("data-mode", "STOPPED")
 
-
-def test_a_program_may_stop_and_may_not_release(page: Page, stack: Site) -> None:
-    with stack.api() as api:
-        stop = api.post("robots/AGI/stop")
-        release = api.post("robots/AGI/release", json={"holds": ["x"]})
-        resume = api.post("robots/AGI/resume")
-
-    assert stop.status_code == 202
-    assert (release.status_code, resume.status_code) == (403, 403)
-    expect(strip_stop(page, "AGI")).to_contain_text(STANDING, timeout=WITHIN_MS)
-
-
-def _release(page: Page, robot: str) -> None:
-    """Hold the release for the two seconds that it asks for."""
-    open_menu(page, robot)
-    release = page.locator(f'[data-release="{robot}"]')
-    expect(release).to_be_enabled(timeout=WITHIN_MS)
     release.click(delay=HELD_MS)
+    expect(page.locator('[data-resume="AGI"]')).to_be_enabled(timeout=WITHIN_MS)
+    until(lambda: abs(number(page, "AGI", "v")) < 0.02, 30.0, "AGI shows its rest")
+
+    page.locator('[data-resume="AGI"]').click()
+    wait_for_mode(page, "AGI", "RUNNING", "SLOW")
+    until(lambda: abs(number(page, "AGI", "v")) > 0.1, 30.0, "AGI drives")
