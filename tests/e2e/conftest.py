@@ -95,6 +95,17 @@ def opened(
         yield page
 
 
+@contextmanager
+def live_page(browser: Browser, stack: Site, *robots: str) -> Iterator[Page]:
+    """The live page in Spanish on a desktop for several tests, these robots LIVE."""
+    complaints: list[str] = []
+    with opened(browser, stack, complaints) as page:
+        for robot in robots:
+            page.wait_for_selector(f'[data-robot="{robot}"][data-link="LIVE"]')
+        yield page
+    assert complaints == []
+
+
 @pytest.fixture
 def page(open_page: OpenPage) -> Page:
     """The live page in Spanish on a desktop, both robots LIVE."""

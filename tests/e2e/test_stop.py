@@ -2,12 +2,13 @@
 
 import re
 import time
+from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Page, WebSocketRoute, expect
+from playwright.sync_api import Browser, Page, WebSocketRoute, expect
 
 from iveg.ngsi.codec import format_stamp
-from tests.e2e.conftest import OpenPage
+from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.hands import HELD_MS, let_go, open_menu
 from tests.e2e.reading import card, evaluate, number, strip_stop, wait_for_mode
 from tests.processes import Site, until
@@ -48,9 +49,17 @@ def scenario() -> str:
     return "peers"
 
 
+@pytest.fixture(scope="module")
+def page(browser: Browser, stack: Site) -> Iterator[Page]:
+    """One for all tests."""
+    with live_page(browser, stack, "AGI", "AGII") as live:
+        yield live
+
+
 @pytest.fixture(autouse=True)
 def driving(page: Page, stack: Site) -> None:
-    """Every test begins with two robots that nothing holds."""
+    """Every test begins with two robots that nothing holds, and no open panel."""
+    page.keyboard.press("Escape")
     for robot in ("AGI", "AGII"):
         let_go(page, stack, robot)
 

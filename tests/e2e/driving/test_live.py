@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.e2e.conftest import OpenPage, opened
+from tests.e2e.conftest import OpenPage, live_page
 from tests.e2e.reading import card, evaluate, number
 from tests.processes import Site, until
 
@@ -21,12 +21,8 @@ STOP_ALL = re.compile("PARAR T.DO")
 @pytest.fixture(scope="module")
 def page(browser: Browser, stack: Site) -> Iterator[Page]:
     """One page in Spanish for all tests that leave it as they found it."""
-    complaints: list[str] = []
-    with opened(browser, stack, complaints) as live:
-        for robot in ("AGI", "AGII"):
-            live.wait_for_selector(f'[data-robot="{robot}"][data-link="LIVE"]')
+    with live_page(browser, stack, "AGI", "AGII") as live:
         yield live
-    assert complaints == []
 
 
 def test_robots_that_drive_change_their_read_outs(page: Page) -> None:

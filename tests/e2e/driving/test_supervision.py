@@ -151,17 +151,6 @@ def test_the_sound_can_be_tried_and_only_the_chime_switched_off(
     expect(page.locator("#sound-others")).not_to_be_checked()
 
 
-def test_markup_from_a_robot_is_never_markup_on_a_page(page: Page, stack: Site) -> None:
-    _publish(stack, "AGI", _detection(PROBE))
-
-    # What is left of it without the characters that the wire forbids.
-    expect(page.locator("#log")).to_contain_text("onerror", timeout=30_000)
-    for route in ("/", "/alerts", "/fleet", "/history"):
-        visit(page, route)
-        assert page.locator("main img").count() == 0
-        assert evaluate(page, "() => window.probed ?? null") is None
-
-
 def test_the_fleet_page_tells_how_the_fleet_obeys_with_age_and_count(
     open_page: OpenPage,
 ) -> None:
