@@ -22,7 +22,7 @@ export PYTHONDONTWRITEBYTECODE :=
 demo: $(RUN) ; @exec $(BIN)/python -m iveg demo
 demo-ros2: $(DEV) ; @exec $(BIN)/python -m iveg demo --ros2
 test: test-needs $(DEV) ; $(BIN)/python -m pytest $(SIDE_BY_SIDE)
-quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 IVEG_STOP_LIVES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
+quick: $(DEV) ; IVEG_HYPOTHESIS=quick IVEG_STOP_EXAMPLES=20 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not real and not slow"
 setup: $(DEV)
 format: $(DEV) ; $(BIN)/ruff format . && $(BIN)/ruff check --fix .
 check: check-needs $(DEV) node_modules ; $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/lint-imports && npm run --silent check

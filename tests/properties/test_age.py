@@ -224,6 +224,7 @@ def check(rig: Rig) -> None:
         assert not rig.is_clear()
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.lists(phases, min_size=1, max_size=6), st.integers(0, 2**32))
 def test_the_age_of_a_robot_that_echoes_is_never_shown_too_young(

@@ -22,7 +22,7 @@ from tests.properties.test_stop_kills import Watched
 LIVES = int(os.environ.get("IVEG_STOP_LIVES", "100"))
 BATCHES = 10
 ACTS = 12
-pytestmark = pytest.mark.timeout(max(120, LIVES))
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(max(120, LIVES))]
 
 
 @dataclass(frozen=True)

@@ -148,6 +148,7 @@ async def test_f6_an_orion_that_is_down_is_told_once_and_shown(
     assert "cannot be reached" in site.health_monitor.orion_error
 
 
+@pytest.mark.slow
 async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
     fiware: Running,
 ) -> None:
@@ -163,6 +164,7 @@ async def test_f8_a_subscription_that_was_deleted_is_told_and_made_again(
     assert len(kept) == len(wanted_for(["AGI"]))
 
 
+@pytest.mark.slow
 async def test_twenty_lives_of_iveg_leave_one_subscription_of_each_kind(
     fiware: Running,
 ) -> None:
@@ -182,6 +184,7 @@ async def test_a_probe_that_reached_orion_is_found_there(fiware: Running) -> Non
         await until(lambda: site.health_monitor.stored_at is not None)
 
 
+@pytest.mark.slow
 async def test_a_foreign_device_on_a_robots_entity_is_told_while_it_is_there(
     fiware: Running, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -198,6 +198,7 @@ async def test_many_robots_are_live_and_drive() -> None:
     assert [a for a in stage.alerts() if a["priority"] == "P1"] == []
 
 
+@pytest.mark.slow
 async def test_nearly_every_slow_down_of_the_demo_carries_every_link() -> None:
     stage = Stage("demo", profile="simulation", seed=1)
 

@@ -49,6 +49,7 @@ def nearest_person(world: World, robot_id: str) -> float:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(SCENARIOS))
 def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> None:
     greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
@@ -63,6 +64,7 @@ def test_robots_drive_without_touching_anything_or_anybody(scenario: str) -> Non
             assert min(gaps) > RADIUS_M
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robots", "greenhouse"),

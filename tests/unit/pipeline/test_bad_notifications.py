@@ -62,6 +62,7 @@ def events(desk: Desk) -> Counter[tuple[str, str | None, str | None]]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_f9_the_state_is_right_at_the_end_and_no_event_is_told_twice(
     seed: int,

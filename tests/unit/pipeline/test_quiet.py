@@ -6,6 +6,8 @@ and drive on.  What is wrong all the same is told, each fault under its own name
 
 from functools import partial
 
+import pytest
+
 from iveg.emulator.orders import FaultOrder
 from tests.stage import Stage
 
@@ -18,6 +20,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 async def test_13_10_a_quiet_run_raises_nothing_and_each_fault_its_alert() -> None:
     stage = Stage("demo")
     for _ in range(20 * QUIET_S):
