@@ -3,7 +3,7 @@
 import pytest
 
 from tests.mutants import MUTANTS, Mutant
-from tests.proofs import counted, kept
+from tests.proofs import TESTS, counted, kept
 
 
 @pytest.mark.parametrize("section", ["facts", "properties", "repeats"])
@@ -29,6 +29,7 @@ def test_every_invariant_is_named_by_a_test() -> None:
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.says)
 def test_the_text_of_every_mutant_is_in_the_code(mutant: Mutant) -> None:
     assert mutant.file.suffix == ".py"
+    assert [one for one in mutant.tests if not (TESTS / one).exists()] == []
     assert mutant.right != mutant.wrong
 
 
