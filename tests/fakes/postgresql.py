@@ -2,17 +2,20 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import psycopg
 
+from tests.bonds import bound
 from tests.ports import free_ports
+from tests.processes import until
 
 _WAIT_S = 30
 
@@ -49,40 +52,62 @@ class PostgreSQL:
 
     def start(self) -> None:
         """Start, and return when it answers."""
-        options = (
-            f"-p {self._port} -c listen_addresses=127.0.0.1 -c fsync=off "
-            f"-c unix_socket_directories={self._directory}"
-        )
-        log = str(self._directory / "log")
-        self._control("start", "-l", log, "-o", options, "-t", str(_WAIT_S))
+        options = {
+            "listen_addresses": "127.0.0.1",
+            "fsync": "off",
+            "unix_socket_directories": str(self._directory),
+        }
+        words = [f"--{name}={value}" for name, value in options.items()]
+        program = str(self._bin / "postgres")
+        with (self._directory / "log").open("ab") as log:
+            self._server = subprocess.Popen(
+                bound(program, "-D", str(self._data), "-p", str(self._port), *words),
+                stdout=log,
+                stderr=log,
+                cwd=self._directory,
+                **_other_user(),
+            )
+        until(self._answers, _WAIT_S, "PostgreSQL answers")
 
     def stop(self) -> None:
         """Stop this very server at once, as a crash would."""
-        self._control("stop", "-m", "immediate")
+        self._server.send_signal(signal.SIGQUIT)
+        self._server.wait(_WAIT_S)
+
+    def _answers(self) -> bool:
+        assert self._server.poll() is None, (self._directory / "log").read_text()
+        try:
+            psycopg.connect(self._address).close()
+        except psycopg.OperationalError:
+            return False
+        return True
+
+    @property
+    def _address(self) -> str:
+        return f"postgresql://postgres@127.0.0.1:{self._port}/postgres"
 
     def empty_database(self) -> str:
         """The address of the one database, emptied: far cheaper than a new one."""
-        address = f"postgresql://postgres@127.0.0.1:{self._port}/postgres"
-        with psycopg.connect(address) as connection:
+        with psycopg.connect(self._address) as connection:
             connection.execute("DROP SCHEMA public CASCADE")
             connection.execute("CREATE SCHEMA public")
-        return address
-
-    def _control(self, *words: str) -> None:
-        self._run("pg_ctl", "-D", str(self._data), "-w", *words)
+        return self._address
 
     def _run(self, program: str, *words: str) -> None:
-        # The server refuses to run as root; continuous integration is root.
-        user = "postgres" if os.geteuid() == 0 else None
         subprocess.run(
             [self._bin / program, *words],
             check=True,
             stdout=subprocess.DEVNULL,
             cwd=self._directory,
-            user=user,
-            group=user,
-            extra_groups=None if user is None else [],
+            **_other_user(),
         )
+
+
+def _other_user() -> dict[str, Any]:
+    """The server refuses to run as root; continuous integration is root."""
+    if os.geteuid() != 0:
+        return {}
+    return {"user": "postgres", "group": "postgres", "extra_groups": []}
 
 
 @contextmanager
