@@ -15,6 +15,7 @@ from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
 from iveg.models.command import Drill, FleetPressed, Latency
 from iveg.models.decision import Decision
+from iveg.models.latency import HopLatency
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
 from iveg.models.snapshot import Snapshot
@@ -27,6 +28,7 @@ TOLD: tuple[type[Model], ...] = (
     Decision,
     Drill,
     Latency,
+    HopLatency,
     FleetPressed,
     AlertListing,
     ClimateReading,

@@ -56,6 +56,10 @@ class Sketch:
         value = self._filled.get_quantile_value(share)
         return None if value is None else min(max(float(value), self.least), self.most)
 
+    def bins(self) -> tuple[list[float], list[int]]:
+        """Upper ends of its bins (s), the same for all sketches, and their counts."""
+        return np.exp(self.keys * _LOG_GAMMA).tolist(), self.counts.tolist()
+
     def distribution(self) -> tuple[list[float], list[float]]:
         """Rising durations (s), and the share (0 to 1) that did not exceed each."""
         edges = np.minimum(np.exp(self.keys * _LOG_GAMMA), self.most)

@@ -11,7 +11,6 @@ import orjson
 from fastapi import APIRouter, Depends, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
-from typing_extensions import TypedDict
 
 from iveg.domain.latency.account import Cell, Spread, collect, merge, spread_of
 from iveg.domain.latency.hops import DATA, HOPS, WINDOW_S, Data, Hop, Window
@@ -20,111 +19,31 @@ from iveg.domain.latency.order import Order
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
+from iveg.domain.latency.trace import Trace
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
+from iveg.models.base import write_json
+from iveg.models.latency import (
+    HopBins,
+    HopClock,
+    HopLatency,
+    HopOrder,
+    HopRemark,
+    HopRow,
+    HopSpread,
+    HopStream,
+    HopTrace,
+)
 from iveg.ngsi.codec import format_stamp
 from iveg.web.api.exports import form_of
 from iveg.web.pages import charts
 from iveg.web.pages.latency_figures import (
-    StepJson,
     bars_figure,
     cdf_figure,
     steps_of,
     trace_figure,
 )
 from iveg.web.security.authentication import require
-
-
-class SpreadJson(TypedDict):
-    """One hop (ms); null where nothing was measured."""
-
-    count: int
-    mean_ms: float | None
-    p50_ms: float | None
-    p95_ms: float | None
-    p99_ms: float | None
-    least_ms: float | None
-    most_ms: float | None
-
-
-class RowJson(TypedDict):
-    """One kind of data; ``sampled``: hops of which not every message is told."""
-
-    data: Data
-    hops: dict[str, SpreadJson]
-    sampled: list[str]
-
-
-class ClockJson(TypedDict):
-    """A robot's clock less the server's, as far as it is proven."""
-
-    robot_id: str
-    state: str
-    offset_ms: float | None
-    uncertainty_ms: float | None
-    jumps: int
-
-
-class OrderJson(TypedDict):
-    """What passed a hop since the start."""
-
-    passed: int
-    missing: int
-    reordered: int
-    repeated: int
-
-
-class StreamJson(TypedDict):
-    """One kind of data of one robot: what really comes, and how."""
-
-    robot_id: str
-    data: Data
-    heard_hz: float
-    agent_hz: float
-    orion_hz: float
-    kept_back: float | None
-    throttled: bool
-    orion_first: int
-    uplink: OrderJson
-    fiware: OrderJson
-    excluded: dict[str, dict[str, int]]
-
-
-class RemarkJson(TypedDict):
-    """What is wrong with a hop now: a sentence's name, and what fills it."""
-
-    key: str
-    hop: str
-    slots: dict[str, str | float]
-
-
-class TraceJson(TypedDict):
-    """One message, hop by hop."""
-
-    robot_id: str
-    data: Data
-    stamp: str | None
-    steps: list[StepJson]
-
-
-class LatencyJson(TypedDict):
-    """All of it over one window."""
-
-    at: str
-    window: Window
-    window_s: float
-    robot: str | None
-    direct: bool
-    rows: list[RowJson]
-    paper: dict[str, dict[str, dict[str, float]]]
-    clocks: list[ClockJson]
-    pages_within_ms: float | None
-    streams: list[StreamJson]
-    remarks: list[RemarkJson]
-    trace: TraceJson | None
-    library: str
-    style_ids: list[str]
-    figures: dict[str, Any]
 
 
 class Asked(BaseModel):
@@ -137,6 +56,7 @@ class Asked(BaseModel):
         None, pattern=r"^[A-Za-z0-9-]{1,64}$", description="Robot id; all unless told"
     )
     figures: bool = Field(True, description="Whether to draw them, too")
+    bins: bool = Field(False, description="Whether to tell the whole distributions")
     format: Literal["json", "csv"] | None = Field(
         None, description="Instead of an `Accept` header"
     )
@@ -148,7 +68,7 @@ def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
     )
 
-    @routes.get("/latency", response_model=LatencyJson)
+    @routes.get("/latency", response_model=HopLatency)
     async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, rates, loss, and the figures."""
         parts = collect(watch.streams, asked.window, asked.robot)
@@ -157,8 +77,7 @@ def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
             return Response(_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
         told = _told(watch, asked, clock())
         # A day of twenty robots is merged beside the loop, not in it.
-        draws = asked.figures
-        body = await asyncio.to_thread(_finished, parts, told, draws=draws)
+        body = await asyncio.to_thread(_finished, parts, told, asked)
         return Response(body, media_type="application/json")
 
     return routes
@@ -196,7 +115,7 @@ def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
         "streams": [_stream(one) for one in streams],
         "sampled": _sampled(streams),
         "remarks": [
-            {"key": one.key, "hop": one.hop, "slots": dict(one.slots)}
+            HopRemark(key=one.key, hop=one.hop, slots=dict(one.slots))
             for one in watch.overloads.remarks
         ],
         "traced": None if traced is None else (traced.robot_id, traced.data),
@@ -205,7 +124,7 @@ def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
 
 
 def _finished(
-    parts: Mapping[Cell, list[Sketch]], told: dict[str, Any], *, draws: bool
+    parts: Mapping[Cell, list[Sketch]], told: dict[str, Any], asked: Asked
 ) -> bytes:
     """The whole answer; in a thread of its own."""
     sketches = merge(parts)
@@ -213,38 +132,59 @@ def _finished(
     traced, newest = told.pop("traced"), told.pop("newest")
     sampled = told.pop("sampled")
     figures = {}
-    if draws:
+    if asked.figures:
         figures = {
             "bars": bars_figure(spreads),
             "cdf": cdf_figure(sketches),
             "trace": trace_figure(newest),
         }
     library = charts.library()
-    return orjson.dumps(
-        {
-            **told,
-            "direct": any(spreads[data, "uplink"].count for data in DATA),
-            "rows": [_row(data, spreads, sampled[data]) for data in DATA],
-            "trace": None
-            if traced is None
-            else {
-                "robot_id": traced[0],
-                "data": traced[1],
-                "stamp": newest.stamp,
-                "steps": steps_of(newest),
-            },
-            "library": f"/vendor/{library.name}",
-            "style_ids": library.style_ids,
-            "figures": {
-                name: orjson.Fragment(figure) for name, figure in figures.items()
-            },
-        }
+    answer = HopLatency(
+        **told,
+        direct=any(spreads[data, "uplink"].count for data in DATA),
+        rows=[
+            _row(data, spreads, sampled[data], sketches if asked.bins else None)
+            for data in DATA
+        ],
+        trace=None if traced is None else _trace(traced, newest),
+        library=f"/vendor/{library.name}",
+        style_ids=list(library.style_ids),
+        figures={name: orjson.Fragment(figure) for name, figure in figures.items()},
+    )
+    # Member by member, as only orjson knows what to do with a figure that is drawn.
+    return write_json(vars(answer))
+
+
+def _trace(of: tuple[str, Data], newest: Trace) -> HopTrace:
+    robot_id, data = of
+    return HopTrace(
+        robot_id=robot_id, data=data, stamp=newest.stamp, steps=steps_of(newest)
     )
 
 
-def _row(data: Data, spreads: Mapping[Cell, Spread], sampled: list[Hop]) -> RowJson:
-    hops: dict[str, SpreadJson] = {hop: _spread(spreads[data, hop]) for hop in HOPS}
-    return {"data": data, "hops": hops, "sampled": list(sampled)}
+def _row(
+    data: Data,
+    spreads: Mapping[Cell, Spread],
+    sampled: list[Hop],
+    sketches: Mapping[Cell, Sketch] | None,
+) -> HopRow:
+    return HopRow(
+        data=data,
+        hops={hop: _spread(spreads[data, hop]) for hop in HOPS},
+        sampled=list(sampled),
+        bins=None
+        if sketches is None
+        else {hop: _bins(sketches[data, hop]) for hop in HOPS},
+    )
+
+
+def _bins(of: Sketch) -> HopBins:
+    edges, counts = of.bins()
+    return HopBins(
+        edges_ms=[float(f"{1000.0 * edge:.6g}") for edge in edges],
+        counts=counts,
+        total_ms=round(1000.0 * of.total, 3),
+    )
 
 
 def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
@@ -256,65 +196,65 @@ def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
     }
 
 
-def _spread(of: Spread) -> SpreadJson:
-    return {
-        "count": of.count,
-        "mean_ms": _ms(of.mean),
-        "p50_ms": _ms(of.p50),
-        "p95_ms": _ms(of.p95),
-        "p99_ms": _ms(of.p99),
-        "least_ms": _ms(of.least),
-        "most_ms": _ms(of.most),
-    }
+def _spread(of: Spread) -> HopSpread:
+    return HopSpread(
+        count=of.count,
+        mean_ms=_ms(of.mean),
+        p50_ms=_ms(of.p50),
+        p95_ms=_ms(of.p95),
+        p99_ms=_ms(of.p99),
+        least_ms=_ms(of.least),
+        most_ms=_ms(of.most),
+    )
 
 
-def _clock(robot_id: str, of: ClockOffset) -> ClockJson:
-    return {
-        "robot_id": robot_id,
-        "state": of.state,
-        "offset_ms": _ms(of.offset_s),
-        "uncertainty_ms": _ms(of.uncertainty_s),
-        "jumps": of.jumps,
-    }
+def _clock(robot_id: str, of: ClockOffset) -> HopClock:
+    return HopClock(
+        robot_id=robot_id,
+        state=of.state,
+        offset_ms=_ms(of.offset_s),
+        uncertainty_ms=_ms(of.uncertainty_s),
+        jumps=of.jumps,
+    )
 
 
-def _stream(of: Stream) -> StreamJson:
+def _stream(of: Stream) -> HopStream:
     rates = of.rates
     excluded: dict[str, dict[str, int]] = {}
     for (hop, why), count in of.excluded.items():
         excluded.setdefault(hop, {})[why] = count
-    return {
-        "robot_id": of.robot_id,
-        "data": of.data,
-        "heard_hz": round(rates.heard, 1),
-        "agent_hz": round(rates.agent, 1),
-        "orion_hz": round(rates.orion, 1),
-        "kept_back": round(1.0 - rates.agent / rates.heard, 2) if rates.heard else None,
-        "throttled": of.is_throttled,
-        "orion_first": of.orion_first,
-        "uplink": _order(of.up),
-        "fiware": _order(of.fiware),
-        "excluded": excluded,
-    }
+    return HopStream(
+        robot_id=of.robot_id,
+        data=of.data,
+        heard_hz=round(rates.heard, 1),
+        agent_hz=round(rates.agent, 1),
+        orion_hz=round(rates.orion, 1),
+        kept_back=round(1.0 - rates.agent / rates.heard, 2) if rates.heard else None,
+        throttled=of.is_throttled,
+        orion_first=of.orion_first,
+        uplink=_order(of.up),
+        fiware=_order(of.fiware),
+        excluded=excluded,
+    )
 
 
-def _order(of: Order) -> OrderJson:
-    return {
-        "passed": of.passed,
-        "missing": of.missing,
-        "reordered": of.reordered,
-        "repeated": of.repeated,
-    }
+def _order(of: Order) -> HopOrder:
+    return HopOrder(
+        passed=of.passed,
+        missing=of.missing,
+        reordered=of.reordered,
+        repeated=of.repeated,
+    )
 
 
 def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
     """One line a kind of data and hop (RFC 4180)."""
     text = io.StringIO()
     lines = csv.writer(text)
-    names = list(SpreadJson.__annotations__)
+    names = list(HopSpread.model_fields)
     lines.writerow(["data", "hop", *names])
     for (data, hop), sketch in sketches.items():
-        told = dict(_spread(spread_of(sketch)))
+        told = vars(_spread(spread_of(sketch)))
         cells = ("" if told[name] is None else told[name] for name in names)
         lines.writerow([data, hop, *cells])
     return text.getvalue().encode()

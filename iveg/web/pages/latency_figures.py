@@ -6,12 +6,11 @@ Traces name what they show in ``meta``; the page gives them words and colours.
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from typing_extensions import TypedDict
-
 from iveg.domain.latency.account import Cell, Spread
 from iveg.domain.latency.hops import DATA, Hop
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.trace import Trace
+from iveg.models.latency import HopStep
 from iveg.web.pages.charts import figure_of
 
 STEPS: Final[tuple[Hop, ...]] = ("uplink", "fiware", "iveg", "screen")
@@ -43,26 +42,18 @@ def trace_figure(trace: Trace | None) -> bytes:
         {
             "type": "bar",
             "orientation": "h",
-            "name": step["hop"],
-            "meta": {"hop": step["hop"]},
-            "y": [step["hop"]],
-            "base": [step["from_ms"]],
-            "x": [step["to_ms"] - step["from_ms"]],
+            "name": step.hop,
+            "meta": {"hop": step.hop},
+            "y": [step.hop],
+            "base": [step.from_ms],
+            "x": [step.to_ms - step.from_ms],
         }
         for step in steps_of(trace)
     ]
     return figure_of(bars, ("ms", "hop"), {"showlegend": False})
 
 
-class StepJson(TypedDict):
-    """One hop of one message (ms since the robot's stamp, or since the broker)."""
-
-    hop: str
-    from_ms: float
-    to_ms: float
-
-
-def steps_of(trace: Trace | None) -> list[StepJson]:
+def steps_of(trace: Trace | None) -> list[HopStep]:
     """The hops that a message has passed, in their order.
 
     The decision may come before Orion's copy: iVeg acts on whichever copy is first.
@@ -77,11 +68,11 @@ def steps_of(trace: Trace | None) -> list[StepJson]:
         ("screen", trace.decided_at or 0.0, trace.painted_at),
     ]
     return [
-        {
-            "hop": hop,
-            "from_ms": round(1000.0 * (begin - start), 2),
-            "to_ms": round(1000.0 * (end - start), 2),
-        }
+        HopStep(
+            hop=hop,
+            from_ms=round(1000.0 * (begin - start), 2),
+            to_ms=round(1000.0 * (end - start), 2),
+        )
         for hop, begin, end in spans
         if end is not None
     ]

@@ -198,6 +198,19 @@ async def test_the_table_comes_as_csv_for_whoever_likes_that() -> None:
     assert liked.text.splitlines()[0] == asked.text.splitlines()[0]
 
 
+async def test_the_whole_distribution_is_told_to_whoever_asks() -> None:
+    desk = WebDesk()
+    drive(desk, 2.0)
+
+    bins = row(await ask(desk, "window=24h&bins=true"))["bins"]["uplink"]
+
+    assert sum(bins["counts"]) == 40
+    assert bins["total_ms"] == pytest.approx(160.0, abs=2.0)
+    assert bins["edges_ms"] == sorted(bins["edges_ms"])
+    assert all(3.9 < edge < 4.2 for edge in bins["edges_ms"])
+    assert row(await ask(desk))["bins"] is None
+
+
 async def test_strangers_learn_nothing() -> None:
     async with WebDesk().stranger() as stranger:
         answer = await stranger.get("/api/v1/latency")

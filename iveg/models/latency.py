@@ -1,0 +1,128 @@
+"""What each message takes from hop to hop (docs/interfaces.md §5)."""
+
+from typing import Any
+
+from iveg.domain.latency.hops import Data, Hop, Window
+from iveg.models.base import Model
+
+
+class HopSpread(Model):
+    """What one hop takes; null where nothing was measured."""
+
+    count: int
+    mean_ms: float | None
+    p50_ms: float | None
+    p95_ms: float | None
+    p99_ms: float | None
+    least_ms: float | None
+    most_ms: float | None
+
+
+class HopBins(Model):
+    """All that was measured of one hop, within 1 %."""
+
+    edges_ms: list[float]
+    """Upper ends of the bins that are not empty, rising."""
+    counts: list[int]
+    """How many messages fell into each."""
+    total_ms: float
+    """The sum of all durations, exact."""
+
+
+class HopRow(Model):
+    """One kind of data."""
+
+    data: Data
+    hops: dict[str, HopSpread]
+    sampled: list[Hop]
+    """Hops of which not every message is told."""
+    bins: dict[str, HopBins] | None = None
+    """Null unless they were asked for."""
+
+
+class HopClock(Model):
+    """A robot's clock less the server's, as far as it is proven."""
+
+    robot_id: str
+    state: str
+    offset_ms: float | None
+    uncertainty_ms: float | None
+    jumps: int
+
+
+class HopOrder(Model):
+    """What passed a hop since the start."""
+
+    passed: int
+    missing: int
+    reordered: int
+    repeated: int
+
+
+class HopStream(Model):
+    """One kind of data of one robot: what really comes, and how."""
+
+    robot_id: str
+    data: Data
+    heard_hz: float
+    agent_hz: float
+    orion_hz: float
+    kept_back: float | None
+    """Share (0 to 1) that the agent was not sent; null while nothing is heard."""
+    throttled: bool
+    orion_first: int
+    uplink: HopOrder
+    fiware: HopOrder
+    excluded: dict[str, dict[str, int]]
+    """By hop and reason, what is in no statistics."""
+
+
+class HopRemark(Model):
+    """What is wrong with a hop now: a sentence's name, and what fills it."""
+
+    key: str
+    hop: str
+    slots: dict[str, str | float]
+
+
+class HopStep(Model):
+    """One hop of one message, since the robot's stamp, or since the broker without."""
+
+    hop: Hop
+    from_ms: float
+    to_ms: float
+
+
+class HopTrace(Model):
+    """One message, hop by hop."""
+
+    robot_id: str
+    data: Data
+    stamp: str | None
+    steps: list[HopStep]
+
+
+class HopLatency(Model):
+    """Every hop of every kind of data over one window."""
+
+    at: str
+    window: Window
+    window_s: float
+    robot: str | None
+    """Null: all robots."""
+    direct: bool
+    """Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."""
+    rows: list[HopRow]
+    paper: dict[str, dict[str, dict[str, float]]]
+    """What the paper printed, by place, kind of data and column (ms)."""
+    clocks: list[HopClock]
+    pages_within_ms: float | None
+    """How well pages' clocks are known; null while none has told."""
+    streams: list[HopStream]
+    remarks: list[HopRemark]
+    trace: HopTrace | None
+    library: str
+    """Where the script lies that draws the figures."""
+    style_ids: list[str]
+    figures: dict[str, Any]
+    """``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted."""
