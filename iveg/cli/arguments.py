@@ -49,7 +49,7 @@ def add_experiment_arguments(
     for name, told in (
         ("minimal", "one scenario, seconds: whether it works at all"),
         ("quick", "every scenario once, three minutes (the usual)"),
-        ("full", "every scenario six times, over 100,000 messages"),
+        ("full", "every scenario five times, over 100,000 messages"),
     ):
         size.add_argument(
             f"--{name}", dest="size", action="store_const", const=name, help=told
@@ -57,13 +57,18 @@ def add_experiment_arguments(
     run.set_defaults(size="quick")
     run.add_argument(
         "--fiware",
-        choices=("embedded", "settings"),
-        default="embedded",
-        help="a FIWARE of its own, or the one that the settings name",
+        nargs="+",
+        default=["embedded"],
+        metavar="URL",
+        help="a FIWARE of its own (embedded, the usual), the one that the settings "
+        "name (settings), or Orion's address, the IoT Agent's and the broker's",
     )
     run.add_argument("--profile", choices=("field", "simulation"), default="field")
     run.add_argument("--seed", type=int, metavar="S")
     run.add_argument("--out", type=Path, metavar="DIR", help="where results go")
+    run.add_argument(
+        "--until-eof", action="store_true", help="end when the input closes"
+    )
     compare = words.add_parser("compare", help="two results beside each other")
     compare.add_argument("before", type=Path, metavar="A")
     compare.add_argument("after", type=Path, metavar="B")

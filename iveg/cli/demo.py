@@ -96,14 +96,20 @@ def _free_domain() -> int:
     raise SettingsError("ROS_DOMAIN_ID", "any", "a DDS domain that is free")
 
 
-def on_free_ports(settings: Settings, environment: Mapping[str, str]) -> Settings:
-    """Defaults that are taken move to a free port; what somebody chose does not."""
+def on_free_ports(
+    settings: Settings, environment: Mapping[str, str], *, fiware: bool = True
+) -> Settings:
+    """Defaults that are taken move to a free port; what somebody chose does not.
+
+    Without ``fiware`` only the page's: a FIWARE that runs stays where it is.
+    """
     listeners = [_Listener("port", "IVEG_PORT", settings.host, settings.port)]
-    for field, variable in (
+    places = (
         ("mqtt_url", "IVEG_MQTT_URL"),
         ("orion_url", "IVEG_ORION_URL"),
         ("iota_url", "IVEG_IOTA_URL"),
-    ):
+    )
+    for field, variable in places if fiware else ():
         parts = urlsplit(getattr(settings, field))
         default = {"mqtt_url": 1883}.get(field, 80)
         listeners.append(

@@ -10,29 +10,41 @@ import asyncio
 import contextlib
 import secrets
 import sys
-from collections.abc import AsyncIterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import AsyncIterator, Coroutine, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
 
 import httpx
 
 from iveg.adapters import clock
+from iveg.adapters.orion import OrionClient
 from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
 from iveg.cli.running import run_until_told
-from iveg.domain.errors import HopError
+from iveg.domain.detection_rule import Rule
+from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment import compare
 from iveg.experiment.notebook import Notebook, directory_of
-from iveg.experiment.observer import injections, slowdowns_of, watch
-from iveg.experiment.outcome import outcome_of, read_json, read_truth
-from iveg.experiment.plan import PLANS, Step
-from iveg.experiment.scoring import tally
+from iveg.experiment.observer import watch
+from iveg.experiment.outcome import (
+    Outcome,
+    counted_of,
+    outcome_of,
+    read_json,
+    read_truth,
+    stack_of,
+)
+from iveg.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, Step
+from iveg.experiment.progress import Progress
+from iveg.experiment.rehearsal import Rehearsal
 from iveg.settings import Settings
 
-_STARTS_S = 6.0
 _STOPS_WITHIN_S = 4.0
 _LIVE_WITHIN_S = 30.0
+_LIVE_ROBOT_S = 10.0
+T = TypeVar("T")
 
 
 def experiment(
@@ -50,19 +62,39 @@ def experiment(
     if options.seed is not None:
         plan = replace(plan, seed=options.seed)
     directory = options.out or directory_of(data / "experiments", plan)
-    embedded = options.fiware == "embedded"
-    placed = _placed(settings, environment, directory, embedded)
-    lab = Lab(Notebook(plan, directory), plan.profile, placed)
-    return run_until_told(lab.run(environment, embedded=embedded)) or lab.exit_code
+    embedded = options.fiware == ["embedded"]
+    named = with_fiware(settings, options.fiware)
+    placed = placed_in(directory, on_free_ports(named, environment, fiware=embedded))
+    lab = Lab(Notebook(plan, directory), plan.profile, placed, embedded=embedded)
+    work = lab.run(environment)
+    return run_until_told(work, until_eof=options.until_eof) or lab.exit_code
 
 
-def _placed(
-    settings: Settings, environment: Mapping[str, str], directory: Path, embedded: bool
-) -> Settings:
-    """Everything where nothing else is; a FIWARE that is named stays where it is."""
-    moved = on_free_ports(settings, environment) if embedded else settings
+def with_fiware(settings: Settings, words: list[str]) -> Settings:
+    """What ``--fiware`` says: ``embedded``, ``settings``, or addresses.
+
+    Raises:
+        SettingsError: Orion's or the IoT Agent's is missing, or one is no address.
+    """
+    if words in (["embedded"], ["settings"]):
+        return settings
+    schemes = [urlsplit(word).scheme for word in words]
+    web = [w for w, s in zip(words, schemes, strict=True) if s in ("http", "https")]
+    mqtt = [w for w, s in zip(words, schemes, strict=True) if s in ("mqtt", "mqtts")]
+    if len(web) != 2 or len(mqtt) > 1 or len(web) + len(mqtt) != len(words):
+        expected = "Orion's address, the IoT Agent's and, if not set, the broker's"
+        raise SettingsError("--fiware", " ".join(words), expected)
+    broker = mqtt[0] if mqtt else settings.mqtt_url
+    return replace(settings, orion_url=web[0], iota_url=web[1], mqtt_url=broker)
+
+
+def placed_in(directory: Path, settings: Settings) -> Settings:
+    """The paper's fleet in its greenhouse, with data and secrets of its own."""
     return replace(
-        moved,
+        settings,
+        robots=ROBOTS,
+        fleet="",
+        greenhouse=GREENHOUSE,
         api_token=secrets.token_urlsafe(24),
         sign_in_token=secrets.token_hex(32),
         notify_token=secrets.token_hex(32),
@@ -77,84 +109,117 @@ class Lab:
     """One experiment on its way.
 
     Attributes:
+        embedded: Whether FIWARE is started, too.
         exit_code: 1 where it ended before its plan did.
     """
 
     notebook: Notebook
     profile: str
     settings: Settings
+    embedded: bool = True
     exit_code: int = 1
+    _running: dict[str, asyncio.subprocess.Process] = field(default_factory=dict)
 
-    async def run(self, environment: Mapping[str, str], *, embedded: bool) -> None:
+    async def run(self, environment: Mapping[str, str]) -> None:
         """Every step that is not done yet, then the report."""
         surroundings = {**environment, **self.settings.to_environment()}
+        steps = self.notebook.steps_left()
+        directory = self.notebook.directory
+        print(f"experiment: {directory}", flush=True)
+        progress = Progress(directory, steps, self.notebook.done, sys.stdout)
+        ticking = asyncio.create_task(_ticks(progress))
         why = "interrupted"
-        measured: dict[str, Any] = {}
         try:
-            async with self._stack(surroundings, embedded=embedded):
-                for step in self._open():
-                    await self._step(step, surroundings)
-                measured = {"latency": await self._latency()}
+            if not self.embedded:
+                await refuse_live_robots(self.settings)
+            async with self._stack(surroundings):
+                for step in steps:
+                    await self._step(step, surroundings, progress)
             why = ""
-        except (HopError, SystemExit) as error:
+        except (HopError, DataFileError, SystemExit) as error:
             why = str(error)
         finally:
-            self._finish(measured, why)
-
-    def _open(self) -> list[Step]:
-        steps = self.notebook.steps_left()
-        left = round(sum(one.seconds + _STARTS_S for one in steps))
-        place = self.notebook.directory
-        print(f"{len(steps)} runs to go, about {left} s: {place}", flush=True)
-        return steps
+            ticking.cancel()
+            progress.finish(why)
+            self._finish(why)
 
     @contextlib.asynccontextmanager
-    async def _stack(
-        self, environment: Mapping[str, str], *, embedded: bool
-    ) -> AsyncIterator[None]:
+    async def _stack(self, environment: Mapping[str, str]) -> AsyncIterator[None]:
         # As in a demo no link is printed: nobody signs in here.
-        parts = [["fiware"], ["serve", "--demo"]] if embedded else [["serve", "--demo"]]
-        running: list[asyncio.subprocess.Process] = []
+        serve = ["serve", "--demo"]
+        parts = [["fiware"], serve] if self.embedded else [serve]
         try:
             for words in parts:
-                running.append(await start_part(words, environment))
-                await wait_ready(words[0], running[-1])
+                await self._start(words, environment)
             yield
         finally:
-            await stop_parts([*reversed(running)])
+            await stop_parts([*reversed(self._running.values())])
 
-    async def _step(self, step: Step, environment: Mapping[str, str]) -> None:
-        print(f"{step.name}: {step.seconds:.0f} s", flush=True)
+    async def _start(
+        self, words: list[str], environment: Mapping[str, str]
+    ) -> asyncio.subprocess.Process:
+        part = self._running[words[0]] = await start_part(words, environment)
+        await wait_ready(words[0], part)
+        return part
+
+    async def _step(
+        self, step: Step, environment: Mapping[str, str], progress: Progress
+    ) -> None:
+        progress.begin(step, "counting", clock.now().mono)
+        rehearsal = Rehearsal(step, self.profile, self._rule, WATCHED)
+        counted = counted_of(await rehearsal.play(step.counted_s), WATCHED)
+        progress.begin(step, "running", clock.now().mono)
         truth = self.notebook.directory / f"{step.name}.truth.jsonl"
+        try:
+            stack = await self._real(step, environment, truth)
+        finally:
+            robots = self._running.pop("emulator", None)
+            await stop_parts([] if robots is None else [robots])
+            truth.unlink(missing_ok=True)
+        self.notebook.keep(step, outcome_of(step, counted, stack))
+        progress.end(step, clock.now().mono)
+
+    @property
+    def _rule(self) -> Rule:
+        """As the iVeg that is started has it."""
+        told = self.settings
+        return Rule(threshold=told.confidence_threshold, radius_m=told.safety_radius_m)
+
+    async def _real(
+        self, step: Step, environment: Mapping[str, str], truth: Path
+    ) -> Outcome:
+        """The same run by all programs, which may die."""
         words = ["emulator", "--scenario", step.family, "--seed", str(step.seed)]
         words += ["--profile", self.profile, "--truth", str(truth)]
         since = format_stamp(clock.now().wall)
-        robots = await start_part(words, environment)
-        try:
-            await wait_ready("emulator", robots)
-            completed = await self._until_live()
-            watched = await watch(
-                self._url, self.settings.api_token, step.seconds, "AGII"
-            )
-            completed = completed and await self._are_live() and bool(watched.pictures)
-            # Nobody lets a stopped robot go here, so that is the last thing asked.
-            stops = await self._stop() if self.notebook.is_last(step) else []
-        finally:
-            await stop_parts([robots])
-        real = read_truth(truth)
-        truth.unlink()
-        tallies, compared = tally(real, watched.pictures)
+        await self._start(words, environment)
+        completed = await self._while_all_run(self._until_live())
+        url, token = self._url, self.settings.api_token
+        watched = await self._while_all_run(watch(url, token, step.seconds, WATCHED))
+        completed = completed and await self._are_live()
+        # Nobody lets a stopped robot go here, so that is the last thing asked.
+        stops = await self._stop() if self.notebook.is_last(step) else []
         decisions = (await self._ask(f"decisions?since={since}&limit=500"))["items"]
-        outcome = outcome_of(
-            step,
-            tallies,
-            pictures=compared,
-            completed=completed,
-            slowdowns=slowdowns_of(decisions),
-            injection=injections(real, watched.beliefs, "AGII"),
-            stops=stops,
-        )
-        self.notebook.keep(step, outcome)
+        stack = stack_of(watched, read_truth(truth), decisions, WATCHED)
+        return {**stack, "completed": completed and stack["completed"], "stops": stops}
+
+    async def _while_all_run(self, work: Coroutine[Any, Any, T]) -> T:
+        """Raises HopError as soon as a program has ended."""
+        ends = {
+            asyncio.create_task(part.wait()): name
+            for name, part in self._running.items()
+        }
+        main = asyncio.create_task(work)
+        try:
+            await asyncio.wait([main, *ends], return_when=asyncio.FIRST_COMPLETED)
+            for end, name in ends.items():
+                if end.done():
+                    raise HopError(name, f"has ended (exit code {end.result()})")
+            return await main
+        finally:
+            for task in (main, *ends):
+                task.cancel()
+            await asyncio.gather(main, *ends, return_exceptions=True)
 
     async def _until_live(self) -> bool:
         deadline = clock.now().mono + _LIVE_WITHIN_S
@@ -168,16 +233,16 @@ class Lab:
         robots = (await self._ask("robots"))["items"]
         return bool(robots) and all(one["link"] == "LIVE" for one in robots)
 
-    async def _latency(self) -> dict[str, Any]:
-        """What every message took since this iVeg has been running."""
-        told = await self._ask("latency?window=24h")
-        return {name: told[name] for name in ("rows", "figures", "clocks")}
-
     async def _stop(self) -> Any:
         """Stop the fleet, and how long that took each robot (ms)."""
         await self._ask("fleet/stop", "POST")
-        await asyncio.sleep(_STOPS_WITHIN_S)
-        return (await self._ask("commands/latency"))["robots"]
+        deadline = clock.now().mono + _STOPS_WITHIN_S
+        while True:
+            await asyncio.sleep(0.5)
+            robots = (await self._ask("commands/latency"))["robots"]
+            standing = sum(one["standing"]["count"] for one in robots)
+            if standing >= len(ROBOTS) or clock.now().mono > deadline:
+                return robots
 
     @property
     def _url(self) -> str:
@@ -198,10 +263,47 @@ class Lab:
         except httpx.HTTPError as error:
             raise HopError("iveg", f"{path}: {error!r}") from error
 
-    def _finish(self, measured: Mapping[str, Any], why: str) -> None:
-        report = self.notebook.finish(measured, why)
+    def _finish(self, why: str) -> None:
+        report = self.notebook.finish(self._chosen(), why)
         self.exit_code = int(bool(why))
         if why:
             told = f"broken off ({why}); the same command goes on with it"
             print(f"iveg: {told}: {self.notebook.directory}", file=sys.stderr)
         print(f"report: {report}", flush=True)
+
+    def _chosen(self) -> dict[str, Any]:
+        """What of the settings has a say in the numbers."""
+        told = self.settings
+        return {
+            "fiware": "embedded" if self.embedded else "named",
+            "confidence_threshold": told.confidence_threshold,
+            "safety_radius_m": told.safety_radius_m,
+            "direct_read": told.direct_read,
+            "uplink": told.uplink,
+            "orion_throttle": told.orion_throttle,
+        }
+
+
+async def refuse_live_robots(settings: Settings) -> None:
+    """An experiment's robots bear the names of real ones.
+
+    Raises:
+        DataFileError: one of them was heard at that Orion a moment ago.
+        HopError: Orion does not answer.
+    """
+    service = settings.fiware_service, settings.fiware_servicepath
+    orion = OrionClient(settings.orion_url, *service)
+    try:
+        for robot_id in ROBOTS:
+            heard = await orion.modified_at(robot_id)
+            if heard is not None and clock.now().wall - heard < _LIVE_ROBOT_S:
+                reason = f"{robot_id} is live there; stop it first"
+                raise DataFileError("--fiware", settings.orion_url, reason)
+    finally:
+        await orion.close()
+
+
+async def _ticks(progress: Progress) -> None:
+    while True:
+        await asyncio.sleep(1.0)
+        progress.tick(clock.now().mono)

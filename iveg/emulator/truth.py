@@ -1,11 +1,21 @@
 """What was really in view of each camera, for whoever scores a detector."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
 import orjson
 
+from iveg.emulator.camera import Target
 from iveg.emulator.world import Rig, World
+
+
+def in_view(rig: Rig, world: World) -> Iterator[tuple[Target, float]]:
+    """Targets of which a part (0 to 1) is in view of a robot's camera, and it."""
+    for target in world.targets_for(rig.robot_id):
+        part = rig.part_seen(target, world)
+        if part > 0.0:
+            yield target, part
 
 
 class TruthLog:
@@ -22,19 +32,17 @@ class TruthLog:
     def looked(self, rig: Rig, world: World, at: float) -> None:
         """A robot has just looked (``at`` Unix s, by its own clock)."""
         visible = []
-        for target in world.targets_for(rig.robot_id):
-            part = rig.part_seen(target, world)
-            if part > 0.0:
-                pose = target.body.pose
-                visible.append(
-                    {
-                        "key": target.key,
-                        "class": target.class_id,
-                        "x": round(pose.x, 3),
-                        "y": round(pose.y, 3),
-                        "part": round(part, 2),
-                    }
-                )
+        for target, part in in_view(rig, world):
+            pose = target.body.pose
+            visible.append(
+                {
+                    "key": target.key,
+                    "class": target.class_id,
+                    "x": round(pose.x, 3),
+                    "y": round(pose.y, 3),
+                    "part": round(part, 2),
+                }
+            )
         told = {"robot": rig.robot_id, "at": at, "visible": visible}
         self._file.write(orjson.dumps(told).decode() + "\n")
 

@@ -1,8 +1,9 @@
 """The paper's evaluation as one command (``iveg experiment``).
 
-``cli/experiment`` starts the real programs; here is what they are asked and what is
-made of it: ``plan`` says which scenarios run how often, ``watching`` listens to what
-comes out, ``scoring`` holds it against the emulator's truth, ``statistics`` says how
-sure that is, ``outcome`` and ``notebook`` keep it, ``report`` and ``compare`` show it
-beside the paper.
+``plan`` says which scenarios run how often.  Each is played on a virtual clock
+(``stage``, ``rehearsal``), from which everything is counted, and through the real
+programs, which ``cli/experiment`` starts, ``watching`` listens to and ``slices`` times.
+``scoring`` and ``believing`` hold both against the emulator's truth, ``statistics``
+says how sure that is, ``outcome`` and ``notebook`` keep it, ``tables``, ``report`` and
+``compare`` show it beside the paper, ``progress`` says how far it is.
 """

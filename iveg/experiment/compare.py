@@ -1,24 +1,46 @@
 """Two results beside each other: better, worse, or nobody can tell."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Final
 
+from iveg.domain.errors import DataFileError
+from iveg.domain.latency.account import Cell
+from iveg.domain.latency.hops import DATA, Hop
+from iveg.experiment.outcome import slices_of
 from iveg.experiment.paper_tables import CLASSES
+from iveg.experiment.slices import apart, spreads
 from iveg.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]
+FORMAT: Final = 2
+_HOPS: Final[tuple[Hop, ...]] = ("uplink", "fiware", "robot_orion", "iveg")
 
 
 def write_comparison(before: Result, after: Result) -> str:
-    """As a table of text: rates with the 95 % interval of their difference."""
-    lines = [f"{'what':<28}{'before':>10}{'after':>10}   difference (95 %)"]
-    for what, one, other in _rates(before, after):
-        apart = difference(one, other)
-        told = f"{_percent(apart.low)} to {_percent(apart.high)}: {verdict(apart)}"
-        shares = f"{_percent(one.share):>10}{_percent(other.share):>10}"
-        lines.append(f"{what:<28}{shares}   {told}")
+    """As a table of text, with the 95 % interval of each difference.
+
+    Raises:
+        DataFileError: one is of another version's format.
+    """
+    for result in (before, after):
+        if result.get("format") != FORMAT:
+            reason = f"is not of format {FORMAT}: run it again with this version"
+            raise DataFileError("result.json", "format", reason)
+    lines = [f"{'what':<28}{'before':>12}{'after':>12}   difference (95 %)"]
+    lines += _shares(before, after)
     lines += _latencies(before, after)
+    if before["plan"] != after["plan"]:
+        lines.append("The plans differ: so may what was counted.")
     return "\n".join(lines) + "\n"
+
+
+def _shares(before: Result, after: Result) -> Iterator[str]:
+    """Newcombe's interval, of Wilson's two (1998, method 10)."""
+    for what, one, other in _rates(before, after):
+        apart_ = difference(one, other)
+        told = f"{_percent(apart_.low)} to {_percent(apart_.high)}: {verdict(apart_)}"
+        shares = f"{_percent(one.share):>12}{_percent(other.share):>12}"
+        yield f"{what:<28}{shares}   {told}"
 
 
 def _rates(before: Result, after: Result) -> Iterator[tuple[str, Interval, Interval]]:
@@ -31,22 +53,18 @@ def _rates(before: Result, after: Result) -> Iterator[tuple[str, Interval, Inter
 
 
 def _latencies(before: Result, after: Result) -> Iterator[str]:
-    """Means and P95 as they are: messages follow each other too closely to test."""
-    old, new = _means(before), _means(after)
-    for name, (mean, p95) in old.items():
-        if name in new:
-            was, now = f"{mean:.1f}/{p95:.1f}", f"{new[name][0]:.1f}/{new[name][1]:.1f}"
-            yield f"{name + ' ms':<28}{was:>10}{now:>10}   mean/P95"
-
-
-def _means(result: Result) -> dict[str, tuple[float, float]]:
-    rows = result.get("latency", {}).get("rows", [])
-    return {
-        f"{row['data']} {hop}": (told["mean_ms"], told["p95_ms"])
-        for row in rows
-        for hop, told in row["hops"].items()
-        if told["count"]
-    }
+    """Bootstrapped intervals; what takes longer is worse."""
+    old, new = slices_of(before), slices_of(after)
+    was, now = spreads(old), spreads(new)
+    cells: list[Cell] = [(data, hop) for data in DATA for hop in _HOPS]
+    for cell in cells:
+        for name, between in apart(old, new, cell):
+            one, other = was[cell], now[cell]
+            pair = (one.mean, other.mean) if name == "mean" else (one.p95, other.p95)
+            shown = "".join(f"{1000.0 * (value or 0.0):>12.2f}" for value in pair)
+            better = Interval(-between.share, -between.high, -between.low)
+            told = f"{between.low:.2f} to {between.high:.2f}: {verdict(better)}"
+            yield f"{' '.join(cell)} {name} ms".ljust(28) + f"{shown}   {told}"
 
 
 def _percent(share: float) -> str:

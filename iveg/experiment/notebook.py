@@ -28,7 +28,13 @@ class Notebook:
 
     def steps_left(self) -> list[Step]:
         """Those that no earlier start has finished."""
-        return [one for one in self._plan.steps() if not self._file(one).exists()]
+        known = {(one["family"], one["number"]) for one in self._outcomes()}
+        return [s for s in self._plan.steps() if (s.family, s.number) not in known]
+
+    @property
+    def done(self) -> int:
+        """How many runs are finished."""
+        return len(self._outcomes())
 
     def is_last(self, step: Step) -> bool:
         """Whether nothing comes after it."""
@@ -38,8 +44,12 @@ class Notebook:
         """A run is finished."""
         write_json(self._file(step), outcome)
 
-    def finish(self, measured: Mapping[str, Any], why: str) -> Path:
-        """Write the result, or as much as there is; ``why`` it broke off, or empty.
+    def finish(self, chosen: Mapping[str, Any], why: str) -> Path:
+        """Write the result, or as much as there is.
+
+        Args:
+            chosen: What of the settings has a say in it.
+            why: It broke off, or empty.
 
         Returns:
             The report.
@@ -47,7 +57,7 @@ class Notebook:
         for file in self.directory.glob("partial.*"):
             file.unlink()
         name = "partial" if why else "result"
-        result = result_of(self._plan, self._outcomes(), measured, why)
+        result = result_of(self._plan, self._outcomes(), chosen, why)
         write_json(self.directory / f"{name}.json", result)
         report = self.directory / f"{name}.html"
         report.write_text(write_report(result), encoding="utf-8")

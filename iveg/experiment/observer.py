@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,20 +13,31 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
 from iveg.domain.stamps import parse_stamp
+from iveg.experiment.believing import Belief, belief_in
 from iveg.experiment.scoring import Picture, Seen
+from iveg.experiment.slices import Slice, slice_between
 
 _MAP_EVERY_S = 1.0
-_TAKEN = 50
-"""Of a cell of the costmap (0 to 100)."""
-Costmap = Mapping[str, Any]
+_SLICE_S = 5.0
+_ORDER = ("passed", "missing", "reordered", "repeated")
 
 
 @dataclass(slots=True)
 class Watched:
-    """Pictures that arrived, and what AGII believed at some moments (Unix s)."""
+    """What was heard.
+
+    Attributes:
+        pictures: As ``/live`` told them.
+        beliefs: What a robot's costmap held at some moments (Unix s).
+        slices: What messages took, a few seconds each.
+        order: By hop, how many messages passed, are missing, came out of order or
+            twice.
+    """
 
     pictures: list[Picture] = field(default_factory=list)
-    beliefs: list[tuple[float, Costmap]] = field(default_factory=list)
+    beliefs: list[tuple[float, Belief]] = field(default_factory=list)
+    slices: list[Slice] = field(default_factory=list)
+    order: dict[str, dict[str, int]] = field(default_factory=dict)
 
 
 async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
@@ -38,11 +50,55 @@ async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
         robot_id: Whose belief is asked for once a second.
     """
     watched = Watched()
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(seconds), asyncio.TaskGroup() as tasks:
-            tasks.create_task(_listen(url, token, watched))
-            tasks.create_task(_believe(url, token, robot_id, watched))
+    beside = [
+        asyncio.create_task(_listen(url, token, watched)),
+        asyncio.create_task(_believe(url, token, robot_id, watched)),
+    ]
+    try:
+        await _measure(url, token, seconds, watched)
+    finally:
+        for task in beside:
+            task.cancel()
+        await asyncio.gather(*beside, return_exceptions=True)
     return watched
+
+
+async def _measure(url: str, token: str, seconds: float, watched: Watched) -> None:
+    """A slice every few seconds, the last one at the end."""
+    slices = max(1, math.floor(seconds / _SLICE_S))
+    start = before = await _told(url, token)
+    for _ in range(slices):
+        await asyncio.sleep(seconds / slices)
+        now = await _told(url, token)
+        if before is not None and now is not None:
+            watched.slices.append(slice_between(before["rows"], now["rows"]))
+        before = now or before
+    if start is not None and before is not None:
+        watched.order = _order_between(start["streams"], before["streams"])
+
+
+async def _told(url: str, token: str) -> Any:
+    """What the latency API tells since iVeg's start; None: nothing."""
+    bearer = {"Authorization": f"Bearer {token}"}
+    path = f"{url}/api/v1/latency?window=24h&figures=false&bins=true"
+    try:
+        async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
+            return (await client.get(path)).raise_for_status().json()
+    except httpx.HTTPError:
+        return None
+
+
+def _order_between(
+    before: Sequence[Mapping[str, Any]], after: Sequence[Mapping[str, Any]]
+) -> dict[str, dict[str, int]]:
+    return {
+        hop: {
+            name: sum(one[hop][name] for one in after)
+            - sum(one[hop][name] for one in before)
+            for name in _ORDER
+        }
+        for hop in ("uplink", "fiware")
+    }
 
 
 async def _listen(url: str, token: str, watched: Watched) -> None:
@@ -72,7 +128,7 @@ async def _believe(url: str, token: str, robot_id: str, watched: Watched) -> Non
                 if answer.status_code == 200 and watched.pictures:
                     # By the clock of the pictures, with which it is compared.
                     newest = watched.pictures[-1].at
-                    watched.beliefs.append((newest, answer.json()))
+                    watched.beliefs.append((newest, belief_in(answer.json())))
             await asyncio.sleep(_MAP_EVERY_S)
 
 
@@ -92,37 +148,6 @@ def picture_of(told: Mapping[str, Any]) -> Picture | None:
         for place, one in enumerate(told["items"])
     )
     return Picture(told["robot_id"], at, seen)
-
-
-def injections(
-    truth: Sequence[Picture], beliefs: Sequence[tuple[float, Costmap]], robot_id: str
-) -> dict[str, int]:
-    """How often somebody whom a robot could not see stood in its costmap all the same.
-
-    Of the moments at which another robot had a person in view and it had not:
-    ``asked`` so many, ``injected`` in so many.
-    """
-    asked = injected = 0
-    for at, belief in beliefs:
-        near = [one for one in truth if abs(one.at - at) < 0.1]
-        own = {s.key for one in near if one.robot_id == robot_id for s in one.seen}
-        others = (s for one in near if one.robot_id != robot_id for s in one.seen)
-        hidden = {
-            s.key: s for s in others if s.class_id == "farmer" and s.key not in own
-        }
-        for one in hidden.values():
-            asked += 1
-            injected += _is_taken(belief, one)
-    return {"asked": asked, "injected": injected}
-
-
-def _is_taken(belief: Costmap, one: Seen) -> bool:
-    resolution, origin = belief["resolution"], belief["origin"]
-    column = int((one.x - origin["x"]) / resolution)
-    row = int((one.y - origin["y"]) / resolution)
-    if not (0 <= column < belief["width"] and 0 <= row < belief["height"]):
-        return False
-    return int(belief["data"][row * belief["width"] + column]) >= _TAKEN
 
 
 def slowdowns_of(decisions: Sequence[Mapping[str, Any]]) -> dict[str, int]:

@@ -2,99 +2,180 @@
 
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import orjson
 
 from iveg import __version__
 from iveg.domain.errors import DataFileError
+from iveg.domain.latency.account import Spread
+from iveg.domain.latency.hops import DATA, HOPS
+from iveg.experiment.believing import injections
+from iveg.experiment.observer import Watched, slowdowns_of
 from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.plan import Plan, Step
-from iveg.experiment.scoring import Picture, Score, Seen, Tally, score
-from iveg.experiment.statistics import wilson
+from iveg.experiment.rehearsal import Rehearsed
+from iveg.experiment.scoring import Picture, Seen, Tally, paired, score, tally
+from iveg.experiment.slices import Slice, spreads
+from iveg.experiment.statistics import thinned
 
 Outcome = dict[str, Any]
 
 
-def outcome_of(
-    step: Step,
-    tallies: Mapping[str, Tally],
-    *,
-    pictures: int,
-    completed: bool,
-    slowdowns: Mapping[str, int],
-    injection: Mapping[str, int],
-    stops: Sequence[Mapping[str, Any]],
-) -> Outcome:
-    """One run as it is kept."""
+def counted_of(run: Rehearsed, robot_id: str) -> Outcome:
+    """What a run on the virtual clock came to; the same twice."""
+    real = [one for one, _ in run.pairs]
     return {
-        **asdict(step),
-        "completed": completed,
-        "pictures": pictures,
-        "classes": {name: asdict(one) for name, one in tallies.items()},
-        "slowdowns": dict(slowdowns),
-        "injection": dict(injection),
-        "stops": list(stops),
+        "completed": run.completed,
+        "pictures": len(run.pairs),
+        "classes": _tallied(tally(run.pairs)),
+        "slowdowns": slowdowns_of([asdict(one) for one in run.decisions]),
+        "injection": injections(real, run.beliefs, robot_id),
     }
 
 
+def stack_of(
+    watched: Watched,
+    truth: Sequence[Picture],
+    decisions: Sequence[Mapping[str, Any]],
+    robot_id: str,
+) -> Outcome:
+    """What came through all programs in real time."""
+    pairs = list(paired(truth, watched.pictures))
+    return {
+        "completed": bool(pairs),
+        "pictures": len(pairs),
+        "classes": _tallied(tally(pairs)),
+        "slowdowns": slowdowns_of(decisions),
+        "injection": injections(truth, watched.beliefs, robot_id),
+        "order": watched.order,
+        "slices": watched.slices,
+        "stops": [],
+    }
+
+
+def outcome_of(step: Step, counted: Outcome, stack: Outcome) -> Outcome:
+    """One run as it is kept."""
+    return {**asdict(step), "counted": counted, "stack": stack}
+
+
+def _tallied(tallies: Mapping[str, Tally]) -> dict[str, Any]:
+    return {name: asdict(one) for name, one in tallies.items()}
+
+
 def result_of(
-    plan: Plan, outcomes: Sequence[Outcome], measured: Mapping[str, Any], why: str = ""
+    plan: Plan,
+    outcomes: Sequence[Outcome],
+    chosen: Mapping[str, Any],
+    why: str = "",
 ) -> dict[str, Any]:
     """The whole experiment; ``why`` it ended early, empty where it did not."""
-    done = sum(one["completed"] for one in outcomes)
-    of = len(list(plan.steps()))
+    stack = [one["stack"] for one in outcomes]
+    slices = [piece for one in stack for piece in one["slices"]]
     return {
-        "format": 1,
+        "format": 2,
         "plan": asdict(plan),
         "ended_early": why,
         "version": __version__,
-        "machine": {
-            "system": platform.platform(),
-            "processor": platform.processor() or platform.machine(),
-            "cores": os.cpu_count(),
-            "python": platform.python_version(),
+        "machine": machine(),
+        "configuration": dict(chosen),
+        **_summed(plan, [one["counted"] for one in outcomes]),
+        "stack": {
+            **_summed(plan, stack),
+            "order": _order(stack),
+            "stops": [stop for one in stack for stop in one["stops"]],
         },
-        "completion": {"runs": len(outcomes), "completed": done, "planned": of},
-        "detection": {name: _scored(outcomes, name) for name in CLASSES},
-        "slowdowns": _sum(outcomes, "slowdowns"),
-        "injection": _sum(outcomes, "injection"),
-        "stops": [stop for one in outcomes for stop in one["stops"]],
-        **measured,
+        "latency": {"rows": _rows(slices), "slices": len(slices)},
         "runs": list(outcomes),
     }
 
 
-def score_of(outcomes: Sequence[Outcome], class_id: str) -> Score:
-    """One class over all runs."""
-    told = (one["classes"].get(class_id) for one in outcomes)
-    return score(
-        Tally(tuple(one["found"]), one["missed"], tuple(one["ghosts"]))
-        for one in told
-        if one is not None
-    )
+def machine() -> dict[str, Any]:
+    """On what it ran."""
+    return {
+        "system": platform.platform(),
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+    }
 
 
-def _scored(outcomes: Sequence[Outcome], class_id: str) -> dict[str, Any]:
-    of = score_of(outcomes, class_id)
-    precision, recall = wilson(of.tp, of.tp + of.fp), wilson(of.tp, of.tp + of.fn)
+def slices_of(result: Mapping[str, Any]) -> list[Slice]:
+    """All slices of all runs."""
+    return [piece for one in result["runs"] for piece in one["stack"]["slices"]]
+
+
+def _summed(plan: Plan, runs: Sequence[Outcome]) -> dict[str, Any]:
+    planned = len(list(plan.steps()))
+    done = sum(one["completed"] for one in runs)
+    return {
+        "completion": {"runs": len(runs), "completed": done, "planned": planned},
+        "detection": {name: scored([name], runs) for name in CLASSES},
+        "global": scored(CLASSES, runs),
+        "slowdowns": _sum(one["slowdowns"] for one in runs),
+        "injection": _sum(one["injection"] for one in runs),
+    }
+
+
+def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
+    """Counts, rates with their intervals and AP of some classes over all runs."""
+    told = [
+        Tally(**one["classes"][name])
+        for one in runs
+        for name in classes
+        if name in one["classes"]
+    ]
+    of = score(told)
+    sure = [one for each in told for one in each.found]
+    precision = thinned(of.tp, of.tp + of.fp, of.claims)
+    recall = thinned(of.tp, of.tp + of.fn, of.looks)
     return {
         "tp": of.tp,
         "fp": of.fp,
         "fn": of.fn,
         "ap": of.ap,
+        "looks": of.looks,
+        "claims": of.claims,
+        "confidence": fmean(sure) if sure else None,
         "precision": None if precision is None else asdict(precision),
         "recall": None if recall is None else asdict(recall),
     }
 
 
-def _sum(outcomes: Sequence[Outcome], name: str) -> dict[str, int]:
+def _rows(slices: Sequence[Slice]) -> list[dict[str, Any]]:
+    found = spreads(slices)
+    return [
+        {"data": data, "hops": {hop: _told(found[data, hop]) for hop in HOPS}}
+        for data in DATA
+    ]
+
+
+def _told(of: Spread) -> dict[str, Any]:
+    def ms(seconds: float | None) -> float | None:
+        return None if seconds is None else round(1000.0 * seconds, 2)
+
+    return {
+        "count": of.count,
+        "mean_ms": ms(of.mean),
+        "p50_ms": ms(of.p50),
+        "p95_ms": ms(of.p95),
+        "p99_ms": ms(of.p99),
+    }
+
+
+def _order(runs: Sequence[Outcome]) -> dict[str, dict[str, int]]:
+    hops = ("uplink", "fiware")
+    return {hop: _sum(one["order"].get(hop, {}) for one in runs) for hop in hops}
+
+
+def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
     total: dict[str, int] = {}
-    for one in outcomes:
-        for key, count in one[name].items():
+    for one in counts:
+        for key, count in one.items():
             total[key] = total.get(key, 0) + count
     return total
 
@@ -130,5 +211,5 @@ def read_json(file: Path) -> Any:
 def write_json(file: Path, value: object) -> None:
     """Whole or not at all: a crash leaves the file as it was."""
     fresh = file.with_suffix(".part")
-    fresh.write_bytes(orjson.dumps(value, option=orjson.OPT_INDENT_2))
+    fresh.write_bytes(orjson.dumps(value))
     fresh.replace(file)

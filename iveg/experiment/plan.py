@@ -7,17 +7,29 @@ from typing import Final, Literal
 Size = Literal["minimal", "quick", "full"]
 FAMILIES: Final = ("viewpoints", "peers", "together", "occluded", "nlos")
 """The paper's four scenarios and its test without a line of sight."""
+ROBOTS: Final = ("AGI", "AGII")
+"""The paper's fleet, whatever the site's own is."""
+WATCHED: Final = "AGII"
+"""Whose costmap is looked into: the one that is blind in the paper's test."""
+GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One run of one scenario; ``seed`` of its people and its detector's noise."""
+    """One run of one scenario.
+
+    Attributes:
+        seconds: It lasts in real time, through all programs.
+        counted_s: It lasts on the virtual clock, where everything is counted (s).
+        seed: Of its people and its detector's noise.
+    """
 
     family: str
     number: int
     seconds: float
     seed: int
+    counted_s: float = 60.0
 
     @property
     def name(self) -> str:
@@ -30,7 +42,8 @@ class Plan:
     """All runs of an experiment.
 
     Attributes:
-        seconds: Each run lasts; ``runs`` of each family.
+        seconds: Each run lasts in real time; ``runs`` of each family.
+        counted_s: Each run lasts on the virtual clock (s).
         profile: Of the emulated detector: ``simulation`` or ``field``.
     """
 
@@ -40,18 +53,20 @@ class Plan:
     families: tuple[str, ...] = FAMILIES
     seed: int = SEED
     profile: str = "field"
+    counted_s: float = 60.0
 
     def steps(self) -> Iterator[Step]:
         """In their order; every family's first runs come before any second."""
         for number in range(1, self.runs + 1):
             for place, family in enumerate(self.families):
                 seed = self.seed + 100 * place + number
-                yield Step(family, number, self.seconds, seed)
+                yield Step(family, number, self.seconds, seed, self.counted_s)
 
 
 PLANS: Final[dict[Size, Plan]] = {
-    "minimal": Plan("minimal", 1, 6.0, ("together",)),
-    "quick": Plan("quick", 1, 22.0),
-    "full": Plan("full", 6, 60.0),
+    "minimal": Plan("minimal", 1, 5.0, ("together",), counted_s=5.0),
+    "quick": Plan("quick", 1, 18.0),
+    "full": Plan("full", 5, 28.0),
 }
-"""Two robots send about 180 messages a second: quick has 19,000, full 320,000."""
+"""Two robots send about 180 messages a second: quick has 16,000, full 126,000.  Five
+runs of each are the paper's own number in simulation."""

@@ -1,16 +1,14 @@
-"""Detections that came through the whole stack, against what was really in view.
+"""Detections that iVeg told, against what was really in view, picture by picture.
 
 Mistakes of a detector last: a person who is missed in one picture is missed in the next
-twenty, too.  So what is counted is a second of one robot in which one target was in
-view, found or not by the majority of its pictures, and a second in which something was
-told that is not there.
+twenty, too.  So pictures are counted, and how sure a rate is comes from how many
+*looks* they are: two seconds of one robot at one target, as long as a mistake lasts.
 """
 
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from statistics import fmean
 from typing import Final
 
 OVERLAP: Final = 0.5
@@ -18,6 +16,8 @@ OVERLAP: Final = 0.5
 SIZE_M: Final = {"farmer": 0.5}
 _ROBOT_SIZE_M = 1.0
 _SAME_PICTURE_S = 0.06
+_LOOK_S = 2.0
+"""As long as the emulated detector goes on making one mistake, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +45,25 @@ class Picture:
     seen: tuple[Seen, ...]
 
 
+Pair = tuple[Picture, Picture]
+"""One picture: what was in view, and what was told of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Of one class; ``ap`` is average precision at an overlap of one half."""
+    """Of one class; ``ap`` is average precision at an overlap of one half.
+
+    Attributes:
+        looks: At targets, and ``claims``: looks in which something was told; so many
+            are the counts worth, as pictures of one look are not independent.
+    """
 
     tp: int = 0
     fp: int = 0
     fn: int = 0
     ap: float | None = None
+    looks: int = 0
+    claims: int = 0
 
     @property
     def precision(self) -> float | None:
@@ -65,62 +76,72 @@ class Score:
         return self.tp / (self.tp + self.fn) if self.tp + self.fn else None
 
 
-@dataclass(slots=True)
-class _Second:
-    """One target, or one class of ghosts, for one second of one robot."""
-
-    hits: list[float] = field(default_factory=list)
-    looks: int = 0
-
-    @property
-    def is_found(self) -> bool:
-        return 2 * len(self.hits) >= self.looks
-
-
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Counted seconds of one class, from which scores of many runs can be added.
+    """Counted pictures of one class, from which scores of many runs can be added.
 
     Attributes:
-        found: Mean confidence of each second in which a target was found.
-        missed: How many seconds it was not.
-        ghosts: Mean confidence of each second in which something was not there.
+        found: Confidence of each picture of a target that was told.
+        missed: How many pictures of a target were told without it.
+        ghosts: Confidence of each box that belongs to no target.
+        looks, claims: As in ``Score``.
     """
 
     found: tuple[float, ...] = ()
     missed: int = 0
     ghosts: tuple[float, ...] = ()
+    looks: int = 0
+    claims: int = 0
 
 
-def tally(
-    truth: Iterable[Picture], told: Iterable[Picture]
-) -> tuple[dict[str, Tally], int]:
-    """Count each class, and how many pictures were compared."""
+@dataclass(slots=True)
+class _Count:
+    """A tally that grows; looks are (robot, target or none, which two seconds)."""
+
+    found: list[float] = field(default_factory=list)
+    missed: int = 0
+    ghosts: list[float] = field(default_factory=list)
+    looks: set[tuple[str, str, int]] = field(default_factory=set)
+    claims: set[tuple[str, str, int]] = field(default_factory=set)
+
+    def tally(self) -> Tally:
+        return Tally(
+            tuple(self.found),
+            self.missed,
+            tuple(self.ghosts),
+            len(self.looks),
+            len(self.claims),
+        )
+
+
+def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
+    """Count each class."""
+    counts: dict[str, _Count] = defaultdict(_Count)
+    for real, told in pairs:
+        robot_id, look = real.robot_id, int(real.at // _LOOK_S)
+        matched, wrong = match(real.seen, told.seen)
+        for target in real.seen:
+            one, place = counts[target.class_id], (robot_id, target.key, look)
+            one.looks.add(place)
+            if target.key in matched:
+                one.found.append(round(matched[target.key], 4))
+                one.claims.add(place)
+            else:
+                one.missed += 1
+        for ghost in wrong:
+            one = counts[ghost.class_id]
+            one.ghosts.append(round(ghost.confidence, 4))
+            one.claims.add((robot_id, "", look))
+    return {name: counts[name].tally() for name in sorted(counts)}
+
+
+def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
+    """What was told beside what was in view at that moment, where that is known."""
     views = _by_robot(truth)
-    targets: dict[tuple[str, str, str, int], _Second] = defaultdict(_Second)
-    ghosts: dict[tuple[str, str, int], _Second] = defaultdict(_Second)
-    pictures: dict[tuple[str, int], int] = defaultdict(int)
-    compared = 0
     for picture in told:
         real = _nearest(views.get(picture.robot_id, ()), picture.at)
-        if real is None:
-            continue
-        compared += 1
-        second = int(picture.at)
-        pictures[picture.robot_id, second] += 1
-        matched, wrong = match(real.seen, picture.seen)
-        for target in real.seen:
-            one = targets[picture.robot_id, target.class_id, target.key, second]
-            one.looks += 1
-            if target.key in matched:
-                one.hits.append(matched[target.key])
-        for ghost in wrong:
-            ghosts[picture.robot_id, ghost.class_id, second].hits.append(
-                ghost.confidence
-            )
-    for (robot_id, _, second), one in ghosts.items():
-        one.looks = pictures[robot_id, second]
-    return _tallies(targets, ghosts), compared
+        if real is not None:
+            yield real, picture
 
 
 def match(
@@ -158,7 +179,9 @@ def score(tallies: Iterable[Tally]) -> Score:
     ghosts = [one for each in all_of for one in each.ghosts]
     missed = sum(each.missed for each in all_of)
     ap = _average_precision(found, ghosts, len(found) + missed)
-    return Score(len(found), len(ghosts), missed, ap)
+    looks = sum(each.looks for each in all_of)
+    claims = sum(each.claims for each in all_of)
+    return Score(len(found), len(ghosts), missed, ap, looks, claims)
 
 
 def _average_precision(
@@ -177,23 +200,6 @@ def _average_precision(
         best = max(best, precision)
         area += best * hit / targets
     return area
-
-
-def _tallies(
-    targets: Mapping[tuple[str, str, str, int], _Second],
-    ghosts: Mapping[tuple[str, str, int], _Second],
-) -> dict[str, Tally]:
-    classes = {key[1] for key in targets} | {key[1] for key in ghosts}
-    out = {}
-    for class_id in sorted(classes):
-        seconds = [one for key, one in targets.items() if key[1] == class_id]
-        wrong = [one for key, one in ghosts.items() if key[1] == class_id]
-        out[class_id] = Tally(
-            tuple(fmean(one.hits) for one in seconds if one.is_found and one.hits),
-            sum(not one.is_found for one in seconds),
-            tuple(fmean(one.hits) for one in wrong if one.is_found),
-        )
-    return out
 
 
 def _by_robot(pictures: Iterable[Picture]) -> dict[str, list[Picture]]:

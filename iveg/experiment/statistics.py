@@ -18,7 +18,7 @@ class Interval:
     high: float
 
 
-def wilson(hits: int, of: int) -> Interval | None:
+def wilson(hits: float, of: float) -> Interval | None:
     """The Wilson score interval (Wilson 1927); None of nothing."""
     if of <= 0:
         return None
@@ -26,6 +26,11 @@ def wilson(hits: int, of: int) -> Interval | None:
     middle = (share + z2 / (2 * of)) / (1 + z2 / of)
     half = _Z / (1 + z2 / of) * sqrt(share * (1 - share) / of + z2 / (4 * of * of))
     return Interval(share, max(0.0, middle - half), min(1.0, middle + half))
+
+
+def thinned(hits: int, of: int, worth: int) -> Interval | None:
+    """The same where ``of`` counts are worth only so many independent ones."""
+    return wilson(hits * worth / of, worth) if of and worth else None
 
 
 def difference(before: Interval, after: Interval) -> Interval:

@@ -1,47 +1,100 @@
-"""The smallest experiment, for real: every program, one scenario, a report."""
+"""The smallest experiment, for real: it dies, is interrupted, goes on, and reports."""
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.processes import ROOT, Site
+from tests.processes import ROOT, Site, children_of, is_alive, until
 
-pytestmark = pytest.mark.timeout(180)
+pytestmark = pytest.mark.timeout(240)
 PLACES = ("IVEG_HOST", "IVEG_PORT", "IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL")
 
 
-def run(out: Path) -> "subprocess.CompletedProcess[str]":
+@contextmanager
+def running(out: Path) -> "Iterator[subprocess.Popen[str]]":
     """``iveg experiment run --minimal`` on ports of its own."""
     inherited = ("PATH", "HOME", "LANG")
     kept = {name: os.environ[name] for name in inherited if name in os.environ}
     places = {name: Site(out.parent).settings[name] for name in PLACES}
-    return subprocess.run(
-        [sys.executable, "-m", "iveg", "experiment", "run", "--minimal", "--out", out],
+    words = ["experiment", "run", "--minimal", "--out", str(out)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "iveg", *words],
         env={**kept, **places, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
-        timeout=150.0,
-        check=False,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def reaches(out: Path, phase: str) -> None:
+    """Wait until it is there."""
+    file = out / "progress.json"
+    until(
+        lambda: file.exists() and json.loads(file.read_text())["phase"] == phase,
+        60.0,
+        phase,
     )
 
 
-def test_a_minimal_experiment_scores_what_came_through_the_whole_stack(
+def ended(process: "subprocess.Popen[str]") -> tuple[int, str]:
+    said, _ = process.communicate(timeout=150.0)
+    return process.returncode, said
+
+
+def read(file: Path) -> Any:
+    return json.loads(file.read_text())
+
+
+def test_an_experiment_survives_a_death_and_ctrl_c_and_scores_the_whole_stack(
     tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"
 
-    done = run(out)
+    with running(out) as process:
+        reaches(out, "running")
+        parts = children_of(process.pid)
+        [fiware] = [
+            pid
+            for pid in parts
+            if b"\0fiware\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
+        ]
+        os.kill(fiware, signal.SIGKILL)
+        code, said = ended(process)
+    assert code == 1, said
+    assert "fiware: has ended (exit code -9)" in said
+    assert read(out / "partial.json")["ended_early"].startswith("fiware: has ended")
+    assert "Broken off: fiware" in (out / "partial.html").read_text()
+    assert not [pid for pid in parts if is_alive(pid)]
 
-    assert done.returncode == 0, done.stdout + done.stderr
-    told = json.loads((out / "result.json").read_text())
+    with running(out) as process:
+        reaches(out, "counting")
+        process.send_signal(signal.SIGINT)
+        code, said = ended(process)
+    assert code == 1, said
+    assert read(out / "partial.json")["ended_early"] == "interrupted"
+
+    with running(out) as process:
+        code, said = ended(process)
+    assert code == 0, said
+    told = read(out / "result.json")
     assert told["completion"] == {"runs": 1, "completed": 1, "planned": 1}
-    person = told["detection"]["farmer"]
+    assert told["stack"]["completion"]["completed"] == 1
+    person = told["stack"]["detection"]["farmer"]
     assert person["tp"] + person["fn"] > 0
     hops = {row["data"]: row["hops"] for row in told["latency"]["rows"]}
     assert all(hops[data]["robot_orion"]["count"] > 20 for data in hops)
-    assert {one["robot_id"] for one in told["stops"]} == {"AGI", "AGII"}
+    assert {one["robot_id"] for one in told["stack"]["stops"]} == {"AGI", "AGII"}
     assert "Broken off" not in (out / "result.html").read_text()
+    assert not list(out.glob("partial.*"))

@@ -96,6 +96,17 @@ def sketch_of(durations: Sequence[float]) -> Sketch:
     )
 
 
+def from_bins(edges: Sequence[float], counts: Sequence[int], total: float) -> Sketch:
+    """What ``Sketch.bins`` told, and the sum (s); least and most are those of bins."""
+    if not edges:
+        return NOTHING
+    ends = np.asarray(edges, np.float64)
+    keys = np.rint(np.log(ends) / _LOG_GAMMA).astype(np.int16)
+    weights = np.asarray(counts, np.int64)
+    least = float(ends[0]) / _MAPPING.gamma
+    return Sketch(int(weights.sum()), total, least, float(ends[-1]), keys, weights)
+
+
 def merged(sketches: Iterable[Sketch]) -> Sketch:
     """All of them as one: as if their durations had gone into it."""
     parts = [one for one in sketches if one.count]

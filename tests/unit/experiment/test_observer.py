@@ -24,7 +24,9 @@ async def test_pictures_and_beliefs_are_heard_while_a_scenario_runs() -> None:
     assert len(watched.pictures) >= 3
     [seen] = watched.pictures[-1].seen
     assert (seen.class_id, seen.x) == ("farmer", 3.0)
-    assert watched.beliefs[-1][1]["resolution"] > 0.0
+    assert watched.beliefs[-1][1](3.0, 0.0) == "nobody"
+    assert len(watched.slices) == 1
+    assert watched.order.keys() == {"uplink", "fiware"}
 
 
 async def test_a_server_that_is_not_there_leaves_nothing_and_ends_in_time() -> None:

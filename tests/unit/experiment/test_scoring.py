@@ -1,10 +1,18 @@
-"""Detections against the truth: counted by seconds, the same whatever the machine."""
+"""Detections against the truth, picture by picture, worth as much as they prove."""
 
 import random
 
 import pytest
 
-from iveg.experiment.scoring import Picture, Score, Seen, overlap, score, tally
+from iveg.experiment.scoring import (
+    Picture,
+    Score,
+    Seen,
+    overlap,
+    paired,
+    score,
+    tally,
+)
 
 HZ = 10
 
@@ -21,21 +29,21 @@ def pictures(seconds: int, *seen: Seen, robot_id: str = "AGI") -> list[Picture]:
 
 
 def scored(truth: list[Picture], told: list[Picture]) -> Score:
-    tallies, _ = tally(truth, told)
-    return score([tallies["farmer"]])
+    return score([tally(paired(truth, told))["farmer"]])
 
 
-def test_a_person_who_is_told_each_second_is_found_each_second() -> None:
+def test_a_person_who_is_told_in_each_picture_is_found_in_each() -> None:
     found = scored(pictures(4, person()), pictures(4, person(5.05)))
 
-    assert (found.tp, found.fp, found.fn) == (4, 0, 0)
-    assert (found.precision, found.recall, found.ap) == (1.0, 1.0, 1.0)
+    assert (found.tp, found.fp, found.fn) == (40, 0, 0)
+    assert (found.precision, found.recall) == (1.0, 1.0)
+    assert found.ap == pytest.approx(1.0)
 
 
-def test_a_person_who_is_never_told_is_missed_each_second() -> None:
+def test_a_person_who_is_never_told_is_missed_in_each_picture() -> None:
     found = scored(pictures(3, person()), pictures(3))
 
-    assert (found.tp, found.fp, found.fn) == (0, 0, 3)
+    assert (found.tp, found.fp, found.fn) == (0, 0, 30)
     assert found.precision is None
     assert found.recall == 0.0
 
@@ -43,30 +51,35 @@ def test_a_person_who_is_never_told_is_missed_each_second() -> None:
 def test_what_is_not_there_is_a_ghost_and_hides_no_miss() -> None:
     found = scored(pictures(3, person(5.0)), pictures(3, person(8.0)))
 
-    assert (found.tp, found.fp, found.fn) == (0, 3, 3)
+    assert (found.tp, found.fp, found.fn) == (0, 30, 30)
 
 
-def test_one_wrong_picture_of_ten_changes_no_second() -> None:
+def test_one_wrong_picture_is_one_miss_and_one_ghost() -> None:
     told = pictures(2, person())
     told[3] = Picture("AGI", told[3].at, (person(9.0),))
 
     found = scored(pictures(2, person()), told)
 
-    assert (found.tp, found.fp, found.fn) == (2, 0, 0)
+    assert (found.tp, found.fp, found.fn) == (19, 1, 1)
+
+
+def test_counts_are_worth_as_many_looks_of_two_seconds_as_they_are_of() -> None:
+    found = scored(pictures(8, person()), pictures(8, person(), person(9.0)))
+
+    assert (found.tp, found.fp) == (80, 80)
+    assert (found.looks, found.claims) == (4, 8)
 
 
 def test_pictures_that_nobody_wrote_down_are_not_compared() -> None:
     later = [Picture("AGI", one.at + 60.0, one.seen) for one in pictures(2, person())]
 
-    tallies, compared = tally(pictures(2, person()), later)
-
-    assert (tallies, compared) == ({}, 0)
+    assert list(paired(pictures(2, person()), later)) == []
 
 
 def test_pictures_of_another_robot_prove_nothing() -> None:
-    _, compared = tally(pictures(2, person()), pictures(2, person(), robot_id="AGII"))
+    other = pictures(2, person(), robot_id="AGII")
 
-    assert compared == 0
+    assert list(paired(pictures(2, person()), other)) == []
 
 
 def test_each_target_takes_its_own_detection_the_surest_first() -> None:
@@ -75,7 +88,7 @@ def test_each_target_takes_its_own_detection_the_surest_first() -> None:
 
     found = scored(pictures(2, *two), pictures(2, *told))
 
-    assert (found.tp, found.fp, found.fn) == (4, 2, 0)
+    assert (found.tp, found.fp, found.fn) == (40, 20, 0)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +107,7 @@ def test_average_precision_falls_with_ghosts_that_are_surer_than_what_is_there()
 
     low, high = scored(truth, sure), scored(truth, unsure)
 
-    assert (low.tp, low.fp, low.fn) == (high.tp, high.fp, high.fn) == (2, 2, 2)
+    assert (low.tp, low.fp, low.fn) == (high.tp, high.fp, high.fn) == (20, 20, 20)
     assert low.ap == pytest.approx(0.25)
     assert high.ap == pytest.approx(0.5)
 
@@ -107,9 +120,9 @@ def test_counts_are_the_same_whatever_order_pictures_come_in() -> None:
 
 
 def test_runs_add_up_to_one_score() -> None:
-    one, _ = tally(pictures(3, person()), pictures(3, person()))
-    other, _ = tally(pictures(2, person()), pictures(2))
+    one = tally(paired(pictures(3, person()), pictures(3, person())))
+    other = tally(paired(pictures(2, person()), pictures(2)))
 
     both = score([one["farmer"], other["farmer"]])
 
-    assert (both.tp, both.fn) == (3, 2)
+    assert (both.tp, both.fn) == (30, 20)

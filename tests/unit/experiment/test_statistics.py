@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.experiment.paper_tables import disagreements
-from iveg.experiment.statistics import Interval, difference, verdict, wilson
+from iveg.experiment.statistics import Interval, difference, thinned, verdict, wilson
 
 
 @pytest.mark.parametrize(
@@ -30,6 +30,17 @@ def test_of_nothing_nothing_is_known() -> None:
     assert wilson(0, 0) is None
 
 
+def test_counts_that_prove_little_have_the_interval_of_what_they_prove() -> None:
+    many, few = wilson(900, 1000), thinned(900, 1000, 10)
+
+    assert few == wilson(9, 10)
+    assert many is not None
+    assert few is not None
+    assert few.share == many.share
+    assert few.low < many.low
+    assert thinned(0, 0, 0) is None
+
+
 def test_newcombes_interval_of_a_difference_is_the_one_in_the_books() -> None:
     after, before = wilson(56, 70), wilson(48, 80)
     assert after is not None
@@ -52,13 +63,14 @@ def test_a_difference_is_told_only_where_the_interval_leaves_no_doubt(
     assert verdict(Interval((low + high) / 2, low, high)) == told
 
 
-def test_the_papers_rates_that_do_not_follow_from_its_counts_are_found() -> None:
-    found = {
-        (one.place, one.class_id, one.rate): one.follows for one in disagreements()
-    }
+def test_what_does_not_follow_in_the_papers_tables_is_found() -> None:
+    found = {(one.place, one.row, one.what): one.follows for one in disagreements()}
 
     assert found == {
-        ("simulation", "AGI", "precision"): 90.0,
-        ("simulation", "AGI", "recall"): 90.0,
-        ("simulation", "AGII", "recall"): 90.32,
+        ("simulation", "AGI", "precision %"): 90.0,
+        ("simulation", "AGI", "recall %"): 90.0,
+        ("simulation", "AGII", "recall %"): 90.32,
+        ("simulation", "total", "FP"): 9,
+        ("simulation", "total", "precision %"): 92.63,
+        ("simulation", "total", "recall %"): 93.62,
     }

@@ -1,0 +1,100 @@
+"""Whom a robot's costmap holds although it could not see them."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from iveg.domain.costmap import Costmap
+from iveg.experiment.scoring import Picture, Seen
+
+Held = Literal["nobody", "told", "own"]
+Belief = Callable[[float, float], Held]
+"""What stands at a place in ``map`` (m), and whether others told of it."""
+_TAKEN: Final = 50
+"""Of a cell of the costmap (0 to 100)."""
+_SAME_MOMENT_S: Final = 0.1
+
+
+def belief_of(own: Costmap, told: Costmap) -> Belief:
+    """By what its own laser found, and that with whom it was told of."""
+
+    def held(x: float, y: float) -> Held:
+        if _is_taken(own, x, y):
+            return "own"
+        return "told" if _is_taken(told, x, y) else "nobody"
+
+    return held
+
+
+def belief_in(answer: Mapping[str, Any]) -> Belief:
+    """By an answer of the API, in which both are one."""
+    grid = np.asarray(answer["data"], np.int16)
+    cells = grid.reshape(answer["height"], answer["width"])
+
+    def held(x: float, y: float) -> Held:
+        column = math.floor((x - answer["origin"]["x"]) / answer["resolution"])
+        row = math.floor((y - answer["origin"]["y"]) / answer["resolution"])
+        inside = 0 <= column < answer["width"] and 0 <= row < answer["height"]
+        return "told" if inside and cells[row, column] >= _TAKEN else "nobody"
+
+    return held
+
+
+def injections(
+    truth: Sequence[Picture], beliefs: Sequence[tuple[float, Belief]], robot_id: str
+) -> dict[str, int]:
+    """How often somebody whom a robot could not see stood in its costmap all the same.
+
+    Of the moments at which another robot had a person in view and its own camera and
+    laser had not: ``asked`` so many, ``injected`` in so many.  Of the ``people`` whom
+    another had in view first, ``ahead`` so many stood there before its own camera had
+    them.
+    """
+    asked = injected = 0
+    sighted = _first_sights(truth, robot_id)
+    first: set[str] = set()
+    ahead: set[str] = set()
+    for at, belief in beliefs:
+        for one in _hidden(truth, at, robot_id):
+            held = belief(one.x, one.y)
+            asked += held != "own"
+            injected += held == "told"
+            is_first = sighted.get(one.key, float("inf")) > at
+            first |= {one.key} if is_first else set()
+            ahead |= {one.key} if is_first and held == "told" else set()
+    return {
+        "asked": asked,
+        "injected": injected,
+        "people": len(first),
+        "ahead": len(ahead),
+    }
+
+
+def _hidden(truth: Sequence[Picture], at: float, robot_id: str) -> list[Seen]:
+    """People whom others have in view at a moment, and this robot's camera has not."""
+    near = [one for one in truth if abs(one.at - at) < _SAME_MOMENT_S]
+    own = {s.key for one in near if one.robot_id == robot_id for s in one.seen}
+    others = (s for one in near if one.robot_id != robot_id for s in one.seen)
+    hidden = {s.key: s for s in others if s.class_id == "farmer" and s.key not in own}
+    return list(hidden.values())
+
+
+def _first_sights(truth: Sequence[Picture], robot_id: str) -> dict[str, float]:
+    """When a robot's own camera first had each target in view (s)."""
+    first: dict[str, float] = {}
+    for picture in truth:
+        if picture.robot_id == robot_id:
+            for one in picture.seen:
+                first[one.key] = min(picture.at, first.get(one.key, picture.at))
+    return first
+
+
+def _is_taken(costmap: Costmap, x: float, y: float) -> bool:
+    grid = costmap.grid
+    column = math.floor((x - grid.xmin) / grid.resolution)
+    row = math.floor((y - grid.ymin) / grid.resolution)
+    if not (0 <= column < grid.width and 0 <= row < grid.height):
+        return False
+    return int(costmap.data[row, column]) >= _TAKEN

@@ -1,0 +1,233 @@
+"""One run on the virtual clock, from which everything is counted.
+
+What programs do in real time depends on when each gets the processor; here nothing
+does, so that two runs of one seed give the same counts on any machine.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Literal
+
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.costmap import Costmap
+from iveg.domain.detection_rule import Rule
+from iveg.domain.feedback import Feedback
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.rule.zones import zones_of
+from iveg.emulator.camera import DETECTORS
+from iveg.emulator.layout import Layout, lay_out
+from iveg.emulator.scenarios import scenario_named
+from iveg.emulator.truth import in_view
+from iveg.emulator.world import Rig, World
+from iveg.experiment.believing import Belief, belief_of
+from iveg.experiment.plan import ROBOTS, Step
+from iveg.experiment.scoring import Pair, Picture, Seen
+from iveg.experiment.stage import STEP_S, Stage, heard
+from iveg.ngsi.codec import format_stamp
+from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.mapping import Mapper
+from iveg.web.views import Views
+
+_EPOCH = Instant(0.0, 1_700_000_000.0)
+_SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
+"""Steps between two sweeps, two looks into a costmap, and two rests for others."""
+
+
+@dataclass(slots=True)
+class Rehearsed:
+    """What came of it.
+
+    Attributes:
+        pairs: Each picture, as it was and as iVeg told it.
+        beliefs: At some moments (s), what a robot's costmap holds.
+        decisions: As each ended.
+        touched: Moments at which a robot touched a person.
+        lost: Robots that were not live in the end.
+    """
+
+    pairs: list[Pair] = field(default_factory=list)
+    beliefs: list[tuple[float, Belief]] = field(default_factory=list)
+    decisions: list[DecisionRecord] = field(default_factory=list)
+    touched: int = 0
+    lost: int = 0
+
+    @property
+    def completed(self) -> bool:
+        """It went to its end: all robots live, nobody touched."""
+        return bool(self.pairs) and not self.touched and not self.lost
+
+
+class _Outside:
+    """The doors of a pipeline in which nobody presses anything.
+
+    Implements ``pipeline.ports.Fleet``, ``Journal`` and ``RecordSink``.
+    """
+
+    def __init__(self) -> None:
+        self.told: list[Feedback] = []
+        self.decisions: dict[str, DecisionRecord] = {}
+
+    def tell(self, feedback: Feedback) -> None:
+        self.told.append(feedback)
+
+    def offer(self, record: Record) -> None:
+        if isinstance(record, DecisionRecord):
+            self.decisions[record.decision_id] = record
+
+    async def flushed(self) -> None:
+        """Nothing here outlives a crash, nor has to."""
+
+    async def set_desired_state(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        """Nobody is stopped."""
+
+    async def wanted(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Likewise."""
+
+    async def named(
+        self,
+        robot_id: str,
+        hold_id: str,
+        ids: Sequence[str],
+        challenge: str,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Likewise."""
+
+
+class Rehearsal:
+    """One scenario between its doors.
+
+    Args:
+        watched: The robot whose costmap is looked into.
+    """
+
+    def __init__(self, step: Step, profile: str, rule: Rule, watched: str) -> None:
+        scenario = scenario_named(step.family)
+        greenhouse = load_greenhouse(scenario.greenhouse)
+        layout = lay_out(scenario, ROBOTS, greenhouse)
+        self._now = _EPOCH
+        self._outside = _Outside()
+        self._watched = watched
+        self._result = Rehearsed()
+        self._detections: list[Picture] = []
+        self._wire(greenhouse, rule)
+        self._world = _world_of(greenhouse, layout, profile, step.seed)
+        self._stage = Stage(
+            self._world,
+            layout.incidents,
+            self._parts.ingest,
+            self._parts.loop,
+            self._outside.told,
+            self._move,
+            self._hear,
+            looked=self._looked,
+            scan_every=_SCAN_EVERY,
+        )
+
+    def _wire(self, greenhouse: Greenhouse, rule: Rule) -> None:
+        ids = count(1)
+        outside = self._outside
+        ports = Ports(
+            outside,
+            {},
+            outside,
+            outside,
+            lambda: self._now,
+            lambda: f"{next(ids):026d}",
+            format_stamp,
+        )
+        parts = build(load_fleet(words=ROBOTS), greenhouse, ports, Choices(rule))
+        self._parts = parts
+        self._mapper = Mapper(parts.world, greenhouse.bounds)
+        self._views = Views(
+            parts.evaluator, parts.commander, parts.minutes, parts.chain, Counter
+        )
+
+    async def play(self, seconds: float) -> Rehearsed:
+        """From the beginning; lets others have their turn once a virtual second."""
+        for number in range(round(seconds / STEP_S)):
+            self._stage.step()
+            self._mapper.tick(self._now)
+            self._result.pairs += self._told()
+            if number % _BELIEVE_EVERY == 1:
+                self._believe()
+            self._result.touched += self._touches()
+            if number % _REST_EVERY == 0:
+                await asyncio.sleep(0)
+        self._result.decisions = list(self._outside.decisions.values())
+        live = (self._views.robot(one, self._now).link for one in ROBOTS)
+        self._result.lost = sum(link != "LIVE" for link in live)
+        return self._result
+
+    def _move(self, seconds: float) -> Instant:
+        self._now = _EPOCH.later(seconds)
+        return self._now
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        for received in heard(topic, payload, self._now):
+            self._parts.ingest.offer(received)
+
+    def _looked(self, rig: Rig) -> None:
+        """What is in view at the very moment of the picture."""
+        seen = (
+            Seen(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
+            for one, _ in in_view(rig, self._world)
+        )
+        self._detections.append(Picture(rig.robot_id, self._now.mono, tuple(seen)))
+
+    def _told(self) -> Iterator[Pair]:
+        """What iVeg makes of the pictures of this step."""
+        looks, self._detections = self._detections, []
+        for real in looks:
+            frame = self._views.frame(real.robot_id, self._now)
+            items = [] if frame is None else frame.items
+            seen = (
+                Seen(
+                    str(place),
+                    one.class_id,
+                    one.position.x,
+                    one.position.y,
+                    one.probability,
+                )
+                for place, one in enumerate(items)
+            )
+            yield real, Picture(real.robot_id, real.at, tuple(seen))
+
+    def _believe(self) -> None:
+        own = self._costmap(told=False)
+        told = self._costmap(told=True)
+        if own is not None and told is not None:
+            self._result.beliefs.append((self._now.mono, belief_of(own, told)))
+
+    def _costmap(self, *, told: bool) -> Costmap | None:
+        evaluator, now = self._parts.evaluator, self._now
+        zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
+        return self._mapper.of(self._watched, zones if told else (), now)
+
+    def _touches(self) -> int:
+        people = self._world.discs()
+        return sum(
+            body.gap_to(one.x, one.y)[0] < one.radius
+            for body in self._world.bodies()
+            for one in people
+        )
+
+
+def _world_of(greenhouse: Greenhouse, layout: Layout, profile: str, seed: int) -> World:
+    return World(greenhouse, layout, DETECTORS[layout.detector or profile], seed)

@@ -1,0 +1,205 @@
+"""A greenhouse on a clock that is moved by hand.
+
+The emulator's world, the robots' own safety machines and all of iVeg between its doors,
+without a socket or a process.
+
+What goes from one to the other is written and read by the codec, as on the wire.  The
+same seed gives the same run on any machine, however busy it is.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Final
+
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Instant, Received
+from iveg.emulator.orders import FaultOrder
+from iveg.emulator.scripts import Incident
+from iveg.emulator.world import REST, Rig, World
+from iveg.ngsi import codec
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.loop import RuleLoop
+from iveg.robot.echo import Echo
+from iveg.robot.effects import Drive, Effect, Report
+from iveg.robot.holds import HoldSet
+from iveg.robot.judgement import Limits
+from iveg.robot.safety import SafetyMachine
+from iveg.robot.uplink import Uplink
+
+STEP_S: Final = 0.05
+_LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
+"""Steps between two looks, the first when everybody has said where it is, and between
+two words of navigation."""
+Looked = Callable[[Rig], None]
+
+
+@dataclass
+class Faults:
+    """What is wrong with a robot.
+
+    Attributes:
+        mute: Nothing that it says arrives.
+        deaf: It drives as it likes whatever speed limit iVeg sets; holds still bite.
+        clock_offset_s: Its wall clock is this far ahead (s).
+    """
+
+    mute: bool = False
+    deaf: bool = False
+    clock_offset_s: float = 0.0
+
+
+class StagedRobot:
+    """One rig under its safety machine, whose effects are performed at once.
+
+    Args:
+        hear: Where its messages go, by topic.
+        looked: Told when its camera has just taken a picture.
+        scan_every: Steps between two sweeps of its laser; 0: none.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        now: Instant,
+        hear: Callable[[str, bytes], None],
+        looked: Looked = lambda _: None,
+        scan_every: int = 0,
+    ) -> None:
+        texts = count(1)
+        self.faults = Faults()
+        self._rig = rig
+        self._hear = hear
+        self._looked = looked
+        self._scan_every = scan_every
+        self._echo = Echo()
+        self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
+        self._machine = SafetyMachine(
+            rig.robot_id,
+            "b1",
+            now.mono,
+            stored=HoldSet(),
+            fresh=lambda: f"{rig.robot_id}-{next(texts)}",
+            limits=Limits(rig.profile.max_speed, rig.profile.max_turn),
+        )
+        self._perform(self._machine.release_locally(now.mono), now)
+
+    def step(self, number: int, world: World, now: Instant) -> None:
+        """Navigate, drive, sense."""
+        into_run = number * STEP_S
+        free = self._machine.may_drive
+        wish = self._rig.wish(into_run, world) if free else REST
+        self._perform(self._machine.wish(wish, now.mono), now)
+        if self.faults.deaf and free:
+            self._rig.drive(wish)
+        self._rig.move(STEP_S)
+        moved = self._rig.odometry()
+        self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
+        now = self._dated(now)
+        self._uplink.send(moved, now)
+        if self._scan_every and number % self._scan_every == 0:
+            self._uplink.send(self._rig.scan(world), now)
+        if number % _LOOK_EVERY == 1:
+            self._uplink.send(self._rig.look(into_run, world), now)
+            self._looked(self._rig)
+        if number % _NAVIGATION_EVERY == 0:
+            self._uplink.send(self._rig.navigation(), now)
+
+    def _dated(self, now: Instant) -> Instant:
+        """What its own clocks show."""
+        return Instant(now.mono, now.wall + self.faults.clock_offset_s)
+
+    def listen(self, topic: str, payload: bytes, now: Instant) -> None:
+        """Hear iVeg's feedback to a robot of the fleet."""
+        feedback = codec.read_feedback(payload)
+        self._echo.take(feedback.origin)
+        self._perform(self._machine.feedback(topic, feedback, now.mono), now)
+
+    def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
+        for effect in effects:
+            match effect:
+                case Drive(twist):
+                    self._rig.drive(twist)
+                case Report(report):
+                    seq, (_, message) = self._uplink.report(report, self._dated(now))
+                    self._machine.reported(seq, now.mono)
+                    self._say(message.topic, message.payload)
+
+    def _say(self, topic: str, payload: bytes) -> None:
+        if not self.faults.mute:
+            self._hear(topic, payload)
+
+
+def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
+    """What a message says that came straight, read as iVeg does."""
+    reading = codec.read_measure(topic.split("/")[2], payload)
+    assert reading.problems == ()  # noqa: S101 - both ends are ours
+    for observation in reading.observations:
+        yield Received(observation, now, "direct")
+
+
+class Stage:
+    """One scenario that is played, a twentieth of a second at a time.
+
+    Args:
+        incidents: What goes wrong in it.
+        told: What iVeg has told the fleet; it grows.
+        move_clock: Told how many seconds have passed; answers the moment.
+        hear: Takes each message of a robot, by topic; they speak as soon as they are.
+        looked, scan_every: Of every robot.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        incidents: Iterable[Incident],
+        ingest: Ingest,
+        loop: RuleLoop,
+        told: Sequence[Feedback],
+        move_clock: Callable[[float], Instant],
+        hear: Callable[[str, bytes], None],
+        *,
+        looked: Looked = lambda _: None,
+        scan_every: int = 0,
+    ) -> None:
+        self._world = world
+        self._incidents = [(one.at_s, one.order) for one in incidents]
+        self._ingest, self._loop, self._told = ingest, loop, told
+        self._move_clock = move_clock
+        self.now = move_clock(0.0)
+        self._robots = {
+            robot_id: StagedRobot(rig, self.now, hear, looked, scan_every)
+            for robot_id, rig in world.rigs.items()
+        }
+        self._delivered = 0
+        self._steps = 0
+
+    def step(self) -> None:
+        """Let a twentieth of a second pass for everybody."""
+        number = self._steps
+        self._steps += 1
+        self.now = self._move_clock(round(self._steps * STEP_S, 6))
+        for at_s, order in self._incidents:
+            if number == round(at_s / STEP_S):
+                self.happen(order)
+        self._world.walk(STEP_S)
+        for robot in self._robots.values():
+            robot.step(number, self._world, self.now)
+        self._loop.step(self._ingest.drain(), self.now)
+        self._deliver()
+
+    def happen(self, order: FaultOrder) -> None:
+        """Something goes wrong with a robot, or is well again."""
+        faults = self._robots[order.robot].faults
+        faults.clock_offset_s = order.clock_offset_s or faults.clock_offset_s
+        faults.mute = faults.mute if order.mute is None else order.mute
+        faults.deaf = faults.deaf if order.deaf is None else order.deaf
+
+    def _deliver(self) -> None:
+        """Every robot listens to what is told to any."""
+        told = self._told[self._delivered :]
+        self._delivered += len(told)
+        for feedback in told:
+            payload = codec.write_feedback(feedback)
+            for robot in self._robots.values():
+                robot.listen(feedback.robot_id, payload, self.now)

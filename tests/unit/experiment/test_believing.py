@@ -1,0 +1,97 @@
+"""Who stands in a costmap without having been seen, and through whom."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iveg.domain.costmap import Costmap, Grid
+from iveg.experiment.believing import Belief, belief_in, belief_of, injections
+from iveg.experiment.observer import picture_of, slowdowns_of
+from iveg.experiment.scoring import Picture, Seen
+
+FARMER = Seen("person-0", "farmer", 1.0, 1.0)
+
+
+def look(robot_id: str, *seen: Seen, at: float = 0.0) -> Picture:
+    return Picture(robot_id, at, seen)
+
+
+def answer(*, taken: bool) -> dict[str, Any]:
+    cells = [0] * 400
+    cells[10 * 20 + 10] = 100 if taken else 0
+    grid = {"resolution": 0.1, "width": 20, "height": 20}
+    return {**grid, "origin": {"x": 0.0, "y": 0.0}, "data": cells}
+
+
+def costmap(*, taken: bool) -> Costmap:
+    data = np.zeros((20, 20), np.int8)
+    data[10, 10] = 100 if taken else 0
+    return Costmap(Grid(0.1, 0.0, 0.0, 20, 20), data)
+
+
+@pytest.mark.parametrize("taken", [True, False])
+def test_somebody_out_of_sight_is_injected_when_the_costmap_has_them(
+    *, taken: bool
+) -> None:
+    belief = belief_in(answer(taken=taken))
+
+    found = injections([look("AGI", FARMER), look("AGII")], [(0.0, belief)], "AGII")
+
+    assert found == {
+        "asked": 1,
+        "injected": int(taken),
+        "people": 1,
+        "ahead": int(taken),
+    }
+
+
+def test_whom_a_robot_sees_itself_was_not_injected() -> None:
+    both = [look("AGI", FARMER), look("AGII", FARMER)]
+
+    found = injections(both, [(0.0, belief_in(answer(taken=True)))], "AGII")
+
+    assert found["asked"] == 0
+
+
+def test_whom_a_robots_own_laser_found_was_not_injected() -> None:
+    own = belief_of(costmap(taken=True), costmap(taken=True))
+    told = belief_of(costmap(taken=False), costmap(taken=True))
+    seen = [look("AGI", FARMER), look("AGII")]
+
+    by_laser = injections(seen, [(0.0, own)], "AGII")
+    by_others = injections(seen, [(0.0, told)], "AGII")
+
+    assert (by_laser["asked"], by_laser["injected"]) == (0, 0)
+    assert (by_others["asked"], by_others["injected"]) == (1, 1)
+
+
+@pytest.mark.parametrize(("own_at", "ahead"), [(-1.0, 0), (1.0, 1)])
+def test_only_who_was_told_of_before_the_own_camera_saw_them_is_ahead(
+    own_at: float, ahead: int
+) -> None:
+    belief: Belief = belief_in(answer(taken=True))
+    seen = [look("AGI", FARMER), look("AGII"), look("AGII", FARMER, at=own_at)]
+
+    assert injections(seen, [(0.0, belief)], "AGII")["ahead"] == ahead
+
+
+def test_a_picture_is_read_as_live_tells_it() -> None:
+    item = {"class_id": "farmer", "position": {"x": 1.0, "y": 2.0}, "probability": 0.9}
+    told = {"robot_id": "AGI", "stamp": "2026-01-01T00:00:00.000Z", "items": [item]}
+
+    picture = picture_of(told)
+
+    assert picture is not None
+    assert picture.seen == (Seen("0", "farmer", 1.0, 2.0, 0.9),)
+    assert picture_of({**told, "stamp": None}) is None
+
+
+def test_slow_downs_are_counted_by_how_far_they_came() -> None:
+    times = {"applied_at": "t", "observed_at": None}
+    person = {**times, "reason": "person", "in_sight": False}
+    stale = {**times, "reason": "stale", "in_sight": None}
+
+    found = slowdowns_of([person, stale])
+
+    assert found == {"decided": 1, "applied": 1, "observed": 0, "out_of_sight": 1}
