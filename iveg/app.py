@@ -40,6 +40,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
+from iveg.experiment.bench import Bench
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
@@ -50,7 +51,7 @@ from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.restore import remember
 from iveg.pipeline.rules import Rules
 from iveg.settings import Settings
-from iveg.web import notifications, problems
+from iveg.web import experiments, notifications, problems
 from iveg.web.api import (
     alerts,
     commands,
@@ -211,6 +212,7 @@ class Dss:
             self.health_monitor,
             self.counters,
         )
+        self.bench = Bench(directory / "experiments", self.is_robot_there)
         self.sessions = FileSessions(directory / "sessions.jsonl")
         self.authenticator = Authenticator(
             sign_in_token=self.sign_in_token,
@@ -232,6 +234,7 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
+            await self.bench.close()
             self.evaluator.leave(clock.now())
             await self.commander.close()
             await self.recorder.close()
@@ -340,6 +343,13 @@ class Dss:
         targets = self.commander.machines if robot_id is None else [robot_id]
         await self.commander.stop(targets, by, clock.now(), press)
 
+    def is_robot_there(self) -> bool:
+        """Whether a robot is connected that is not known to be emulated."""
+        now, robots = clock.now(), self.evaluator.world.live_robots()
+        return not self._demo and any(
+            robot.link(now) in ("LIVE", "LATE") for robot in robots
+        )
+
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a subscription is one that this DSS keeps."""
         return subscription_id in self.provisioner.subscription_ids
@@ -416,6 +426,8 @@ def create_app(dss: Dss) -> FastAPI:
         )
     )
     app.include_router(latency.router(watch, clock.now))
+    app.include_router(experiments.router(dss.bench))
+    app.include_router(experiments.page_router(drawn))
     app.include_router(service_worker.router())
     app.include_router(health.router(clock.now, dss.views.health))
     app.include_router(metrics.router(clock.now, dss.views.health, watch, dss.queues))

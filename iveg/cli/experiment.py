@@ -26,13 +26,13 @@ from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment import compare
-from iveg.experiment.notebook import Notebook, directory_of
+from iveg.experiment.files import directory_of, read_json
+from iveg.experiment.notebook import Notebook
 from iveg.experiment.observer import watch
 from iveg.experiment.outcome import (
     Outcome,
     counted_of,
     outcome_of,
-    read_json,
     read_truth,
     stack_of,
 )

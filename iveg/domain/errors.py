@@ -69,6 +69,18 @@ class OutdatedError(IvegError):
         self.now = now
 
 
+class ExperimentRefusedError(IvegError):
+    """No experiment may be started now.
+
+    Attributes:
+        why: ``running`` or ``live_robot``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"No experiment may be started now: {why}.")
+        self.why = why
+
+
 class NotAllowedError(IvegError):
     """The caller is known and may not do this."""
 

@@ -2,6 +2,8 @@
 
 ::
 
+    plan.json                     whose runs these are
+    progress.json                 how far it is
     together-1.json … one for each finished run
     partial.json, partial.html    it broke off: what there is so far
     result.json, result.html      it is whole
@@ -13,18 +15,23 @@ from pathlib import Path
 from typing import Any
 
 from iveg.domain.errors import DataFileError
-from iveg.experiment.outcome import Outcome, read_json, result_of, write_json
+from iveg.experiment.files import claim, read_json, write_json
+from iveg.experiment.outcome import Outcome, result_of
 from iveg.experiment.plan import Plan, Step
 from iveg.experiment.report import write_report
 
 
 class Notebook:
-    """What one experiment has come to."""
+    """What one experiment has come to.
+
+    Raises:
+        DataFileError: the directory holds another one.
+    """
 
     def __init__(self, plan: Plan, directory: Path) -> None:
         self.directory = directory
         self._plan = plan
-        directory.mkdir(parents=True, exist_ok=True)
+        claim(directory, plan)
 
     def steps_left(self) -> list[Step]:
         """Those that no earlier start has finished."""
@@ -73,11 +80,3 @@ class Notebook:
 
     def _file(self, step: Step) -> Path:
         return self.directory / f"{step.name}.json"
-
-
-def directory_of(place: Path, plan: Plan) -> Path:
-    """The newest experiment of this size that broke off, else a new one."""
-    known = sorted(place.glob(f"{plan.size}-*")) if place.is_dir() else []
-    if known and not (known[-1] / "result.json").exists():
-        return known[-1]
-    return place / f"{plan.size}-{len(known) + 1:03d}"

@@ -11,7 +11,6 @@ from typing import Any
 import orjson
 
 from iveg import __version__
-from iveg.domain.errors import DataFileError
 from iveg.domain.latency.account import Spread
 from iveg.domain.latency.hops import DATA, HOPS
 from iveg.experiment.believing import injections
@@ -194,22 +193,3 @@ def read_truth(file: Path) -> list[Picture]:
         )
         pictures.append(Picture(told["robot"], told["at"], seen))
     return pictures
-
-
-def read_json(file: Path) -> Any:
-    """A file of ours.
-
-    Raises:
-        DataFileError: there is none, or it is no JSON.
-    """
-    try:
-        return orjson.loads(file.read_bytes())
-    except (OSError, orjson.JSONDecodeError) as error:
-        raise DataFileError(str(file), "", str(error)) from error
-
-
-def write_json(file: Path, value: object) -> None:
-    """Whole or not at all: a crash leaves the file as it was."""
-    fresh = file.with_suffix(".part")
-    fresh.write_bytes(orjson.dumps(value))
-    fresh.replace(file)

@@ -9,12 +9,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final, Literal, TextIO
 
-from iveg.experiment.outcome import write_json
+from iveg.experiment.files import PROGRESS, write_json
 from iveg.experiment.plan import Step
 
 Phase = Literal["counting", "running"]
 State = Literal["running", "done", "broken"]
-FILE: Final = "progress.json"
 _STARTS_S: Final = 8.0
 """Programs of one run take so long to come and go."""
 _COUNTED_SHARE: Final = 0.15
@@ -99,7 +98,7 @@ class Progress:
             "left_s": round(left_s),
             "why": why,
         }
-        write_json(self._directory / FILE, told)
+        write_json(self._directory / PROGRESS, told)
 
     def _line(self, now: float) -> str:
         name, phase, _ = self._now or ("", "", 0.0)

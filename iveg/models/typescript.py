@@ -15,6 +15,7 @@ from iveg.models.base import Model
 from iveg.models.climate import ClimateReading
 from iveg.models.command import Drill, FleetPressed, Latency
 from iveg.models.decision import Decision
+from iveg.models.experiment import Experiments
 from iveg.models.latency import HopLatency
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
@@ -29,6 +30,7 @@ TOLD: tuple[type[Model], ...] = (
     Drill,
     Latency,
     HopLatency,
+    Experiments,
     FleetPressed,
     AlertListing,
     ClimateReading,

@@ -24,6 +24,7 @@ from starlette.responses import JSONResponse, Response
 
 from iveg.domain.errors import (
     CommandRefusedError,
+    ExperimentRefusedError,
     HopError,
     IvegError,
     NotAllowedError,
@@ -130,6 +131,8 @@ def problem_of(error: Exception) -> Problem:
             )
         case CommandRefusedError():
             return Problem(409, str(error), "command-refused", {"why": error.why})
+        case ExperimentRefusedError():
+            return Problem(409, str(error), "experiment-refused", {"why": error.why})
         case UnreadableError():
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
         case HopError():

@@ -280,6 +280,33 @@ export type Drill = {
   command: Command;
 };
 
+/** One experiment, on its way or over. */
+export type Experiment = {
+  name: string;
+  size: string;
+  state: "running" | "done" | "broken";
+  /** Which run it is at; null between two. */
+  run: string | null;
+  /** On the virtual clock, or in real time. */
+  phase: "counting" | "running" | null;
+  done: number;
+  of: number;
+  /** About how long it still takes (s). */
+  left_s: number;
+  /** Why it broke off, in a word or the program's own; empty where it did not. */
+  why: string;
+  began_at: string;
+  /** Whether there is something to open: the report, or what a break left. */
+  report: boolean;
+};
+
+/** All of them, newest first. */
+export type Experiments = {
+  items: Experiment[];
+  /** Why none may be started now: ``running``, ``live_robot``; null: one may. */
+  refused: string | null;
+};
+
 /** What a robot finds wrong with its own data. */
 export type Fault = {
   code: string;

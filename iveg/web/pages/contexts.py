@@ -115,6 +115,14 @@ class LatencyPage:
 
 
 @dataclass(frozen=True, slots=True)
+class ExperimentsPage:
+    """``experiments.html``: the paper's evaluation, started and watched."""
+
+    template: ClassVar[str] = "experiments.html"
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsPage:
     """``settings.html``: the rule in force, and what this device remembers."""
 
@@ -212,6 +220,7 @@ Page = (
     | FleetPage
     | ClimatePage
     | LatencyPage
+    | ExperimentsPage
     | SettingsPage
     | DecisionPage
     | DocsPage

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from iveg.experiment.outcome import read_json
+from iveg.experiment.files import read_json
 from iveg.experiment.plan import Step
 from iveg.experiment.progress import Progress, expected_s
 

@@ -1,7 +1,7 @@
 """Results are kept whole, compared honestly and told without a network."""
 
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,14 +9,9 @@ import pytest
 
 from iveg.domain.errors import DataFileError
 from iveg.experiment.compare import write_comparison
-from iveg.experiment.notebook import Notebook, directory_of
-from iveg.experiment.outcome import (
-    outcome_of,
-    read_json,
-    read_truth,
-    result_of,
-    write_json,
-)
+from iveg.experiment.files import directory_of, read_json, write_json
+from iveg.experiment.notebook import Notebook
+from iveg.experiment.outcome import outcome_of, read_truth, result_of
 from iveg.experiment.plan import FAMILIES, PLANS, Step
 from iveg.experiment.progress import expected_s
 from iveg.experiment.report import write_report
@@ -261,3 +256,13 @@ def test_the_same_command_takes_up_what_broke_off_and_else_begins_anew(
 
     assert first == again == tmp_path / "quick-001"
     assert directory_of(tmp_path, plan) == tmp_path / "quick-002"
+
+
+def test_runs_of_two_plans_are_never_one_experiment(tmp_path: Path) -> None:
+    plan, other = PLANS["quick"], replace(PLANS["quick"], seed=7)
+    first = directory_of(tmp_path, plan)
+    Notebook(plan, first).finish(CHOSEN, "interrupted")
+
+    assert directory_of(tmp_path, other) == tmp_path / "quick-002"
+    with pytest.raises(DataFileError, match="another plan"):
+        Notebook(other, first)

@@ -29,6 +29,7 @@ const ROUTES = {
   fleet: () => import("../pages/fleet.js"),
   climate: () => import("../pages/climate.js"),
   latency: () => import("../pages/hops.js"),
+  experiments: () => import("../pages/experiments.js"),
   settings: () => import("../pages/settings.js"),
   decision: () => import("../pages/decision.js"),
   day: () => import("../pages/day.js"),

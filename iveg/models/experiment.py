@@ -1,0 +1,34 @@
+"""The paper's evaluation as a page sees it (docs/experiment.md)."""
+
+from typing import Literal
+
+from iveg.models.base import Model
+
+
+class Experiment(Model):
+    """One experiment, on its way or over."""
+
+    name: str
+    size: str
+    state: Literal["running", "done", "broken"]
+    run: str | None
+    """Which run it is at; null between two."""
+    phase: Literal["counting", "running"] | None
+    """On the virtual clock, or in real time."""
+    done: int
+    of: int
+    left_s: float
+    """About how long it still takes (s)."""
+    why: str
+    """Why it broke off, in a word or the program's own; empty where it did not."""
+    began_at: str
+    report: bool
+    """Whether there is something to open: the report, or what a break left."""
+
+
+class Experiments(Model):
+    """All of them, newest first."""
+
+    items: list[Experiment]
+    refused: str | None
+    """Why none may be started now: ``running``, ``live_robot``; null: one may."""
