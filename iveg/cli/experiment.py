@@ -167,7 +167,8 @@ class Lab:
     ) -> None:
         progress.begin(step, "counting", clock.now().mono)
         rehearsal = Rehearsal(step, self.profile, self._rule, WATCHED)
-        counted = counted_of(await rehearsal.play(step.counted_s), WATCHED)
+        played = await self._while_all_run(rehearsal.play(step.counted_s))
+        counted = counted_of(played, WATCHED)
         progress.begin(step, "running", clock.now().mono)
         truth = self.notebook.directory / f"{step.name}.truth.jsonl"
         try:

@@ -41,11 +41,12 @@ def running(out: Path) -> "Iterator[subprocess.Popen[str]]":
 def reaches(out: Path, phase: str) -> None:
     """Wait until it is there."""
     file = out / "progress.json"
-    until(
-        lambda: file.exists() and json.loads(file.read_text())["phase"] == phase,
-        60.0,
-        phase,
-    )
+
+    def is_there() -> bool:
+        told = read(file) if file.exists() else {}
+        return (told.get("state"), told.get("phase")) == ("running", phase)
+
+    until(is_there, 60.0, phase)
 
 
 def ended(process: "subprocess.Popen[str]") -> tuple[int, str]:
@@ -63,7 +64,7 @@ def test_an_experiment_survives_a_death_and_ctrl_c_and_scores_the_whole_stack(
     out = tmp_path / "out"
 
     with running(out) as process:
-        reaches(out, "running")
+        reaches(out, "counting")
         parts = children_of(process.pid)
         [fiware] = [
             pid

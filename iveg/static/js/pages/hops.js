@@ -1,25 +1,10 @@
 /**
  * The Latency page: the paper's table and figure as they are now, beside what it printed.
  *
- * @typedef {{count: number, mean_ms: number | null, p50_ms: number | null,
- *   p95_ms: number | null, p99_ms: number | null}} Spread
- * @typedef {{passed: number, missing: number, reordered: number, repeated: number}} Order
- * @typedef {{
- *   robot_id: string, data: string, heard_hz: number, agent_hz: number,
- *   orion_hz: number, kept_back: number | null, throttled: boolean,
- *   orion_first: number, uplink: Order, fiware: Order,
- *   excluded: Record<string, Record<string, number>>,
- * }} Stream
- * @typedef {{robot_id: string, state: string, offset_ms: number | null,
- *   uncertainty_ms: number | null, jumps: number}} Clock
- * @typedef {import("./history/charts.js").Source & {
- *   window: string, direct: boolean,
- *   rows: {data: string, hops: Record<string, Spread>, sampled: string[]}[],
- *   paper: Record<string, Record<string, Record<string, number>>>,
- *   clocks: Clock[], pages_within_ms: number | null, streams: Stream[],
- *   remarks: {key: string, hop: string, slots: Record<string, string | number>}[],
- *   trace: {robot_id: string, data: string, stamp: string | null,
- *     steps: {hop: string, from_ms: number, to_ms: number}[]} | null,
+ * @typedef {import("../types.js").HopSpread} Spread
+ * @typedef {import("../types.js").HopStream} Stream
+ * @typedef {import("../types.js").HopRow["sampled"][number]} Hop
+ * @typedef {import("../types.js").HopLatency & {
  *   figures: Record<string, import("./hop_figures.js").Figure>,
  * }} Latency
  */
@@ -32,7 +17,13 @@ import { drawHopFigure } from "./hop_figures.js";
 const EVERY_MS = 2000;
 /** Figures cost the server more than numbers: every fifth time. */
 const DRAW_EVERY = 5;
-const HOPS = ["uplink", "fiware", "robot_orion", "iveg", "screen"];
+const HOPS = /** @type {Hop[]} */ ([
+  "uplink",
+  "fiware",
+  "robot_orion",
+  "iveg",
+  "screen",
+]);
 const FIGURES = ["bars", "cdf", "trace"];
 const NOTHING = "—";
 /** The paper's name of each of our hops; it has none for what comes after Orion. */
