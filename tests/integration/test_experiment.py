@@ -12,21 +12,22 @@ from typing import Any
 
 import pytest
 
-from tests.processes import ROOT, Site, children_of, is_alive, until
+from tests.processes import ROOT, Site, children_of, is_alive, site, until
 
 pytestmark = pytest.mark.timeout(240)
 PLACES = ("IVEG_HOST", "IVEG_PORT", "IVEG_MQTT_URL", "IVEG_ORION_URL", "IVEG_IOTA_URL")
+FIWARE = ("IVEG_ORION_URL", "IVEG_IOTA_URL", "IVEG_MQTT_URL")
 
 
 @contextmanager
-def running(out: Path) -> "Iterator[subprocess.Popen[str]]":
-    """``iveg experiment run --minimal`` on ports of its own."""
+def running(out: Path, place: Site, *words: str) -> "Iterator[subprocess.Popen[str]]":
+    """``iveg experiment run --minimal`` on the ports of a place."""
     inherited = ("PATH", "HOME", "LANG")
     kept = {name: os.environ[name] for name in inherited if name in os.environ}
-    places = {name: Site(out.parent).settings[name] for name in PLACES}
-    words = ["experiment", "run", "--minimal", "--out", str(out)]
+    places = {name: place.settings[name] for name in PLACES}
+    command = ["experiment", "run", "--minimal", "--out", str(out), *words]
     with subprocess.Popen(
-        [sys.executable, "-m", "iveg", *words],
+        [sys.executable, "-m", "iveg", *command],
         env={**kept, **places, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -58,19 +59,18 @@ def read(file: Path) -> Any:
     return json.loads(file.read_text())
 
 
-def test_an_experiment_survives_a_death_and_ctrl_c_and_scores_the_whole_stack(
+def is_word(pid: int, word: bytes) -> bool:
+    return b"\0" + word + b"\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
+
+
+def test_an_experiment_survives_a_death_and_ctrl_c_and_ends_on_a_named_fiware(
     tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"
-
-    with running(out) as process:
+    with running(out, Site(tmp_path)) as process:
         reaches(out, "counting")
         parts = children_of(process.pid)
-        [fiware] = [
-            pid
-            for pid in parts
-            if b"\0fiware\0" in Path(f"/proc/{pid}/cmdline").read_bytes()
-        ]
+        [fiware] = [pid for pid in parts if is_word(pid, b"fiware")]
         os.kill(fiware, signal.SIGKILL)
         code, said = ended(process)
     assert code == 1, said
@@ -79,18 +79,23 @@ def test_an_experiment_survives_a_death_and_ctrl_c_and_scores_the_whole_stack(
     assert "Broken off: fiware" in (out / "partial.html").read_text()
     assert not [pid for pid in parts if is_alive(pid)]
 
-    with running(out) as process:
+    with running(out, Site(tmp_path)) as process:
         reaches(out, "counting")
         process.send_signal(signal.SIGINT)
         code, said = ended(process)
     assert code == 1, said
     assert read(out / "partial.json")["ended_early"] == "interrupted"
 
-    with running(out) as process:
-        code, said = ended(process)
+    with site(tmp_path) as place:
+        place.start("fiware").wait_until_ready()
+        named = ["--fiware", *(place.settings[name] for name in FIWARE)]
+        with running(out, place, *named) as process:
+            code, said = ended(process)
     assert code == 0, said
+
     told = read(out / "result.json")
     assert told["completion"] == {"runs": 1, "completed": 1, "planned": 1}
+    assert told["configuration"]["fiware"] == "named"
     assert told["stack"]["completion"]["completed"] == 1
     person = told["stack"]["detection"]["farmer"]
     assert person["tp"] + person["fn"] > 0
