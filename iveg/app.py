@@ -51,13 +51,14 @@ from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.restore import remember
 from iveg.pipeline.rules import Rules
 from iveg.settings import Settings
-from iveg.web import experiments, notifications, problems
+from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,
     commands,
     costmap,
     coverage,
     day,
+    experiments,
     health,
     history,
     latency,

@@ -156,7 +156,11 @@ class Rehearsal:
         self._parts = parts
         self._mapper = Mapper(parts.world, greenhouse.bounds)
         self._views = Views(
-            parts.evaluator, parts.commander, parts.minutes, parts.chain, Counter
+            parts.evaluator,
+            parts.commander,
+            parts.event_log,
+            parts.health_monitor,
+            Counter,
         )
 
     async def play(self, seconds: float) -> Rehearsed:

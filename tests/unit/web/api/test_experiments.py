@@ -7,7 +7,7 @@ import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
 from iveg.models.experiment import Experiment, Experiments
-from iveg.web import experiments
+from iveg.web.api import experiments
 from iveg.web.pages import routes
 from iveg.web.pages.contexts import Site
 from iveg.web.security.authentication import Role
