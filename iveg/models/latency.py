@@ -1,4 +1,4 @@
-"""What each message takes from hop to hop (docs/interfaces.md §5)."""
+"""What each message takes from hop to hop (docs/interfaces/resources.md)."""
 
 from typing import Any
 
