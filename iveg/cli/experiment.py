@@ -140,8 +140,7 @@ class Lab:
             why = str(error)
         finally:
             ticking.cancel()
-            progress.finish(why)
-            self._finish(why)
+            self._finish(why, progress)
 
     @contextlib.asynccontextmanager
     async def _stack(self, environment: Mapping[str, str]) -> AsyncIterator[None]:
@@ -264,8 +263,10 @@ class Lab:
         except httpx.HTTPError as error:
             raise HopError("iveg", f"{path}: {error!r}") from error
 
-    def _finish(self, why: str) -> None:
+    def _finish(self, why: str, progress: Progress) -> None:
+        # Who reads that it is over may open the report at once.
         report = self.notebook.finish(self._chosen(), why)
+        progress.finish(why)
         self.exit_code = int(bool(why))
         if why:
             told = f"broken off ({why}); the same command goes on with it"

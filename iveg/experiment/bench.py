@@ -151,11 +151,13 @@ class Bench:
                 return_when=asyncio.FIRST_COMPLETED,
             )
             told.cancel()
-        if not gone.done():
-            process.terminate()
-            await asyncio.wait((gone,), timeout=_GRACE_S)
-        if not gone.done():
-            process.kill()
+        # It may end by itself in this very moment.
+        with contextlib.suppress(ProcessLookupError):
+            if not gone.done():
+                process.terminate()
+                await asyncio.wait((gone,), timeout=_GRACE_S)
+            if not gone.done():
+                process.kill()
 
     def _end(self, why: str) -> None:
         if self._running is not None and self._why is None:

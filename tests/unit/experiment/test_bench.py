@@ -33,8 +33,8 @@ write()
 """
 WAITS = PROGRAM + "signal.pause()"
 FINISHES = PROGRAM + (
-    'write(state="done", run=None, phase=None, done=5, left_s=0)\n'
-    '(place / "result.html").write_text("<h1>whole</h1>")'
+    '(place / "result.html").write_text("<h1>whole</h1>")\n'
+    'write(state="done", run=None, phase=None, done=5, left_s=0)'
 )
 DIES = PROGRAM + 'sys.exit("iveg: the sky has fallen")'
 
