@@ -81,7 +81,8 @@ def _turn(item: pytest.Item) -> tuple[int, int, int]:
     path, place = _path(item), 0
     name, module = str(path.parent), path.stem.removeprefix("test_")
     if name in _TOGETHER:
-        place = _TOGETHER[name].index(module)
+        modules = _TOGETHER[name]
+        place = modules.index(module) if module in modules else len(modules)
     else:
         name = str(path.with_suffix(""))
     first = _FIRST.index(name) if name in _FIRST else len(_FIRST)
