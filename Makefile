@@ -10,6 +10,9 @@ WORKERS ?= 3
 quick: WORKERS = 2
 # A worker that dies ends the run: loadscope would wait for it for ever.
 SIDE_BY_SIDE = -n $(WORKERS) --dist loadscope --no-loadscope-reorder --max-worker-restart 0
+# What a site installs (run.lock), the demo and all that a test can ask for.
+LOCK = $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml
+ALL := demo bags postgresql ros2
 # No end for a test that takes hours.
 FOR_HOURS := -o faulthandler_timeout=0
 export PYTHONPATH := $(CURDIR)
@@ -33,13 +36,13 @@ mutants: $(DEV) ; $(BIN)/python -m tests.mutants
 experiment: $(RUN) ; @exec $(BIN)/python -m iveg experiment run --$(or $(SIZE),quick)
 soak: $(DEV) ; $(BIN)/python -m benchmarks.soak
 migration: $(DEV) ; $(BIN)/alembic revision --autogenerate -m "$(m)"
-lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header pyproject.toml -o requirements/run.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra dev --extra postgresql pyproject.toml -o requirements/dev.lock && $(BIN)/uv pip compile --quiet --universal --generate-hashes --no-emit-index-url --no-header --extra bench -c requirements/dev.lock pyproject.toml -o requirements/bench.lock
+lock: $(DEV) ; $(BIN)/python -m pip install --quiet uv && $(LOCK) -o requirements/run.lock && $(LOCK) --extra demo --extra bags -o requirements/demo.lock && $(LOCK) $(ALL:%=--extra %) --extra dev -o requirements/dev.lock && $(LOCK) --extra bench -c requirements/dev.lock -o requirements/bench.lock
 clean: ; rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .hypothesis test-output
 
 # The system's part: installed on Debian, named elsewhere.
 test-needs check-needs: ; @PYTHON=$(PYTHON) .ci/setup venv $(@:-needs=)
 $(BIN)/python: ; PYTHON=$(PYTHON) .ci/setup venv && $(PYTHON) -m venv $(VENV)
-$(RUN): requirements/run.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
+$(RUN): requirements/demo.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 $(DEV): requirements/dev.lock | $(BIN)/python ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@ $(RUN)
 $(BENCH): requirements/bench.lock $(DEV) ; $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $< && touch $@
 node_modules: package.json ; npm install --silent --no-audit --no-fund --no-package-lock && touch $@

@@ -12,19 +12,25 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from rosbags.interfaces import Connection
-from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag2 import Reader as Ros2Reader
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.stores.ros2_humble import nav_msgs__msg__Odometry as RosOdometry
-from rosbags.typesys.stores.ros2_humble import sensor_msgs__msg__LaserScan as RosScan
 
+from iveg.adapters.extras import require_extra
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry, Origin
+
+if TYPE_CHECKING:  # an extra: iveg[bags]
+    from rosbags.interfaces import Connection
+    from rosbags.rosbag1 import Reader as Ros1Reader
+    from rosbags.rosbag2 import Reader as Ros2Reader
+    from rosbags.typesys.stores.ros2_humble import (
+        nav_msgs__msg__Odometry as RosOdometry,
+    )
+    from rosbags.typesys.stores.ros2_humble import (
+        sensor_msgs__msg__LaserScan as RosScan,
+    )
 
 _log = logging.getLogger(__name__)
 ODOMETRY, SCAN = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"
@@ -65,6 +71,7 @@ class Bag:
 
     Raises:
         DataFileError: it cannot be read, or its topics leave open which is meant.
+        MissingExtraError: rosbags is not installed.
     """
 
     def __init__(
@@ -75,6 +82,9 @@ class Bag:
         *,
         needs_odometry: bool = True,
     ) -> None:
+        require_extra("bags", str(path))
+        from rosbags.typesys import Stores, get_typestore
+
         self._path = path
         self._mount = mount
         self._is_ros1 = path.suffix == ".bag" and not path.is_dir()
@@ -120,7 +130,10 @@ class Bag:
     # --- the file -----------------------------------------------------------------
 
     @contextmanager
-    def _open(self) -> Iterator[Ros1Reader | Ros2Reader]:
+    def _open(self) -> "Iterator[Ros1Reader | Ros2Reader]":
+        from rosbags.rosbag1 import Reader as Ros1Reader
+        from rosbags.rosbag2 import Reader as Ros2Reader
+
         reader: Ros1Reader | Ros2Reader
         with ExitStack() as stack:
             try:
@@ -133,7 +146,7 @@ class Bag:
             yield reader
 
     def _choose(
-        self, found: list[Connection], kind: str, wanted: str | None, option: str
+        self, found: "list[Connection]", kind: str, wanted: str | None, option: str
     ) -> str | None:
         """The topic to read; None when there is none of its type."""
         topics = sorted({one.topic for one in found if one.msgtype == kind})
@@ -156,7 +169,7 @@ class Bag:
     # --- its messages -------------------------------------------------------------
 
     def _message(
-        self, connection: Connection, logged: int, data: bytes
+        self, connection: "Connection", logged: int, data: bytes
     ) -> BagMessage | None:
         try:
             stamp_s, observation = self._read(connection.msgtype, data)
@@ -184,12 +197,12 @@ class Bag:
         return _stamp_of(scan), _scan(scan, self._mount)
 
 
-def _stamp_of(message: RosOdometry | RosScan) -> float:
+def _stamp_of(message: "RosOdometry | RosScan") -> float:
     stamp = message.header.stamp
     return float(stamp.sec + stamp.nanosec / 1e9)
 
 
-def _odometry(message: RosOdometry) -> Odometry:
+def _odometry(message: "RosOdometry") -> Odometry:
     """Seen from above: pose in the odometry frame, twist in the robot's own."""
     place, turned = message.pose.pose.position, message.pose.pose.orientation
     twist = message.twist.twist
@@ -207,7 +220,7 @@ def _odometry(message: RosOdometry) -> Odometry:
     )
 
 
-def _scan(message: RosScan, mount: Pose2D) -> LaserScan:
+def _scan(message: "RosScan", mount: Pose2D) -> LaserScan:
     """Whatever is no distance (nan, inf, below zero) is no return."""
     ranges = np.array(message.ranges, np.float32)
     if ranges.size > _MOST_BEAMS:

@@ -14,7 +14,12 @@ from iveg.cli.arguments import (
     add_network_arguments,
     add_robot_arguments,
 )
-from iveg.domain.errors import DataFileError, IvegError, SettingsError
+from iveg.domain.errors import (
+    DataFileError,
+    IvegError,
+    MissingExtraError,
+    SettingsError,
+)
 from iveg.domain.fleet import is_robot_id
 from iveg.domain.geometry import Pose2D
 from iveg.settings import Settings, default_data_directory, describe
@@ -37,7 +42,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         settings = Settings.from_environment(os.environ)
         return _run(options, settings)
-    except (SettingsError, DataFileError) as error:
+    except (SettingsError, DataFileError, MissingExtraError) as error:
         print(f"iveg: {error}", file=sys.stderr)
         return UNUSABLE
     except IvegError as error:

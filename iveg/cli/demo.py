@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.cli.running import LOOPBACK, run_until_told, tell_link
 from iveg.domain.errors import SettingsError
@@ -46,6 +47,7 @@ def demo(
     ros2: bool = False,
 ) -> int:
     """Run the demo; returns the exit code."""
+    require_extra("demo", "iveg demo")
     directory = data / "demo"
     placed = replace(
         on_free_ports(settings, environment),

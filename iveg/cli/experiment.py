@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 import httpx
 
 from iveg.adapters import clock
+from iveg.adapters.extras import require_extra
 from iveg.adapters.orion import OrionClient
 from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
 from iveg.cli.running import run_until_told
@@ -63,6 +64,8 @@ def experiment(
         plan = replace(plan, seed=options.seed)
     directory = options.out or directory_of(data / "experiments", plan)
     embedded = options.fiware == ["embedded"]
+    if embedded:
+        require_extra("demo", "iveg experiment")
     named = with_fiware(settings, options.fiware)
     placed = placed_in(directory, on_free_ports(named, environment, fiware=embedded))
     lab = Lab(Notebook(plan, directory), plan.profile, placed, embedded=embedded)

@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 import uvicorn
 
 from iveg.adapters import clock
+from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.engine import sqlite_url
@@ -128,6 +129,7 @@ def _print_link(settings: Settings, dss: Dss) -> None:
 
 async def fiware(settings: Settings) -> None:
     """The embedded broker, Orion and IoT Agent."""
+    require_extra("demo", "iveg fiware")
     from iveg.embedded.server import serve_fiware
 
     settle_memory()
@@ -204,12 +206,10 @@ def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
     if not options.dds:
         yield None
         return
-    from iveg.cli.robot import MISSING, load_config, network_of
+    from iveg.cli.robot import load_config, network_of
 
     config, _ = load_config(options, os.environ)
-    network = network_of(config, os.environ)
-    if network is None:
-        raise DataFileError("--dds", "", MISSING)
+    network = network_of(config, os.environ, "iveg emulator --dds")
     from iveg.adapters.dds import Dds
 
     with Dds(network) as dds:

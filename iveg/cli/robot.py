@@ -3,7 +3,6 @@
 import argparse
 import asyncio
 import logging
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from iveg.adapters import clock
+from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.cli.running import LOOPBACK, run_until_told, tell_ready
@@ -44,10 +44,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 UNUSABLE = 2
-MISSING = (
-    "speaks to ROS 2 through Cyclone DDS, which is not installed: "
-    "pip install 'iveg[ros2]'."
-)
 _CHECK_S = 3.0
 
 
@@ -62,10 +58,7 @@ def run_robot(
         allowed = "1 to 64 letters, digits and hyphens, and no name of iVeg's own"
         raise SettingsError("--id", options.id, allowed)
     config, classes = load_config(options, environment)
-    network = network_of(config, environment)
-    if network is None:
-        print(f"iveg: iveg robot {MISSING}", file=sys.stderr)
-        return UNUSABLE
+    network = network_of(config, environment, "iveg robot")
     if options.action == "check":
         return asyncio.run(_check(options.id, config, network, settings))
     if options.attended and _broker(settings).host not in LOOPBACK:
@@ -244,14 +237,16 @@ def _text_of(file: Path) -> str:
 
 
 def network_of(
-    config: RobotConfig, environment: Mapping[str, str]
-) -> "DdsNetwork | None":
-    """Where ROS 2 is; None where Cyclone DDS is not installed."""
-    try:
-        from iveg.adapters.dds import DdsNetwork
-    except ImportError as error:
-        _log.info("no DDS: %s", error)
-        return None
+    config: RobotConfig, environment: Mapping[str, str], what: str
+) -> "DdsNetwork":
+    """Where ROS 2 is, for one command or option.
+
+    Raises:
+        MissingExtraError: Cyclone DDS is not installed.
+    """
+    require_extra("ros2", what)
+    from iveg.adapters.dds import DdsNetwork
+
     uri = environment.get("CYCLONEDDS_URI", "")
     return DdsNetwork(config.domain, config.interface, config.peers, uri)
 

@@ -3,6 +3,7 @@
 IvegError
 ├── SettingsError           a setting that cannot be used; stops the start
 ├── DataFileError           a greenhouse, scenario or log file that cannot be used
+├── MissingExtraError       a library that was not installed; stops the command
 ├── UnreadableError         bytes that the contract does not describe (HTTP 400)
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
@@ -31,6 +32,17 @@ class DataFileError(IvegError):
     def __init__(self, file: str, where: str, reason: str) -> None:
         place = f"{file}, {where}" if where else file
         super().__init__(f"{place}: {reason}")
+
+
+class MissingExtraError(IvegError):
+    """A command needs a library that belongs to an extra of the package."""
+
+    def __init__(self, what: str, library: str, extra: str) -> None:
+        super().__init__(
+            f"{what} needs {library}, which is not installed: "
+            f"pip install 'iveg[{extra}]'."
+        )
+        self.extra = extra
 
 
 class UnreadableError(IvegError):

@@ -12,7 +12,7 @@ from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, Pool, QueuePool
 
-from iveg.domain.errors import HopError, SettingsError
+from iveg.domain.errors import MissingExtraError, SettingsError
 
 _BUSY_TIMEOUT_S = 5.0
 _POSTGRESQL = {
@@ -83,7 +83,8 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
             connect_args=_POSTGRESQL | {"options": options},
         )
     except ModuleNotFoundError as error:
-        raise HopError("database", "PostgreSQL needs iveg[postgresql]") from error
+        wanted = "psycopg", "postgresql"
+        raise MissingExtraError("IVEG_DATABASE_URL", *wanted) from error
 
 
 def _with_timeout(url: URL) -> URL:

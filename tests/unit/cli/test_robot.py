@@ -31,24 +31,6 @@ def test_an_id_that_iveg_cannot_know_is_refused(robot_id: str, tmp_path: Path) -
         run_robot(asked, Settings(), tmp_path, {})
 
 
-def test_without_cyclone_dds_one_sentence_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    # Another test of this process may have imported parts of it already.
-    imported = [name for name in sys.modules if name.startswith("cyclonedds.")]
-    for name in ("cyclonedds", *imported):
-        monkeypatch.setitem(sys.modules, name, None)
-    monkeypatch.delitem(sys.modules, "iveg.adapters.dds", raising=False)
-
-    code = run_robot(options(), Settings(), tmp_path, {})
-
-    assert code == 2
-    (sentence,) = capsys.readouterr().err.splitlines()
-    assert "pip install 'iveg[ros2]'" in sentence
-
-
 def test_importing_iveg_needs_no_dds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cyclonedds", None)
 
