@@ -5,15 +5,15 @@ ROS map files use for unknown; its first line is the north.
 """
 
 import asyncio
-import struct
-import zlib
 from collections.abc import Callable
+from io import BytesIO
 from typing import Annotated
 
 import numpy as np
 import orjson
 from fastapi import APIRouter, Depends, Query, Request
 from numpy.typing import NDArray
+from PIL import Image
 from starlette.responses import Response
 
 from iveg.domain.costmap import UNKNOWN, Costmap
@@ -98,18 +98,6 @@ def _shades(costmap: Costmap | None) -> NDArray[np.uint8]:
 
 def write_png(shades: NDArray[np.uint8]) -> bytes:
     """A picture of grey shades, shape (height, width), as a PNG (ISO 15948)."""
-    height, width = shades.shape
-    lines = np.zeros((height, width + 1), np.uint8)  # each line begins "no filter"
-    lines[:, 1:] = shades
-    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n"
-        + _chunk(b"IHDR", head)
-        + _chunk(b"IDAT", zlib.compress(lines.tobytes(), 6))
-        + _chunk(b"IEND", b"")
-    )
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    check = zlib.crc32(kind + data)
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", check)
+    file = BytesIO()
+    Image.fromarray(shades).save(file, "png")
+    return file.getvalue()
