@@ -4,8 +4,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-import orjson
-
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
@@ -142,4 +140,4 @@ class Stage:
 
 def links_of(decision: DecisionRecord) -> dict[str, str]:
     """The verdict on each link of a decision's chain."""
-    return {one["link"]: one["verdict"] for one in orjson.loads(decision.links)}
+    return {one["link"]: one["verdict"] for one in decision.links}

@@ -3,11 +3,15 @@
 All times are Unix seconds UTC, positions are in ``map`` (m), speeds in m/s and rad/s.
 A decision, a command and an alert change state: a later record with the same id takes
 the place of the earlier one.  The other records are facts that are only ever added.
+``Json`` is what JSON can hold; the history keeps it as such, not as text.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Json = Mapping[str, Any]
+"""An object."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,12 +25,12 @@ class DecisionRecord:
         confidence: 0 to 1.
         distance_m: From the robot to the centre of the ring (m).
         speed_factor: What was limited to: 0, 0.5 or 1.
-        rule_parameters: JSON text of the rule's parameters at that moment.
+        rule_parameters: The rule's parameters at that moment.
         in_sight: Whether the robot itself could see the cause; None when unknown.
         started_at: When the rule fired; ``ended_at`` when it let go.
         observed_at: When the speed had come down.
         speed_before: At ``started_at`` (m/s); ``speed_after`` at ``observed_at``.
-        links: JSON text: ``[{"link", "at", "value", "verdict"}, …]``.
+        links: Each ``{"link", "at", "value", "verdict"}``.
     """
 
     decision_id: str
@@ -46,7 +50,7 @@ class DecisionRecord:
     reason: str | None = None
     rule_id: str | None = None
     rule_version: str | None = None
-    rule_parameters: str = "{}"
+    rule_parameters: Json = field(default_factory=dict)
     in_sight: bool | None = None
     feedback_at: float | None = None
     applied_at: float | None = None
@@ -54,7 +58,7 @@ class DecisionRecord:
     ended_at: float | None = None
     speed_before: float | None = None
     speed_after: float | None = None
-    links: str = "[]"
+    links: Sequence[Json] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +71,7 @@ class DetectionRecord:
         class_: Canonical; None for a class that the alias table does not know.
         confident: Whether it reached the threshold.
         road: ``orion`` or ``mqtt``, whichever was first.
-        box: JSON text of the box with its ``frame_id``; None when it was not kept.
+        box: The box with its ``frame_id``; None when it was not kept.
     """
 
     at: float
@@ -82,7 +86,7 @@ class DetectionRecord:
     stamp: str | None = None
     class_: str | None = None
     person_id: str | None = None
-    box: str | None = None
+    box: Json | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,10 +139,10 @@ class AlertRecord:
 
     Attributes:
         priority: ``P1``, ``P2`` or ``P3``.
-        key: Template of its sentence; ``slots`` JSON text that fills it.
+        key: Template of its sentence; ``slots`` fill it.
         raised_at: The first time; ``last_raised_at`` the newest.
         count: How often it was raised while it lived.
-        members: JSON text: the newest times, each with its priority and life.
+        members: The newest times, each with its priority and life.
     """
 
     alert_id: str
@@ -146,14 +150,14 @@ class AlertRecord:
     key: str
     raised_at: float
     last_raised_at: float
-    slots: str = "{}"
+    slots: Json = field(default_factory=dict)
     robot_id: str | None = None
     cleared_at: float | None = None
     acknowledged_at: float | None = None
     acknowledged_by: str | None = None
     note: str | None = None
     count: int = 1
-    members: str = "[]"
+    members: Sequence[Json] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,14 +166,14 @@ class LogRecord:
 
     Attributes:
         id: The live log's number.
-        key: Template of its sentence; ``slots`` JSON text that fills it.
+        key: Template of its sentence; ``slots`` fill it.
     """
 
     id: int
     at: float
     kind: str
     key: str
-    slots: str = "{}"
+    slots: Json = field(default_factory=dict)
     robot_id: str | None = None
     class_: str | None = None
     decision_id: str | None = None

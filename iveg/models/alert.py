@@ -2,13 +2,13 @@
 
 from typing import cast
 
-from pydantic import Field, JsonValue
+from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
-from iveg.domain.records import AlertRecord, LogRecord
+from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
-from iveg.models.remembered import read_objects, read_slots, read_stamp
+from iveg.models.remembered import read_slots, read_stamp
 
 
 class Occurrence(Model):
@@ -34,7 +34,7 @@ class Occurrence(Model):
         )
 
     @classmethod
-    def of_object(cls, one: dict[str, JsonValue]) -> "Occurrence":
+    def of_object(cls, one: Json) -> "Occurrence":
         """One that is remembered."""
         by, note = one.get("acknowledged_by"), one.get("note")
         return cls(
@@ -102,7 +102,7 @@ class Alert(Model):
             acknowledged_by=record.acknowledged_by,
             note=record.note,
             count=record.count,
-            members=[Occurrence.of_object(one) for one in read_objects(record.members)],
+            members=[Occurrence.of_object(one) for one in record.members],
         )
 
 

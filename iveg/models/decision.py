@@ -4,12 +4,12 @@ from typing import Literal
 
 from pydantic import Field, JsonValue
 
-from iveg.domain.records import DecisionRecord
+from iveg.domain.records import DecisionRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Model, stamp
 from iveg.models.command import Sentence
 from iveg.models.places import Position
-from iveg.models.remembered import read_json, read_objects, read_stamp
+from iveg.models.remembered import read_stamp
 
 
 class DecisionRule(Model):
@@ -72,8 +72,8 @@ class Decision(Model):
     @classmethod
     def of_record(cls, record: DecisionRecord) -> "Decision":
         """One decision, from memory or from the history."""
-        parameters = read_json(record.rule_parameters)
-        places = parameters.pop("places", []) if isinstance(parameters, dict) else []
+        parameters = dict(record.rule_parameters)
+        places = parameters.pop("places", [])
         return cls(
             decision_id=record.decision_id,
             kind=record.kind,
@@ -100,12 +100,9 @@ class Decision(Model):
             ended_at=stamp(record.ended_at),
             speed_before=record.speed_before,
             speed_after=record.speed_after,
-            links=[_link(one) for one in read_objects(record.links)],
+            links=[_link(one) for one in record.links],
             sentence=sentence_of(record),
-            places=[
-                DecisionPlace.model_validate(one)
-                for one in (places if isinstance(places, list) else [])
-            ],
+            places=[DecisionPlace.model_validate(one) for one in places],
         )
 
 
@@ -140,7 +137,7 @@ def sentence_of(record: DecisionRecord) -> Sentence:
     )
 
 
-def _link(link: dict[str, JsonValue]) -> DecisionLink:
+def _link(link: Json) -> DecisionLink:
     return DecisionLink(
         link=str(link.get("link")),
         at=read_stamp(link.get("at")),

@@ -4,7 +4,7 @@ from pydantic import Field, ValidationError
 
 from iveg.domain.detection_rule import Class
 from iveg.domain.geometry import Box3D
-from iveg.domain.records import DetectionRecord
+from iveg.domain.records import DetectionRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
@@ -129,10 +129,10 @@ class Detection(Model):
         )
 
 
-def _box(text: str | None) -> DetectionBox | None:
+def _box(found: Json | None) -> DetectionBox | None:
     """A remembered box; None where a row holds none that is whole."""
     try:
-        return None if text is None else DetectionBox.model_validate_json(text)
+        return None if found is None else DetectionBox.model_validate(found)
     except ValidationError:
         return None
 

@@ -4,7 +4,6 @@ One place turns domain values into log lines and history records, so that the pa
 API and the database say the same.
 """
 
-import json
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import asdict, fields, replace
@@ -66,7 +65,7 @@ class EventLog:
             kind=event.kind,
             robot_id=event.robot_id,
             key=event.key,
-            slots=json.dumps(dict(event.slots), ensure_ascii=False),
+            slots=dict(event.slots),
             class_=event.class_,
             decision_id=event.decision_id,
         )
@@ -118,12 +117,10 @@ class EventLog:
                 stamp=stamp,
                 class_=one.class_,
                 person_id=None if one.person is None else one.person.person_id,
-                box=json.dumps(
-                    {
-                        **asdict(one.detection.box),
-                        "frame_id": one.detection.frame_id,
-                    }
-                ),
+                box={
+                    **asdict(one.detection.box),
+                    "frame_id": one.detection.frame_id,
+                },
             )
         )
 
@@ -258,7 +255,6 @@ class EventLog:
     def alert(self, alert: Alert) -> None:
         """An alert was raised, acknowledged or cleared."""
         condition, last = alert.condition, alert.last
-        members = [_member(one) for one in alert.members]
         self._sink.offer(
             AlertRecord(
                 alert_id=alert.alert_id,
@@ -266,14 +262,14 @@ class EventLog:
                 key=condition.key,
                 raised_at=alert.raised.wall,
                 last_raised_at=last.raised.wall,
-                slots=json.dumps(dict(condition.slots), ensure_ascii=False),
+                slots=dict(condition.slots),
                 robot_id=condition.robot_id,
                 cleared_at=wall_of(last.cleared),
                 acknowledged_at=wall_of(last.acknowledged),
                 acknowledged_by=last.acknowledged_by,
                 note=last.note or None,
                 count=alert.count,
-                members=json.dumps(members, ensure_ascii=False),
+                members=[_member(one) for one in alert.members],
             )
         )
         self._hub.changed(topics.ALERTS.name)

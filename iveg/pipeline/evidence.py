@@ -1,6 +1,5 @@
 """A decision as it is written down and read: each link with time, value and verdict."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 
@@ -36,12 +35,10 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         reason=zone.reason,
         rule_id=decision.rule.id,
         rule_version=str(decision.rule.version),
-        rule_parameters=json.dumps(
-            {
-                **_parameters(decision.rule, zone),
-                "places": [asdict(one) for one in decision.places],
-            }
-        ),
+        rule_parameters={
+            **_parameters(decision.rule, zone),
+            "places": [asdict(one) for one in decision.places],
+        },
         in_sight=crossing.in_sight,
         feedback_at=wall_of(decision.feedback),
         applied_at=wall_of(decision.applied),
@@ -49,7 +46,7 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
         ended_at=wall_of(decision.ended),
         speed_before=crossing.speed_before,
         speed_after=decision.speed_after,
-        links=json.dumps([_link(link) for link in decision.links(now)]),
+        links=[_link(link) for link in decision.links(now)],
     )
 
 
@@ -73,19 +70,16 @@ def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
     """
     links = [
         {**link, "verdict": "unknown"} if link["verdict"] == "open" else link
-        for link in json.loads(record.links)
+        for link in record.links
     ]
     links.append(_link(Link("interrupted", "unknown", found)))
-    return replace(record, ended_at=found, links=json.dumps(links))
+    return replace(record, ended_at=found, links=links)
 
 
 def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
     """An alert that an earlier run left active; what is still wrong is a new one."""
-    members = json.loads(record.members)
-    for one in members[-1:]:
-        one["cleared_at"] = found
-    text = json.dumps(members, ensure_ascii=False)
-    return replace(record, cleared_at=found, members=text)
+    last = [{**one, "cleared_at": found} for one in record.members[-1:]]
+    return replace(record, cleared_at=found, members=[*record.members[:-1], *last])
 
 
 def _parameters(rule: Rule, zone: Zone) -> dict[str, object]:

@@ -6,7 +6,6 @@ earlier alerts are unknown.
 """
 
 import asyncio
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, cast
 
@@ -94,7 +93,7 @@ def alert_of(record: AlertRecord, now: Instant) -> Alert:
     if record.cleared_at is None:
         record = cleared_behind(record, now.wall)
     priority = cast("Priority", record.priority)
-    members = tuple(_occurrence(one, now) for one in json.loads(record.members))
+    members = tuple(_occurrence(one, now) for one in record.members)
     last = Occurrence(
         priority,
         _moment(record.last_raised_at, now),
@@ -107,7 +106,7 @@ def alert_of(record: AlertRecord, now: Instant) -> Alert:
             record.key,
             _subject(record),
             record.robot_id,
-            json.loads(record.slots),
+            record.slots,
         ),
         _moment(record.raised_at, now),
         members or (last,),
@@ -118,7 +117,7 @@ def alert_of(record: AlertRecord, now: Instant) -> Alert:
 
 def _subject(record: AlertRecord) -> str:
     """Whom it was about; of a person nobody knows after a restart who it was."""
-    if record.robot_id is None or "person" in json.loads(record.slots):
+    if record.robot_id is None or "person" in record.slots:
         return record.alert_id
     return record.robot_id
 

@@ -133,7 +133,7 @@ def _remember(store: Store) -> None:
         decision_record(),
         detection_record(person_id="P1"),
         command_record(state="STANDING", standstill_ms=640.0, drill=True, tries=1),
-        alert_record(members=orjson.dumps([member]).decode()),
+        alert_record(members=[member]),
         log_record(),
     )
     store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])

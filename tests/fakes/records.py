@@ -58,8 +58,15 @@ def detection_record(**fields: Any) -> DetectionRecord:
         "z": 0.9,
         "confident": True,
         "road": "mqtt",
-        "box": '{"xmin":-4.0,"xmax":-3.0,"ymin":1.5,"ymax":2.5,"zmin":0.0,"zmax":1.8,'
-        '"frame_id":"map"}',
+        "box": {
+            "xmin": -4.0,
+            "xmax": -3.0,
+            "ymin": 1.5,
+            "ymax": 2.5,
+            "zmin": 0.0,
+            "zmax": 1.8,
+            "frame_id": "map",
+        },
     }
     return DetectionRecord(**(defaults | fields))
 
@@ -83,10 +90,11 @@ def decision_record(**fields: Any) -> DecisionRecord:
         "reason": "person",
         "rule_id": "ring",
         "rule_version": "1",
-        "rule_parameters": '{"radius_m":2.0}',
+        "rule_parameters": {"radius_m": 2.0},
         "in_sight": False,
-        "links": f'[{{"link":"detection","at":{NOON},"value":"farmer",'
-        '"verdict":"ok"}]',
+        "links": [
+            {"link": "detection", "at": NOON, "value": "farmer", "verdict": "ok"}
+        ],
     }
     return DecisionRecord(**(defaults | fields))
 
@@ -121,7 +129,7 @@ def alert_record(**fields: Any) -> AlertRecord:
         "key": "alert.person_slowed",
         "raised_at": NOON,
         "last_raised_at": NOON,
-        "slots": '{"robot":"AGI"}',
+        "slots": {"robot": "AGI"},
         "robot_id": "AGI",
     }
     return AlertRecord(**(defaults | fields))
@@ -149,7 +157,7 @@ def log_record(**fields: Any) -> LogRecord:
         "at": NOON,
         "kind": "speed",
         "key": "log.speed_up",
-        "slots": '{"robot":"AGI"}',
+        "slots": {"robot": "AGI"},
         "robot_id": "AGI",
     }
     return LogRecord(**(defaults | fields))

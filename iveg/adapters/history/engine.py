@@ -7,6 +7,7 @@ transactions are turned off, so that a transaction begins where we say so.
 from collections.abc import Callable
 from pathlib import Path
 
+import orjson
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError
@@ -80,6 +81,8 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
             max_overflow=0,
             pool_timeout=5,
             pool_pre_ping=True,
+            # A number that is none becomes null; PostgreSQL would refuse the row.
+            json_serializer=lambda value: orjson.dumps(value).decode(),
             connect_args=_POSTGRESQL | {"options": options},
         )
     except ModuleNotFoundError as error:

@@ -20,6 +20,8 @@ from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
 _KINDS: dict[str, type[Record]] = {kind.__name__: kind for kind in RECORD_TYPES}
+_ONCE_TEXT = frozenset({"rule_parameters", "links", "slots", "members", "box"})
+"""What the version before wrote as JSON in a text; its lines are still read."""
 _RESERVE_BYTES = 10 * 2**20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
@@ -178,7 +180,11 @@ def _write_line(row: Waiting) -> bytes:
 def _read_line(line: bytes) -> Waiting | None:
     try:
         value = orjson.loads(line)
-        record = _KINDS[value["kind"]](**value["record"])
+        told = value["record"]
+        for name in _ONCE_TEXT & told.keys():
+            if isinstance(told[name], str):
+                told[name] = orjson.loads(told[name])
+        record = _KINDS[value["kind"]](**told)
         return Waiting(record, int(value["revision"]), 0.0)
     except (ValueError, TypeError, KeyError):
         return None

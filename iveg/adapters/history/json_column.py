@@ -1,14 +1,15 @@
-"""A column that holds JSON and hands out values: PostgreSQL's own, SQLite's text."""
+"""A column that holds JSON and hands out values: PostgreSQL's JSONB, SQLite's text."""
 
 from typing import Any
 
 import orjson
 from sqlalchemy import JSON, Dialect, Text
+from sqlalchemy.dialects.postgresql import JSONB
 from sqlalchemy.types import TypeDecorator, TypeEngine
 
 
 class JsonValue(TypeDecorator[Any]):
-    """JSON as PostgreSQL keeps it; in SQLite, which has no such type, its text.
+    """JSON as PostgreSQL keeps it (JSONB); in SQLite, whose JSON is text, its text.
 
     A text that is damaged reads as null: one bad row must not hide a list.
     """
@@ -18,7 +19,7 @@ class JsonValue(TypeDecorator[Any]):
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """What the database knows."""
-        kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSON()
+        kind: TypeEngine[Any] = Text() if dialect.name == "sqlite" else JSONB()
         return dialect.type_descriptor(kind)
 
     def process_bind_param(self, value: Any, dialect: Dialect) -> Any:

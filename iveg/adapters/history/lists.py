@@ -173,10 +173,10 @@ def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
 
 
 def record_of(kind: type[R], row: RowMapping) -> R:
-    """A row as the record that was offered."""
+    """A row as the record that was offered; what a damaged row lacks is its default."""
     columns = tables.TABLE_MAPPINGS[kind].table.c
     values = {field.name: row[columns[field.name]] for field in fields(kind)}
-    return kind(**values)
+    return kind(**{name: one for name, one in values.items() if one is not None})
 
 
 def write_cursor(cursor: Cursor) -> str:

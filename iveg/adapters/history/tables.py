@@ -7,6 +7,7 @@ newest state of a decision, command or alert win in whatever order states arrive
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 from sqlalchemy import (
     BigInteger,
@@ -56,6 +57,10 @@ def _text(name: str, *, null: bool = True, key: str | None = None) -> Column[str
     return Column(name, Text, nullable=null, key=key or name)
 
 
+def _json(name: str, *, null: bool = False) -> Column[Any]:
+    return Column(name, JsonValue, nullable=null)
+
+
 def _row_id() -> Column[int]:
     return Column("row_id", _BIG, primary_key=True, autoincrement=True)
 
@@ -84,7 +89,7 @@ decisions = Table(
     _text("reason"),
     _text("rule_id"),
     _text("rule_version"),
-    _text("rule_parameters", null=False),
+    _json("rule_parameters"),
     Column("in_sight", Boolean),
     _number("feedback_at"),
     _number("applied_at"),
@@ -92,7 +97,7 @@ decisions = Table(
     _number("ended_at"),
     _number("speed_before"),
     _number("speed_after"),
-    _text("links", null=False),
+    _json("links"),
     _revision(),
     Index(None, "started_at", "decision_id"),
     Index(None, "robot_id", "started_at"),
@@ -114,7 +119,7 @@ detections = Table(
     _text("stamp"),
     _text("class", key="class_"),
     _text("person_id"),
-    _text("box"),
+    _json("box", null=True),
     Index(None, "at", "row_id"),
     Index(None, "robot_id", "at"),
     sqlite_autoincrement=True,
@@ -165,7 +170,7 @@ alerts = Table(
     _text("priority", null=False),
     _text("key", null=False),
     _number("raised_at", null=False),
-    _text("slots", null=False),
+    _json("slots"),
     _text("robot_id"),
     _number("cleared_at"),
     _number("acknowledged_at"),
@@ -173,7 +178,7 @@ alerts = Table(
     _text("note"),
     Column("count", Integer, nullable=False),
     _number("last_raised_at", null=False),
-    _text("members", null=False),
+    _json("members"),
     _revision(),
     Index(None, "last_raised_at", "alert_id"),
     Index(None, "robot_id", "raised_at"),
@@ -187,7 +192,7 @@ log = Table(
     _number("at", null=False),
     _text("kind", null=False),
     _text("key", null=False),
-    _text("slots", null=False),
+    _json("slots"),
     _text("robot_id"),
     _text("class", key="class_"),
     _text("decision_id"),
@@ -254,7 +259,7 @@ readings = Table(
     _number("at", null=False),
     _text("robot_id", null=False),
     _text("kind", null=False),
-    Column("value", JsonValue, nullable=False),
+    _json("value"),
     Index(None, "at", "row_id"),
     Index(None, "robot_id", "at"),
     sqlite_autoincrement=True,

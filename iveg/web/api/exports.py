@@ -14,7 +14,6 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequenc
 from dataclasses import fields
 from typing import Any, Literal, TypeVar
 
-import orjson
 from starlette.datastructures import Headers
 
 from iveg.domain.records import AlertRecord, DecisionRecord, LogRecord, Record
@@ -76,7 +75,7 @@ async def write_csv(
 def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
     """What says in words what a row is; None where it is numbers alone."""
     if kind in (LogRecord, AlertRecord):
-        return lambda row: _safe(reader.say(row.key, orjson.loads(row.slots)))
+        return lambda row: _safe(reader.say(row.key, row.slots))
     if kind is DecisionRecord:
         return lambda row: _safe(_decision_said(row, reader))
     return None

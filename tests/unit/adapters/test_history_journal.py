@@ -1,7 +1,9 @@
 import errno
 import os
+from dataclasses import asdict
 from pathlib import Path
 
+import orjson
 import pytest
 
 from iveg.adapters.history.journal import Journal
@@ -103,7 +105,7 @@ def test_what_was_appended_meanwhile_is_not_cleared(journal: Journal) -> None:
 def test_a_record_that_is_no_text_is_left_out_and_its_neighbours_kept(
     journal: Journal,
 ) -> None:
-    journal.append(rows(log_record(slots="\ud800"), command_record()))
+    journal.append(rows(log_record(key="\ud800"), command_record()))
 
     found, _ = journal.read(0, 10)
 
@@ -148,3 +150,19 @@ def test_no_room_for_the_reserve_is_no_error(journal: Journal, tmp_path: Path) -
         journal.keep_reserve()
 
     assert not (tmp_path / "journal-reserve").exists()
+
+
+def test_a_line_of_the_version_before_is_read_back_with_its_json(
+    journal: Journal, tmp_path: Path
+) -> None:
+    record = asdict(decision_record(links=[])) | {
+        "links": '[{"link": "detection", "at": 1.0}]',
+        "rule_parameters": "{}",
+    }
+    line = {"kind": "DecisionRecord", "revision": 1, "record": record}
+    (tmp_path / "journal").write_bytes(orjson.dumps(line) + b"\n")
+
+    [row], _ = journal.read(0, 10)
+
+    links = [{"link": "detection", "at": 1.0}]
+    assert row.record == decision_record(links=links, rule_parameters={})

@@ -1,7 +1,5 @@
 """The rule at work: feedback, log, alerts and the heartbeat of the fleet."""
 
-import json
-
 import pytest
 
 from iveg.domain.detection_rule import Rule
@@ -150,8 +148,8 @@ def test_a_decision_is_written_down_with_its_feedback() -> None:
     assert isinstance(newest, DecisionRecord)
     assert (newest.robot_id, newest.observer) == ("AGI", "AGII")
     assert newest.feedback_at is not None
-    assert json.loads(newest.rule_parameters)["threshold"] == 0.8
-    verdicts = {one["link"]: one["verdict"] for one in json.loads(newest.links)}
+    assert newest.rule_parameters["threshold"] == 0.8
+    verdicts = {one["link"]: one["verdict"] for one in newest.links}
     assert verdicts["feedback"] == "ok"
 
 
@@ -276,7 +274,7 @@ def stored_verdicts(desk: Desk) -> set[str]:
     """Verdicts of the newest row of the newest decision."""
     newest = desk.records(DecisionRecord)[-1]
     assert isinstance(newest, DecisionRecord)
-    return {one["verdict"] for one in json.loads(newest.links)}
+    return {one["verdict"] for one in newest.links}
 
 
 async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
@@ -331,7 +329,7 @@ def test_what_a_crash_left_open_is_closed_and_says_that_nobody_knows() -> None:
     assert closed.decision_id == left.decision_id
     assert closed.ended_at == cleared.cleared_at == desk.clock().wall
     assert stored_verdicts(desk) == {"ok", "unknown"}
-    assert json.loads(closed.links)[-1]["link"] == "interrupted"
+    assert closed.links[-1]["link"] == "interrupted"
 
 
 async def test_what_this_run_has_open_is_left_alone() -> None:
@@ -374,7 +372,7 @@ def test_a_speed_change_is_told_with_who_saw_whom() -> None:
     desk.report("AGI", factor=0.5, reason="person", decision_id=speed_limit.decision_id)
 
     line = desk.event_log.lines[-1]
-    slots = json.loads(line.slots)
+    slots = line.slots
     assert line.key == "log.speed_down.person"
     assert (slots["observer"], slots["distance"]) == ("AGII", 1.5)
 

@@ -1,7 +1,5 @@
 """Which sentence the log takes, and what fills its holes."""
 
-import json
-
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import SafetyReport
@@ -17,7 +15,7 @@ def told(desk: Desk) -> tuple[str, dict[str, object]]:
     """The newest line about AGI's speed."""
     lines = [one for one in desk.event_log.lines if one.kind == "speed"]
     line = [one for one in lines if one.robot_id == "AGI"][-1]
-    return line.key, json.loads(line.slots)
+    return line.key, dict(line.slots)
 
 
 def means_agii(desk: Desk) -> SafetyReport:

@@ -64,7 +64,7 @@ def unseen(alert_id: str, cleared_at: float | None = None) -> AlertRecord:
         cleared_at=cleared_at,
         acknowledged_at=None,
         acknowledged_by=None,
-        members="[]",
+        members=[],
     )
 
 

@@ -1,7 +1,9 @@
 import csv
 import gzip
 import io
+import sqlite3
 from collections.abc import AsyncIterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +42,8 @@ class Past:
     """A history with a door."""
 
     def __init__(self, directory: Path, *, open_: bool = True) -> None:
-        url = f"sqlite:///{directory / 'history.db'}"
+        self._file = directory / "history.db"
+        url = f"sqlite:///{self._file}"
         self._store = Store(url)
         self._queries = Queries(url)
         self._open = open_
@@ -65,6 +68,11 @@ class Past:
     def holds(self, *records: Record) -> None:
         rows = [Waiting(record, n, 0.0) for n, record in enumerate(records, 1)]
         self._store.write(rows)
+
+    def spoils(self, statement: str) -> None:
+        """Somebody's hand in the file."""
+        with closing(sqlite3.connect(self._file)) as hand, hand:
+            hand.execute(statement)
 
     def close(self) -> None:
         self._queries.close()
@@ -184,7 +192,7 @@ async def test_alerts_and_log_read_as_their_live_topics_do(
 ) -> None:
     member = {"priority": "P2", "raised_at": NOON, "acknowledged_by": "ana"}
     past.holds(
-        alert_record(members=orjson.dumps([member]).decode()),
+        alert_record(members=[member]),
         log_record(class_="person", decision_id="D1"),
     )
 
@@ -269,13 +277,17 @@ async def test_each_kind_of_decision_has_its_sentence(
 async def test_a_decision_whose_texts_were_spoilt_is_still_shown(
     client: httpx.AsyncClient, past: Past
 ) -> None:
-    past.holds(decision_record(links="[{]", rule_parameters="", x=None))
+    past.holds(decision_record(x=None), detection_record())
+    past.spoils("UPDATE decisions SET links = '[{]', rule_parameters = ''")
+    past.spoils("UPDATE detections SET box = '{'")
 
     decision = (await client.get("/api/v1/decisions/D1")).json()
 
     assert decision["links"] == []
-    assert decision["rule"]["parameters"] is None
+    assert decision["rule"]["parameters"] == {}
     assert decision["position"] is None
+    [seen] = (await client.get("/api/v1/detections")).json()["items"]
+    assert seen["box"] is None
 
 
 async def test_a_decision_in_memory_is_told_as_it_stands_now(

@@ -72,7 +72,7 @@ async def test_a_change_counts_at_once_and_every_later_decision_carries_it() -> 
     record = desk.records(DecisionRecord)[-1]
     assert isinstance(record, DecisionRecord)
     assert record.rule_version == "2"
-    assert '"threshold": 0.7' in (record.rule_parameters or "")
+    assert record.rule_parameters["threshold"] == 0.7
 
 
 async def test_a_class_may_have_a_threshold_of_its_own() -> None:

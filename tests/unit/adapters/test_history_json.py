@@ -1,0 +1,128 @@
+"""What is JSON is kept as JSON, also what the version before kept as a text."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from alembic import command
+from sqlalchemy import Connection, text
+
+from iveg.adapters.history.engine import writing_engine
+from iveg.adapters.history.lists import Filter
+from iveg.adapters.history.migrate import alembic_config, upgrade
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.store import Store
+from iveg.domain.records import Record
+from iveg.pipeline.record import Waiting
+from tests.fakes.records import (
+    NOON,
+    alert_record,
+    decision_record,
+    detection_record,
+    log_record,
+)
+
+BEFORE = "keep_readings"
+OLD_ROWS = (
+    "INSERT INTO decisions (decision_id, kind, robot_id, started_at, rule_parameters,"
+    " links, revision) VALUES ('D1', 'mandate', 'AGI', 1.0, '{\"radius_m\": 2.0}',"
+    ' \'[{"link": "detection", "verdict": "ok"}]\', 1)',
+    "INSERT INTO detections (at, robot_id, class_id, probability, x, y, z, confident,"
+    " road, box) VALUES (1.0, 'AGI', 'farmer', 0.9, 1.0, 2.0, 0.9, true, 'mqtt',"
+    ' \'{"xmin": -4.0, "frame_id": "map"}\'), '
+    "(2.0, 'AGI', 'farmer', 0.9, 1.0, 2.0, 0.9, true, 'mqtt', NULL)",
+    "INSERT INTO alerts (alert_id, priority, key, raised_at, last_raised_at, slots,"
+    " members, count, revision) VALUES ('A1', 'P2', 'alert.robot_lost', 1.0, 1.0,"
+    ' \'{"robot": "AGI"}\', \'[{"priority": "P2", "raised_at": 1.0}]\', 1, 1)',
+    "INSERT INTO log (id, at, kind, key, slots) VALUES "
+    "(1, 1.0, 'speed', 'log.speed_up', '{\"robot\": \"Túnel\"}'), "
+    "(2, 2.0, 'speed', 'log.speed_up', '{\"factor\": NaN}')",
+)
+LOOK = (
+    "SELECT slots FROM alerts",
+    "SELECT members FROM alerts",
+    "SELECT links FROM decisions",
+    "SELECT rule_parameters FROM decisions",
+    "SELECT box FROM detections WHERE at = 1.0",
+    "SELECT slots FROM log WHERE id = 1",
+)
+
+
+@pytest.fixture
+def old(database_url: str) -> str:
+    """A history that the version before wrote, one row of it spoilt."""
+    with connected(database_url) as connection:
+        command.upgrade(alembic_config(connection), BEFORE)
+        for row in OLD_ROWS:
+            connection.execute(text(row.replace(":", "\\:")))
+    return database_url
+
+
+@pytest.fixture
+def queries(database_url: str) -> Iterator[Queries]:
+    queries = Queries(database_url)
+    yield queries
+    queries.close()
+
+
+async def test_rows_of_the_version_before_read_as_values(
+    old: str, queries: Queries
+) -> None:
+    upgrade(old)
+
+    [decision] = (await queries.decisions(Filter())).items
+    [unboxed, boxed] = (await queries.detections(Filter())).items
+    [alert] = (await queries.alerts(Filter())).items
+    [spoilt, line] = (await queries.log(Filter())).items
+    assert decision.rule_parameters == {"radius_m": 2.0}
+    assert list(decision.links) == [{"link": "detection", "verdict": "ok"}]
+    assert (boxed.box, unboxed.box) == ({"xmin": -4.0, "frame_id": "map"}, None)
+    assert alert.slots == {"robot": "AGI"}
+    assert list(alert.members) == [{"priority": "P2", "raised_at": 1.0}]
+    assert (line.slots, spoilt.slots) == ({"robot": "Túnel"}, {})
+
+
+def test_the_way_back_gives_the_version_before_its_texts(old: str) -> None:
+    with connected(old) as connection:
+        before = [connection.scalar(text(look)) for look in LOOK]
+    upgrade(old)
+
+    with connected(old) as connection:
+        command.downgrade(alembic_config(connection), BEFORE)
+        after = [connection.scalar(text(look)) for look in LOOK]
+
+    assert after == before
+
+
+async def test_what_is_stored_is_found_by_its_members(
+    database_url: str, queries: Queries
+) -> None:
+    records: tuple[Record, ...] = (
+        alert_record(),
+        decision_record(),
+        detection_record(),
+        log_record(),
+    )
+    store = Store(database_url)
+    store.write([Waiting(record, n, 0.0) for n, record in enumerate(records, 1)])
+    store.close()
+    member = {
+        "sqlite": "json_extract(slots, '$.robot')",
+        "postgresql": "slots ->> 'robot'",
+    }
+
+    with connected(database_url) as connection:
+        wanted = f"SELECT {member[connection.dialect.name]} FROM log"  # noqa: S608
+        robot = connection.scalar(text(wanted))
+
+    [line] = (await queries.log(Filter(since=NOON))).items
+    assert (robot, line.slots) == ("AGI", {"robot": "AGI"})
+
+
+@contextmanager
+def connected(database_url: str) -> Iterator[Connection]:
+    """A transaction of its own."""
+    engine = writing_engine(database_url)
+    with engine.begin() as connection:
+        yield connection
+    engine.dispose()
