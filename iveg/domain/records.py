@@ -10,8 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from iveg.domain.transports import TransportId
+
 Json = Mapping[str, Any]
 """An object."""
+ByTransport = Mapping[TransportId, float]
+"""A time for each transport that has one (Unix s)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +100,8 @@ class CommandRecord:
     Attributes:
         state: One of the nine states of the STOP machine, RUNNING at the end of a
             STOP, REPLACED or EXPIRED where another command took over.
+        sent_at: When each transport first took it; ``answer_at`` when the robot first
+            said by it that it has it.
         standing_at: First standing sample.
         standstill_ms: ``standing_at`` − the press, or ``requested_at`` without (ms).
         tries: How often it was sent.
@@ -110,10 +116,8 @@ class CommandRecord:
     state: str
     requested_by: str
     requested_at: float
-    sent_fiware_at: float | None = None
-    sent_direct_at: float | None = None
-    answer_fiware_at: float | None = None
-    answer_direct_at: float | None = None
+    sent_at: ByTransport = field(default_factory=dict)
+    answer_at: ByTransport = field(default_factory=dict)
     standing_at: float | None = None
     standstill_ms: float | None = None
     tries: int = 0

@@ -7,13 +7,14 @@ from typing import Literal
 from iveg.domain import stop
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.records import CommandEventRecord, CommandRecord
+from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
 from iveg.domain.stop.latency import Spread
 from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
-from iveg.models.base import Model, Slots, moment, rounded, stamp
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.models.base import Model, Slots, rounded, stamp
 
 AGENT_LATE_S = 1.0
 """An agent that is less behind than this is not worth a sentence."""
@@ -25,12 +26,39 @@ class CommandTimes(Model):
     pressed: str | None
     """By the browser's corrected clock; null where no page told, or it cannot be."""
     requested: str
+    sent: dict[TransportId, str]
+    """By transport, when it took it; one that has not is not there."""
+    answer: dict[TransportId, str]
+    """By transport, when the robot said by it that it has it."""
     sent_fiware: str | None
+    """As ``sent["fiware"]``, for one version; so are the next three."""
     sent_direct: str | None
     answer_fiware: str | None
     answer_direct: str | None
     standing: str | None
     """The first standing sample."""
+
+    @classmethod
+    def of(
+        cls,
+        pressed: float | None,
+        requested: float,
+        sent: ByTransport,
+        answer: ByTransport,
+        standing: float | None,
+    ) -> "CommandTimes":
+        """All in Unix seconds."""
+        return cls(
+            pressed=stamp(pressed),
+            requested=format_stamp(requested),
+            sent={one: format_stamp(at) for one, at in sent.items()},
+            answer={one: format_stamp(at) for one, at in answer.items()},
+            sent_fiware=stamp(sent.get(FIWARE.id)),
+            sent_direct=stamp(sent.get(DIRECT.id)),
+            answer_fiware=stamp(answer.get(FIWARE.id)),
+            answer_direct=stamp(answer.get(DIRECT.id)),
+            standing=stamp(standing),
+        )
 
 
 class CommandRobot(Model):
@@ -128,14 +156,12 @@ class Command(Model):
             drill=record.drill,
             state=record.state,
             requested_by=record.requested_by,
-            times=CommandTimes(
-                pressed=stamp(record.pressed_at),
-                requested=format_stamp(record.requested_at),
-                sent_fiware=stamp(record.sent_fiware_at),
-                sent_direct=stamp(record.sent_direct_at),
-                answer_fiware=stamp(record.answer_fiware_at),
-                answer_direct=stamp(record.answer_direct_at),
-                standing=stamp(record.standing_at),
+            times=CommandTimes.of(
+                record.pressed_at,
+                record.requested_at,
+                record.sent_at,
+                record.answer_at,
+                record.standing_at,
             ),
             standstill_ms=record.standstill_ms,
             tries=record.tries,
@@ -153,14 +179,12 @@ class Command(Model):
 
 
 def _times(of: Times) -> CommandTimes:
-    return CommandTimes(
-        pressed=stamp(of.pressed),
-        requested=format_stamp(of.requested.wall),
-        sent_fiware=moment(of.sent.get("fiware")),
-        sent_direct=moment(of.sent.get("direct")),
-        answer_fiware=moment(of.answered.get("fiware")),
-        answer_direct=moment(of.answered.get("direct")),
-        standing=moment(of.standing),
+    return CommandTimes.of(
+        of.pressed,
+        of.requested.wall,
+        {one: at.wall for one, at in of.sent.items()},
+        {one: at.wall for one, at in of.answered.items()},
+        None if of.standing is None else of.standing.wall,
     )
 
 
@@ -178,7 +202,7 @@ def _note(of: stop.Command) -> Sentence | None:
     lag = of.agent_lag_s
     if lag is None or lag <= AGENT_LATE_S:
         return None
-    direct = of.transports["direct"] not in ("off", "failed")
+    direct = of.transports[DIRECT.id] not in ("off", "failed")
     key = "stop.note.direct" if direct else "stop.note.fiware"
     return Sentence(key=key, slots={"lag": round(lag, 1)})
 
@@ -231,7 +255,11 @@ class RobotLatency(Model):
     robot_id: str
     stops: int
     accepted: LatencySpread
+    sent: dict[TransportId, LatencySpread]
+    """By transport, until it left; ``answer`` until the robot said that it has it."""
+    answer: dict[TransportId, LatencySpread]
     sent_direct: LatencySpread
+    """As ``sent["direct"]``, for one version; so are the next three."""
     sent_fiware: LatencySpread
     answer_direct: LatencySpread
     answer_fiware: LatencySpread

@@ -25,7 +25,6 @@ from iveg.domain.records import (
 )
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.tracking.people import Placed
-from iveg.domain.transports import DIRECT, FIWARE
 from iveg.domain.world import RobotState
 from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
@@ -161,10 +160,8 @@ class EventLog:
                 state=command.state,
                 requested_by=command.requesters[0],
                 requested_at=times.requested.wall,
-                sent_fiware_at=wall_of(times.sent.get(FIWARE.id)),
-                sent_direct_at=wall_of(times.sent.get(DIRECT.id)),
-                answer_fiware_at=wall_of(times.answered.get(FIWARE.id)),
-                answer_direct_at=wall_of(times.answered.get(DIRECT.id)),
+                sent_at={one: at.wall for one, at in times.sent.items()},
+                answer_at={one: at.wall for one, at in times.answered.items()},
                 standing_at=wall_of(times.standing),
                 standstill_ms=command.standstill_ms,
                 tries=command.tries,

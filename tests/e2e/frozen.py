@@ -155,10 +155,8 @@ def _history() -> Iterator[Record]:
     yield command_record(
         state="RUNNING",
         requested_at=NOW - 300,
-        sent_direct_at=NOW - 299.998,
-        sent_fiware_at=NOW - 299.99,
-        answer_direct_at=NOW - 299.95,
-        answer_fiware_at=NOW - 299.93,
+        sent_at={"direct": NOW - 299.998, "fiware": NOW - 299.99},
+        answer_at={"direct": NOW - 299.95, "fiware": NOW - 299.93},
         standing_at=NOW - 299.588,
         standstill_ms=412.0,
         tries=1,

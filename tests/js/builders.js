@@ -121,6 +121,8 @@ export function command(changes = {}) {
     times: {
       pressed: null,
       requested: STAMP,
+      sent: {},
+      answer: {},
       sent_fiware: null,
       sent_direct: null,
       answer_fiware: null,

@@ -29,6 +29,8 @@ const order = (differs = {}) =>
     times: {
       pressed: null,
       requested: "2026-11-20T12:00:00.000Z",
+      sent: { fiware: "2026-11-20T12:00:00.004Z", direct: "2026-11-20T12:00:00.002Z" },
+      answer: { fiware: "2026-11-20T12:00:00.050Z" },
       sent_fiware: "2026-11-20T12:00:00.004Z",
       sent_direct: "2026-11-20T12:00:00.002Z",
       answer_fiware: "2026-11-20T12:00:00.050Z",

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import orjson
 
@@ -21,7 +22,7 @@ from iveg.pipeline.record import Waiting
 _log = logging.getLogger(__name__)
 _KINDS: dict[str, type[Record]] = {kind.__name__: kind for kind in RECORD_TYPES}
 _ONCE_TEXT = frozenset({"rule_parameters", "links", "slots", "members", "box"})
-"""What the version before wrote as JSON in a text; its lines are still read."""
+"""What the version before wrote as JSON in a text."""
 _RESERVE_BYTES = 10 * 2**20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
@@ -181,10 +182,20 @@ def _read_line(line: bytes) -> Waiting | None:
     try:
         value = orjson.loads(line)
         told = value["record"]
-        for name in _ONCE_TEXT & told.keys():
-            if isinstance(told[name], str):
-                told[name] = orjson.loads(told[name])
-        record = _KINDS[value["kind"]](**told)
+        record = _KINDS[value["kind"]](**_as_now(told))
         return Waiting(record, int(value["revision"]), 0.0)
     except (ValueError, TypeError, KeyError):
         return None
+
+
+def _as_now(told: dict[str, Any]) -> dict[str, Any]:
+    """A record as this version has it, of a line that the version before wrote."""
+    for name in _ONCE_TEXT & told.keys():
+        if isinstance(told[name], str):
+            told[name] = orjson.loads(told[name])
+    for what in ("sent", "answer"):
+        for transport in ("direct", "fiware"):
+            at = told.pop(f"{what}_{transport}_at", None)
+            if at is not None:
+                told.setdefault(f"{what}_at", {})[transport] = at
+    return told

@@ -21,7 +21,7 @@ from sqlalchemy import (
 from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.tables import climate, commands, detections, odometry
 from iveg.domain.day import Pose, Seen
-from iveg.domain.records import CommandRecord
+from iveg.domain.records import ByTransport, CommandRecord
 
 _Point = tuple[Any, ...]
 MOST_POINTS = 2000
@@ -88,21 +88,19 @@ class CommandLatency:
     Where nobody told when it was pressed, the press is when it was accepted.
 
     Attributes:
-        direct_ms: To the answer by the direct transport; ``fiware_ms`` by the other.
+        answer_ms: To the robot's answer by each transport that brought one.
         standstill_ms: To the first standing sample.
         accepted_ms: To this server, where the page told when it was pressed.
-        sent_direct_ms: Until it left for the broker; ``sent_fiware_ms`` for Orion.
+        sent_ms: Until it left by each transport that took it.
     """
 
     command_id: str
     robot_id: str
     requested_at: float
-    direct_ms: float | None
-    fiware_ms: float | None
+    answer_ms: ByTransport
+    sent_ms: ByTransport
     standstill_ms: float | None
     accepted_ms: float | None = None
-    sent_direct_ms: float | None = None
-    sent_fiware_ms: float | None = None
 
 
 def speed_series(
@@ -227,17 +225,15 @@ def _latency(record: CommandRecord) -> CommandLatency:
         record.command_id,
         record.robot_id,
         record.requested_at,
-        _ms(asked, record.answer_direct_at),
-        _ms(asked, record.answer_fiware_at),
+        {one: _ms(asked, at) for one, at in record.answer_at.items()},
+        {one: _ms(asked, at) for one, at in record.sent_at.items()},
         record.standstill_ms,
         None if told is None else _ms(told, record.requested_at),
-        _ms(asked, record.sent_direct_at),
-        _ms(asked, record.sent_fiware_at),
     )
 
 
-def _ms(start: float, end: float | None) -> float | None:
-    return None if end is None else 1000.0 * (end - start)
+def _ms(start: float, end: float) -> float:
+    return 1000.0 * (end - start)
 
 
 def _robots(connection: Connection) -> Iterator[str]:

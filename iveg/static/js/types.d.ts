@@ -145,6 +145,11 @@ export type CommandTimes = {
   /** By the browser's corrected clock; null where no page told, or it cannot be. */
   pressed: string | null;
   requested: string;
+  /** By transport, when it took it; one that has not is not there. */
+  sent: Record<string, string>;
+  /** By transport, when the robot said by it that it has it. */
+  answer: Record<string, string>;
+  /** As ``sent["fiware"]``, for one version; so are the next three. */
   sent_fiware: string | null;
   sent_direct: string | null;
   answer_fiware: string | null;
@@ -718,6 +723,10 @@ export type RobotLatency = {
   robot_id: string;
   stops: number;
   accepted: LatencySpread;
+  /** By transport, until it left; ``answer`` until the robot said that it has it. */
+  sent: Record<string, LatencySpread>;
+  answer: Record<string, LatencySpread>;
+  /** As ``sent["direct"]``, for one version; so are the next three. */
   sent_direct: LatencySpread;
   sent_fiware: LatencySpread;
   answer_direct: LatencySpread;

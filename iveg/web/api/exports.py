@@ -10,14 +10,30 @@ is never held in memory.
 import codecs
 import csv
 import io
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import (
+    AsyncIterator,
+    Awaitable,
+    Callable,
+    Iterator,
+    Mapping,
+    Sequence,
+)
 from dataclasses import fields
+from functools import partial
+from operator import attrgetter
 from typing import Any, Literal, TypeVar
 
 from starlette.datastructures import Headers
 
-from iveg.domain.records import AlertRecord, DecisionRecord, LogRecord, Record
+from iveg.domain.records import (
+    AlertRecord,
+    ByTransport,
+    DecisionRecord,
+    LogRecord,
+    Record,
+)
 from iveg.domain.stamps import format_stamp
+from iveg.domain.transports import TRANSPORTS, TransportId
 from iveg.models.base import Model, write_json
 from iveg.models.decision import sentence_of
 from iveg.web.pages.sentences import Sentences
@@ -57,9 +73,9 @@ async def write_csv(
         pages: The rows.
         reader: Whose spreadsheet it is for; None for programs.
     """
-    names = [field.name for field in fields(kind)]
+    columns = list(_columns(kind))
     tell = None if reader is None else _telling(kind, reader)
-    head = [name.rstrip("_") for name in names]
+    head = [name.rstrip("_") for name, _ in columns]
     if reader is not None:
         yield codecs.BOM_UTF8
         head = [reader.say("export.sentence", {}), *head] if tell else head
@@ -67,9 +83,25 @@ async def write_csv(
     async for records in pages:
         rows = []
         for record in records:
-            row = [_cell(name, getattr(record, name), reader) for name in names]
+            row = [_cell(name, read(record), reader) for name, read in columns]
             rows.append([tell(record), *row] if tell else row)
         yield _csv_lines(rows, reader)
+
+
+def _columns(kind: type[R]) -> Iterator[tuple[str, Callable[[R], object]]]:
+    """A column a field; of what is kept by transport one for each of the table."""
+    for one in fields(kind):
+        if one.type != ByTransport:
+            yield one.name, attrgetter(one.name)
+            continue
+        # The version before had them in this order.
+        for transport in reversed(TRANSPORTS):
+            name = one.name.replace("_at", f"_{transport.id}_at")
+            yield name, partial(_of_transport, one.name, transport.id)
+
+
+def _of_transport(name: str, transport: TransportId, record: R) -> object:
+    return getattr(record, name).get(transport)
 
 
 def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:

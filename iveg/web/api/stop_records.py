@@ -13,9 +13,10 @@ from starlette.responses import Response
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import CommandLatency
 from iveg.domain.observations import Instant
-from iveg.domain.records import CommandRecord
+from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop.latency import spread
+from iveg.domain.transports import DIRECT, FIWARE, TRANSPORTS, TransportId
 from iveg.models.base import Listing, rounded
 from iveg.models.command import (
     Command,
@@ -87,16 +88,30 @@ def _by_robot(found: Iterable[CommandLatency]) -> list[RobotLatency]:
 
 
 def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
+    sent = _by_transport([one.sent_ms for one in stops])
+    answer = _by_transport([one.answer_ms for one in stops])
     return RobotLatency(
         robot_id=robot_id,
         stops=len(stops),
         accepted=LatencySpread.of(spread(one.accepted_ms for one in stops)),
-        sent_direct=LatencySpread.of(spread(one.sent_direct_ms for one in stops)),
-        sent_fiware=LatencySpread.of(spread(one.sent_fiware_ms for one in stops)),
-        answer_direct=LatencySpread.of(spread(one.direct_ms for one in stops)),
-        answer_fiware=LatencySpread.of(spread(one.fiware_ms for one in stops)),
+        sent=sent,
+        answer=answer,
+        sent_direct=sent[DIRECT.id],
+        sent_fiware=sent[FIWARE.id],
+        answer_direct=answer[DIRECT.id],
+        answer_fiware=answer[FIWARE.id],
         standing=LatencySpread.of(spread(one.standstill_ms for one in stops)),
     )
+
+
+def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
+    """Of each transport of the table, and of those that rows know besides."""
+    known = dict.fromkeys(one.id for one in TRANSPORTS)
+    known |= dict.fromkeys(transport for one in took for transport in one)
+    return {
+        transport: LatencySpread.of(spread(one.get(transport) for one in took))
+        for transport in known
+    }
 
 
 def _drill(record: CommandRecord, now: float) -> Drill:

@@ -23,6 +23,7 @@ from iveg.adapters.history.series import (
 )
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.fleet import FleetDescription
+from iveg.domain.transports import TRANSPORTS
 
 _Trace = Mapping[str, object]
 
@@ -114,20 +115,24 @@ def confidence_figure(
 
 
 def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
-    """How long each STOP took (ms): to both answers, and to standing still."""
-    kinds = ("direct_ms", "fiware_ms", "standstill_ms")
+    """How long each STOP took (ms): to each transport's answer, and to standing."""
+    kinds: dict[str, list[float | None]] = {
+        transport.id: [one.answer_ms.get(transport.id) for one in latencies]
+        for transport in TRANSPORTS
+    }
+    kinds["standstill"] = [one.standstill_ms for one in latencies]
     traces = [
         {
             "type": "scatter",
             "mode": "markers",
-            "name": kind.removesuffix("_ms"),
-            "meta": {"kind": kind.removesuffix("_ms")},
+            "name": kind,
+            "meta": {"kind": kind},
             "x": [_ms(one.requested_at) for one in latencies],
-            "y": [getattr(one, kind) for one in latencies],
+            "y": took,
             "text": [one.robot_id for one in latencies],
         }
-        for kind in kinds
-        if any(getattr(one, kind) is not None for one in latencies)
+        for kind, took in kinds.items()
+        if any(one is not None for one in took)
     ]
     return figure_of(traces, ("time", "took"), {"yaxis": {"rangemode": "tozero"}})
 

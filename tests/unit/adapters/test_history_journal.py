@@ -166,3 +166,19 @@ def test_a_line_of_the_version_before_is_read_back_with_its_json(
 
     links = [{"link": "detection", "at": 1.0}]
     assert row.record == decision_record(links=links, rule_parameters={})
+
+
+def test_an_order_of_the_version_before_is_read_back_with_its_times(
+    journal: Journal, tmp_path: Path
+) -> None:
+    record = asdict(command_record()) | {
+        "sent_direct_at": 1.5,
+        "answer_fiware_at": None,
+    }
+    del record["sent_at"], record["answer_at"]
+    line = {"kind": "CommandRecord", "revision": 1, "record": record}
+    (tmp_path / "journal").write_bytes(orjson.dumps(line) + b"\n")
+
+    [row], _ = journal.read(0, 10)
+
+    assert row.record == command_record(sent_at={"direct": 1.5})

@@ -34,6 +34,10 @@ OLD_ROWS = (
     "INSERT INTO alerts (alert_id, priority, key, raised_at, last_raised_at, slots,"
     " members, count, revision) VALUES ('A1', 'P2', 'alert.robot_lost', 1.0, 1.0,"
     ' \'{"robot": "AGI"}\', \'[{"priority": "P2", "raised_at": 1.0}]\', 1, 1)',
+    "INSERT INTO commands (command_id, robot_id, kind, state, requested_by,"
+    " requested_at, sent_fiware_at, sent_direct_at, answer_direct_at, tries, revision)"
+    " VALUES ('C1', 'AGI', 'stop', 'STANDING', 'ana', 1700000000.123456,"
+    " 1700000000.223456, 1700000000.133457, 1700000000.153, 1, 1)",
     "INSERT INTO log (id, at, kind, key, slots) VALUES "
     "(1, 1.0, 'speed', 'log.speed_up', '{\"robot\": \"Túnel\"}'), "
     "(2, 2.0, 'speed', 'log.speed_up', '{\"factor\": NaN}')",
@@ -45,6 +49,10 @@ LOOK = (
     "SELECT rule_parameters FROM decisions",
     "SELECT box FROM detections WHERE at = 1.0",
     "SELECT slots FROM log WHERE id = 1",
+    "SELECT sent_fiware_at FROM commands",
+    "SELECT sent_direct_at FROM commands",
+    "SELECT answer_fiware_at FROM commands",
+    "SELECT answer_direct_at FROM commands",
 )
 
 
@@ -74,6 +82,9 @@ async def test_rows_of_the_version_before_read_as_values(
     [unboxed, boxed] = (await queries.detections(Filter())).items
     [alert] = (await queries.alerts(Filter())).items
     [spoilt, line] = (await queries.log(Filter())).items
+    [order] = (await queries.commands(Filter())).items
+    assert order.sent_at == {"fiware": 1700000000.223456, "direct": 1700000000.133457}
+    assert order.answer_at == {"direct": 1700000000.153}
     assert decision.rule_parameters == {"radius_m": 2.0}
     assert list(decision.links) == [{"link": "detection", "verdict": "ok"}]
     assert (boxed.box, unboxed.box) == ({"xmin": -4.0, "frame_id": "map"}, None)

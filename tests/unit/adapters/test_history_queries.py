@@ -339,8 +339,8 @@ async def test_how_long_stops_took_is_counted_from_the_press(
         database_url,
         command_record(command_id="C2", requested_at=NOON + 1),
         command_record(
-            answer_direct_at=NOON + 0.25,
-            answer_fiware_at=NOON + 0.5,
+            sent_at={"direct": NOON + 0.125},
+            answer_at={"direct": NOON + 0.25, "fiware": NOON + 0.5},
             standing_at=NOON + 1.5,
             standstill_ms=1500.0,
         ),
@@ -349,9 +349,10 @@ async def test_how_long_stops_took_is_counted_from_the_press(
 
     first, second = await queries.command_latencies(NOON, NOON + 2)
 
-    assert (first.command_id, first.direct_ms, first.fiware_ms) == ("C1", 250.0, 500.0)
+    assert (first.command_id, first.sent_ms) == ("C1", {"direct": 125.0})
+    assert first.answer_ms == {"direct": 250.0, "fiware": 500.0}
     assert first.standstill_ms == 1500.0
-    assert (second.command_id, second.direct_ms) == ("C2", None)
+    assert (second.command_id, second.answer_ms) == ("C2", {})
     assert await queries.command_latencies(NOON, NOON + 2, "AGII") == ()
 
 

@@ -1,9 +1,11 @@
 """A third way to the robots is one entry of the table: nothing else is told of it."""
 
 from iveg.domain.observations import CommandAnswer, Hold
+from iveg.domain.records import CommandRecord
 from iveg.domain.transports import FIWARE, Transport
 from iveg.models.command import Command as CommandModel
 from tests.fakes.fleet import FakeFleet
+from tests.fakes.records import NOON
 from tests.unit.pipeline.desk import Desk, settle
 
 DDS = Transport("dds", confirms=True)
@@ -41,6 +43,25 @@ async def test_json_says_how_far_an_order_came_on_the_third_transport() -> None:
 
     assert told_now.transports == {"direct": "ok", "fiware": "pending", "dds": "ok"}
     assert set(desk.commander.commands[command_id].times.answered) == {"dds"}
+    await desk.commander.close()
+
+
+async def test_times_and_the_row_of_the_history_are_keyed_by_the_third_transport() -> (
+    None
+):
+    desk = Desk(also={DDS: FakeFleet()})
+    command_id = await stopped(desk)
+    desk.clock.now = 0.5
+    desk.hear(CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"), "dds")
+
+    row = desk.records(CommandRecord)[-1]
+    times = told(desk, command_id).times
+
+    assert set(row.sent_at) == {"direct", "fiware", "dds"}
+    assert row.answer_at == {"dds": NOON + 0.5}
+    assert set(times.sent) == {"direct", "fiware", "dds"}
+    assert times.answer == {"dds": "2023-11-14T22:13:20.500Z"}
+    assert CommandModel.of_record(row).times == times
     await desk.commander.close()
 
 

@@ -23,14 +23,14 @@ export function zeroOf({ pressed, requested }) {
  */
 export function tookOf({ times, standstill_ms }) {
   const zero = Date.parse(zeroOf(times));
-  const since = (/** @type {string | null} */ at) =>
-    at === null ? null : Date.parse(at) - zero;
+  const since = (/** @type {string | undefined} */ at) =>
+    at === undefined ? null : Date.parse(at) - zero;
   return {
     accepted: times.pressed ? since(times.requested) : null,
-    sentDirect: since(times.sent_direct),
-    direct: since(times.answer_direct),
-    sentFiware: since(times.sent_fiware),
-    fiware: since(times.answer_fiware),
+    sentDirect: since(times.sent.direct),
+    direct: since(times.answer.direct),
+    sentFiware: since(times.sent.fiware),
+    fiware: since(times.answer.fiware),
     standing: standstill_ms,
   };
 }

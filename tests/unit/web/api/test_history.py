@@ -138,7 +138,7 @@ async def test_a_detection_reads_as_the_contract_says(
 async def test_a_command_reads_as_the_contract_says(
     client: httpx.AsyncClient, past: Past
 ) -> None:
-    past.holds(command_record(sent_direct_at=NOON + 0.003, tries=1))
+    past.holds(command_record(sent_at={"direct": NOON + 0.003}, tries=1))
 
     [item] = (await client.get("/api/v1/commands")).json()["items"]
 
@@ -152,6 +152,8 @@ async def test_a_command_reads_as_the_contract_says(
         "times": {
             "pressed": None,
             "requested": "2023-11-14T22:13:20.000Z",
+            "sent": {"direct": "2023-11-14T22:13:20.003Z"},
+            "answer": {},
             "sent_fiware": None,
             "sent_direct": "2023-11-14T22:13:20.003Z",
             "answer_fiware": None,

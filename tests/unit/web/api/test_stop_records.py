@@ -26,7 +26,7 @@ def record(number: int, **fields: object) -> CommandRecord:
         "requested_by": "ana",
         "requested_at": T - 100.0 + number,
         "pressed_at": T - 100.0 + number - 0.01 * number,
-        "answer_direct_at": T - 100.0 + number + 0.02,
+        "answer_at": {"direct": T - 100.0 + number + 0.02},
         "standstill_ms": 1000.0 * number,
         "standing_at": T - 100.0 + 2 * number,
     }
