@@ -18,6 +18,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.transports import DIRECT
 
 ROBOTS, HZ, SECONDS, TICKS = 20, 90, 70, 20
 GOAL_SHARE = 0.05
@@ -72,7 +73,7 @@ def _messages(
             origin = Origin("b", seq, "", stamp, now, True, heard)
             told = Odometry(robot_id, origin, Pose2D(0, 0, 0), Twist2D(0, 0))
             at = Instant(now + 0.001 * one, WALL + now + 0.001 * one)
-            out.append((Received(told, at, "mqtt"), Received(told, at.later(0.02))))
+            out.append((Received(told, at, DIRECT.id), Received(told, at.later(0.02))))
     return out
 
 

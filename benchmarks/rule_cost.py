@@ -27,6 +27,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
+from iveg.domain.transports import FIWARE
 
 RATE_HZ = 30
 SECONDS = 8.0
@@ -42,7 +43,7 @@ def story(robots: tuple[str, ...], *, storm: bool) -> Iterator[Received]:
             number, kind = divmod(place, 3)
             origin = Origin("b", tick, "2026-11-20T14:13:07.754Z", WALL + at)
             told = _told(robots[number], number, kind, origin, at, draw, storm)
-            yield Received(told, Instant(at, WALL + at), "fiware")
+            yield Received(told, Instant(at, WALL + at), FIWARE.id)
 
 
 def _told(

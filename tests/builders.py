@@ -20,7 +20,7 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import FIWARE, TransportId
 from iveg.ngsi.codec import format_stamp
 
 AGI = built_in().of_robot("AGI").profile
@@ -145,7 +145,7 @@ def safety_report(
 
 
 def received(
-    observation: Observation, *, after: float = 0.0, transport: TransportId = "fiware"
+    observation: Observation, *, after: float = 0.0, transport: TransportId = FIWARE.id
 ) -> Received:
     """An observation that came ``after`` seconds from the start."""
     return Received(observation, at(after), transport)

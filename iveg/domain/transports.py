@@ -6,8 +6,10 @@ nothing, so that what breaks one leaves the others alone.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NewType
 
-TransportId = str
+TransportId = NewType("TransportId", str)
+"""In JSON, columns, file names and translations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +17,7 @@ class Transport:
     """One way.
 
     Attributes:
-        id: In JSON, columns, file names and translations.
+        id: Its name everywhere.
         can_stop: Whether it carries STOP; ``can_release`` RELEASE and RESUME.
         confirms: Its word that it took a STOP says that it is on its way (PUBACK);
             without, only the robot's answer says anything.
@@ -36,9 +38,9 @@ class Transport:
         return self if on else replace(self, can_stop=False, can_release=False)
 
 
-DIRECT = Transport("direct", confirms=True, alias="mqtt")
+DIRECT = Transport(TransportId("direct"), confirms=True, alias="mqtt")
 """Straight over MQTT; its word is the broker's PUBACK."""
-FIWARE = Transport("fiware", one_at_a_time=True, alias="orion")
+FIWARE = Transport(TransportId("fiware"), one_at_a_time=True, alias="orion")
 """Through Orion and the IoT Agent; a 204 says nothing."""
 
 TRANSPORTS = (DIRECT, FIWARE)

@@ -135,7 +135,7 @@ def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
     reading = codec.read_measure(topic.split("/")[2], payload)
     assert reading.problems == ()  # noqa: S101 - both ends are ours
     for observation in reading.observations:
-        yield Received(observation, now, "direct")
+        yield Received(observation, now, DIRECT.id)
 
 
 class Stage:

@@ -8,6 +8,7 @@ import pytest
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
+from iveg.domain.transports import DIRECT
 from iveg.embedded.http_server import Request, Response, http_server
 from tests.fakes.context_broker import FakeContextBroker
 from tests.unit.pipeline.desk import Desk, settle
@@ -48,7 +49,7 @@ async def test_f7_the_direct_transport_is_as_fast_while_orion_hangs(
 
     command = desk.commander.machine("AGI").stop
     assert command is not None
-    assert desk.now(command).times.sent["direct"] == desk.now(command).times.requested
+    assert desk.now(command).times.sent[DIRECT.id] == desk.now(command).times.requested
     await desk.wait(1.0)
     # At 0, 250, 500 and 1000 ms, whatever Orion does.
     assert len(desk.fleet.stops) == 4

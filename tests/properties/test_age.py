@@ -24,7 +24,7 @@ from iveg.domain.observations import Instant, Odometry, Origin, Received
 from iveg.domain.probe import ProbeLag
 from iveg.domain.rule.speed_limits import SpeedLimits
 from iveg.domain.tracking.people import People
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.domain.world import World
 from iveg.robot.echo import Echo
 from tests.builders import START, odometry, origin
@@ -90,7 +90,7 @@ class Parcel:
     """What is under way: odometry, or the count of a feedback or a probe."""
 
     content: Odometry | Origin
-    transport: TransportId = "fiware"
+    transport: TransportId = FIWARE.id
     is_probe: bool = False
 
 
@@ -103,7 +103,7 @@ class Rig:
     """
 
     acknowledgements: bool = True
-    transports: tuple[TransportId, ...] = ("direct", "fiware")
+    transports: tuple[TransportId, ...] = (DIRECT.id, FIWARE.id)
     now: float = 0.0
     robot_clock: float = 0.0
     our_clock: float = 0.0
@@ -271,7 +271,7 @@ def backlog(seconds: float, grows_s: float, most_s: float) -> Iterator[float]:
 def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_pose(
     grows_s: float, steps: list[float], seed: int
 ) -> None:
-    rig = Rig(acknowledgements=False, transports=("fiware",))
+    rig = Rig(acknowledgements=False, transports=(FIWARE.id,))
     rnd = Random(seed)  # noqa: S311 - repeatable on purpose
     for number, late in enumerate(backlog(40, grows_s, 25.0)):
         step = steps[number // 15] if number % 15 == 14 else 0.0
@@ -283,7 +283,7 @@ def test_on_fiware_alone_a_robot_that_does_not_echo_is_never_live_with_an_old_po
 
 
 def test_a_healthy_robot_that_does_not_echo_is_live_by_its_estimate() -> None:
-    rig, rnd = Rig(acknowledgements=False, transports=("fiware",)), Random(1)  # noqa: S311
+    rig, rnd = Rig(acknowledgements=False, transports=(FIWARE.id,)), Random(1)  # noqa: S311
     links = [rig.robot.link(rig.at()) for _ in rig.drive(quiet(5), rnd)]
 
     assert set(links[20:]) == {"LIVE"}

@@ -10,14 +10,14 @@ import pytest
 
 from iveg.domain.observations import SafetyReport
 from iveg.domain.stop import SendStop, StopMachine
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.ngsi import codec
 from iveg.robot.effects import Effect, Report
 from tests.builders import at
 from tests.unit.robot.rig import STEP_S, Rig
 
-JITTER_S: dict[TransportId, float] = {"direct": 0.06, "fiware": 0.25}
-BASE_S: dict[TransportId, float] = {"direct": 0.005, "fiware": 0.02}
+JITTER_S: dict[TransportId, float] = {DIRECT.id: 0.06, FIWARE.id: 0.25}
+BASE_S: dict[TransportId, float] = {DIRECT.id: 0.005, FIWARE.id: 0.02}
 
 
 class Greenhouse:
@@ -25,7 +25,7 @@ class Greenhouse:
 
     def __init__(self, scope: str, seed: int) -> None:
         self.transports: tuple[TransportId, ...] = (
-            ("fiware",) if scope == "off" else ("direct", "fiware")
+            (FIWARE.id,) if scope == "off" else (DIRECT.id, FIWARE.id)
         )
         self.chance = Random(seed)  # noqa: S311 - a delay, no secret
         self.iveg = StopMachine("AGI")

@@ -282,7 +282,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         self._drive()
         for up in UP:
             for word in self.transports[up].arrived():
-                self.hear(word, up.removeprefix("from_"))
+                self.hear(word, TransportId(up.removeprefix("from_")))
         self.perform(self.iveg.tick(self.at(), self.new_id()))
 
     def _drive(self) -> None:

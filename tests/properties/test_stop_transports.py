@@ -16,6 +16,7 @@ import pytest
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import CommandAnswer
 from iveg.domain.stop import Changed, Effect, SendStop
+from iveg.domain.transports import FIWARE
 from tests.properties.test_stop import DOWN, SORTS, TICK_S, Channel
 from tests.properties.test_stop_kills import Watched
 
@@ -238,7 +239,7 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next(seed: int) 
     rig.somebody_releases()
     second = rig.iveg.once
     for refusal in early:
-        rig.hear(refusal, "fiware")
+        rig.hear(refusal, FIWARE.id)
     assert rig.iveg.once == second is not None
     rig.run_for(1.0)
 

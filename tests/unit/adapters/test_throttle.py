@@ -12,6 +12,7 @@ from iveg.adapters.throttle import Throttle
 from iveg.domain.errors import HopError
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import LaserScan, Odometry
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.embedded.server import embedded_fiware
 from tests.fakes.clock import FakeClock
 from tests.unit.adapters.test_subscriptions import FakeStore
@@ -69,8 +70,8 @@ class Bench:
                 for kind in (Odometry, LaserScan):
                     feed = self.feeds.of(robot_id, kind)
                     if robot_id in direct:
-                        feed.heard("direct", now, news=True)
-                    feed.heard("fiware", now, news=robot_id not in direct)
+                        feed.heard(DIRECT.id, now, news=True)
+                    feed.heard(FIWARE.id, now, news=robot_id not in direct)
 
     def throttled(self) -> set[str]:
         return {

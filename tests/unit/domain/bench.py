@@ -47,7 +47,7 @@ class Bench:
         return self.keep(self.machine.press(by, at(self.now), self.new_id()))
 
     def sent(
-        self, transport: TransportId = "direct", *, ok: bool = True
+        self, transport: TransportId = DIRECT.id, *, ok: bool = True
     ) -> list[Effect]:
         assert self.machine.stop is not None
         command_id = self.machine.stop.command_id
@@ -60,7 +60,7 @@ class Bench:
         angular: float = 0.0,
         factor: float = 0.0,
         released: tuple[str, ...] = (),
-        transport: TransportId = "direct",
+        transport: TransportId = DIRECT.id,
         challenge: str = CHALLENGE,
         sparse: bool = False,
     ) -> list[Effect]:
@@ -88,7 +88,7 @@ class Bench:
         why: str | None = None,
         seq: int | None = None,
         attempt: str | None = None,
-        transport: TransportId = "direct",
+        transport: TransportId = DIRECT.id,
     ) -> list[Effect]:
         number = next(self._answers) if seq is None else seq
         named = self.machine.hold_id if id is None else id
@@ -184,7 +184,7 @@ def _pressed() -> Bench:
 
 def _sent() -> Bench:
     bench = _pressed()
-    bench.sent("direct")
+    bench.sent(DIRECT.id)
     return bench
 
 

@@ -12,7 +12,7 @@ from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import FeedbackRef, Observation, Origin, Received
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import START, at, detection_frame, odometry, scan
 
 Delay = Callable[[], float]
@@ -116,10 +116,10 @@ class Chain:
         broker = self.now + self.up()
         if self.direct:
             read = broker + self.reading()
-            self._later(read, lambda: self._arrive(told, read, "direct", data))
+            self._later(read, lambda: self._arrive(told, read, DIRECT.id, data))
         if not self.lost_agent(seq):
             orion = broker + self.agent()
-            self._later(orion, lambda: self._arrive(told, orion, "fiware", data))
+            self._later(orion, lambda: self._arrive(told, orion, FIWARE.id, data))
 
     def _arrive(
         self, told: Observation, when: float, transport: TransportId, data: Data

@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.clocks import RobotClock
 from iveg.domain.observations import Instant, Odometry, Origin, SafetyReport
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import START, at, origin
 
 HOUR_S = 3600.0
@@ -25,7 +25,7 @@ class Robot:
         self,
         sent: float,
         delay: float = 0.0,
-        transport: TransportId = "direct",
+        transport: TransportId = DIRECT.id,
         *,
         lag: float | None = 0.0,
         kind: type = Odometry,
@@ -60,7 +60,7 @@ def test_a_slow_transport_is_never_taken_for_a_clock(delay: float) -> None:
     robot.send_many(0.0, 20, 0.001)
 
     found = [
-        robot.send(2.0 + 0.1 * n - delay, delay, "fiware", lag=None) for n in range(20)
+        robot.send(2.0 + 0.1 * n - delay, delay, FIWARE.id, lag=None) for n in range(20)
     ]
 
     assert found == [pytest.approx(delay - 0.001, abs=1e-6)] * 20
@@ -70,20 +70,20 @@ def test_a_slow_transport_is_never_taken_for_a_clock(delay: float) -> None:
 def test_fiware_alone_is_never_younger_than_the_lag_of_our_probe() -> None:
     robot = Robot()
 
-    found = [robot.send(0.1 * n, 25.0, "fiware", lag=24.5) for n in range(20)]
+    found = [robot.send(0.1 * n, 25.0, FIWARE.id, lag=24.5) for n in range(20)]
 
     assert found == [24.5] * 20
 
 
 def test_fiware_alone_is_unknown_until_a_probe_came_back() -> None:
-    assert Robot().send(0.0, 25.0, "fiware", lag=None) is None
+    assert Robot().send(0.0, 25.0, FIWARE.id, lag=None) is None
 
 
 def test_direct_messages_of_long_ago_do_not_date_what_fiware_brings() -> None:
     robot = Robot()
     robot.send(0.0, 0.001)
 
-    assert robot.send(50.0, 9.0, "fiware", lag=8.0) == 8.0
+    assert robot.send(50.0, 9.0, FIWARE.id, lag=8.0) == 8.0
 
 
 def test_the_fastest_message_of_more_than_a_minute_ago_is_forgotten() -> None:
@@ -162,7 +162,7 @@ def test_our_own_wall_clock_ages_nothing_when_it_is_set() -> None:
     jumped = Instant(moment.mono, moment.wall + HOUR_S)
     one = origin(99, after=2.0)
 
-    found = robot.estimate.delay(Odometry, one, jumped, "direct", 0.0)
+    found = robot.estimate.delay(Odometry, one, jumped, DIRECT.id, 0.0)
     assert found == pytest.approx(0.0, abs=1e-6)
     assert robot.estimate.offset_s(jumped) == pytest.approx(HOUR_S)
 
@@ -174,14 +174,14 @@ def test_the_offset_is_the_least_of_a_minute_of_direct_messages() -> None:
     robot = Robot()
     for number, delay in enumerate((0.30, 0.02, 0.25, 0.40)):
         robot.send(float(number), delay)
-        robot.send(float(number), 7.0, "fiware")
+        robot.send(float(number), 7.0, FIWARE.id)
 
     assert robot.offset(4.0) == pytest.approx(0.02)
 
 
 def test_fiware_tells_no_offset() -> None:
     robot = Robot(ahead_s=-9.0)
-    robot.send(0.0, 1.0, "fiware")
+    robot.send(0.0, 1.0, FIWARE.id)
 
     assert robot.offset(1.0) is None
 

@@ -11,6 +11,7 @@ from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.person import Sighting
+from iveg.domain.transports import DIRECT
 from iveg.domain.world import RobotState, World
 from tests.builders import (
     START,
@@ -222,7 +223,7 @@ def test_a_lost_robot_is_graver_when_it_was_moving(
 @pytest.mark.parametrize(("offset", "told"), [(0.24, False), (0.3, True), (-0.3, True)])
 def test_a_clock_a_quarter_second_off_is_told(offset: float, told: bool) -> None:
     world = World(["AGI"])
-    world.apply(received(odometry(origin=origin(1, after=offset)), transport="direct"))
+    world.apply(received(odometry(origin=origin(1, after=offset)), transport=DIRECT.id))
 
     found = robot_keys(world.robot("AGI"), 0.1)
 
@@ -237,7 +238,7 @@ def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
     world.ledger.composed("iveg", 1, 1, at(composed).mono)
     heard = FeedbackRef("iveg", 1)
     late = replace(origin(1, after=-10.0), acknowledgements=True, heard=heard)
-    world.apply(received(odometry(origin=late), transport="direct"))
+    world.apply(received(odometry(origin=late), transport=DIRECT.id))
 
     found = robot_keys(world.robot("AGI"), 0.1)
 

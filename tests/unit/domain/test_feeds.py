@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.feeds import Feed
 from iveg.domain.observations import LaserScan, Odometry, Origin
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.domain.world import World
 from tests.builders import START, at, odometry, origin, received
 
@@ -33,9 +33,9 @@ class Bench:
         for _ in range(round(seconds * HZ)):
             self.now = round(self.now + 1 / HZ, 6)
             if direct:
-                self.feed.heard("direct", self.now, news=not fiware_leads)
+                self.feed.heard(DIRECT.id, self.now, news=not fiware_leads)
             if fiware:
-                self.feed.heard("fiware", self.now, news=fiware_leads or not direct)
+                self.feed.heard(FIWARE.id, self.now, news=fiware_leads or not direct)
             judged = self.feed.judge(self.now, connected=connected)
             if judged != self.switches[-1][1]:
                 self.switches.append((self.now, judged))
@@ -134,11 +134,11 @@ def heard(
 def test_the_newest_by_count_wins_whatever_brought_it() -> None:
     world = World(["AGI"])
     verdicts = [
-        heard(world, "direct", 2, 0.1, x=2.0),
-        heard(world, "fiware", 1, 0.2, x=1.0),
-        heard(world, "fiware", 2, 0.3, x=2.0),
-        heard(world, "fiware", 3, 0.4, x=3.0),
-        heard(world, "direct", 3, 0.5, x=3.0),
+        heard(world, DIRECT.id, 2, 0.1, x=2.0),
+        heard(world, FIWARE.id, 1, 0.2, x=1.0),
+        heard(world, FIWARE.id, 2, 0.3, x=2.0),
+        heard(world, FIWARE.id, 3, 0.4, x=3.0),
+        heard(world, DIRECT.id, 3, 0.5, x=3.0),
     ]
     assert verdicts == ["new", "late", "duplicate", "new", "duplicate"]
     pose = world.robot("AGI").odometry
@@ -158,23 +158,23 @@ def test_a_direct_twin_of_the_newest_is_not_behind() -> None:
 def test_a_robot_without_a_count_is_read_directly_while_that_works() -> None:
     world = World(["AGI"])
     blank = odometry(origin=Origin())
-    assert world.apply(received(blank, after=0.0, transport="direct")) == "new"
-    assert world.apply(received(blank, after=0.9, transport="fiware")) == "duplicate"
-    assert world.apply(received(blank, after=1.1, transport="fiware")) == "new"
+    assert world.apply(received(blank, after=0.0, transport=DIRECT.id)) == "new"
+    assert world.apply(received(blank, after=0.9, transport=FIWARE.id)) == "duplicate"
+    assert world.apply(received(blank, after=1.1, transport=FIWARE.id)) == "new"
 
 
 def test_a_throttled_copy_is_never_live_by_itself() -> None:
     world = World(["AGI"])
-    copy = replace(received(odometry(), transport="fiware"), thinned=True)
+    copy = replace(received(odometry(), transport=FIWARE.id), thinned=True)
     assert world.apply(copy) == "new"
     assert world.robot("AGI").link(START) == "LATE"
 
 
 def test_a_throttled_copy_makes_no_pose_older() -> None:
     world = World(["AGI"])
-    heard(world, "direct", 1, 0.0)
+    heard(world, DIRECT.id, 1, 0.0)
     copy = received(
-        odometry(origin=origin(2, after=0.1)), after=0.1, transport="fiware"
+        odometry(origin=origin(2, after=0.1)), after=0.1, transport=FIWARE.id
     )
     world.apply(replace(copy, thinned=True))
     assert world.robot("AGI").link(at(0.9)) == "LIVE"
@@ -182,12 +182,12 @@ def test_a_throttled_copy_makes_no_pose_older() -> None:
 
 def test_scans_and_poses_have_feeds_of_their_own() -> None:
     world = World(["AGI"])
-    heard(world, "direct", 1, 0.0)
+    heard(world, DIRECT.id, 1, 0.0)
     assert world.feeds.of("AGI", Odometry).transport(START.mono) == "direct"
     assert world.feeds.of("AGI", LaserScan).transport(START.mono) == "fiware"
 
 
 def test_what_was_asked_of_orion_feeds_nobody() -> None:
     world = World(["AGI"])
-    world.apply(replace(received(odometry(), transport="fiware"), asked=True))
+    world.apply(replace(received(odometry(), transport=FIWARE.id), asked=True))
     assert world.feeds.of("AGI").fiware_at == float("-inf")

@@ -7,6 +7,7 @@ import pytest
 from iveg.domain.latency.hops import DATA, HOPS, Hop
 from iveg.domain.latency.sketch import sketch_of
 from iveg.domain.observations import Origin
+from iveg.domain.transports import DIRECT, FIWARE
 from tests.unit.domain.chain import Chain, jittered, still
 
 CALM: dict[Hop, float] = {
@@ -159,8 +160,8 @@ def test_a_message_that_comes_twice_counts_once() -> None:
     chain.run(5.0)
     before = chain.took("uplink").count
 
-    chain.watch.arrived(chain.last("direct"))
-    chain.watch.arrived(chain.last("fiware"))
+    chain.watch.arrived(chain.last(DIRECT.id))
+    chain.watch.arrived(chain.last(FIWARE.id))
 
     assert chain.took("uplink").count == before
     assert chain.stream("lidar").up.repeated == 1

@@ -5,7 +5,7 @@ from typing import get_args
 import pytest
 
 from iveg.domain.stop import STEPS, Changed, Key, OffTable, SendStop, State, StopMachine
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import at
 from tests.unit.domain.bench import (
     RED_BUTTON,
@@ -59,19 +59,19 @@ def test_a_transport_that_failed_does_not_make_it_sent() -> None:
     bench = Bench()
     bench.press()
 
-    bench.sent("direct", ok=False)
+    bench.sent(DIRECT.id, ok=False)
 
     assert bench.state == "REQUESTED"
     assert bench.machine.stop is not None
-    assert bench.machine.stop.transports["direct"] == "failed"
+    assert bench.machine.stop.transports[DIRECT.id] == "failed"
 
 
 def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
     bench = Bench()
     bench.press()
 
-    bench.sent("direct")
-    bench.sent("fiware")
+    bench.sent(DIRECT.id)
+    bench.sent(FIWARE.id)
 
     assert bench.machine.stop is not None
     assert bench.machine.stop.transports == {"direct": "ok", "fiware": "pending"}
@@ -80,12 +80,12 @@ def test_orions_204_is_no_evidence_and_the_brokers_word_is_little() -> None:
 def test_the_robots_answer_through_orion_is_evidence_that_204_does_not_undo() -> None:
     bench = Bench()
     bench.press()
-    bench.answer(transport="fiware")
+    bench.answer(transport=FIWARE.id)
 
-    bench.sent("fiware")
+    bench.sent(FIWARE.id)
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.transports["fiware"] == "ok"
+    assert bench.machine.stop.transports[FIWARE.id] == "ok"
 
 
 def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None:
@@ -94,24 +94,24 @@ def test_a_204_while_the_agent_is_known_to_be_cut_off_is_not_even_sent() -> None
     stop = bench.machine.stop
     assert stop is not None
 
-    bench.machine.sent("fiware", stop.command_id, at(0.1), ok=True, doubtful=True)
+    bench.machine.sent(FIWARE.id, stop.command_id, at(0.1), ok=True, doubtful=True)
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.transports["fiware"] == "unknown"
+    assert bench.machine.stop.transports[FIWARE.id] == "unknown"
     assert bench.state == "REQUESTED"
 
 
 def test_the_first_time_of_each_transport_is_kept() -> None:
     bench = Bench()
     bench.press()
-    bench.sent("direct")
+    bench.sent(DIRECT.id)
     bench.now = 0.4
-    bench.sent("direct")
-    bench.sent("fiware")
+    bench.sent(DIRECT.id)
+    bench.sent(FIWARE.id)
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.times.sent["direct"] == at(0.0)
-    assert bench.machine.stop.times.sent["fiware"] == at(0.4)
+    assert bench.machine.stop.times.sent[DIRECT.id] == at(0.0)
+    assert bench.machine.stop.times.sent[FIWARE.id] == at(0.4)
 
 
 def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> None:
@@ -129,7 +129,7 @@ def test_direct_sends_come_at_0_250_500_1000_ms_and_then_every_half_second() -> 
 def test_a_robot_that_has_the_stop_is_sent_it_once_a_second_until_it_stands() -> None:
     bench = Bench()
     bench.press()
-    bench.sent("fiware")
+    bench.sent(FIWARE.id)
     bench.now = 0.05
     bench.report(bench.ours, linear=0.8)
     times = []
@@ -145,7 +145,7 @@ def test_a_robot_that_has_the_stop_is_sent_it_once_a_second_until_it_stands() ->
 def test_without_the_direct_transport_a_robot_that_has_it_is_still_sent_it() -> None:
     bench = Bench(direct=False)
     bench.press()
-    bench.sent("fiware")
+    bench.sent(FIWARE.id)
     bench.report(bench.ours, linear=0.8)
 
     assert [one.transport for one in sends(bench.wait(2.05))] == ["fiware"]
@@ -179,7 +179,7 @@ def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -
     bench = Bench()
     bench.press()
     bench.wait(0.1)
-    bench.sent("fiware", ok=False)
+    bench.sent(FIWARE.id, ok=False)
 
     early, later = bench.wait(1.9), bench.wait(0.15)
 
@@ -190,7 +190,7 @@ def test_the_next_fiware_request_leaves_two_seconds_after_the_last_came_back() -
 def test_without_the_direct_transport_the_other_repeats_every_two_seconds() -> None:
     bench = Bench(direct=False)
     bench.press()
-    bench.sent("fiware")
+    bench.sent(FIWARE.id)
 
     assert len(sends(bench.wait(2.0))) == 1
 
@@ -202,7 +202,7 @@ def test_the_result_of_an_earlier_episode_counts_for_nothing() -> None:
     bench.stand()
     bench.report()  # the hold is lost: a new episode
 
-    effects = bench.machine.sent("fiware", earlier, at(bench.now), ok=True)
+    effects = bench.machine.sent(FIWARE.id, earlier, at(bench.now), ok=True)
 
     assert effects == []
     assert bench.state == "REQUESTED"
@@ -255,11 +255,11 @@ def test_the_times_of_both_answers_are_kept() -> None:
     bench.now = 0.02
     bench.answer(seq=1)
     bench.now = 0.08
-    bench.answer(seq=1, transport="fiware")
+    bench.answer(seq=1, transport=FIWARE.id)
 
     assert bench.machine.stop is not None
-    assert bench.machine.stop.times.answered["direct"] == at(0.02)
-    assert bench.machine.stop.times.answered["fiware"] == at(0.08)
+    assert bench.machine.stop.times.answered[DIRECT.id] == at(0.02)
+    assert bench.machine.stop.times.answered[FIWARE.id] == at(0.08)
 
 
 @pytest.mark.parametrize("first", ["REQUESTED", "SENT"])
@@ -267,7 +267,7 @@ def test_no_word_of_the_robot_for_a_second_means_unconfirmed(first: str) -> None
     bench = Bench()
     bench.press()
     for _ in range(first == "SENT"):
-        bench.sent("direct")
+        bench.sent(DIRECT.id)
     assert bench.state == first
 
     bench.wait(0.95)
@@ -473,8 +473,8 @@ def test_an_answer_or_a_status_alone_never_means_standing() -> None:
     bench.press()
     for _ in range(100):
         bench.answer()
-        bench.sent("direct")
-        bench.sent("fiware")
+        bench.sent(DIRECT.id)
+        bench.sent(FIWARE.id)
         bench.wait(0.05)
 
     assert bench.state == "STILL_MOVING"
@@ -497,14 +497,14 @@ def test_a_standing_robot_is_reminded_every_five_seconds() -> None:
 def test_without_the_direct_transport_it_is_reminded_on_the_other() -> None:
     bench = Bench(direct=False)
     bench.press()
-    bench.sent("fiware")
+    bench.sent(FIWARE.id)
     bench.stand()
     reminders = []
     for _ in range(200):
         bench.report(bench.ours)
         done = bench.wait(0.1)
         for _ in sends(done):
-            bench.sent("fiware")
+            bench.sent(FIWARE.id)
         reminders += done
 
     assert len(sends(reminders)) in (3, 4)

@@ -5,6 +5,7 @@ import pytest
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold
 from iveg.domain.stop import Changed, Closed, Effect
+from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import at, safety_report
 from tests.unit.domain.bench import (
     BOOT_HOLD,
@@ -110,7 +111,7 @@ def test_i2_a_release_needs_a_challenge() -> None:
     bench = Bench()
     report = safety_report("AGI", BOOT_HOLD, challenge="")
     silent = type(report)("AGI", report.origin, 0.0, "hold", holds=(BOOT_HOLD,))
-    bench.machine.reported(silent, at(0.0), "direct", "unused")
+    bench.machine.reported(silent, at(0.0), DIRECT.id, "unused")
 
     with pytest.raises(CommandRefusedError, match="no challenge"):
         bench.release(BOOT_HOLD.id)
@@ -162,7 +163,7 @@ def test_the_answer_released_is_noted_and_decides_nothing() -> None:
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answered["direct"] == at(bench.now)
+    assert bench.machine.once.times.answered[DIRECT.id] == at(bench.now)
 
 
 def test_a_refused_release_leaves_the_robot_standing_and_says_why() -> None:
@@ -204,13 +205,13 @@ def test_the_late_refusal_of_one_attempt_changes_nothing_of_the_next() -> None:
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
     bench.release(bench.ours.id)
 
-    for transport in ("direct", "fiware"):
+    for transport in (DIRECT.id, FIWARE.id):
         bench.answer("REFUSED", why="challenge", attempt=first, transport=transport)
     bench.report(bench.ours, challenge="another")
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answered.get("direct") is None
+    assert bench.machine.once.times.answered.get(DIRECT.id) is None
 
 
 def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> None:
@@ -219,7 +220,7 @@ def test_the_copy_of_a_refusal_without_an_attempt_does_not_refuse_the_next() -> 
     bench.report(bench.ours, challenge=NEXT_CHALLENGE)
     bench.release(bench.ours.id)
 
-    bench.answer("REFUSED", why="challenge", seq=9, transport="fiware")
+    bench.answer("REFUSED", why="challenge", seq=9, transport=FIWARE.id)
     bench.report(bench.ours, challenge="another")
 
     assert bench.state == "RELEASING"
@@ -239,7 +240,7 @@ def test_an_answer_without_an_attempt_is_matched_by_what_it_names(
 
     assert bench.state == "RELEASING"
     assert bench.machine.once is not None
-    assert bench.machine.once.times.answered.get("direct") is None
+    assert bench.machine.once.times.answered.get(DIRECT.id) is None
 
 
 def test_an_unconfirmed_release_keeps_the_hold_that_a_later_report_shows() -> None:
@@ -415,7 +416,7 @@ def test_the_result_of_a_release_is_not_taken_for_that_of_a_stop() -> None:
     release_id = bench.machine.once.command_id
     bench.press("ben")
 
-    bench.machine.sent("fiware", release_id, at(bench.now), ok=True)
+    bench.machine.sent(FIWARE.id, release_id, at(bench.now), ok=True)
 
     assert bench.state == "REQUESTED"
 
@@ -426,11 +427,11 @@ def test_the_late_result_of_a_stop_is_not_taken_for_that_of_a_release() -> None:
     bench.stand()
     bench.release(bench.ours.id)
 
-    bench.sent("direct")
+    bench.sent(DIRECT.id)
 
     assert bench.machine.once is not None
-    assert bench.machine.once.times.sent.get("direct") is None
-    assert bench.machine.once.transports["direct"] == "pending"
+    assert bench.machine.once.times.sent.get(DIRECT.id) is None
+    assert bench.machine.once.transports[DIRECT.id] == "pending"
 
 
 def test_a_held_robot_that_iveg_did_not_stop_can_be_released() -> None:

@@ -22,6 +22,7 @@ from iveg.domain.observations import (
 from iveg.domain.probe import ProbeLag
 from iveg.domain.rule.zones import zones_of
 from iveg.domain.tracking.people import People
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.domain.world import RobotState, World
 from tests.builders import (
     START,
@@ -317,9 +318,9 @@ def test_an_older_message_changes_nothing_but_the_count() -> None:
 
 def test_the_same_message_by_the_other_transport_changes_only_the_count() -> None:
     world = World(["AGI"])
-    world.apply(received(safety_report("AGI", hold()), transport="direct"))
+    world.apply(received(safety_report("AGI", hold()), transport=DIRECT.id))
 
-    world.apply(received(safety_report("AGI"), after=1.0, transport="fiware"))
+    world.apply(received(safety_report("AGI"), after=1.0, transport=FIWARE.id))
 
     robot = world.robot("AGI")
     assert robot.safety is not None

@@ -18,6 +18,7 @@ from iveg.domain.observations import (
     Overtaken,
     Received,
 )
+from iveg.domain.transports import FIWARE
 from iveg.domain.world import World
 from iveg.ngsi import codec
 from tests.builders import START, detection_frame, notification, odometry, scan
@@ -111,7 +112,7 @@ class Listener:
         reading = codec.read_measure(device, payload, self._is_past)
         for one in reading.observations:
             self.skipped += isinstance(one, Overtaken)
-            self._waiting.append(Received(one, at, "fiware"))
+            self._waiting.append(Received(one, at, FIWARE.id))
 
     def catch_up(self) -> None:
         for received in self._waiting:

@@ -95,7 +95,7 @@ class Desk:
     def hear(
         self,
         observation: Observation,
-        transport: TransportId = "direct",
+        transport: TransportId = DIRECT.id,
         *,
         asked: bool = False,
     ) -> None:

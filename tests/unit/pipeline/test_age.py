@@ -13,6 +13,7 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
+from iveg.domain.transports import FIWARE
 from tests.builders import (
     detection,
     detection_frame,
@@ -65,7 +66,7 @@ class Robot:
     def thaw(self) -> None:
         """What Orion has kept arrives."""
         for one in self._kept:
-            self.desk.hear(one, "orion")
+            self.desk.hear(one, FIWARE.id)
         self._kept.clear()
 
     async def live_for(self, seconds: float) -> None:
@@ -218,7 +219,7 @@ async def test_a_robot_that_stands_and_whose_odometry_is_late_did_not_move() -> 
     robot = await standing()
     robot.frozen = True
     await robot.live_for(0.5)
-    robot.desk.hear(odometry(linear=0.0, origin=robot._origin("odom")), "orion")
+    robot.desk.hear(odometry(linear=0.0, origin=robot._origin("odom")), FIWARE.id)
     robot.desk.world.robot("AGI").odometry = odometry(linear=0.5)
 
     await robot.live_for(4.0)
@@ -235,7 +236,7 @@ async def test_a_slow_agent_beside_fast_direct_messages_warns_of_no_clock() -> N
         late.append((desk.clock.now + 0.05 * number, one))
         desk.hear(safety_report(origin=one.origin))
         while late and late[0][0] <= desk.clock.now:
-            desk.hear(late.pop(0)[1], "orion")
+            desk.hear(late.pop(0)[1], FIWARE.id)
         await desk.wait(0.05)
 
     raised = [one.condition.key for one in desk.evaluator.alerts.waiting]
@@ -273,7 +274,7 @@ async def test_what_the_agent_brings_late_shows_no_ghosts(late_s: float) -> None
         desk.hear(look)
         late.append((desk.clock.now + late_s, look))
         while late and late[0][0] <= desk.clock.now:
-            desk.hear(late.pop(0)[1], "orion")
+            desk.hear(late.pop(0)[1], FIWARE.id)
         await desk.wait(0.1)
 
     assert len(desk.evaluator.people.known) == 1

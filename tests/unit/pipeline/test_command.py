@@ -8,6 +8,7 @@ from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
 from iveg.domain.stop import STEPS, Command, StopMachine, Wanted
+from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import safety_report
 from tests.fakes.records import command_record
 from tests.unit.pipeline.desk import Desk, conditions_of, settle
@@ -339,7 +340,7 @@ async def test_a_transport_that_hangs_does_not_hold_up_a_release_on_the_other() 
     await settle()
 
     assert len(desk.fleet.asked) == 1
-    assert desk.now(once).times.sent.get("direct") is not None
+    assert desk.now(once).times.sent.get(DIRECT.id) is not None
     assert desk.now(once).transports == {"direct": "pending", "fiware": "pending"}
     await desk.commander.close()
 
@@ -354,7 +355,7 @@ async def test_13_7_an_order_was_sent_when_it_left_not_when_orion_says_so() -> N
     desk.broker.opened.set()
     await settle()
 
-    assert desk.now(command).times.sent["fiware"] == left
+    assert desk.now(command).times.sent[FIWARE.id] == left
     await desk.commander.close()
 
 

@@ -12,6 +12,7 @@ from iveg.domain.records import (
     DetectionRecord,
     OdometryRecord,
 )
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.models.decision import Decision
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.fakes.records import alert_record
@@ -497,8 +498,8 @@ def test_poses_are_written_down_twice_a_second() -> None:
 def test_the_same_look_on_the_other_transport_is_one_sighting() -> None:
     desk = watched(Desk())
     frame = detection_frame("AGII", detection("farmer", 9.0), origin=desk.next_origin())
-    desk.hear(frame, "mqtt")
-    desk.hear(frame, "orion")
+    desk.hear(frame, DIRECT.id)
+    desk.hear(frame, FIWARE.id)
 
     assert desk.world.counters["DetectionFrame.duplicate"] == 1
     assert len(desk.records(DetectionRecord)) == 1

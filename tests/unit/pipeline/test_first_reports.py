@@ -4,6 +4,7 @@ import pytest
 
 from iveg.domain.acknowledgements import Acknowledgements, acknowledgements_of
 from iveg.domain.observations import Observation, Received
+from iveg.domain.transports import DIRECT
 from tests.builders import detection, detection_frame, odometry, origin, safety_report
 from tests.unit.pipeline.desk import Desk
 
@@ -14,7 +15,7 @@ class LateDesk(Desk):
     """Messages of the robots arrive ``DELAY_S`` after they were stamped."""
 
     def arrive(self, observation: Observation) -> None:
-        self.loop.step([Received(observation, self.clock(), "direct")], self.clock())
+        self.loop.step([Received(observation, self.clock(), DIRECT.id)], self.clock())
 
     def told(self) -> Acknowledgements:
         return acknowledgements_of(self.evaluator.live_decisions(), self.clock())

@@ -12,6 +12,7 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
+from iveg.domain.transports import DIRECT
 from iveg.pipeline.ingest import MAX_QUEUED, Ingest
 from tests.builders import (
     detection_frame,
@@ -86,7 +87,7 @@ def test_a_queue_of_nothing_but_safety_grows_rather_than_losing_one() -> None:
 def test_what_comes_is_counted_by_transport_and_kind() -> None:
     queue = ingest()
     queue.offer(received(odometry()))
-    queue.offer(received(safety_report(), transport="direct"))
+    queue.offer(received(safety_report(), transport=DIRECT.id))
 
     assert queue.counters["orion.Odometry"] == 1
     assert queue.counters["mqtt.SafetyReport"] == 1

@@ -8,7 +8,7 @@ from iveg.domain.latency.hops import Hop
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.observations import Received
 from iveg.domain.records import LatencyRecord
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.pipeline.latency import hours_of
 from iveg.web.pages.translations import read_translations
 from tests.builders import odometry
@@ -32,7 +32,7 @@ def took(desk: Desk, hop: Hop) -> Sketch:
 def test_both_copies_of_a_message_are_timed_and_it_is_decided_on_once() -> None:
     desk = Desk()
 
-    say(desk, "direct", "fiware", after_s=0.120)
+    say(desk, DIRECT.id, FIWARE.id, after_s=0.120)
 
     assert took(desk, "fiware").mean == pytest.approx(0.120)
     assert took(desk, "robot_orion").mean == pytest.approx(0.120)
@@ -43,7 +43,7 @@ def test_what_waits_for_the_loop_is_part_of_the_third_hop() -> None:
     desk = Desk()
     told = odometry("AGI", origin=desk.next_origin())
 
-    desk.ingest.offer(Received(told, desk.clock(), "direct"))
+    desk.ingest.offer(Received(told, desk.clock(), DIRECT.id))
     desk.clock.now += 0.3
     desk.loop.step(desk.ingest.drain(), desk.clock())
 
@@ -54,7 +54,7 @@ def test_an_answer_to_a_question_is_no_message() -> None:
     desk = Desk()
 
     told = odometry("AGI", origin=desk.next_origin())
-    desk.ingest.offer(Received(told, desk.clock(), "fiware", asked=True))
+    desk.ingest.offer(Received(told, desk.clock(), FIWARE.id, asked=True))
 
     assert took(desk, "robot_orion").count == 0
 
@@ -62,7 +62,7 @@ def test_an_answer_to_a_question_is_no_message() -> None:
 async def test_a_minute_goes_to_the_history_and_comes_back_from_it() -> None:
     desk = Desk()
     for _ in range(8):
-        say(desk, "direct", "fiware", after_s=0.020)
+        say(desk, DIRECT.id, FIWARE.id, after_s=0.020)
         await desk.wait(10.0)
 
     kept = desk.records(LatencyRecord)
@@ -92,9 +92,9 @@ def test_rows_of_a_later_version_and_broken_ones_are_left_alone() -> None:
 
 async def test_an_agent_that_is_behind_is_told_in_the_log_once() -> None:
     desk = Desk()
-    say(desk, "direct", "fiware")
+    say(desk, DIRECT.id, FIWARE.id)
     for _ in range(40):
-        say(desk, "direct")
+        say(desk, DIRECT.id)
         await desk.wait(0.1)
 
     assert desk.sentences().count("log.behind.fiware") == 1

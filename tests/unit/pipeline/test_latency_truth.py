@@ -14,7 +14,7 @@ import pytest
 from iveg.domain.latency.hops import Hop
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.observations import Instant, Received
-from iveg.domain.transports import TransportId
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.emulator.radio import LinkFaults, Packet, Radio
 from iveg.ngsi import codec
 from tests.builders import START
@@ -61,8 +61,8 @@ class Air(Stage):
         if device == "AGI_odom":
             self.put_in.append(due - now)
         transports: tuple[tuple[TransportId, float], ...] = (
-            ("direct", due),
-            ("fiware", due + self.agent_s),
+            (DIRECT.id, due),
+            (FIWARE.id, due + self.agent_s),
         )
         for transport, when in transports:
             number = next(self._numbers)

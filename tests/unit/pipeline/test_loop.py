@@ -3,6 +3,7 @@
 import asyncio
 
 from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Origin, Received
+from iveg.domain.transports import DIRECT, FIWARE
 from iveg.pipeline.publish import MAX_PENDING
 from tests.builders import detection, detection_frame, odometry, origin
 from tests.unit.pipeline.desk import Desk, settle
@@ -57,12 +58,12 @@ async def test_the_second_transports_copy_of_an_answer_keeps_its_time() -> None:
     (command,) = await desk.commander.stop(["AGI"], "ana", desk.clock())
     await settle()
     answer = CommandAnswer("AGI", Origin("b", 1), command.command_id, "LATCHED")
-    desk.hear(answer, "direct")
+    desk.hear(answer, DIRECT.id)
     desk.clock.now = 0.3
-    desk.hear(answer, "fiware")
+    desk.hear(answer, FIWARE.id)
 
-    assert desk.now(command).times.answered.get("direct") is not None
-    assert desk.now(command).times.answered["fiware"] == desk.clock()
+    assert desk.now(command).times.answered.get(DIRECT.id) is not None
+    assert desk.now(command).times.answered[FIWARE.id] == desk.clock()
 
 
 def test_the_heartbeat_that_came_back_is_evidence_for_the_chain() -> None:

@@ -2,13 +2,13 @@
 
 from iveg.domain.observations import CommandAnswer, Hold
 from iveg.domain.records import CommandRecord
-from iveg.domain.transports import FIWARE, Transport
+from iveg.domain.transports import FIWARE, Transport, TransportId
 from iveg.models.command import Command as CommandModel
 from tests.fakes.fleet import FakeFleet
 from tests.fakes.records import NOON
 from tests.unit.pipeline.desk import Desk, settle
 
-DDS = Transport("dds", confirms=True)
+DDS = Transport(TransportId("dds"), confirms=True)
 
 
 async def stopped(desk: Desk) -> str:
@@ -37,7 +37,10 @@ async def test_a_stop_goes_over_the_third_transport_again_and_again() -> None:
 async def test_json_says_how_far_an_order_came_on_the_third_transport() -> None:
     desk = Desk(also={DDS: FakeFleet()})
     command_id = await stopped(desk)
-    desk.hear(CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"), "dds")
+    desk.hear(
+        CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"),
+        TransportId("dds"),
+    )
 
     told_now = told(desk, command_id)
 
@@ -52,7 +55,10 @@ async def test_times_and_the_row_of_the_history_are_keyed_by_the_third_transport
     desk = Desk(also={DDS: FakeFleet()})
     command_id = await stopped(desk)
     desk.clock.now = 0.5
-    desk.hear(CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"), "dds")
+    desk.hear(
+        CommandAnswer("AGI", desk.next_origin(), command_id, "LATCHED"),
+        TransportId("dds"),
+    )
 
     row = desk.records(CommandRecord)[-1]
     times = told(desk, command_id).times
@@ -68,7 +74,7 @@ async def test_times_and_the_row_of_the_history_are_keyed_by_the_third_transport
 async def test_a_release_goes_once_over_every_transport_that_can() -> None:
     dds = FakeFleet()
     deaf = FakeFleet()
-    only_stops = Transport("radio", can_release=False)
+    only_stops = Transport(TransportId("radio"), can_release=False)
     desk = Desk(also={DDS: dds, only_stops: deaf})
     hold_id = await stopped(desk)
     await desk.stand()
@@ -79,7 +85,7 @@ async def test_a_release_goes_once_over_every_transport_that_can() -> None:
     assert dds.asked == [("release", "AGI", (hold_id,))]
     assert deaf.asked == []
     assert deaf.stops
-    assert desk.now(order).transports["radio"] == "off"
+    assert desk.now(order).transports[TransportId("radio")] == "off"
     await desk.commander.close()
 
 
@@ -90,7 +96,7 @@ async def test_a_pose_by_the_third_transport_counts_as_direct_and_is_named() -> 
     desk.clock.now = 0.1
 
     feed = desk.world.feeds.of("AGI")
-    feed.heard("dds", desk.clock().mono, news=True)
+    feed.heard(TransportId("dds"), desk.clock().mono, news=True)
 
     assert feed.transport(desk.clock().mono) == "dds"
     assert feed.transport(desk.clock().mono) != FIWARE.id

@@ -9,6 +9,7 @@ from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Received
+from iveg.domain.transports import DIRECT
 from iveg.web.live.painting import SAMPLE_S, Painting
 from tests.builders import at, odometry, origin
 
@@ -18,7 +19,7 @@ START = at(0.0).mono
 def watching() -> tuple[LatencyWatch, Painting]:
     """AGI's odometry was decided on at 1.0 s."""
     watch = LatencyWatch(("AGI",))
-    watch.decided([Received(odometry(origin=origin()), at(0.9), "direct")], at(1.0))
+    watch.decided([Received(odometry(origin=origin()), at(0.9), DIRECT.id)], at(1.0))
     return watch, Painting(watch)
 
 
