@@ -6,45 +6,14 @@ failed row and not six.  The order is the order of the examination.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Literal
 
+from iveg.domain.hops import NEEDS, Check, Hop
 from iveg.domain.probe import lag_in_words
 
 State = Literal["ok", "failed", "not tried"]
 
 
-class Hop(StrEnum):
-    """What is examined, as the table names it."""
-
-    BROKER = "MQTT broker: connect, echo"
-    ORION = "Orion answers"
-    AGENT = "IoT Agent answers"
-    DEVICE = "probe device can be made"
-    MEASURE = "measure: MQTT > agent > Orion"
-    NOTIFICATION = "notification: Orion > here"
-    COMMAND = "command: Orion > agent > MQTT"
-    ANSWER = "answer: MQTT > agent > Orion"
-    DIRECT = "command straight over MQTT"
-    DATABASE = "database, newest migration"
-    PAGE = "iVeg's own page, /healthz"
-
-
-NEEDS: Mapping[Hop, tuple[Hop, ...]] = {
-    Hop.BROKER: (),
-    Hop.ORION: (),
-    Hop.AGENT: (),
-    Hop.DEVICE: (Hop.ORION, Hop.AGENT),
-    Hop.MEASURE: (Hop.BROKER, Hop.DEVICE),
-    Hop.NOTIFICATION: (Hop.ORION,),
-    Hop.COMMAND: (Hop.BROKER, Hop.DEVICE),
-    Hop.ANSWER: (Hop.COMMAND, Hop.MEASURE),
-    Hop.DIRECT: (Hop.BROKER,),
-    Hop.DATABASE: (),
-    Hop.PAGE: (),
-}
-"""What each hop stands on."""
-_BY_THE_AGENT = frozenset((Hop.AGENT, Hop.DEVICE, Hop.MEASURE, Hop.COMMAND, Hop.ANSWER))
 _ORION_WAITS_S = 4.0
 """Nearly the five seconds for which Orion waits for an agent."""
 LATE_S = 1.0
@@ -109,7 +78,7 @@ class Finding:
             where nothing came in time.
     """
 
-    hop: Hop
+    check: Check
     took_s: float
     trouble: str | None = None
 
@@ -123,25 +92,25 @@ class Finding:
 class Row:
     """One line of the table; ``sentence`` is empty where all is well."""
 
-    hop: Hop
+    check: Check
     state: State
     took_s: float | None = None
     sentence: str = ""
 
 
-Findings = Mapping[Hop, Finding]
+Findings = Mapping[Check, Finding]
 
 
-def missing(hop: Hop, findings: Findings) -> tuple[Hop, ...]:
+def missing(check: Check, findings: Findings) -> tuple[Check, ...]:
     """The hops that a hop stands on and that were not well."""
     return tuple(
-        need for need in NEEDS[hop] if need not in findings or not findings[need].well
+        need for need in NEEDS[check] if need not in findings or not findings[need].well
     )
 
 
 def judge(findings: Findings, stack: Stack) -> list[Row]:
     """Every hop with its state and, where it failed, what to look at."""
-    return [_row(hop, findings, stack) for hop in Hop]
+    return [_row(check, findings, stack) for check in Check]
 
 
 def exit_code(rows: Sequence[Row]) -> int:
@@ -151,41 +120,43 @@ def exit_code(rows: Sequence[Row]) -> int:
 
 def table(rows: Sequence[Row]) -> str:
     """The rows as text: hop, state, milliseconds, and sentences below their row."""
-    wide = max(len(hop) for hop in Hop)
+    wide = max(len(check) for check in Check)
     lines = [f"{'hop':<{wide}}  {'state':<9}  {'ms':>6}"]
     for row in rows:
         took = "" if row.took_s is None else f"{row.took_s * 1000:.0f}"
-        lines.append(f"{row.hop:<{wide}}  {row.state:<9}  {took:>6}".rstrip())
+        lines.append(f"{row.check:<{wide}}  {row.state:<9}  {took:>6}".rstrip())
         if row.sentence:
             lines.append(f"    {row.sentence}")
     return "\n".join(lines)
 
 
-def _row(hop: Hop, findings: Findings, stack: Stack) -> Row:
-    finding = findings.get(hop)
-    if finding is None and stack.lag is not None and hop in _BY_THE_AGENT:
-        return Row(hop, "not tried", None, "The agent is behind: nothing is added.")
+def _row(check: Check, findings: Findings, stack: Stack) -> Row:
+    finding = findings.get(check)
+    if finding is None and stack.lag is not None and check.hop is Hop.AGENT:
+        return Row(check, "not tried", None, "The agent is behind: nothing is added.")
     if finding is None:
-        because = " and ".join(f"“{need}”" for need in missing(hop, findings))
-        return Row(hop, "not tried", None, f"Stands on {because}." if because else "")
+        because = " and ".join(f"“{need}”" for need in missing(check, findings))
+        return Row(check, "not tried", None, f"Stands on {because}." if because else "")
     if finding.trouble is None:
-        late = hop == Hop.MEASURE and finding.took_s > LATE_S
-        return Row(hop, "ok", finding.took_s, _late(finding.took_s) if late else "")
+        late = check == Check.MEASURE and finding.took_s > LATE_S
+        return Row(check, "ok", finding.took_s, _late(finding.took_s) if late else "")
     said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
-    away = hop == Hop.AGENT and not _is_silence(said)
-    if stack.lag is not None and hop in _BY_THE_AGENT and not away:
-        sentence = _overloaded(hop, said, stack, stack.lag)
-        return Row(hop, "failed", finding.took_s, sentence)
-    return Row(hop, "failed", finding.took_s, _SENTENCES[hop](said, stack, findings))
+    away = check == Check.AGENT and not _is_silence(said)
+    if stack.lag is not None and check.hop is Hop.AGENT and not away:
+        sentence = _overloaded(check, said, stack, stack.lag)
+        return Row(check, "failed", finding.took_s, sentence)
+    return Row(
+        check, "failed", finding.took_s, _SENTENCES[check](said, stack, findings)
+    )
 
 
 def _late(took_s: float) -> str:
     return f"{Lag(took_s).sentence}."
 
 
-def _overloaded(hop: Hop, said: str, stack: Stack, lag: Lag) -> str:
+def _overloaded(check: Check, said: str, stack: Stack, lag: Lag) -> str:
     """Before anything is said of addresses, tenants or databases."""
-    if hop not in (Hop.AGENT, Hop.MEASURE):
+    if check not in (Check.AGENT, Check.MEASURE):
         return f"The agent is behind ({said}); {lag_in_words(lag.lag_s)}."
     return (
         f"{lag.sentence} ({said}): the agent at {stack.agent} is overloaded. Let the "
@@ -252,7 +223,7 @@ def _measure(said: str, stack: Stack, findings: Findings) -> str:
         f"{least}, or never ({said}). First look whether the agent is overloaded: the "
         "processor time it takes, and whether this changes within a minute. If not, "
     )
-    command = findings.get(Hop.COMMAND)
+    command = findings.get(Check.COMMAND)
     if command is not None and command.well:
         return first + (
             f"it sends commands and is deaf to {stack.topics}attrs: its connection is, "
@@ -295,7 +266,7 @@ def _command(said: str, stack: Stack, findings: Findings) -> str:
 
 def _took_long(findings: Findings) -> bool:
     """Orion says 404 at once of an agent that is away, after 5 s of a silent one."""
-    finding = findings.get(Hop.COMMAND)
+    finding = findings.get(Check.COMMAND)
     return finding is not None and finding.took_s > _ORION_WAITS_S
 
 
@@ -333,16 +304,16 @@ def _page(said: str, stack: Stack, _: Findings) -> str:
     )
 
 
-_SENTENCES: Mapping[Hop, Callable[[str, Stack, Findings], str]] = {
-    Hop.BROKER: _broker,
-    Hop.ORION: _orion,
-    Hop.AGENT: _agent,
-    Hop.DEVICE: _device,
-    Hop.MEASURE: _measure,
-    Hop.NOTIFICATION: _notification,
-    Hop.COMMAND: _command,
-    Hop.ANSWER: _answer,
-    Hop.DIRECT: _direct,
-    Hop.DATABASE: _database,
-    Hop.PAGE: _page,
+_SENTENCES: Mapping[Check, Callable[[str, Stack, Findings], str]] = {
+    Check.BROKER: _broker,
+    Check.ORION: _orion,
+    Check.AGENT: _agent,
+    Check.DEVICE: _device,
+    Check.MEASURE: _measure,
+    Check.NOTIFICATION: _notification,
+    Check.COMMAND: _command,
+    Check.ANSWER: _answer,
+    Check.DIRECT: _direct,
+    Check.DATABASE: _database,
+    Check.PAGE: _page,
 }

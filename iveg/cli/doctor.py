@@ -32,7 +32,6 @@ from iveg.app import broker_of, notify_url_of
 from iveg.cli.diagnosis import (
     LATE_S,
     Finding,
-    Hop,
     Lag,
     Stack,
     exit_code,
@@ -43,6 +42,7 @@ from iveg.cli.diagnosis import (
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_told
 from iveg.domain.errors import HopError, IvegError
+from iveg.domain.hops import Check, Hop
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.ngsi import names
 from iveg.settings import Settings
@@ -98,18 +98,18 @@ class Examination:
         self._orion = OrionClient(settings.orion_url, *service)
         self._agent = IotAgentClient(settings.iota_url, *service)
         self._page = FiwareHttp(
-            "page", _page_url(settings), *service, bearer=settings.api_token
+            Hop.PAGE, _page_url(settings), *service, bearer=settings.api_token
         )
         self._probe = Probe(self._orion, self._agent, settings.apikey)
         self._device: ProbeDevice | None = None
         self._listening_at = ""
         self._mark = ""
-        self._began: dict[Hop, float] = {}
+        self._began: dict[Check, float] = {}
         self._ends = clock.now().mono + limit_s - _REMOVAL_S
         self._measure_mark = ""
         self._measured_at = 0.0
         self._waited_s = 0.0
-        self.findings: dict[Hop, Finding] = {}
+        self.findings: dict[Check, Finding] = {}
         self.lag: Lag | None = None
 
     @property
@@ -141,34 +141,34 @@ class Examination:
                 stack.push_async_callback(client.close)
             stack.push_async_callback(self._probe.remove, _REMOVAL_S)
             async with asyncio.TaskGroup() as tasks:
-                for hop, step in (
-                    (Hop.BROKER, lambda: self._connect(stack)),
-                    (Hop.ORION, self._orion.version),
-                    (Hop.AGENT, self._agent.version),
-                    (Hop.DATABASE, self._look_at_database),
-                    (Hop.PAGE, self._look_at_page),
+                for check, step in (
+                    (Check.BROKER, lambda: self._connect(stack)),
+                    (Check.ORION, self._orion.version),
+                    (Check.AGENT, self._agent.version),
+                    (Check.DATABASE, self._look_at_database),
+                    (Check.PAGE, self._look_at_page),
                 ):
-                    tasks.create_task(self._try(hop, step), name=hop.name)
+                    tasks.create_task(self._try(check, step), name=check.name)
             told = await self._ask_iveg()
             if told is None or told.lag_s < self._patience_s:
                 await self._use_the_agent()
             else:
                 self.lag = told
-                self.findings[Hop.MEASURE] = Finding(
-                    Hop.MEASURE, told.lag_s, "nothing was added to it"
+                self.findings[Check.MEASURE] = Finding(
+                    Check.MEASURE, told.lag_s, "nothing was added to it"
                 )
-            await self._try(Hop.NOTIFICATION, self._be_notified)
-            await self._try(Hop.DIRECT, self._command_straight)
+            await self._try(Check.NOTIFICATION, self._be_notified)
+            await self._try(Check.DIRECT, self._command_straight)
             await self._wait_for_the_measure()
 
     async def _use_the_agent(self) -> None:
-        await self._try(Hop.DEVICE, self._make_device)
-        await self._try(Hop.MEASURE, self._measure)
-        await self._try(Hop.COMMAND, self._command)
-        await self._try(Hop.ANSWER, self._answer)
+        await self._try(Check.DEVICE, self._make_device)
+        await self._try(Check.MEASURE, self._measure)
+        await self._try(Check.COMMAND, self._command)
+        await self._try(Check.ANSWER, self._answer)
 
-    async def _try(self, hop: Hop, step: Callable[[], Awaitable[object]]) -> None:
-        if missing(hop, self.findings) or clock.now().mono >= self._ends:
+    async def _try(self, check: Check, step: Callable[[], Awaitable[object]]) -> None:
+        if missing(check, self.findings) or clock.now().mono >= self._ends:
             return
         trouble = None
         began = clock.now().mono
@@ -182,8 +182,8 @@ class Examination:
             trouble = error.detail
         except (IvegError, OSError) as error:
             trouble = str(error)
-        took_s = clock.now().mono - self._began.get(hop, began)
-        self.findings[hop] = Finding(hop, took_s, trouble)
+        took_s = clock.now().mono - self._began.get(check, began)
+        self.findings[check] = Finding(check, took_s, trouble)
 
     @property
     def _left_s(self) -> float:
@@ -193,7 +193,7 @@ class Examination:
 
     async def _ask_iveg(self) -> Lag | None:
         """What a running iVeg says of the lag, to those who have its token."""
-        if not self._settings.api_token or missing(Hop.PAGE, self.findings):
+        if not self._settings.api_token or missing(Check.PAGE, self.findings):
             return None
         with contextlib.suppress(HopError):
             path, within_s = "/api/v1/health", self._patience_s
@@ -203,7 +203,7 @@ class Examination:
 
     async def _wait_for_the_measure(self) -> None:
         """A measure that comes late tells how late; one that does not, at least how."""
-        finding = self.findings.get(Hop.MEASURE)
+        finding = self.findings.get(Check.MEASURE)
         if finding is None or finding.trouble is None or not self._measured_at:
             return
         until = self._measured_at + _WAITS * self._patience_s
@@ -213,8 +213,8 @@ class Examination:
             took_s = clock.now().mono - self._measured_at
             self.lag = Lag(took_s)
         self._waited_s = took_s = clock.now().mono - self._measured_at
-        self.findings[Hop.MEASURE] = Finding(
-            Hop.MEASURE, took_s, f"nothing came in {self._patience_s:.1f} s"
+        self.findings[Check.MEASURE] = Finding(
+            Check.MEASURE, took_s, f"nothing came in {self._patience_s:.1f} s"
         )
         if self.lag is None:
             self.lag = await self._lag_of_the_heartbeat()
@@ -233,8 +233,8 @@ class Examination:
     @property
     def _agent_is_slow(self) -> bool:
         """Whether it answered other questions late too."""
-        asked = (Hop.AGENT, Hop.DEVICE, Hop.COMMAND)
-        found = [self.findings[hop] for hop in asked if hop in self.findings]
+        asked = (Check.AGENT, Check.DEVICE, Check.COMMAND)
+        found = [self.findings[check] for check in asked if check in self.findings]
         return any(one.took_s > LATE_S for one in found)
 
     # --- hops ---------------------------------------------------------------------
@@ -248,7 +248,7 @@ class Examination:
         try:
             await device.ear.heard(mark, self._patience_s)
         except TimeoutError as error:
-            raise HopError("mqtt", "gives no echo of what we publish") from error
+            raise HopError(Hop.MQTT, "gives no echo of what we publish") from error
 
     async def _make_device(self) -> None:
         settings = self._settings
@@ -274,13 +274,13 @@ class Examination:
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()
             # What was done so far is preparation; the hop begins here.
-            self._began[Hop.NOTIFICATION] = clock.now().mono
+            self._began[Check.NOTIFICATION] = clock.now().mono
             await self._probe.change(mark)
             try:
                 await ear.heard(mark, self._patience_s)
             except TimeoutError as error:
                 reason = await self._probe.why_not_notified(subscription)
-                raise HopError("orion", reason) from error
+                raise HopError(Hop.ORION, reason) from error
 
     async def _command(self) -> None:
         device = self._connected
@@ -308,7 +308,7 @@ class Examination:
     @property
     def _connected(self) -> ProbeDevice:
         if self._device is None:
-            raise HopError("mqtt", "not connected")
+            raise HopError(Hop.MQTT, "not connected")
         return self._device
 
     async def _publish(self, last: str, payload: dict[str, Any]) -> None:
@@ -327,7 +327,7 @@ class Examination:
 def _lag_told(health: Any) -> Lag | None:
     """The lag in ``GET /api/v1/health``; None where all is well or nothing is told."""
     try:
-        agent = next(one for one in health["hops"] if one["hop"] == "iot_agent")
+        agent = next(one for one in health["hops"] if one["hop"] == Hop.AGENT)
         lag_s, growing = float(agent["lag_s"]), bool(agent["growing"])
     except (KeyError, TypeError, ValueError, StopIteration):
         return None

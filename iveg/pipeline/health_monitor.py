@@ -14,10 +14,10 @@ A hop behind a broken one is not accused: nobody knows how it does.
 from dataclasses import dataclass
 from typing import Literal
 
+from iveg.domain.hops import Hop
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.probe import ProbeLag, lag_in_words
 
-HopName = Literal["mqtt", "orion", "iot_agent", "notifications", "database"]
 HopState = Literal["ok", "late", "down", "unknown"]
 Earlier = Literal["known", "reading", "unknown"]
 
@@ -33,7 +33,7 @@ _LONGEST_GAP_S = 30.0
 
 
 @dataclass(frozen=True, slots=True)
-class Hop:
+class HopHealth:
     """One hop's state and why.
 
     Attributes:
@@ -43,7 +43,7 @@ class Hop:
         growing: Whether they pass it ever later.
     """
 
-    name: HopName
+    name: Hop
     state: HopState
     age_s: float | None = None
     detail: str = ""
@@ -133,7 +133,7 @@ class HealthMonitor:
 
     # --- the verdict --------------------------------------------------------------
 
-    def hops(self, now: Instant) -> list[Hop]:
+    def hops(self, now: Instant) -> list[HopHealth]:
         """Every hop, in the order in which a datum passes them."""
         mqtt, orion = self._mqtt(now), self._orion(now)
         agent = self._agent(now, broken=mqtt.state == "down" or orion.state == "down")
@@ -143,7 +143,7 @@ class HealthMonitor:
             agent,
             orion,
             self._notifications(now, blind=blind or mqtt.state == "down"),
-            Hop("database", self.database),
+            HopHealth(Hop.DATABASE, self.database),
         ]
 
     def earlier(self, now: Instant) -> Earlier:
@@ -156,32 +156,32 @@ class HealthMonitor:
     def whole(self, now: Instant) -> bool:
         """Whether every hop of FIWARE is well."""
         return all(
-            hop.state == "ok" for hop in self.hops(now) if hop.name != "database"
+            hop.state == "ok" for hop in self.hops(now) if hop.name is not Hop.DATABASE
         )
 
     def is_cut(self, now: Instant) -> bool:
         """Whether it is known that Orion's commands do not reach the robots."""
         down = {hop.name for hop in self.hops(now) if hop.state == "down"}
-        return not down.isdisjoint(("mqtt", "iot_agent"))
+        return not down.isdisjoint((Hop.MQTT, Hop.AGENT))
 
-    def _mqtt(self, now: Instant) -> Hop:
+    def _mqtt(self, now: Instant) -> HopHealth:
         if self.mqtt_connected:
             self._was_connected = True
             state: HopState = "down" if self.mqtt_error else "ok"
-            return Hop("mqtt", state, detail=self.mqtt_error)
+            return HopHealth(Hop.MQTT, state, detail=self.mqtt_error)
         if not self._was_connected and self._starting(now):
-            return Hop("mqtt", "unknown")
-        return Hop("mqtt", "down", detail="not connected")
+            return HopHealth(Hop.MQTT, "unknown")
+        return HopHealth(Hop.MQTT, "down", detail="not connected")
 
-    def _orion(self, now: Instant) -> Hop:
+    def _orion(self, now: Instant) -> HopHealth:
         age = _age(self.orion_ok_at, now)
         if self.orion_error:
-            return Hop("orion", "down", age, self.orion_error)
+            return HopHealth(Hop.ORION, "down", age, self.orion_error)
         if self.orion_slow:
-            return Hop("orion", "late", age, self.orion_slow)
-        return Hop("orion", "unknown" if age is None else "ok", age)
+            return HopHealth(Hop.ORION, "late", age, self.orion_slow)
+        return HopHealth(Hop.ORION, "unknown" if age is None else "ok", age)
 
-    def _agent(self, now: Instant, *, broken: bool) -> Hop:
+    def _agent(self, now: Instant, *, broken: bool) -> HopHealth:
         """Deaf, overloaded or healthy: the probe knows, if the hops round it are well.
 
         An agent that measures still pass is not down because it leaves questions
@@ -189,16 +189,16 @@ class HealthMonitor:
         """
         age = _age(_newest(self.received_at, self.stored_at), now)
         if self.agent_error:
-            return Hop("iot_agent", "down", age, self.agent_error)
+            return HopHealth(Hop.AGENT, "down", age, self.agent_error)
         state = self._by_age(age, now, self._agent_down_s)
         if broken and state != "ok":
-            return Hop("iot_agent", "unknown", age)
+            return HopHealth(Hop.AGENT, "unknown", age)
         lag, growing = self._lag(now)
         if state == "ok" or (state == "late" and self._was_behind):
             state, detail = self._agent_says(lag, growing=growing)
         else:
             detail = "" if state == "unknown" else "measures do not reach Orion"
-        return Hop("iot_agent", state, age, detail, lag, growing)
+        return HopHealth(Hop.AGENT, state, age, detail, lag, growing)
 
     def _lag(self, now: Instant) -> tuple[float | None, bool]:
         """How far the agent is behind (s), and whether that grows.
@@ -241,15 +241,16 @@ class HealthMonitor:
         passing = self._by_age(age, now, self._agent_down_s) in ("ok", "late")
         return passing and self._was_behind and self.probe.grows(now)
 
-    def _notifications(self, now: Instant, *, blind: bool) -> Hop:
+    def _notifications(self, now: Instant, *, blind: bool) -> HopHealth:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
         if state == "ok":
             missed: HopState = "down" if self.notify_error else "ok"
-            return Hop("notifications", missed, age, self.notify_error)
+            return HopHealth(Hop.NOTIFICATIONS, missed, age, self.notify_error)
         if blind:
-            return Hop("notifications", "unknown", age)
-        return Hop("notifications", state, age, self.notify_error or self.notify_detail)
+            return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
+        detail = self.notify_error or self.notify_detail
+        return HopHealth(Hop.NOTIFICATIONS, state, age, detail)
 
     def _by_age(
         self, age: float | None, now: Instant, down_s: float = DOWN_S

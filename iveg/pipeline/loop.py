@@ -12,7 +12,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.health_monitor import HealthMonitor, Hop, HopState
+from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.ports import Clock
@@ -121,7 +121,7 @@ class RuleLoop:
             self._health_at = now.mono
             self._hub.changed(topics.HEALTH.name)
 
-    def _tell(self, hop: Hop, now: Instant) -> None:
+    def _tell(self, hop: HopHealth, now: Instant) -> None:
         """A loss once, and its end once; what is merely late or unknown is neither."""
         if hop.state == "down" and hop.name not in self._broken:
             self._broken.add(hop.name)
@@ -131,5 +131,5 @@ class RuleLoop:
             key = "log.hop.back"
         else:
             return
-        slots = {"hop": hop.name, "detail": hop.detail}
+        slots = {"hop": hop.name.value, "detail": hop.detail}
         self._event_log.log(LogEvent("system", key, slots), now)

@@ -46,8 +46,7 @@ from iveg.ngsi.names import ROBOT_DEVICES
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.health_monitor import HealthMonitor
-from iveg.pipeline.health_monitor import Hop as ChainHop
+from iveg.pipeline.health_monitor import HealthMonitor, HopHealth
 
 _FIRST_LINES = 200
 
@@ -322,12 +321,12 @@ class Views:
         return Rule.of(self._evaluator.rule)
 
 
-def _hop(hop: ChainHop) -> Hop:
+def _hop(hop: HopHealth) -> Hop:
     return Hop(
-        hop=hop.name,
+        hop=hop.name.value,
         state=hop.state,
         age_s=rounded(hop.age_s, 1),
-        key=f"health.hop.{hop.name}.{hop.state}",
+        key=f"health.{hop.name.label}.{hop.state}",
         detail=hop.detail,
         lag_s=rounded(hop.lag_s, 1),
         growing=hop.growing,

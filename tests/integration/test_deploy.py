@@ -19,8 +19,9 @@ import aiomqtt
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.cli.diagnosis import Hop, judge
+from iveg.cli.diagnosis import judge
 from iveg.cli.doctor import Examination
+from iveg.domain.hops import Check
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
@@ -418,10 +419,10 @@ async def test_the_doctor_tells_a_closed_door_from_a_short_list(
 
     await examination.run()
 
-    rows = {row.hop: row for row in judge(examination.findings, examination.stack)}
-    assert rows[Hop.BROKER].state == broker_state
-    assert said in rows[Hop.BROKER].sentence
-    assert (rows[Hop.DIRECT].state == "ok") == (broker_state == "ok")
+    rows = {row.check: row for row in judge(examination.findings, examination.stack)}
+    assert rows[Check.BROKER].state == broker_state
+    assert said in rows[Check.BROKER].sentence
+    assert (rows[Check.DIRECT].state == "ok") == (broker_state == "ok")
 
 
 def test_the_broker_had_nothing_to_complain_of(broker: Broker) -> None:

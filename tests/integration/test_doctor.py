@@ -13,9 +13,10 @@ import pytest
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
-from iveg.cli.diagnosis import Hop, State, exit_code, judge
+from iveg.cli.diagnosis import State, exit_code, judge
 from iveg.cli.doctor import Examination
 from iveg.cli.probe import DESCRIPTION, PROBE_ID
+from iveg.domain.hops import Check
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running
 from iveg.settings import Settings
@@ -60,12 +61,12 @@ async def settings(up: Running, page: int, tmp_path: Path) -> Settings:
 
 async def examine(
     settings: Settings, folder: Path, patience_s: float = LONG_S
-) -> tuple[dict[Hop, State], Examination]:
+) -> tuple[dict[Check, State], Examination]:
     examination = Examination(settings, folder, patience_s)
     async with asyncio.timeout(60):
         await examination.run()
     rows = judge(examination.findings, examination.stack)
-    return {row.hop: row.state for row in rows}, examination
+    return {row.check: row.state for row in rows}, examination
 
 
 async def leftovers(up: Running) -> list[dict[str, Any]]:
@@ -93,7 +94,7 @@ async def test_a_whole_chain_is_well_and_nothing_of_the_doctors_stays(
 ) -> None:
     states, examination = await examine(settings, tmp_path)
 
-    assert states == dict.fromkeys(Hop, "ok")
+    assert states == dict.fromkeys(Check, "ok")
     assert examination.left_behind == []
     assert await leftovers(up) == []
 
@@ -128,7 +129,7 @@ async def test_what_a_killed_doctor_left_is_no_hindrance_and_goes(
 
     states, _ = await examine(settings, tmp_path)
 
-    assert states == dict.fromkeys(Hop, "ok")
+    assert states == dict.fromkeys(Check, "ok")
     assert await leftovers(up) == []
 
 
@@ -139,10 +140,10 @@ async def test_a_deaf_agent_is_found_though_it_says_that_all_is_well(
 
     states, examination = await examine(settings, tmp_path, SHORT_S)
 
-    failed = {hop for hop, state in states.items() if state != "ok"}
-    assert failed == {Hop.MEASURE, Hop.ANSWER}
+    failed = {check for check, state in states.items() if state != "ok"}
+    assert failed == {Check.MEASURE, Check.ANSWER}
     rows = judge(examination.findings, examination.stack)
-    assert "deaf" in next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    assert "deaf" in next(row for row in rows if row.check == Check.MEASURE).sentence
     assert exit_code(rows) == 1
     assert await leftovers(up) == []
 
@@ -154,10 +155,10 @@ async def test_an_agent_that_is_behind_is_called_late_and_not_misconfigured(
 
     states, examination = await examine(settings, tmp_path, 1.0)
 
-    assert states[Hop.DEVICE] == states[Hop.COMMAND] == "ok"
-    assert states[Hop.MEASURE] == "failed"
+    assert states[Check.DEVICE] == states[Check.COMMAND] == "ok"
+    assert states[Check.MEASURE] == "failed"
     rows = judge(examination.findings, examination.stack)
-    sentence = next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    sentence = next(row for row in rows if row.check == Check.MEASURE).sentence
     assert sentence.startswith("Measures reach Orion ")
     assert "at least" not in sentence
     assert "is overloaded" in sentence
@@ -166,25 +167,25 @@ async def test_an_agent_that_is_behind_is_called_late_and_not_misconfigured(
 async def test_the_running_ivegs_figure_is_believed_and_nothing_is_added(
     up: Running, settings: Settings, tmp_path: Path
 ) -> None:
-    hop = {"hop": "iot_agent", "lag_s": 23.4, "growing": True}
+    agent = {"hop": "iot_agent", "lag_s": 23.4, "growing": True}
 
     async def told(request: Request) -> Response:
         assert request.headers["authorization"] == "Bearer secret"
-        return Response(200, orjson.dumps({"hops": [hop]}))
+        return Response(200, orjson.dumps({"hops": [agent]}))
 
     async with http_server(told, "127.0.0.1", 0) as port:
         busy = replace(settings, port=port, api_token="secret")
         states, examination = await examine(busy, tmp_path)
 
     rows = judge(examination.findings, examination.stack)
-    sentence = next(row for row in rows if row.hop == Hop.MEASURE).sentence
+    sentence = next(row for row in rows if row.check == Check.MEASURE).sentence
     assert sentence.startswith(
         "Measures reach Orion 23 s late, growing, as the running"
     )
-    assert {states[hop] for hop in (Hop.DEVICE, Hop.COMMAND, Hop.ANSWER)} == {
+    assert {states[check] for check in (Check.DEVICE, Check.COMMAND, Check.ANSWER)} == {
         "not tried"
     }
-    assert states[Hop.NOTIFICATION] == states[Hop.DIRECT] == "ok"
+    assert states[Check.NOTIFICATION] == states[Check.DIRECT] == "ok"
     assert await leftovers(up) == []
 
 
@@ -222,7 +223,7 @@ async def test_a_visit_ends_in_time_though_nobody_answers(
             await examination.run()
 
     rows = judge(examination.findings, examination.stack)
-    agent = next(row for row in rows if row.hop == Hop.AGENT)
+    agent = next(row for row in rows if row.check == Check.AGENT)
     assert "overloaded or hung" in agent.sentence
 
 
@@ -233,14 +234,14 @@ async def test_a_dead_broker_leaves_orion_and_the_page_well(
 
     states, _ = await examine(dead, tmp_path, SHORT_S)
 
-    assert states[Hop.BROKER] == "failed"
-    assert {hop for hop, state in states.items() if state == "not tried"} == {
-        Hop.MEASURE,
-        Hop.COMMAND,
-        Hop.ANSWER,
-        Hop.DIRECT,
+    assert states[Check.BROKER] == "failed"
+    assert {check for check, state in states.items() if state == "not tried"} == {
+        Check.MEASURE,
+        Check.COMMAND,
+        Check.ANSWER,
+        Check.DIRECT,
     }
-    assert states[Hop.NOTIFICATION] == states[Hop.PAGE] == "ok"
+    assert states[Check.NOTIFICATION] == states[Check.PAGE] == "ok"
     assert await leftovers(up) == []
 
 
@@ -251,9 +252,9 @@ async def test_a_dead_orion_leaves_the_straight_road_well(
 
     states, examination = await examine(dead, tmp_path, SHORT_S)
 
-    assert states[Hop.ORION] == "failed"
-    assert states[Hop.BROKER] == states[Hop.AGENT] == states[Hop.DIRECT] == "ok"
-    assert states[Hop.DEVICE] == states[Hop.NOTIFICATION] == "not tried"
+    assert states[Check.ORION] == "failed"
+    assert states[Check.BROKER] == states[Check.AGENT] == states[Check.DIRECT] == "ok"
+    assert states[Check.DEVICE] == states[Check.NOTIFICATION] == "not tried"
     assert examination.left_behind == []
 
 
@@ -266,9 +267,11 @@ async def test_an_address_that_orion_cannot_reach_is_a_failed_notification(
         replace(settings, notify_url=url), tmp_path, SHORT_S
     )
 
-    assert {hop for hop, state in states.items() if state != "ok"} == {Hop.NOTIFICATION}
+    assert {check for check, state in states.items() if state != "ok"} == {
+        Check.NOTIFICATION
+    }
     rows = judge(examination.findings, examination.stack)
-    sentence = next(row for row in rows if row.hop == Hop.NOTIFICATION).sentence
+    sentence = next(row for row in rows if row.check == Check.NOTIFICATION).sentence
     assert "http://nowhere.invalid:" in sentence
     assert "IVEG_NOTIFY_URL" in sentence
     assert await leftovers(up) == []
@@ -280,12 +283,12 @@ async def test_a_doctor_that_is_sent_away_still_tidies_up(
     fail(up, Faults(deaf=True))
     examination = Examination(settings, tmp_path, LONG_S)
     visit = asyncio.create_task(examination.run())
-    await until(lambda: Hop.DEVICE in examination.findings, LONG_S)
+    await until(lambda: Check.DEVICE in examination.findings, LONG_S)
 
     visit.cancel()
     await asyncio.gather(visit, return_exceptions=True)
 
-    assert Hop.MEASURE not in examination.findings
+    assert Check.MEASURE not in examination.findings
     assert await leftovers(up) == []
 
 
@@ -298,7 +301,7 @@ async def test_a_history_that_is_not_there_is_not_made(
         replace(settings, database_url=f"sqlite:///{file}"), tmp_path
     )
 
-    assert states[Hop.DATABASE] == "failed"
+    assert states[Check.DATABASE] == "failed"
     assert not file.exists()
 
 
@@ -310,7 +313,7 @@ async def test_a_history_without_migrations_is_told_from_a_good_one(
 
     _, examination = await examine(empty, tmp_path)
 
-    trouble = examination.findings[Hop.DATABASE].trouble
+    trouble = examination.findings[Check.DATABASE].trouble
     assert "it is at migration none" in str(trouble)
 
 

@@ -101,8 +101,8 @@ def test_a_fallback_that_is_first_by_a_moment_changes_nothing() -> None:
     feed = Feed()
     for tenth in range(200):
         if tenth % 10 == 5:
-            feed.heard("fiware", tenth / HZ - 0.01, news=True)
-        feed.heard("direct", tenth / HZ, news=True)
+            feed.heard(FIWARE.id, tenth / HZ - 0.01, news=True)
+        feed.heard(DIRECT.id, tenth / HZ, news=True)
         feed.judge(tenth / HZ, connected=True)
     assert feed.thinned is True
 
@@ -111,8 +111,8 @@ def test_a_direct_copy_that_follows_late_is_missed() -> None:
     feed = Bench().run(8.0).feed
     for tenth in range(80, 110):
         if tenth % 10 == 5:
-            feed.heard("fiware", tenth / HZ - 0.29, news=True)
-        feed.heard("direct", tenth / HZ, news=tenth % 10 == 5)
+            feed.heard(FIWARE.id, tenth / HZ - 0.29, news=True)
+        feed.heard(DIRECT.id, tenth / HZ, news=tenth % 10 == 5)
     assert feed.judge(11.0, connected=True) is False
 
 
@@ -150,8 +150,8 @@ def test_a_direct_twin_of_the_newest_is_not_behind() -> None:
     world = World(["AGI"])
     for seq in range(30):
         after = 0.1 * seq
-        heard(world, "fiware", seq, after)
-        heard(world, "direct", seq, after + 0.02)
+        heard(world, FIWARE.id, seq, after)
+        heard(world, DIRECT.id, seq, after + 0.02)
     assert world.feeds.of("AGI").judge(at(2.95).mono, connected=True) is None
 
 

@@ -2,8 +2,9 @@
 
 import pytest
 
+from iveg.domain.hops import Hop
 from iveg.domain.observations import Origin
-from iveg.pipeline.health_monitor import HealthMonitor, Hop, Pace
+from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, Pace
 from tests.builders import START, at
 
 
@@ -11,7 +12,7 @@ def states(health_monitor: HealthMonitor, now: float) -> dict[str, str]:
     return {hop.name: hop.state for hop in health_monitor.hops(at(now))}
 
 
-def hop(health_monitor: HealthMonitor, name: str, now: float) -> Hop:
+def hop(health_monitor: HealthMonitor, name: str, now: float) -> HopHealth:
     return next(one for one in health_monitor.hops(at(now)) if one.name == name)
 
 
@@ -106,8 +107,8 @@ def test_f8_a_subscription_that_had_to_be_mended_is_told_while_others_arrive() -
     health_monitor = healthy(10.0)
     health_monitor.notify_error = "Subscribed to odometry."
 
-    assert hop(health_monitor, "notifications", 10.0) == Hop(
-        "notifications", "down", 0.0, "Subscribed to odometry."
+    assert hop(health_monitor, "notifications", 10.0) == HopHealth(
+        Hop.NOTIFICATIONS, "down", 0.0, "Subscribed to odometry."
     )
 
 
