@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
-from iveg.adapters.orion import PROBE_TIMEOUT_S, Document, FiwareHttp
+from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareHttp
 from iveg.adapters.orphan_entities import Entities, remove_strays
 from iveg.domain.errors import HopError
 from iveg.ngsi import names

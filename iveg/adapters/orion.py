@@ -4,25 +4,20 @@ Orion's 204 to a command proves nothing: it also answers so when the command wen
 nowhere (docs/fiware.md).  Who wants to know waits for the robot's own answer.
 """
 
-import asyncio
-import socket
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Self
 
-import httpx
-import orjson
-
-from iveg.domain.errors import HopError, NoAnswerError
+from iveg.adapters.fiware_http import (
+    PAGE_SIZE,
+    PROBE_TIMEOUT_S,
+    Document,
+    FiwareHttp,
+)
+from iveg.adapters.orion_subscriptions import OrionSubscriptions
+from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
-_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
-_PAGE = 100
-_TIMEOUT_S = 6.0
-"""A little more than the five seconds that Orion waits for a hung agent."""
-PROBE_TIMEOUT_S = 3.0
-"""For a question that a healthy neighbour answers in milliseconds."""
-_MOST_PAGES = 100
 ROBOT_ATTRIBUTES = (
     names.ODOMETRY,
     names.LIDAR,
@@ -37,134 +32,8 @@ ROBOT_ATTRIBUTES = (
 )
 """What is read of a robot.  Never ``cmd``: Orion would go and ask the agent for it."""
 
-Document = dict[str, Any]
 
-
-class FiwareHttp:
-    """HTTP to one FIWARE service: its headers, and failures as ``HopError``.
-
-    Args:
-        hop: Names the neighbour in errors.
-        url: Address without a path.
-        service: Tenant.
-        path: Service path.
-        bearer: Token that is sent along; empty for none.
-    """
-
-    def __init__(
-        self, hop: str, url: str, service: str, path: str, bearer: str = ""
-    ) -> None:
-        self._hop = hop
-        headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
-        if bearer:
-            headers["Authorization"] = f"Bearer {bearer}"
-        self._client = httpx.AsyncClient(
-            base_url=url,
-            headers=headers,
-            timeout=_TIMEOUT_S,
-            transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
-        )
-
-    async def close(self) -> None:
-        """Close the kept connections."""
-        await self._client.aclose()
-
-    async def ask(
-        self,
-        method: str,
-        path: str,
-        *,
-        query: Mapping[str, str] | None = None,
-        body: Any = None,
-        timeout_s: float = _TIMEOUT_S,
-        also: Sequence[int] = (),
-    ) -> httpx.Response:
-        """One request.
-
-        Args:
-            method: HTTP method.
-            path: With a leading slash.
-            query: Parameters.
-            body: Sent as JSON unless None.
-            timeout_s: For the whole exchange (s), however slowly it trickles.
-            also: Statuses beside 2xx that the caller understands.
-
-        Raises:
-            NoAnswerError: no answer in time.
-            HopError: no connection, or another status.
-        """
-        try:
-            async with asyncio.timeout(timeout_s):
-                response = await self._client.request(
-                    method,
-                    path,
-                    params=dict(query or {}),
-                    json=body,
-                    headers={"Accept": "application/json"},
-                    timeout=timeout_s,
-                )
-        except (TimeoutError, httpx.TimeoutException) as error:
-            raise NoAnswerError(
-                self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
-            ) from error
-        except httpx.HTTPError as error:
-            raise HopError(
-                self._hop, f"cannot be reached: {str(error) or type(error).__name__}"
-            ) from error
-        if response.is_success or response.status_code in also:
-            return response
-        raise HopError(self._hop, _complaint(method, path, response))
-
-    def read(self, response: httpx.Response) -> Any:
-        """The JSON of an answer.
-
-        Raises:
-            HopError: it is not JSON.
-        """
-        try:
-            return orjson.loads(response.content)
-        except ValueError as error:
-            raise HopError(self._hop, "answered something that is not JSON") from error
-
-    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
-        """The list of objects in an answer, or in one part of it.
-
-        Raises:
-            HopError: it is anything else.
-        """
-        told = self.read(response)
-        if part:
-            told = told.get(part) if isinstance(told, dict) else None
-        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
-            raise HopError(self._hop, "answered JSON that means nothing here")
-        return told
-
-    def read_count(self, text: Any) -> int:
-        """How many there are in all, as the neighbour says it.
-
-        Raises:
-            HopError: it does not.
-        """
-        try:
-            return int(text)
-        except (TypeError, ValueError) as error:
-            raise HopError(self._hop, f"counted {text!r} of something") from error
-
-
-def _complaint(method: str, path: str, response: httpx.Response) -> str:
-    """What a refusal says, short; Orion and the agent use different words."""
-    said = ""
-    try:
-        told = orjson.loads(response.content)
-    except ValueError:
-        told = None
-    if isinstance(told, dict):
-        said = str(told.get("description") or told.get("message") or "")[:160]
-    refused = f"{response.status_code} to {method} {path}"
-    return f"{refused}: {said}" if said else refused
-
-
-class OrionClient:
+class OrionClient(OrionSubscriptions):
     """What iVeg asks of Orion.
 
     Args:
@@ -174,7 +43,7 @@ class OrionClient:
     """
 
     def __init__(self, url: str, service: str, path: str) -> None:
-        self.http = FiwareHttp("orion", url, service, path)
+        super().__init__(FiwareHttp("orion", url, service, path))
 
     async def __aenter__(self) -> Self:
         return self
@@ -241,7 +110,7 @@ class OrionClient:
         """
         asked = ",".join(part for part in (options, "count") if part)
         query = {"type": entity_type, "attrs": ",".join(attributes), "orderBy": "id"}
-        return await self._all("/v2/entities", {**query, "options": asked})
+        return await self.http.read_all("/v2/entities", {**query, "options": asked})
 
     async def read_probe(self) -> Document | None:
         """The heartbeat probe as Orion has it; None where none ever came so far.
@@ -300,7 +169,7 @@ class OrionClient:
             "id": ",".join(ids),
             "attrs": "dateCreated",
             "options": "keyValues,skipForwarding",
-            "limit": str(_PAGE),
+            "limit": str(PAGE_SIZE),
         }
         response = await self.http.ask("GET", "/v2/entities", query=query)
         found = self.http.read_list(response)
@@ -373,79 +242,6 @@ class OrionClient:
             return False
         told = self.http.read(response)
         return isinstance(told, dict) and name in told
-
-    async def read_registrations(self) -> list[dict[str, Any]]:
-        """Every registration of our tenant.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        return await self._all("/v2/registrations")
-
-    async def delete_registration(self, registration_id: str) -> None:
-        """Delete a registration; one that is gone already is no error.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        path = f"/v2/registrations/{registration_id}"
-        await self.http.ask("DELETE", path, also=(404,))
-
-    async def read_subscriptions(self) -> list[dict[str, Any]]:
-        """Every subscription of our tenant.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        return await self._all("/v2/subscriptions")
-
-    async def create_subscription(self, document: Mapping[str, Any]) -> str:
-        """Subscribe; the id of the subscription.
-
-        Raises:
-            HopError: Orion does not take it.
-        """
-        response = await self.http.ask("POST", "/v2/subscriptions", body=dict(document))
-        made = str(response.headers.get("Location", "").rpartition("/")[2])
-        if not made:
-            raise HopError("orion", "took a subscription and did not say where it is")
-        return made
-
-    async def update_subscription(
-        self, subscription_id: str, changes: Mapping[str, Any]
-    ) -> None:
-        """Change a subscription; each part that is named replaces the old one whole.
-
-        Raises:
-            HopError: Orion does not take it.
-        """
-        path = f"/v2/subscriptions/{subscription_id}"
-        await self.http.ask("PATCH", path, body=dict(changes))
-
-    async def delete_subscription(self, subscription_id: str) -> None:
-        """Delete a subscription; one that is gone already is no error.
-
-        Raises:
-            HopError: Orion does not answer.
-        """
-        path = f"/v2/subscriptions/{subscription_id}"
-        await self.http.ask("DELETE", path, also=(404,))
-
-    async def _all(
-        self, path: str, query: Mapping[str, str] | None = None
-    ) -> list[Document]:
-        """Page by page; a neighbour that never comes to an end is left."""
-        found: list[Document] = []
-        query = query or {"options": "count"}
-        for _ in range(_MOST_PAGES):
-            page = {**query, "limit": str(_PAGE), "offset": str(len(found))}
-            response = await self.http.ask("GET", path, query=page)
-            told = self.http.read_list(response)
-            found += told
-            total = self.http.read_count(response.headers.get("Fiware-Total-Count", 0))
-            if not told or len(found) >= total:
-                break
-        return found
 
 
 def _date_modified(entity: Any, attribute: str) -> float | None:

@@ -25,9 +25,10 @@ import orjson
 
 from iveg.adapters import clock
 from iveg.adapters.doctor import Ear, ProbeDevice, check_database, probe_device
+from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, sqlite_url
 from iveg.adapters.iot_agent import IotAgentClient
-from iveg.adapters.orion import FiwareHttp, OrionClient
+from iveg.adapters.orion import OrionClient
 from iveg.app import broker_of, notify_url_of
 from iveg.cli.diagnosis import (
     LATE_S,

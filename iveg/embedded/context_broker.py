@@ -6,68 +6,24 @@ the operations, which the embedded IoT Agent also calls directly.
 
 import asyncio
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 
 from iveg.adapters import clock
 from iveg.embedded.entities import (
-    Attribute,
     Change,
     Entity,
-    EntityStore,
     Touched,
     apply,
     fresh,
     touch_all,
     under,
 )
+from iveg.embedded.forwarding import providers
 from iveg.embedded.orion_errors import NgsiError, not_found
 from iveg.embedded.outbox import Outbox
 from iveg.embedded.outcomes import Outcome
-from iveg.embedded.registrations import (
-    Asking,
-    Registration,
-    forward_query,
-    forward_update,
-)
+from iveg.embedded.registrations import Registration, forward_update
 from iveg.embedded.subscriptions import Subscription
-
-
-@dataclass(frozen=True, slots=True)
-class Scope:
-    """Whose data a request is about, and when it came.
-
-    Attributes:
-        service: Tenant, lower case; empty for the default one.
-        path: Service path, or several, or ``/#`` for reading.
-        correlator: Name of the chain of requests.
-        now: Seconds, Unix time.
-    """
-
-    service: str
-    path: str
-    correlator: str
-    now: float
-
-    @property
-    def asking(self) -> Asking:
-        """The same, for a provider."""
-        return Asking(self.service, self.path, self.correlator)
-
-
-@dataclass(slots=True)
-class Tenant:
-    """Everything of one tenant."""
-
-    entities: EntityStore = field(default_factory=EntityStore)
-    subscriptions: dict[str, Subscription] = field(default_factory=dict)
-    registrations: dict[str, Registration] = field(default_factory=dict)
-    concerned: dict[tuple[str, str, str], list[Subscription]] = field(
-        default_factory=dict
-    )
-    """Entity → its subscriptions; emptied whenever a subscription changes."""
-
-
-Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
+from iveg.embedded.tenants import Scope, Tenant
 
 
 class ContextBroker:
@@ -245,7 +201,7 @@ class ContextBroker:
         if entity is not None and local:
             self.append(scope, entity, local, forced=forced)
         rest = {name: one for name, one in changes.items() if name not in own}
-        forwards = self._providers(scope, entity_id, kind, rest)
+        forwards = providers(tenant, scope, entity_id, kind, rest)
         taken = await asyncio.gather(
             *(
                 forward_update(
@@ -279,81 +235,6 @@ class ContextBroker:
             ),
             refused=tuple(name for name in rest if name not in passed),
         )
-
-    def _providers(
-        self, scope: Scope, entity_id: str, kind: str, names: Iterable[str]
-    ) -> list[tuple[Registration, list[str]]]:
-        """Which registration takes which names; the oldest one takes a name."""
-        left = list(names)
-        found = []
-        for registration in self.tenant(scope.service).registrations.values():
-            mine = [
-                name
-                for name in left
-                if not registration.attributes or name in registration.attributes
-            ]
-            if (
-                mine
-                and under(scope.path, registration.path)
-                and registration.concerns(entity_id, kind)
-            ):
-                found.append((registration, mine))
-                left = [name for name in left if name not in mine]
-        return found
-
-    # --- reads that may have to be passed on ------------------------------------
-
-    async def foreign(
-        self, scope: Scope, entity_id: str, entity_type: str, names: tuple[str, ...]
-    ) -> Foreign:
-        """What providers tell of one entity, or of all (empty id).
-
-        Args:
-            scope: Whose data.
-            entity_id: One entity; empty for all.
-            entity_type: Its type; empty for any.
-            names: The attributes wanted; none for all.
-        """
-        found = self.tenant(scope.service).registrations.values()
-        asked = []
-        for registration in found:
-            attrs = [n for n in registration.attributes if not names or n in names]
-            entities = [
-                one
-                for one in registration.entities
-                if "id" in one
-                and (not entity_id or one["id"] == entity_id)
-                and (not entity_type or one.get("type") in (entity_type, None))
-            ]
-            if attrs and entities and under(scope.path, registration.path):
-                asked.append(
-                    forward_query(
-                        registration, entities, attrs, scope.asking, scope.now
-                    )
-                )
-        told: dict[tuple[str, str], dict[str, Attribute]] = {}
-        for answer in await asyncio.gather(*asked):
-            for key, attributes in answer.items():
-                told[key] = {**attributes, **told.get(key, {})}
-        return told
-
-    def bare(self, scope: Scope, names: tuple[str, ...]) -> list[tuple[str, str]]:
-        """Registered entities that nobody need be asked of, by id and type.
-
-        Asked for attributes of which no provider has one, Orion names the entities of
-        its registrations all the same.
-        """
-        if not names or "*" in names:
-            return []
-        return [
-            (one["id"], one.get("type", ""))
-            for registration in self.tenant(scope.service).registrations.values()
-            if registration.attributes
-            and not set(names) & set(registration.attributes)
-            and under(scope.path, registration.path)
-            for one in registration.entities
-            if "id" in one
-        ]
 
     # --- subscriptions and registrations ----------------------------------------
 

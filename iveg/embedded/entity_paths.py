@@ -4,13 +4,15 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from iveg.embedded.context_broker import ContextBroker, Scope
+from iveg.embedded.context_broker import ContextBroker
 from iveg.embedded.entities import Attribute, Change, Entity
+from iveg.embedded.forwarding import bare_entities, foreign
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, names, paging, pattern, read_id
 from iveg.embedded.orion_errors import bad_request, not_found
 from iveg.embedded.outcomes import EXISTING
 from iveg.embedded.query import matches_query, ordered
+from iveg.embedded.tenants import Scope
 from iveg.embedded.views import write_attributes, write_entity
 
 
@@ -22,7 +24,8 @@ async def list_entities(broker: ContextBroker, call: Call) -> Response:
     query = call.request.query
     limit, offset = paging(query)
     wanted = _Wanted.read(call)
-    found = broker.tenant(call.scope.service).entities.all(call.scope.path)
+    tenant = broker.tenant(call.scope.service)
+    found = tenant.entities.all(call.scope.path)
     chosen = [
         one
         for one in found
@@ -35,7 +38,7 @@ async def list_entities(broker: ContextBroker, call: Call) -> Response:
     strange = [key for key in told if key not in known and wanted.fits(*key)]
     bare = [
         key
-        for key in broker.bare(call.scope, view.names)
+        for key in bare_entities(tenant, call.scope, view.names)
         if key not in known and key not in told and wanted.fits(*key)
     ]
     shown = [
@@ -119,16 +122,15 @@ async def _whole(
 ) -> tuple[Entity, Mapping[str, Attribute]]:
     """One entity with what its providers tell of it."""
     entity_id, view = call.parts[1], call.view()
-    entity = broker.tenant(call.scope.service).entities.find(
-        call.scope.path, entity_id, call.kind
-    )
+    tenant = broker.tenant(call.scope.service)
+    entity = tenant.entities.find(call.scope.path, entity_id, call.kind)
     told = await ask_providers(broker, call, entity_id, view.names)
     if entity is not None:
         return entity, told.get((entity.id, entity.type), {})
     for key, attributes in told.items():
         return _ghost(call.scope, *key), attributes
     # Asked with its type, Orion finds that it does not know the entity.
-    for key in broker.bare(call.scope, view.names) if not call.kind else ():
+    for key in bare_entities(tenant, call.scope, view.names) if not call.kind else ():
         if key[0] == entity_id:
             return _ghost(call.scope, *key), {}
     raise not_found()
@@ -140,7 +142,8 @@ async def ask_providers(
     """What providers tell of an entity's attributes, by its id and type."""
     if "skipForwarding" in call.options:
         return {}
-    return await broker.foreign(call.scope, entity_id, call.kind, names)
+    tenant = broker.tenant(call.scope.service)
+    return await foreign(tenant, call.scope, entity_id, call.kind, names)
 
 
 async def delete_entity(broker: ContextBroker, call: Call) -> Response:

@@ -13,7 +13,7 @@ from typing import Any
 import orjson
 
 from iveg.adapters import clock
-from iveg.embedded.context_broker import ContextBroker, Scope
+from iveg.embedded.context_broker import ContextBroker
 from iveg.embedded.devices import (
     DEFAULT_APIKEY,
     AgentError,
@@ -29,6 +29,7 @@ from iveg.embedded.mqtt_broker import MqttBroker
 from iveg.embedded.orion_errors import NgsiError
 from iveg.embedded.orion_text import load_json
 from iveg.embedded.registrations import read_registration
+from iveg.embedded.tenants import Scope
 
 _log = logging.getLogger(__name__)
 

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from iveg.embedded.context_broker import Scope
 from iveg.embedded.entities import Change, read_changes
 from iveg.embedded.http_server import Request
 from iveg.embedded.orion_errors import NgsiError, bad_request, parse_error
 from iveg.embedded.orion_text import check_name, load_json, looks_clean
+from iveg.embedded.tenants import Scope
 from iveg.embedded.views import View
 
 MAX_BODY = 1 << 20

@@ -1,0 +1,165 @@
+"""HTTP to Orion and the IoT Agent: their headers, their pages, their failures."""
+
+import asyncio
+import socket
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import httpx
+import orjson
+
+from iveg.domain.errors import HopError, NoAnswerError
+
+_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+PAGE_SIZE = 100
+_TIMEOUT_S = 6.0
+"""A little more than the five seconds that Orion waits for a hung agent."""
+PROBE_TIMEOUT_S = 3.0
+"""For a question that a healthy neighbour answers in milliseconds."""
+_MOST_PAGES = 100
+
+Document = dict[str, Any]
+
+
+class FiwareHttp:
+    """HTTP to one FIWARE service: its headers, and failures as ``HopError``.
+
+    Args:
+        hop: Names the neighbour in errors.
+        url: Address without a path.
+        service: Tenant.
+        path: Service path.
+        bearer: Token that is sent along; empty for none.
+    """
+
+    def __init__(
+        self, hop: str, url: str, service: str, path: str, bearer: str = ""
+    ) -> None:
+        self._hop = hop
+        headers = {"Fiware-Service": service, "Fiware-ServicePath": path}
+        if bearer:
+            headers["Authorization"] = f"Bearer {bearer}"
+        self._client = httpx.AsyncClient(
+            base_url=url,
+            headers=headers,
+            timeout=_TIMEOUT_S,
+            transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
+        )
+
+    async def close(self) -> None:
+        """Close the kept connections."""
+        await self._client.aclose()
+
+    async def ask(
+        self,
+        method: str,
+        path: str,
+        *,
+        query: Mapping[str, str] | None = None,
+        body: Any = None,
+        timeout_s: float = _TIMEOUT_S,
+        also: Sequence[int] = (),
+    ) -> httpx.Response:
+        """One request.
+
+        Args:
+            method: HTTP method.
+            path: With a leading slash.
+            query: Parameters.
+            body: Sent as JSON unless None.
+            timeout_s: For the whole exchange (s), however slowly it trickles.
+            also: Statuses beside 2xx that the caller understands.
+
+        Raises:
+            NoAnswerError: no answer in time.
+            HopError: no connection, or another status.
+        """
+        try:
+            async with asyncio.timeout(timeout_s):
+                response = await self._client.request(
+                    method,
+                    path,
+                    params=dict(query or {}),
+                    json=body,
+                    headers={"Accept": "application/json"},
+                    timeout=timeout_s,
+                )
+        except (TimeoutError, httpx.TimeoutException) as error:
+            raise NoAnswerError(
+                self._hop, f"no answer to {method} {path} in {timeout_s:g} s"
+            ) from error
+        except httpx.HTTPError as error:
+            raise HopError(
+                self._hop, f"cannot be reached: {str(error) or type(error).__name__}"
+            ) from error
+        if response.is_success or response.status_code in also:
+            return response
+        raise HopError(self._hop, _complaint(method, path, response))
+
+    def read(self, response: httpx.Response) -> Any:
+        """The JSON of an answer.
+
+        Raises:
+            HopError: it is not JSON.
+        """
+        try:
+            return orjson.loads(response.content)
+        except ValueError as error:
+            raise HopError(self._hop, "answered something that is not JSON") from error
+
+    def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
+        """The list of objects in an answer, or in one part of it.
+
+        Raises:
+            HopError: it is anything else.
+        """
+        told = self.read(response)
+        if part:
+            told = told.get(part) if isinstance(told, dict) else None
+        if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
+            raise HopError(self._hop, "answered JSON that means nothing here")
+        return told
+
+    def read_count(self, text: Any) -> int:
+        """How many there are in all, as the neighbour says it.
+
+        Raises:
+            HopError: it does not.
+        """
+        try:
+            return int(text)
+        except (TypeError, ValueError) as error:
+            raise HopError(self._hop, f"counted {text!r} of something") from error
+
+    async def read_all(
+        self, path: str, query: Mapping[str, str] | None = None
+    ) -> list[Document]:
+        """Every object of a list of Orion's, page by page; one without an end is left.
+
+        Raises:
+            HopError: no answer, or none that means anything.
+        """
+        found: list[Document] = []
+        query = query or {"options": "count"}
+        for _ in range(_MOST_PAGES):
+            page = {**query, "limit": str(PAGE_SIZE), "offset": str(len(found))}
+            response = await self.ask("GET", path, query=page)
+            told = self.read_list(response)
+            found += told
+            total = self.read_count(response.headers.get("Fiware-Total-Count", 0))
+            if not told or len(found) >= total:
+                break
+        return found
+
+
+def _complaint(method: str, path: str, response: httpx.Response) -> str:
+    """What a refusal says, short; Orion and the agent use different words."""
+    said = ""
+    try:
+        told = orjson.loads(response.content)
+    except ValueError:
+        told = None
+    if isinstance(told, dict):
+        said = str(told.get("description") or told.get("message") or "")[:160]
+    refused = f"{response.status_code} to {method} {path}"
+    return f"{refused}: {said}" if said else refused
