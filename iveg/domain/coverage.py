@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from iveg.domain.greenhouse import Greenhouse, Lane
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.sight import looks_from
-from iveg.domain.world import RobotState
 
 CELL_M = 1.0
 MOST_CELLS = 4000

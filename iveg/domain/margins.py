@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import Person, Sighting
-from iveg.domain.world import RobotState
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 

@@ -1,7 +1,7 @@
 """What a robot has at the IoT Agent, and when something was last heard of it."""
 
 from iveg.domain.observations import Instant
-from iveg.domain.world import RobotState
+from iveg.domain.robot_state import RobotState
 from iveg.models.base import Model
 
 

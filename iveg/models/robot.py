@@ -7,8 +7,8 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Hold as DomainHold
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.transports import TransportId
-from iveg.domain.world import Link, RobotState
 from iveg.models.base import Model, rounded
 from iveg.models.command import Command
 from iveg.models.margin import Margin

@@ -23,9 +23,9 @@ from iveg.domain.records import (
     OdometryRecord,
     ReadingRecord,
 )
+from iveg.domain.robot_state import RobotState
 from iveg.domain.stop import Changed, Closed, Command
 from iveg.domain.tracking.people import Placed
-from iveg.domain.world import RobotState
 from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
 from iveg.pipeline.publish import Hub

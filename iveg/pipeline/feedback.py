@@ -5,8 +5,9 @@ from collections.abc import Callable, Iterable, Mapping
 from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.observations import Instant, Origin
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 from iveg.pipeline.ports import Fleet
 
 USED_HZ, BURST = 30.0, 8.0

@@ -25,7 +25,7 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.world import RobotState
+from iveg.domain.robot_state import RobotState
 from iveg.pipeline import topics
 from iveg.pipeline.topics import Topic
 

@@ -10,10 +10,11 @@ from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import SafetyReport
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 
 
 @dataclass(frozen=True, slots=True)

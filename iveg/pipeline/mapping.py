@@ -19,8 +19,9 @@ from iveg.domain.costmap import (
 )
 from iveg.domain.geometry import Rectangle
 from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 from iveg.pipeline.ports import Clock
 
 TICK_S = 0.05

@@ -3,10 +3,11 @@
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person
 from iveg.domain.tracking.sight import AllClear
-from iveg.domain.world import Link, RobotState, World
+from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.publish import Hub

@@ -14,12 +14,13 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins, least, margins_of
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
 from iveg.domain.transports import alias_of
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate

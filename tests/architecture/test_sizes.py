@@ -27,7 +27,6 @@ STATE = "one object with one state, each of its functions short; to be divided"
 LARGE_FILES = {
     "iveg/adapters/dds.py": "the one importer of cyclonedds",
     "iveg/app.py": LIST,
-    "iveg/domain/world.py": "to be divided: one robot and all of them",
     "iveg/domain/stop/machine.py": "one machine, read in call order to its table",
     "iveg/robot/ros2/inputs.py": TABLE,
     "iveg/ros2/messages.py": TABLE,

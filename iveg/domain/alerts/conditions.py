@@ -8,8 +8,8 @@ from iveg.domain.decisions import Decision
 from iveg.domain.events import Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.overload import Overload
-from iveg.domain.world import RobotState
 
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """So long a robot may take to hear its first feedback."""

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.domain.world import RobotState, World
+from iveg.domain.robot_state import RobotState
+from iveg.domain.world import World
 
 PICTURES_HZ = 45.0
 """Of one robot, in the mean of a second; the contract's rate is 30 Hz."""

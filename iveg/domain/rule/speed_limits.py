@@ -15,10 +15,11 @@ from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.overload import Overload
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, zones_near
 from iveg.domain.tracking.people import People
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 
 SPEEDING_UP = 0.05
 """Faster than in the mean of its last second by more than this (m/s)."""

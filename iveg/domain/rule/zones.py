@@ -13,10 +13,11 @@ import numpy as np
 from iveg.domain.detection_rule import Rule
 from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.tracking.point_index import Floats
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 
 NOT_FAR_M = 0.01
 """So far outside a ring nobody can be inside, whatever rounding does."""

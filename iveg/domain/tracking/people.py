@@ -13,11 +13,12 @@ from iveg.domain.detection_rule import Class, Rule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.tracking.point_index import PointIndex
 from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
 from iveg.domain.tracking.tracker import Seen, Tracker
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 
 _SUSPECT_M = 1.0
 _PEER_GATE_M = 1.0

@@ -13,9 +13,10 @@ from iveg.domain.geometry import Pose2D, wrap_angle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person, Sighting
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 
 CLEAR_S = 1.0
 _EDGE_RAD = math.radians(5.0)

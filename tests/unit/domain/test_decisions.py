@@ -8,11 +8,12 @@ from iveg.domain.alerts.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import Rule
 from iveg.domain.observations import FeedbackRef, SafetyReport
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
 from iveg.domain.tracking.person import Sighting
 from iveg.domain.transports import DIRECT
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 from tests.builders import (
     START,
     at,

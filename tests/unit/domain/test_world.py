@@ -20,10 +20,11 @@ from iveg.domain.observations import (
     Received,
 )
 from iveg.domain.probe import ProbeLag
+from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import zones_of
 from iveg.domain.tracking.people import People
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.domain.world import RobotState, World
+from iveg.domain.world import World
 from tests.builders import (
     START,
     at,

@@ -6,7 +6,8 @@ import pytest
 
 from iveg.domain.observations import Battery, Observation, Overtaken
 from iveg.domain.records import ReadingRecord
-from iveg.domain.world import RobotState, World
+from iveg.domain.robot_state import RobotState
+from iveg.domain.world import World
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS, Sensor
 from iveg.pipeline.kinds import KINDS, Kind, read_directly
