@@ -14,6 +14,7 @@ from typing import Final
 
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
+from iveg.domain.transports import DIRECT
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scripts import Incident
 from iveg.emulator.world import REST, Rig, World
