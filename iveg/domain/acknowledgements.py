@@ -1,15 +1,15 @@
-"""How soon the fleet does as it is told (docs/safety.md).
+"""Acknowledgement latency: how soon the fleet obeys its speed limits (docs/safety.md).
 
-Timed is the whole way of an alert: from the notification of the look that a slow-down
-rests on to the robot's own report that it applies the factor.  Both are read on our
-clock, so no clock has to be believed; left out is the way from camera to iVeg, which
-only the robot's clock could tell.
+The time runs from the notification of the detection frame that a slow-down rests on to
+the robot's own report that it applies the factor.  Both are read on the server's clock,
+so no other clock has to be believed.  The way from camera to iVeg is left out: only the
+robot's clock could tell it.
 
-A robot judges by its own pose what the feedback told it, and may say so before iVeg
-finds it inside: it is timed from the newest look that the fleet had been told of by
-then.  Whoever drives into a ring that nobody has looked at for a while counts as asked
-and answered, but what it took says nothing of the way.  A robot that was slow for
-something else has nothing to answer.
+A robot judges the feedback by its own pose, and may report a slow-down before iVeg
+finds the robot inside the ring.  It is then timed from the newest frame that the fleet
+had been told of by then.  A robot that drives into a ring of which no frame is recent
+counts as asked and acknowledged, but its time says nothing of the way.  A robot that
+was slow for another reason is not asked.
 """
 
 import math
@@ -27,7 +27,7 @@ ECHO_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Acknowledgements:
-    """The alerts of the last minutes, as the robots answered them.
+    """The alerts of the last minutes, as robots acknowledged them.
 
     Attributes:
         timed: How many answers could be timed.
@@ -82,7 +82,7 @@ def _answered(decision: Decision) -> float | None:
 
 
 def _is_due(decision: Decision, now: Instant) -> bool:
-    """An answer that may still come in time is not missed yet."""
+    """Whether the time to acknowledge is over."""
     waited = now.mono - decision.crossing.entered.mono
     return waited > ECHO_S or _is_acknowledged(decision)
 

@@ -1,9 +1,9 @@
-"""How old a robot's message is at most: proven by what the robot had heard of iVeg.
+"""Upper bound of the age of a robot's message, proven by the feedback that it echoes.
 
-Robots tell in every message the newest feedback that they have heard.  What was
-measured after that feedback arrived was measured after it left, so the message is at
-most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of the
-robot is asked and no delay is guessed (docs/safety.md, "Age").
+Robots name in every message the newest feedback that they have received.  What was
+measured after that feedback arrived was measured after it left iVeg, so the message is
+at most as old as the feedback is now, on iVeg's own monotonic clock.  No clock of the
+robot enters and no delay is guessed (docs/safety.md, "Age").
 """
 
 from bisect import bisect_right
@@ -26,7 +26,7 @@ class FeedbackLedger:
         self._last = -1
 
     def composed(self, boot: str, first: int, last: int, now: float) -> None:
-        """Feedback ``first`` to ``last`` is composed now (monotonic, s)."""
+        """Record that feedback ``first`` to ``last`` is composed now (monotonic, s)."""
         self._boot, self._last = boot, last
         if self._moments and now - self._moments[-1] < _APART_S:
             return
@@ -36,9 +36,10 @@ class FeedbackLedger:
             del self._firsts[:_KEPT], self._moments[:_KEPT]
 
     def composed_at(self, heard: FeedbackRef | None) -> float | None:
-        """When that feedback was composed, or earlier (monotonic, s).
+        """The moment when that feedback was composed, or earlier (monotonic, s).
 
-        None where nothing is proven: of another boot of iVeg, never sent, forgotten.
+        None where nothing is proven: the feedback is of another boot of iVeg, was never
+        sent, or is forgotten.
         """
         if heard is None or heard.boot != self._boot or heard.seq > self._last:
             return None

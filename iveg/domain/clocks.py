@@ -3,7 +3,7 @@
 A stamp says how long a message travelled, relative to the fastest one of the same boot
 and transport within a minute (the minimum filter of NTP).  Seen from one side a delay
 that stays the same and a clock that is off look alike, so this is an estimate: it
-serves robots that prove nothing, and the display of the offset.
+serves robots that do not echo, and the display of the offset.
 
 ::
 
@@ -11,8 +11,8 @@ serves robots that prove nothing, and the display of the offset.
     a message beats the fastest by       messages agree            begins
     more than half a second
 
-A delay lets no stamp fall: that a transport is slow is never taken for a clock that
-was set.  Moments are iVeg's monotonic clock, which nobody sets.
+A delay lets no stamp fall: a slow transport is never taken for a clock that was set.
+Moments are iVeg's monotonic clock, which nobody sets.
 """
 
 from collections import deque
@@ -183,7 +183,7 @@ class RobotClock:
         """The offset to warn of (s); a warning lasts a minute, so that none flaps.
 
         A clock that seems behind by no more than messages may be late (``late_s``) is
-        not blamed.
+        not reported.
         """
         offset = self.offset_s(now)
         if (

@@ -1,10 +1,10 @@
-"""The costmap that all robots share: what their lasers found, and whom to keep off.
+"""The shared costmap: obstacles that lasers found, with the rings of people laid over.
 
-Every scan says of each cell in its reach: free, if the beam that looks that way went
+Every scan judges each cell in its reach: free, if the beam in that direction went
 further; taken, if it ended there (Moravec and Elfes' occupancy grid, in log-odds with
-the clamps of OctoMap, so that a crate that is carried away is soon forgotten).  What
-nobody looks at any more fades to unknown.  People and peers are laid over it with
-their ring at the moment of asking.  Left out: beams are lines without width.
+the clamps of OctoMap, so that a crate that is carried away is soon forgotten).  Cells
+that no beam reaches any more fade to unknown.  People and peers are laid over the grid
+with their ring at the moment of the request.  Left out: beams are lines without width.
 """
 
 import math
@@ -87,7 +87,7 @@ class Grid:
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """What one scan says of the cells in its reach.
+    """The evidence of one scan for the cells in its reach.
 
     Attributes:
         cells: Rows and columns that it speaks of.
@@ -112,7 +112,7 @@ class Costmap:
 
 @dataclass(frozen=True, slots=True)
 class Ring:
-    """Somebody to keep off: centre in ``map`` and radius (m)."""
+    """A person or peer to keep away from: centre in ``map`` and radius (m)."""
 
     x: float
     y: float
@@ -134,7 +134,7 @@ class Occupancy:
         np.clip(part, _LEAST, _MOST, out=part)
 
     def fade(self, mono: float) -> None:
-        """Let what was known at the last call grow old until ``mono`` (s)."""
+        """Let the knowledge of the last call age until ``mono`` (s)."""
         if self._faded is not None:
             passed = max(0.0, mono - self._faded)
             self._log *= np.float32(0.5 ** (passed / _HALF_LIFE_S))
@@ -165,9 +165,9 @@ class Occupancy:
 
 
 def window_round(poses: Iterable[Pose2D], before: Grid | None) -> Grid | None:
-    """Where to map when there are no walls: round the robots, at most 60 m wide.
+    """The area to map when there are no walls: around the robots, at most 60 m wide.
 
-    The window stays where it was while every robot is well inside; None without robots.
+    The window stays in place while every robot is well inside; None without robots.
     """
     places = [(pose.x, pose.y) for pose in poses]
     if not places:
@@ -202,8 +202,8 @@ def _stretch(low: float, high: float) -> tuple[float, float]:
 def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
     """Read one scan, taken at ``pose`` in ``map``, cell by cell.
 
-    Asking every cell for its beam, rather than every beam for its cells, leaves no
-    holes between beams that are far apart.
+    Each cell looks up its beam, rather than each beam its cells, so that no holes
+    remain between beams that are far apart.
     """
     sensor = pose.compose(scan.mount)
     reach = min(scan.range_max, _REACH_M)
@@ -222,7 +222,7 @@ def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
 
 
 def _free_to(scan: LaserScan, yaw: float, dx: _Log, dy: _Log, reach: float) -> _Log:
-    """How far the beam that looks at each cell went (m); 0 where none looks."""
+    """Length of the beam towards each cell (m); 0 where there is no beam."""
     count = scan.ranges.size
     step = scan.angle_increment
     bearing = np.arctan2(dy, dx) - np.float32(yaw + scan.angle_min)

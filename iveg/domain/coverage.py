@@ -1,9 +1,9 @@
-"""What nobody sees: when a camera last looked at each spot of the aisles.
+"""Camera coverage: when a camera last saw each cell of the aisles.
 
-That no person is on the map says something only of where somebody has looked.  Aisles
-are laid out in cells; a cell was looked at when a live robot's camera would have seen a
-person in its middle whole, nothing in between (``sight.looks_from``), the same look
-that may take a ring away.  Recorded robots do not look.
+A map without people says something only of cells that were in view.  Aisles are divided
+into cells; a cell counts as seen when a live robot's camera would have seen a whole
+person in its middle, with nothing in between (``sight.looks_from``).  The same view may
+take a ring away.  Recorded robots do not count.
 """
 
 import math
@@ -22,7 +22,7 @@ CELL_M = 1.0
 MOST_CELLS = 4000
 """A larger greenhouse gets coarser cells, so that none costs more than this."""
 RECENT_S = 10.0
-"""A look that is younger counts as seen now: a ring is remembered as long."""
+"""A younger view counts as seen now: a ring is remembered as long."""
 
 _Floats = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class LaneCells:
 
 
 class Coverage:
-    """Remembers the newest look at each cell of a greenhouse."""
+    """Remembers when each cell of a greenhouse was last in view."""
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse

@@ -1,7 +1,7 @@
 """The evening sheet: one day of the fleet in a few numbers, from the history alone.
 
-Poses are means over a second, so a pass is as close as that tells: to about half a
-metre of what a person and a robot walk and drive in it.
+Poses are means over a second, so the distance of a pass is exact to about half a metre,
+the way that a person and a robot move within that second.
 """
 
 from collections import defaultdict
@@ -99,7 +99,7 @@ def slowed_minutes(
 
 
 def _length(spans: list[tuple[float, float]]) -> float:
-    """How much of time is in any of these spans (s)."""
+    """Length of the union of these spans (s)."""
     total, covered = 0.0, float("-inf")
     for start, end in sorted(spans):
         total += max(0.0, end - max(start, covered))
@@ -110,7 +110,7 @@ def _length(spans: list[tuple[float, float]]) -> float:
 def closest_passes(
     poses: Sequence[Pose], seen: Iterable[Seen], greenhouse: Greenhouse
 ) -> list[Passing]:
-    """The nearest that a moving robot came to somebody, nearest first."""
+    """The closest passes of moving robots near people, nearest first."""
     by_second: dict[int, list[Pose]] = defaultdict(list)
     for pose in poses:
         if abs(pose.speed) >= LIMITS.standing_speed:

@@ -89,7 +89,7 @@ class Decision:
 
     @property
     def took_s(self) -> float | None:
-        """From the look to the robot's own report (s); None where one is missing."""
+        """From the frame to the robot's own report (s); None where one is missing."""
         answered = self.answered
         if answered is None and self.applied is not None and not self.crossing.ahead:
             answered = self.applied.mono
@@ -110,7 +110,7 @@ class Decision:
         return crossing.speed_before > JUDGED_ABOVE and not hidden
 
     def published(self, at: Instant) -> "Decision":
-        """The speed limit went out."""
+        """The speed limit was published."""
         return self if self.feedback is not None else replace(self, feedback=at)
 
     def reported(self, report: SafetyReport, at: Instant) -> "Decision":
@@ -132,13 +132,13 @@ class Decision:
         return replace(self, ended=at)
 
     def aged(self, now: Instant) -> "Decision":
-        """Time passed; a link that did not come is missing from now on."""
+        """Let time pass; a link that did not come is missing from now on."""
         if self.waited_out or now.mono - self.crossing.entered.mono < MISSING_S:
             return self
         return replace(self, waited_out=True)
 
     def broken_off(self, at: Instant) -> "Decision":
-        """Break it off: iVeg goes away, and nobody will know how it went on."""
+        """Close the decision unfinished: iVeg stops, and its end stays unknown."""
         return replace(self, ended=at, interrupted=True)
 
     def overdue(self, now: Instant) -> bool:

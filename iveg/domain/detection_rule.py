@@ -62,7 +62,7 @@ class Rule:
     since: float | None = None
 
     def threshold_of(self, class_: Class | None) -> float:
-        """Least confidence of a canonical class; None is any other."""
+        """Least confidence of a canonical class; None stands for any other class."""
         if class_ is None:
             return self.threshold
         return self.class_thresholds.get(class_, self.threshold)

@@ -1,4 +1,4 @@
-"""What happened, as the log says it: a template's name and what fills its holes."""
+"""Log lines as values: a template's name and what fills its holes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,9 +1,10 @@
-"""How long today the fleet was closer to people than stopping takes (docs/safety.md).
+"""Exposure: how long today the fleet was closer to people than stopping takes.
 
-Margins are looked at a few times a second; each look stands for the time since the one
-before.  What nobody could know is counted apart: it is neither margin nor danger.
-So is a margin to somebody who was last seen more than a second ago: it shrinks with
-their absence alone and was never measured.  A day is one of UTC.
+Margins are evaluated a few times a second; each evaluation stands for the time since
+the one before.  Unknown margins are counted apart: they are neither safe nor dangerous.
+So is the margin to a person who was last seen more than a second ago: it shrinks with
+their absence alone and was never measured.  Days are UTC days (docs/safety.md,
+"Margins").
 """
 
 from collections.abc import Sequence
@@ -14,9 +15,9 @@ from iveg.domain.margins import Margin
 from iveg.domain.observations import Instant
 
 PERIOD_S = 0.5
-"""How often margins are looked at."""
+"""Period of evaluations (s)."""
 _LONGEST_S = 2 * PERIOD_S
-"""A look after a longer silence does not stand for all of it."""
+"""An evaluation after a longer silence does not stand for all of it."""
 _DAY_S = 86_400.0
 
 
@@ -33,8 +34,8 @@ class Exposure:
     """One day so far.
 
     Attributes:
-        since: The first look of the day.
-        looked: The newest look; ``looks`` how many.
+        since: The first evaluation of the day.
+        looked: The newest evaluation; ``looks`` how many there were.
         known_s: Time whose margins are known (s), with nobody near included.
         negative_s: The part of it in which some robot could not have stopped in time.
         unknown_s: Time in which some margin, or the whole fleet, was unknown (s).
@@ -50,7 +51,7 @@ class Exposure:
 
     @property
     def share(self) -> float | None:
-        """Of the known time that was negative (0 to 1); None before any."""
+        """Negative share of the known time (0 to 1); None without known time."""
         return self.negative_s / self.known_s if self.known_s > 0.0 else None
 
 
@@ -59,20 +60,20 @@ class Exposures:
     """Keeps the account of the day.
 
     Attributes:
-        today: None before the first look.
+        today: None before the first evaluation.
     """
 
     today: Exposure | None = field(default=None)
 
     def due(self, now: Instant) -> bool:
-        """Whether it is time to look again."""
-        # Ticks come a hair early; a look must not wait for the one after.
+        """Whether the next evaluation is due."""
+        # Ticks come a little early; an evaluation must not wait for the one after.
         return (
             self.today is None or now.mono - self.today.looked.mono >= PERIOD_S - 1e-3
         )
 
     def look(self, margins: Sequence[Margin], now: Instant, *, seen: bool) -> Exposure:
-        """Take one look.
+        """Take one evaluation of the margins.
 
         Args:
             margins: Of every robot with every person, as far as there are pairs.

@@ -1,7 +1,7 @@
-"""The fleet as data: which robots there are, live or recorded, and what each one is.
+"""The fleet as data: its robots, live or recorded, and the profile of each.
 
-Files are read in ``adapters/fleet_files``; here are the values.  A robot that nobody
-described gets the most cautious profile: the largest body, the weakest brakes, and a
+Files are read in ``adapters/fleet_files``; here are the values.  A robot without a
+description gets the most cautious profile: the largest body, the weakest brakes, and a
 camera that can clear no spot.
 """
 
@@ -22,7 +22,7 @@ RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
 
 @dataclass(frozen=True, slots=True)
 class RobotProfile:
-    """What a robot is; the defaults are those of one that nobody described.
+    """Body, drive, camera and laser of a robot; the defaults are the most cautious.
 
     Attributes:
         drive: ``differential`` (turns on the spot) or ``ackermann``.

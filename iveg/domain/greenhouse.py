@@ -1,4 +1,4 @@
-"""The greenhouse: one description for emulator, occlusion and map."""
+"""The greenhouse that robots drive in, for emulator, occlusion and map alike."""
 
 from dataclasses import dataclass
 

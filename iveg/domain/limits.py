@@ -1,9 +1,9 @@
-"""Every number that safety rests on: once, with its unit and where it comes from.
+"""Every number that safety rests on: once, with its unit and its source.
 
 The rule, the machine of STOP, the software on a robot and the pages take them from
-here, the pages through what the server writes into each (``static/js/core/limits.js``).
-Where a setting may change one, this is its default.  Numbers of an algorithm that
-nobody outside of it relies on stay where the algorithm is.
+here, the pages through values that the server writes into each
+(``static/js/limits.js``).  Where a setting may change one, this is its default.
+Numbers of an algorithm that nobody outside of it relies on stay where the algorithm is.
 """
 
 from collections.abc import Callable, Iterator

@@ -70,7 +70,7 @@ class Margin:
 
     @property
     def band(self) -> Band:
-        """In a word, which is never "safe"."""
+        """The margin as one word, which is never "safe"."""
         if not self.known:
             return "unknown"
         if self.margin_m < 0.0:
@@ -79,10 +79,10 @@ class Margin:
 
 
 def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
-    """The least margin to any look that still protects this person.
+    """The least margin to any sighting that still protects this person.
 
-    None where there is no pair: the robot was never seen, or nobody has seen the
-    person for ten seconds.
+    None where there is no pair: the robot was never seen, or the person has not been
+    seen for ten seconds.
     """
     looks = [
         look for look in person.sightings if look.age_s(now) <= LIMITS.ring_lasts_s
@@ -94,7 +94,7 @@ def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
 def margins_of(
     robots: Iterable[RobotState], people: Collection[Person], now: Instant
 ) -> Iterator[Margin]:
-    """Of every robot with every person, as far as there are pairs."""
+    """The margin of every robot with every person, where there is a pair."""
     for robot in robots:
         for person in people:
             margin = margin_of(robot, person, now)
@@ -103,26 +103,26 @@ def margins_of(
 
 
 def least(margins: Iterable[Margin]) -> Margin | None:
-    """The one to show: who could not stop in time, then what is not known."""
+    """The margin to show first: negative ones, then unknown ones."""
     return min(margins, key=_urgency, default=None)
 
 
 def _urgency(one: Margin) -> float:
-    """The less, the sooner it is shown (m)."""
+    """Rank of a margin (m); the least is shown first."""
     if not one.known:
         return one.margin_m - _UNKNOWN_M
     return one.margin_m - _INSIDE_M if one.margin_m < 0.0 else one.margin_m
 
 
 def _is_known(pose_age_s: float, look_age_s: float, margin_m: float) -> bool:
-    """Whether a margin is one: the least that is left is told of who is far enough."""
+    """Whether the margin is known; of a far person the least possible one is."""
     if pose_age_s > LIMITS.pose_lost_s:
         return False
     return look_age_s <= LIMITS.pose_lost_s or margin_m >= LIMITS.margin_clear_m
 
 
 class LeastMargins:
-    """The least margin of each robot and of each person, all pairs worked out at once.
+    """The least margin of each robot and each person, all pairs at once.
 
     Args:
         robots: Whose margins are asked for.
@@ -153,14 +153,14 @@ class LeastMargins:
         self._margins = _all_pairs(facts, [look for _, look in self._detections], now)
 
     def of_robot(self, robot_id: str) -> Margin | None:
-        """To whomever it has the least margin."""
+        """The least margin of this robot to anybody."""
         row = self._row.get(robot_id)
         if row is None or not self._detections:
             return None
         return self._pair(row, int(np.argmin(self._margins[row])))
 
     def of_person(self, person_id: str) -> Margin | None:
-        """Of whichever robot has the least margin."""
+        """The least margin of any robot to this person."""
         columns = self._columns.get(person_id)
         if columns is None or not self._robots:
             return None

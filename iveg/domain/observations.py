@@ -146,7 +146,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class DetectionFrame:
-    """Everything that one look of a detector found; empty means "looked, saw nothing".
+    """All detections of one picture; an empty frame means that nothing was seen.
 
     Attributes:
         unreadable: Boxes that could not be used (no confidence, no position).
@@ -184,7 +184,7 @@ class RobotFault:
 
 @dataclass(frozen=True, slots=True)
 class Unplaced:
-    """Something was sensed, and where that was in ``map`` is not known.
+    """A measurement whose place in ``map`` is not known.
 
     Attributes:
         kind: What would have been sent.
@@ -199,7 +199,7 @@ class Unplaced:
 
 @dataclass(frozen=True, slots=True)
 class SafetyReport:
-    """What the robot really applies, in its own words.
+    """The speed factor that the robot applies and its reasons, as it reports them.
 
     Attributes:
         cause: Person, robot or hold that the factor is for.
@@ -292,17 +292,18 @@ class Climate:
 
 @dataclass(frozen=True, slots=True)
 class HeartbeatProbe:
-    """iVeg's own probe, come back through the whole chain."""
+    """iVeg's own heartbeat probe after its way through the whole data path."""
 
     origin: Origin
 
 
 @dataclass(frozen=True, slots=True)
 class Overtaken:
-    """A message that its stream is past: who said it, and nothing of what was said.
+    """A message older than its stream, reduced to its identity.
 
-    A twin or straggler changes no pose and no scan, so its numbers are not read.  Of
-    looks that holds for a twin alone: what a late one saw may still protect somebody.
+    A twin or straggler changes no pose and no scan, so its numbers are not read.  This
+    holds for odometry and scans alone: the content of a late detection frame may still
+    protect somebody.
     """
 
     robot_id: str
@@ -326,7 +327,7 @@ Observation = (
 
 
 def kind_of(observation: Observation) -> type[Observation]:
-    """Which stream of its robot an observation belongs to."""
+    """The stream of its robot that an observation belongs to."""
     return observation.kind if isinstance(observation, Overtaken) else type(observation)
 
 

@@ -1,7 +1,7 @@
-"""Order of what one robot sends (docs/interfaces/mqtt.md).
+"""Order of the messages of one robot (docs/interfaces/mqtt.md).
 
-Newest wins: nothing waits for a message that is late, and no stamp ever decides which
-is newer.
+The newest wins: no message waits for a late one, and no stamp ever decides which is
+newer.
 """
 
 from collections import deque
@@ -21,11 +21,11 @@ _GROWN_TO_RETURN = 5
 
 @dataclass(slots=True)
 class Order:
-    """Where one stream (robot and kind) stands.
+    """The position of one stream (robot and kind).
 
-    A straggler of a boot that was never seen looks like a new start, and would make
-    the living boot an old one for ever.  So an old boot that goes on counting, five
-    times with no word of the present one in between, is taken for what it is.
+    A straggler of an unknown boot looks like a new start, and would make the present
+    boot an old one for ever.  So an old boot that goes on counting, five times with no
+    message of the present one in between, becomes the present one again.
     """
 
     boot: str | None = None
@@ -38,7 +38,7 @@ class Order:
     """The same, to look them up: what FIWARE brings is a copy nearly always."""
 
     def knows_better_than(self, origin: Origin) -> bool:
-        """Whether an old record must not even be judged: it is of another boot."""
+        """Whether a record is of an earlier boot and must not be judged."""
         return self.boot is not None and origin.boot != self.boot
 
     def is_past(self, boot: str, seq: int) -> bool:
@@ -50,7 +50,7 @@ class Order:
         return boot == self.boot and seq in self._known
 
     def judge(self, origin: Origin) -> Verdict:
-        """Say whether a message is newer than all before, and remember it.
+        """Judge whether a message is newer than all before, and remember it.
 
         A message without identity is new by arrival.
         """

@@ -1,13 +1,14 @@
-"""How far the FIWARE chain is behind, told by iVeg's own probes alone.
+"""Lag of the FIWARE data path, measured by iVeg's own heartbeat probes alone.
 
 A probe goes out every two seconds and comes back through broker, agent and Orion.  The
-newest that came back says how long the chain took then; the oldest that is still out
-says how long it takes at least now, so a chain that stops is not taken for a fast one::
+newest that came back says how long the path took then; the oldest that is still out
+says how long it takes at least now, so that a path that stops is not taken for a fast
+one::
 
     sent    1    2    3    4    5
     back    +1.0 +1.5                →  now, 4 s after 3 left: 4.0 s behind, growing
 
-One that is passed by a later one counts no more: it may be lost for ever.
+A probe that a later one has overtaken no longer counts: it may be lost for ever.
 """
 
 from collections import deque

@@ -1,4 +1,4 @@
-"""What is remembered: one frozen value for each row of the history.
+"""Rows of the history: one frozen value each.
 
 All times are Unix seconds UTC, positions are in ``map`` (m), speeds in m/s and rad/s.
 A decision, a command and an alert change state: a later record with the same id takes
@@ -67,7 +67,7 @@ class DecisionRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DetectionRecord:
-    """One box of one look of one robot.
+    """One box of one detection frame of one robot.
 
     Attributes:
         at: When it reached iVeg.
@@ -244,7 +244,7 @@ class LatencyRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReadingRecord:
-    """What one small sensor of one robot said.
+    """One reading of a small sensor of one robot.
 
     Attributes:
         kind: Name of the observation in lower case, such as ``battery``.

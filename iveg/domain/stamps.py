@@ -1,4 +1,4 @@
-"""Moments as text: ISO-8601 UTC, as the contract and every document write them."""
+"""Moments as text: ISO-8601 UTC, as in the contract and all documents."""
 
 from datetime import UTC, datetime
 

@@ -1,7 +1,7 @@
-"""The ways to a robot and back, as a table: one more is one entry.
+"""The transports to a robot and back, as a table: another one is one entry.
 
 Orders, their times, JSON and pages are keyed by a transport's id.  Transports share
-nothing, so that what breaks one leaves the others alone.
+nothing, so that a fault of one leaves the others alone.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ TransportId = NewType("TransportId", str)
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """One way.
+    """One way to a robot and back.
 
     Attributes:
         id: Its name everywhere.
@@ -34,7 +34,7 @@ class Transport:
     alias: str = ""
 
     def switched(self, *, on: bool) -> "Transport":
-        """The same, or one that carries no order."""
+        """The same transport, or one that carries no order."""
         return self if on else replace(self, can_stop=False, can_release=False)
 
 

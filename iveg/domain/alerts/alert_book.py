@@ -1,9 +1,9 @@
-"""Alerts to people, after ISA-18.2: raised, acknowledged, cleared (docs/dashboard.md).
+"""Alerts after ISA-18.2: raised, acknowledged, cleared (docs/dashboard.md, "Alerts").
 
-What is wrong is a set of conditions, found anew each time; the book compares it with
-what it holds.  A condition that goes clears its alert; one that comes back is the same
-alert, one occurrence more.  One row stands for all of them, but never for less than
-the gravest that nobody has seen: grouping cannot hide an escalation.
+The conditions that hold are found anew each time; the book compares them with the
+alerts that it keeps.  A condition that ends clears its alert; one that returns is the
+same alert, one occurrence more.  One row stands for all of them, but never for less
+than the gravest unacknowledged occurrence: grouping cannot hide an escalation.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,16 +16,16 @@ from iveg.domain.observations import Instant
 Priority = Literal["P1", "P2", "P3"]
 
 GROUPING_S = 600.0
-"""The same condition back within this time is the same alert, counted once more."""
+"""A condition that returns within this time is the same alert, counted once more."""
 MOST_KEPT = 200
-"""More alerts than this, and even a P1 that nobody saw is left to the history."""
+"""Beyond this number even an unacknowledged P1 is left to the history."""
 MEMBERS_KEPT = 100
-"""Occurrences that an alert can still tell one by one; the others are counted."""
+"""Occurrences that an alert lists one by one; older ones are counted."""
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Something that is wrong now.
+    """A condition that holds now and asks for an alert.
 
     Attributes:
         key: Names the sentence; ``subject`` tells two of a kind apart.
@@ -40,7 +40,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """One time that a condition held, and who has seen it."""
+    """One time that a condition held, and its acknowledgement."""
 
     priority: Priority
     raised: Instant
@@ -52,7 +52,7 @@ class Occurrence:
 
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """One notice with its life: every occurrence of one condition.
+    """One alert with its life: every occurrence of one condition.
 
     Attributes:
         condition: As it is now, or was when it cleared.
@@ -81,12 +81,12 @@ class Alert:
 
     @property
     def waits(self) -> bool:
-        """Whether it is for people to see: it holds, or was a P1 that nobody saw."""
+        """Whether people should see it: it is active, or an unacknowledged P1."""
         return self.cleared is None or self.unseen == "P1"
 
     @property
     def priority(self) -> Priority:
-        """What it is shown and sounds as: never less than the gravest unseen."""
+        """Shown priority: never less than the gravest unacknowledged one."""
         return graver(self.condition.priority, self.unseen)
 
 
@@ -103,13 +103,13 @@ class AlertBook:
 
     @property
     def waiting(self) -> list[Alert]:
-        """What is wrong now, seen or not, and each P1 that went before it was seen."""
+        """Active alerts, and each P1 that cleared before it was acknowledged."""
         return [one for one in self._alerts.values() if one.waits]
 
     def sync(
         self, conditions: Iterable[Condition], now: Instant, new_id: str
     ) -> list[Alert]:
-        """Take what is wrong now; returns the alerts that were raised or cleared."""
+        """Take the conditions that hold now; returns the alerts that they changed."""
         wrong = _gravest(conditions)
         changed = []
         for key, alert in list(self._alerts.items()):
@@ -130,7 +130,7 @@ class AlertBook:
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
     ) -> Alert | None:
-        """Somebody has seen all of it; None when there is no such alert."""
+        """Acknowledge all occurrences; None when there is no such alert."""
         alert = self.find(alert_id)
         if alert is not None:
             alert = _see(alert, by, note, now)
@@ -138,9 +138,9 @@ class AlertBook:
         return alert
 
     def remember(self, alerts: Iterable[Alert]) -> None:
-        """Take up alerts that are over and that nobody has seen; what is known stays.
+        """Take up cleared, unacknowledged alerts of an earlier run; known ones stay.
 
-        One whose condition holds again already stands beside it under its own name.
+        If the condition holds again, a new alert of this run already stands beside it.
         """
         for alert in alerts:
             key = alert.condition.key, alert.condition.subject
@@ -151,7 +151,7 @@ class AlertBook:
             self._alerts[key] = alert
 
     def find(self, alert_id: str) -> Alert | None:
-        """An alert that is active or was not long ago."""
+        """An alert that is active or recently cleared."""
         found = (one for one in self._alerts.values() if one.alert_id == alert_id)
         return next(found, None)
 
@@ -164,7 +164,7 @@ class AlertBook:
 
 
 def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition]:
-    """What is wrong by kind and subject; of two of the same the graver."""
+    """Conditions by kind and subject; of two alike the graver."""
     wrong: dict[tuple[str, str], Condition] = {}
     for one in conditions:
         known = wrong.setdefault((one.key, one.subject), one)
@@ -174,7 +174,7 @@ def _gravest(conditions: Iterable[Condition]) -> dict[tuple[str, str], Condition
 
 
 def _goes_on(before: Alert, condition: Condition) -> bool:
-    """Whether it is the same occurrence: one that gets graver is a new one."""
+    """Whether the occurrence continues: a graver one is a new occurrence."""
     return before.cleared is None and condition.priority >= before.condition.priority
 
 

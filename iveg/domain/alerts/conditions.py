@@ -21,9 +21,9 @@ STORM_SHOWN_S = 10.0
 
 
 def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
-    """One that is not obeyed is grave; a slow-down is the rule at work and no alert.
+    """A decision that is not obeyed is a P1; a slow-down as such is no alert.
 
-    It is on the robot's card, on the map and in the log, and asks nothing of anybody.
+    The slow-down is on the robot's card, on the map and in the log.
     """
     crossing = decision.crossing
     slots: dict[str, Slot] = {
@@ -57,7 +57,7 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
 
 
 def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
-    """What a robot is by its messages, where the fleet says something else."""
+    """A robot whose messages contradict its kind in the fleet: live or recording."""
     slots: dict[str, Slot] = {"robot": robot.robot_id}
     name = robot.robot_id
     if _is_recent(robot.live_at, now):
@@ -71,7 +71,7 @@ def _is_recent(moment: float | None, now: Instant) -> bool:
 
 
 def _may_be_late_s(robot: RobotState, now: Instant) -> float:
-    """How late messages of a robot that echoes may be (s); of others no more."""
+    """Greatest delay of the messages of a robot that echoes (s); else 0."""
     if robot.odometry is None or not robot.odometry.origin.acknowledgements:
         return 0.0
     age = robot.age_s(now)
@@ -79,7 +79,7 @@ def _may_be_late_s(robot: RobotState, now: Instant) -> float:
 
 
 def _was_moving(robot: RobotState) -> bool:
-    """What a robot did when last heard: its report may be newer than its odometry."""
+    """Whether the robot moved when last heard, by its newer report or odometry."""
     report, at = robot.safety, robot.safety_received
     if report is None or at is None or at.mono < (robot.pose_at or 0.0):
         return not robot.stands
@@ -87,7 +87,7 @@ def _was_moving(robot: RobotState) -> bool:
 
 
 def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
-    """Detectors that say more than can be judged: one notice names them all."""
+    """Detectors with more detections than can be judged: one alert names them all."""
     names = [
         name
         for name, at in overload.last.items()
@@ -99,7 +99,7 @@ def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
-    """Robots whose age is only estimated, or that nobody described: one notice each."""
+    """Robots with estimated ages or without a description: one alert each."""
     fleet = list(robots)
     estimated = [
         robot.robot_id

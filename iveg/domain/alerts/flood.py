@@ -1,8 +1,8 @@
-"""How fast alerts come: more than a person can take in is a flood (ISA-18.2).
+"""Floods of alerts: more alerts than a person can handle (ISA-18.2).
 
 A flood begins when more than ten alerts come within ten minutes and is over when fewer
 than five do (ANSI/ISA-18.2, clause on monitoring and assessment; EEMUA 191).  It is
-told, and hides nothing.  Whoever counts leaves out what asks nothing of anybody.
+displayed and hides nothing.  Alerts that ask nothing of anybody are not counted.
 """
 
 from collections import deque
@@ -20,7 +20,7 @@ _MOST_COUNTED = 1000
 
 @dataclass(frozen=True, slots=True)
 class Flood:
-    """How many alerts came within the window; a thousand is the most that is counted.
+    """Number of alerts within the window, at most a thousand.
 
     Attributes:
         since: When the flood began; None while there is none.
@@ -43,7 +43,7 @@ class FloodGauge:
         return self._flood
 
     def take(self, raised: int, now: Instant) -> Flood:
-        """Count what has been raised now and forget what is out of the window."""
+        """Count the alerts raised now and forget those out of the window."""
         self._raised.extend([now.mono] * raised)
         while self._raised and now.mono - self._raised[0] >= FLOOD_WINDOW_S:
             self._raised.popleft()

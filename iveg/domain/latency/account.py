@@ -1,7 +1,7 @@
-"""What the latency page tells: each hop of each kind of data over one window.
+"""The numbers of the latency page: each hop of each kind of data over one window.
 
 Collecting is quick and belongs to the loop, since streams live there; merging and
-summing up take finished sketches alone and may be done in any thread.
+summing up need finished sketches alone and may be done in any thread.
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,8 @@
-"""Overload in one sentence a hop: who is behind and by how much, what is lost.
+"""Overload, one sentence for each hop: how far it is behind and how much it loses.
 
-Read off once a second from what the taps saw last, so a hop that falls behind is named
-within three seconds: by what still waits at it, before any late message has come out.
+It is read once a second from the newest messages at each hop, so that a hop that falls
+behind is named within three seconds: by the messages that still wait at it, before any
+late one has come out.
 """
 
 from collections import deque
@@ -26,7 +27,7 @@ _GROWS_S, _GROWS_WITHIN = 0.25, 4
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """What a person should know of one hop.
+    """One finding about a hop, for people.
 
     Attributes:
         what: ``growing`` is behind and ever more so.
@@ -44,7 +45,7 @@ class Remark:
 
 
 class Overloads:
-    """What is wrong with the hops now; told once a second.
+    """Findings about the hops now, once a second.
 
     Attributes:
         remarks: In sentences.
@@ -58,7 +59,7 @@ class Overloads:
         self._behind: set[tuple[Hop, str]] = set()
 
     def look(self, streams: Sequence[Stream], now: float) -> None:
-        """Judge the hops by what passed them last (``now`` monotonic, s)."""
+        """Judge the hops by their newest messages (``now`` monotonic, s)."""
         found: list[Remark] = []
         robots = sorted({one.robot_id for one in streams})
         for robot_id in robots:

@@ -1,4 +1,4 @@
-"""The words of the latency table: hops, kinds of data, windows, reasons."""
+"""Names of the latency table: hops, kinds of data, windows, reasons."""
 
 from typing import Final, Literal, get_args
 
@@ -43,7 +43,7 @@ arrived before it left; ``page_nonsense``: a page told a moment that cannot be."
 STAMP_S: Final = 0.001
 """Resolution of a stamp (s): what lies below zero by less is zero."""
 LONGEST_S: Final = 60.0
-"""A hop that takes longer is none: the stamp is wrong, or the message was replayed."""
+"""A longer time is not counted: the stamp is wrong, or the message was replayed."""
 
 _DATA: Final[dict[type, Data]] = {
     Odometry: "odometry",
@@ -53,7 +53,7 @@ _DATA: Final[dict[type, Data]] = {
 
 
 def data_of(observation: Observation) -> Data | None:
-    """Which row of the table an observation belongs to; None: to none."""
+    """The row of the table that an observation belongs to; None for no row."""
     data = _DATA.get(type(observation))
     if data is None and isinstance(observation, Overtaken):
         return _DATA[observation.kind]

@@ -52,7 +52,7 @@ _ANYTHING: Final = Bounds()
 
 
 class ClockOffset:
-    """What is known of one robot's clock.
+    """The known offset of one robot's clock.
 
     Attributes:
         bounds: What the last one to two minutes prove.

@@ -11,7 +11,7 @@ _LEAP: Final = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Lately:
-    """The last three seconds: how many passed, were missing, came out of order."""
+    """The last three seconds: messages passed, missing, out of order."""
 
     passed: int
     missing: int
@@ -24,7 +24,7 @@ class Lately:
 
 
 class Order:
-    """Counts what passes.
+    """Counts messages by their numbers.
 
     Attributes:
         newest: Highest number so far; None before the first of a boot.
@@ -42,7 +42,7 @@ class Order:
         self.newest = None
 
     def take(self, seq: int) -> None:
-        """A message of a sender that leaves no number out."""
+        """Count a message of a sender that leaves no number out."""
         newest = self.newest
         skipped = 0 if newest is None else seq - newest - 1
         self.arrived(seq, skipped if 0 < skipped < _LEAP else 0)

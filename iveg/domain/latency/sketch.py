@@ -30,7 +30,7 @@ _LOG_GAMMA = float(np.log(_MAPPING.gamma))
 
 @dataclass(frozen=True)
 class Sketch:
-    """What a hop took, over some while.
+    """Durations of one hop over some time.
 
     Attributes:
         count: How many were measured.

@@ -41,7 +41,7 @@ class Rates:
 
 
 class Stream:
-    """What is measured of one kind of data of one robot.
+    """Measurements of one kind of data of one robot.
 
     Attributes:
         hops: Durations, by hop.
@@ -158,7 +158,7 @@ class Stream:
 
     @property
     def rates(self) -> Rates:
-        """What really comes."""
+        """The rates that really arrive."""
         if len(self._past) < 2:
             return Rates(0.0, 0.0, 0.0)
         (h0, a0, o0), (h1, a1, o1) = self._past[0], self._past[-1]

@@ -1,8 +1,8 @@
-"""The whole fleet's latency: what the boundaries call for each message.
+"""Latency of the whole fleet: the calls that boundaries make for each message.
 
-A call costs a few microseconds (``benchmarks/latency_cost.py``), so that twenty robots
-of ninety messages a second may be timed whole: nothing is built for a message, it gets
-its place in a ring.
+A call costs a few microseconds (``benchmarks/latency_cost.py``), so that every message
+of twenty robots with ninety messages a second can be timed: nothing is allocated for a
+message, it gets its place in a ring.
 """
 
 from collections.abc import Callable, Iterable, Iterator

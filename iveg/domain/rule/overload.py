@@ -1,9 +1,9 @@
-"""When a detector says more than can be judged: what is bounded, and who slows for it.
+"""Overload by detections: its bounds, and which robots drive slower for it.
 
-At most 256 people are kept and 45 pictures a second of each robot are judged.  What is
-over that drops nobody who is known, but somebody new may be among it.  So the observer
-and every robot near what it can see drive at half speed until a picture of it was
-judged whole.
+At most 256 people are kept and 45 pictures a second of each robot are judged.
+Detections beyond that never displace a known person, but somebody new may be among
+them.  So the observer and every robot near what it can see drive at half speed until a
+picture of that observer was judged whole.
 """
 
 from collections.abc import Iterable, Mapping
@@ -42,7 +42,7 @@ class Overload:
         return admitted
 
     def judged(self, robot_id: str, now: Instant, *, whole: bool) -> None:
-        """A picture came; ``whole`` when everybody in it was taken."""
+        """Note a judged picture; ``whole`` when every detection in it was taken."""
         if whole:
             self.since.pop(robot_id, None)
         else:
@@ -50,7 +50,7 @@ class Overload:
             self.last[robot_id] = now.mono
 
     def slowed(self, world: World, bounds_width: float) -> Mapping[str, str]:
-        """Who must drive at half speed, and for whose pictures.
+        """Robots that must drive at half speed, and for whose pictures.
 
         Args:
             world: Where everybody is.
@@ -71,7 +71,7 @@ def _near(
     reach = observer.profile.camera_range + LIMITS.ring_most_m
     here = _pose(observer)
     for robot in robots:
-        # What a recording saw slows recordings of its frame alone.
+        # A recording's detections slow recordings of its frame alone.
         if observer.recording not in (None, robot.recording):
             continue
         there = _pose(robot)

@@ -151,7 +151,7 @@ class SpeedLimits:
         flooded: Mapping[str, str],
         now: Instant,
     ) -> SpeedLimit:
-        """The reason that says most: a person, then a peer, then silence."""
+        """The most specific reason wins: a person, then a peer, then silence."""
         mine = self._open.get(robot.robot_id)
         if mine:
             worst = min(
@@ -181,7 +181,7 @@ class SpeedLimits:
 def _nearest(
     robot: RobotState, zones: Iterable[Zone], mine: Mapping[str, Crossing]
 ) -> dict[str, tuple[float, float, Zone]]:
-    """Of each cause the deepest circle: how far outside (m), distance (m), it.
+    """The deepest circle of each cause: how far outside (m), distance (m), the circle.
 
     Causes that the robot is far from and was not near to are left out.
     """
@@ -217,7 +217,7 @@ def _leave(
 
 
 def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:
-    """A crossing that goes on, or whose robot is outside since now."""
+    """A crossing that continues, or whose robot has just left the circle."""
     since = None
     if depth > LIMITS.release_beyond_m:
         since = crossing.outside_since or now.mono
@@ -240,7 +240,7 @@ def _is_slow_already(robot: RobotState, zone: Zone, speed: float) -> bool:
 
 
 def _is_ahead(robot: RobotState, zone: Zone) -> bool:
-    """Whether a robot reports that it is slow for this very zone."""
+    """Whether the robot already reports that it is slow for this very hazard."""
     report = robot.safety
     if report is None or report.speed_factor > HALF_SPEED:
         return False
@@ -250,7 +250,7 @@ def _is_ahead(robot: RobotState, zone: Zone) -> bool:
 
 
 def _silent_observer(world: World, now: Instant) -> str | None:
-    """Who of the fleet's eyes is shut; an empty text when nobody looks at all."""
+    """The robot whose detector is silent; an empty text when no detector sends."""
     ages = {
         robot.robot_id: now.mono - robot.detections_at
         for robot in world.live_robots()

@@ -1,7 +1,7 @@
-"""Every circle that slows whoever is inside, and which of them a robot is near.
+"""Circles that slow robots, and which of them each robot is near.
 
-Few circles are compared with every robot one by one; many as arrays, where a look at a
-circle costs nothing unless somebody is near it.
+Few circles are compared with every robot one by one; many are compared as arrays, so
+that a circle costs nothing unless a robot is near it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -27,7 +27,7 @@ _FEW_PAIRS = 150
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """One circle that slows whoever is inside.
+    """A circle that slows every robot inside it.
 
     Attributes:
         cause: The person or robot at its centre.
@@ -51,7 +51,7 @@ class Zone:
 
 
 def zones_of(world: World, people: People, rule: Rule, now: Instant) -> Iterator[Zone]:
-    """Every circle that slows somebody now."""
+    """Every circle that slows robots now."""
     for person in people.known.values():
         yield from _zones_of(person, world, rule, now)
     yield from _peers(world, rule, now)
@@ -169,7 +169,7 @@ class _Placed:
 def _people_near(
     placed: _Placed, people: People, rule: Rule, now: Instant
 ) -> dict[str, set[str]]:
-    """Robot → everybody whom it may be near."""
+    """Robot → the people whom it may be near."""
     spots = people.spots
     x, y, seen_at, reach = spots.columns
     age = np.maximum(0.0, now.mono - seen_at)

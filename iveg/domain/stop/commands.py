@@ -35,7 +35,7 @@ PRESS_AHEAD_S = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """What a page says of a press; a program may say nothing.
+    """A page's account of a press; a program may give none.
 
     Attributes:
         press_id: The same on every transport and at every repetition.
@@ -130,13 +130,13 @@ class Command:
     def sent(
         self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
     ) -> "Command":
-        """A transport took what ``left`` for it, or failed; taken is not yet arrived.
+        """A transport took what ``left`` for it, or failed; taken is not arrived.
 
-        Sent is when it left: the robot's answer is often here before the word of who
-        took it, and no answer comes before its question.
+        The time is when it left: the robot's answer is often here before the
+        transport's, and no answer comes before its question.
 
-        Only a broker's word that it has a STOP (PUBACK) says something; Orion's 204
-        and an order at QoS 0 say nothing until the robot answers.
+        Only a broker's PUBACK of a STOP is evidence; Orion's 204 and an order at QoS 0
+        say nothing until the robot answers.
         """
         times = self.times
         if ok:

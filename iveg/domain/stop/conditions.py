@@ -1,4 +1,4 @@
-"""What is wrong with the STOP of a fleet, for whoever raises alerts of it."""
+"""Alert conditions of the STOPs of a fleet."""
 
 from collections.abc import Iterable
 
@@ -34,7 +34,7 @@ def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
 
 
 def _of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
-    """What is wrong with one robot's STOP."""
+    """The alert condition of one robot's STOP."""
     stop, robot_id = machine.stop, machine.robot_id
     if stop is None:
         return

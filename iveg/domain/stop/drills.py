@@ -1,7 +1,7 @@
-"""When each robot's STOP was last proved by a drill, and when that is too long ago.
+"""The last STOP drill of each robot, and whether the next one is due.
 
 A robot that was never drilled is not reminded of: a site begins the habit with its
-first drill, and from then on silence is a fact.
+first drill, and from then on a missing drill is a fact.
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,4 @@
-"""What happens to a STOP machine, and what it asks the world to do."""
+"""Events of a STOP machine, and the effects that it asks for."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -31,7 +31,7 @@ Key = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened, with what the step needs of it.
+    """An event, with what its step needs.
 
     Attributes:
         new_id: Names the command that begins, and its hold unless one is ``kept``.
@@ -109,7 +109,7 @@ class Changed:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """A command that is followed no more: its last audit row, and no log line.
+    """A command that is no longer followed: its last audit row, and no log line.
 
     Attributes:
         key: What closed it; the sentence of that is told by the command that came.
@@ -122,9 +122,9 @@ class Closed:
 
 @dataclass(frozen=True, slots=True)
 class OffTable:
-    """An event came that has no row in this state: a mistake in the machine.
+    """An event without a row in this state: a mistake in the machine.
 
-    Nothing has changed, and what is wanted stays wanted.
+    Nothing has changed, and the desired state stays.
     """
 
     robot_id: str

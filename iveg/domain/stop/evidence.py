@@ -1,7 +1,7 @@
-"""What a robot has last said of itself, how old that is, and what it allows people.
+"""The robot's newest report, its age, and what it allows people to ask for.
 
-The guards stand before the table of steps: a request that must not be is refused here,
-and changes nothing.
+The guards stand before the table of steps: a request that must not happen is refused
+here, and changes nothing.
 """
 
 from collections import deque
@@ -17,7 +17,7 @@ _REMEMBERED_ANSWERS = 64
 
 
 class Evidence:
-    """The robot's last word.
+    """The newest report of one robot.
 
     Attributes:
         report: None before the first.
@@ -38,7 +38,7 @@ class Evidence:
         self.speed = abs(report.linear)
 
     def is_news(self, answer: Origin) -> bool:
-        """Whether this answer has not come before; one without origin never has."""
+        """Whether this answer is new; an answer without origin always is."""
         if answer.boot is None or answer.seq is None:
             return True
         # The agent's copy has lost its stamp.
@@ -59,15 +59,15 @@ class Evidence:
         return [hold.id for hold in self.holds if hold.source == "iveg"]
 
     def report_age(self, now: Instant) -> float:
-        """Since the robot's last word (s); infinite when it never said any."""
+        """Time since the newest report (s); infinite before the first."""
         return inf if self.report_at is None else now.mono - self.report_at.mono
 
     def evidence_age(self, now: Instant) -> float:
-        """How old the robot's last word is at most, its way included (s)."""
+        """Greatest age of the newest report, its way included (s)."""
         return self.report_age(now) + self.report_age_then
 
     def moved_m(self, now: Instant) -> float:
-        """How far it may have driven since its last word (m)."""
+        """How far the robot may have driven since its newest report (m)."""
         if self.report_at is None:
             return 0.0
         age = self.evidence_age(now)

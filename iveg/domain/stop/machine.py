@@ -413,7 +413,7 @@ class StopMachine(Evidence):
     # --- a step -------------------------------------------------------------------
 
     def _take(self, event: Event) -> list[Effect]:
-        """Take the step of the table, or tell that there is none."""
+        """Take the step of the table, or report that there is none."""
         step = self._steps.get((self.state, event.key))
         self._is_lost = step is None
         if step is None:

@@ -1,7 +1,7 @@
-"""How an order ended, for whoever reads of it later (docs/interfaces/resources.md).
+"""How an order ended, for readers of the history (docs/interfaces/resources.md).
 
-A row keeps the state of the machine when the order was followed no more, and that is
-the robot's state: "running" is no answer to what became of a STOP.
+A row keeps the state of the machine when the order was no longer followed, and that is
+the robot's state: "running" does not say how a STOP ended.
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""What an earlier run of iVeg wanted of a robot, as the disk remembers it."""
+"""The desired state of a robot in an earlier run of iVeg, as the disk remembers it."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,6 @@
-"""From what single pictures show to the same people over time (multi-object tracking).
+"""From detections of single pictures to persons over time (multi-object tracking).
 
-Two layers that never mix: *sightings* protect, *tracks* name.  A sighting is replaced
-only by its own observer's next look at the same spot; which track it belongs to is a
+Two layers never mix:  *sightings* protect, *tracks* name.  A sighting is replaced only
+by its own observer's next sighting of the same spot; the track that it belongs to is a
 label, so a wrong label can neither add a ring nor take one away.
 """

@@ -1,4 +1,4 @@
-"""Who is in the greenhouse: detections of robots become people on the map.
+"""People in the greenhouse: robots' detections become persons on the map.
 
 A detection is placed in ``map``, judged by the rule, recognised as a fleet member where
 one stands there, and else handed to the tracker.
@@ -52,7 +52,7 @@ class Placed:
 
 
 class People:
-    """Everyone who is known, in the order of their appearance.
+    """Every known person, in the order of appearance.
 
     Args:
         bounds: The outer wall; what is seen beyond it is of doubtful position.
@@ -70,7 +70,7 @@ class People:
 
     @property
     def spots(self) -> PointIndex:
-        """Where the sightings of everybody are."""
+        """Positions of all sightings."""
         if not self._indexed.keys() <= self.known.keys():
             for person_id in self._indexed.keys() - self.known.keys():
                 del self._indexed[person_id]
@@ -97,10 +97,10 @@ class People:
         at: Instant,
         new_id: str,
     ) -> list[Placed]:
-        """Take one look of one robot in.
+        """Take one detection frame of one robot in.
 
-        ``at`` is the look's source moment on our clocks; ``new_id`` begins the
-        decision ids of whoever appears.
+        ``at`` is the frame's source moment on our clocks; ``new_id`` begins the
+        decision ids of new persons.
 
         Returns:
             Every detection that could be placed, judged and, if confident, assigned.
@@ -134,7 +134,7 @@ class People:
     def _doubt(
         self, one: Placed, frame: DetectionFrame, observer: RobotState
     ) -> Placed:
-        """Mark what cannot be where it was said to be (docs/safety.md, "The rule")."""
+        """Doubt a detection beyond the walls (docs/safety.md, "The rule")."""
         x, y, _ = one.position
         if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
             return one
@@ -174,11 +174,11 @@ class People:
         return out
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
-        """Somebody has looked there in vain: this look protects nobody any more."""
+        """Drop a sighting whose place was seen to be empty."""
         return self._tracker.drop(person_id, sighting)
 
     def is_suspected(self, person: Person, x: float, y: float, observer: str) -> bool:
-        """Whether a robot's newest look holds a faint one of the kind near a spot."""
+        """Whether a robot's newest frame has such a faint detection near a spot."""
         return any(
             one.class_ == person.class_
             and math.hypot(one.position[0] - x, one.position[1] - y) <= _SUSPECT_M
@@ -186,7 +186,7 @@ class People:
         )
 
     def forget(self, now: Instant) -> list[Person]:
-        """Drop who has not been seen for ten minutes; returns them."""
+        """Drop persons who have not been seen for ten minutes; returns them."""
         return self._tracker.forget(now)
 
 

@@ -19,7 +19,7 @@ Stage = Literal["seen", "remembered", "last_seen", "gone"]
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """One robot's newest look at one person, in ``map``.
+    """The newest detection of one person by one robot, in ``map``.
 
     Attributes:
         at: Source moment on our clocks.
@@ -43,13 +43,13 @@ class Sighting:
     recording: str | None = None
 
     def age_s(self, now: Instant) -> float:
-        """Seconds since the look."""
+        """Seconds since the sighting."""
         return max(0.0, now.mono - self.at.mono)
 
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """A person (or a robot that is none of ours) with everyone who saw them.
+    """A person, or a robot that does not belong to the fleet, with all sightings.
 
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
@@ -66,11 +66,11 @@ class Person:
     number: int = 0
 
     def age_s(self, now: Instant) -> float:
-        """Seconds since the last look of any robot."""
+        """Seconds since the newest sighting by any robot."""
         return self.newest.age_s(now)
 
     def stage(self, now: Instant) -> Stage:
-        """Where in the life of a sighting this person stands."""
+        """The stage of life of the newest sighting."""
         age = self.age_s(now)
         if age <= LIMITS.seen_s:
             return "seen"

@@ -1,7 +1,7 @@
-"""Places of many things as columns, so that what is near is found without asking each.
+"""Positions of many things as columns, for a quick search of what is near.
 
-Every key (a person) has a few spots (its looks).  A search tells keys that *may* be
-near; whoever asks judges those by the exact rule.
+Every key (a person) has a few spots (sightings).  A search returns keys that *may* be
+near; the caller judges those by the exact rule.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ _NOWHERE: Spot = (np.inf, np.inf, 0.0, 0.0)
 
 
 class PointIndex:
-    """Where everybody was seen.
+    """Positions of all sightings.
 
     Attributes:
         owners: Of each column: its key and which of the key's spots it is.

@@ -1,7 +1,7 @@
-"""Faint people who are seen again and again (docs/safety.md, "The rule").
+"""Faint people who are detected again and again (docs/safety.md, "The rule").
 
-Whoever is at 0.50 or more in three of five looks within 1 s and 1 m counts as a
-possible person: a setting, off by default, since it costs false slow-downs.
+A person at 0.50 or more in three of five frames within 1 s and 1 m counts as a possible
+person: a setting, off by default, since it costs false slow-downs.
 """
 
 import math
@@ -18,7 +18,7 @@ _Spot = tuple[float, float]
 
 
 class PossiblePeople:
-    """Where each robot's last looks found somebody, however faintly."""
+    """Places of faint persons in each robot's last frames."""
 
     def __init__(self) -> None:
         self._detections: dict[str, deque[tuple[float, Sequence[_Spot]]]] = {}
@@ -26,7 +26,7 @@ class PossiblePeople:
     def seen_again(
         self, spots: Sequence[_Spot], observer: str, at: Instant
     ) -> list[_Spot]:
-        """Take one look in; which of its spots (m, ``map``) were seen often enough."""
+        """Take one frame; returns its spots (m, ``map``) that were seen often."""
         looks = self._detections.setdefault(observer, deque(maxlen=_OF))
         looks.append((at.mono, spots))
         fresh = [seen for moment, seen in looks if abs(at.mono - moment) <= _WITHIN_S]

@@ -1,6 +1,6 @@
-"""Who can see what: cameras, crop, and the all-clear of an empty spot.
+"""Lines of sight: cameras, crop, and the all-clear of an empty spot.
 
-A ring goes by time or because a robot has looked at its centre for a second and found
+A ring goes by time or because a robot has had its centre in view for a second and found
 nobody, not even faintly; never for one missing frame (docs/safety.md, "Age").
 """
 
@@ -30,7 +30,7 @@ _NONE = np.empty(0, np.intp)
 
 
 class AllClear:
-    """Watches old sightings until somebody has looked there in vain."""
+    """Takes old sightings away once their place was seen to be empty."""
 
     def __init__(self) -> None:
         self._since: dict[_Look, float] = {}
@@ -38,7 +38,7 @@ class AllClear:
     def sweep(
         self, people: People, world: World, greenhouse: Greenhouse, now: Instant
     ) -> list[Person]:
-        """Take away rings whose centre is seen to be empty; returns whose."""
+        """Remove rings whose centre is seen to be empty; returns their persons."""
         watched: dict[_Look, float] = {}
         cleared: list[Person] = []
         for person in list(people.known.values()):
@@ -84,7 +84,7 @@ def _sees_faintly(
 def can_see(
     robot: RobotState, x: float, y: float, greenhouse: Greenhouse, now: Instant
 ) -> bool:
-    """Whether a robot's camera looks at a spot now, nothing in between."""
+    """Whether a robot's camera has a spot in view now, with nothing in between."""
     camera = _camera_of(robot, now)
     if camera is None:
         return False
@@ -100,7 +100,7 @@ def can_see(
 def looks_from(
     robot: RobotState, spots: _Spots, greenhouse: Greenhouse, now: Instant
 ) -> NDArray[np.intp]:
-    """Which of many spots a robot's camera looks at now, nothing in between.
+    """The spots that a robot's camera has in view now, with nothing in between.
 
     Args:
         robot: One whose camera may be blind: then none.
@@ -130,12 +130,12 @@ def looks_from(
 
 
 def is_looking(robot: RobotState, now: Instant) -> bool:
-    """Whether a robot's camera looks at all, and it is known where from."""
+    """Whether a robot's camera works and its place is known."""
     return _camera_of(robot, now) is not None
 
 
 def _camera_of(robot: RobotState, now: Instant) -> Pose2D | None:
-    """Where a robot's camera is, if it looks now and nobody doubts where that is."""
+    """Pose of a robot's camera, if it works now and its place is certain."""
     age, looked = robot.age_s(now), robot.detections_at
     if robot.odometry is None or looked is None:
         return None

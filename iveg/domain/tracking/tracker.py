@@ -1,14 +1,14 @@
-"""Sightings become chains of looks, chains become people.
+"""Sightings become chains, chains become persons.
 
-Each look of one robot is taken in two layers.
+Each frame of one robot is taken in two layers.
 
 *Chains* (protection).  A sighting continues the chain of its own observer whose last
-look is near enough, and replaces that look alone; else it begins a chain.  Nothing else
-but time or an all-clear ends a chain's ring.  Names play no part in it.
+sighting is near enough, and replaces that sighting alone; else it begins a chain.  Only
+time or an all-clear ends a chain's ring.  Tracks play no part in it.
 
 *Tracks* (names).  A chain that goes on keeps its track.  One that begins, or comes back
 after a second, joins the nearest live track first (global assignment over the whole
-picture), else one that was lost no longer than somebody could have walked there, else
+picture), else a lost track from whose last place a person could have walked there, else
 it begins a track.  Live tracks closer than half a metre become one unless one picture
 ever showed both.
 """
@@ -48,7 +48,7 @@ class Seen:
 
 @dataclass
 class Tracker:
-    """Everyone who is known, by id, in the order of their appearance.
+    """Every known person by id, in the order of appearance.
 
     Attributes:
         merge_m: Live tracks this near become one (m); below zero none do.
@@ -61,7 +61,7 @@ class Tracker:
     _together: dict[str, set[str]] = field(default_factory=dict)
 
     def take(self, picture: Sequence[Seen], at: Instant) -> list[str | None]:
-        """Take one look of one robot in.
+        """Take one detection frame of one robot in.
 
         Returns:
             The track of each detection; None where no more can be kept.
@@ -80,14 +80,14 @@ class Tracker:
         return [_name_now(track, merged) for track in tracks]
 
     def drop(self, person_id: str, sighting: Sighting) -> Person:
-        """Somebody has looked there in vain: this look protects nobody any more."""
+        """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
         left = tuple(look for look in person.sightings if look != sighting)
         self.known[person_id] = replace(person, sightings=left)
         return self.known[person_id]
 
     def forget(self, now: Instant) -> list[Person]:
-        """Drop who has not been seen for ten minutes; returns them."""
+        """Drop persons who have not been seen for ten minutes; returns them."""
         gone = [one for one in self.known.values() if one.stage(now) == "gone"]
         for person in gone:
             self._remove(person.person_id)
@@ -98,7 +98,7 @@ class Tracker:
     def _continue_chains(
         self, picture: Sequence[Seen], at: Instant
     ) -> list[tuple[str, Sighting] | None]:
-        """For each detection the own earlier look that it replaces, and whose it is."""
+        """For each detection the earlier sighting that it replaces, and its track."""
         out: list[tuple[str, Sighting] | None] = [None] * len(picture)
         if not picture:
             return out
@@ -220,9 +220,9 @@ class Tracker:
         return track
 
     def _has_room(self, now: Instant) -> bool:
-        """Whether one more can be kept, if need be for one who protects nobody.
+        """Whether one more can be kept, if need be in place of one without a ring.
 
-        Whoever has a ring stays, and whoever was ever seen twice.
+        Persons with a ring, and persons who were seen twice, stay.
         """
         if len(self.known) < MAX_PEOPLE:
             return True
@@ -234,7 +234,7 @@ class Tracker:
         return False
 
     def _drop_mark(self, one: Seen, at: Instant) -> None:
-        """Somebody appears: the nearest last-seen mark within reach was theirs."""
+        """Drop the nearest last-seen mark within reach of a new person, its owner."""
         marks = [
             (_distance(person.newest, one.sighting), person.person_id)
             for person in self.known.values()
@@ -252,13 +252,13 @@ class Tracker:
     # --- one person under two names -----------------------------------------------
 
     def _remember_together(self, tracks: Iterable[str]) -> None:
-        """One picture showed all of these: they can never be one."""
+        """Remember that one picture showed all of these: they never merge."""
         shown = set(tracks)
         for track in shown:
             self._together.setdefault(track, set()).update(shown - {track})
 
     def _merge(self, touched: Iterable[str], at: Instant) -> Iterator[tuple[str, str]]:
-        """Join live tracks that stand at one spot; yields who is called what now."""
+        """Join live tracks that stand at one spot; yields the changed names."""
         for track in touched:
             while track in self.known and (twin := self._twin_of(track, at)):
                 first, second = sorted(
