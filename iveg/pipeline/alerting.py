@@ -1,4 +1,4 @@
-"""What people are told of what is wrong: alerts, their lines, how fast they come."""
+"""Alerts: raised, cleared, acknowledged, logged, and how fast they come."""
 
 from collections.abc import Iterable
 
@@ -14,7 +14,7 @@ from iveg.pipeline.publish import Hub
 
 
 class Alerting:
-    """Raises, clears and acknowledges, and writes each of it down."""
+    """Raises, clears and acknowledges alerts, and records each step."""
 
     def __init__(self, event_log: EventLog, hub: Hub, new_id: Ids) -> None:
         self._event_log = event_log
@@ -25,7 +25,7 @@ class Alerting:
 
     @property
     def waiting(self) -> list[Alert]:
-        """What is wrong now, and each P1 that went before anybody saw it."""
+        """Active alerts, and each P1 that cleared before anybody saw it."""
         return self._book.waiting
 
     @property
@@ -34,16 +34,16 @@ class Alerting:
         return self._gauge.flood
 
     def knows(self, alert_id: str) -> bool:
-        """Whether an alert is of this run, active or over not long ago."""
+        """Whether an alert is of this run, active or recently cleared."""
         return self._book.find(alert_id) is not None
 
     def remember(self, earlier: Iterable[Alert]) -> None:
-        """Take up what nobody saw in an earlier run."""
+        """Take up unacknowledged alerts of an earlier run."""
         self._book.remember(one for one in earlier if not self.knows(one.alert_id))
         self._hub.changed(topics.ALERTS.name)
 
     def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
-        """Take what is wrong now."""
+        """Take the conditions that hold now."""
         changed = self._book.sync(wrong, now, self._new_id())
         for alert in changed:
             self._event_log.alert(alert)
@@ -53,7 +53,7 @@ class Alerting:
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant
     ) -> Alert | None:
-        """Somebody has seen an alert; None when there is no such one."""
+        """A person acknowledges an alert; None when there is no such alert."""
         alert = self._book.acknowledge(alert_id, by, note, now)
         if alert is not None:
             self._event_log.alert(alert)

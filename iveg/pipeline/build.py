@@ -1,4 +1,4 @@
-"""Puts the pipeline together: what iVeg is between its doors, running or in a test."""
+"""Composition of the pipeline from its ports, for iVeg and for its tests."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -25,18 +25,18 @@ from iveg.pipeline.record import RecordSink
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """What the pipeline reaches of the outside.
+    """Ports of the pipeline to the outside.
 
     Attributes:
-        fleet: What all robots are told.
-        transports: The ways of an order to a robot.
-        journal: What is wanted of each robot, on disk.
+        fleet: Feedback and desired states of all robots.
+        transports: Ways of an order to a robot.
+        journal: Desired state of each robot, on disk.
         sink: The history.
-        clock: The time.
+        clock: Reads both clocks.
         new_id: A new id, sortable by time.
         stamp: Writes a time (Unix s) as robots read it.
-        rejected: Told of each new kind of message that cannot be used.
-        history_state: How the history does.
+        rejected: Called for each new kind of unusable message.
+        history_state: State of the history.
         agent_lag_s: How far the IoT Agent is behind; None asks the probe.
         fiware_is_cut: Whether orders get nowhere there; None asks the health monitor.
     """
@@ -56,10 +56,10 @@ class Ports:
 
 @dataclass(frozen=True, slots=True)
 class Choices:
-    """What an operator chose of it.
+    """An operator's choices.
 
     Attributes:
-        boot: This life of iVeg, in what it tells.
+        boot: Random, new at each start; identity of our feedback.
     """
 
     rule: Rule = field(default_factory=Rule)

@@ -1,7 +1,7 @@
-"""STOP, release and resume: from a person's hand to the robot's own word.
+"""STOP, release and resume: from a person's press to the robot's own answer.
 
-The machines of ``domain/stop`` decide; ``sending`` carries what they want sent; this
-module stands between the two and tells people, disk and browsers how far it has come.
+The machines of ``domain/stop`` decide; ``sending`` carries their orders; this module
+stands between the two and informs people, disk and browsers of each step.
 """
 
 import asyncio
@@ -60,7 +60,7 @@ _JOURNALLED: Mapping[str, Literal["stopped", "run"]] = {
 
 
 class Commander:
-    """Keeps one STOP machine a robot and does what they ask.
+    """Keeps one STOP machine for each robot and carries out its effects.
 
     Args:
         robots: The fleet.
@@ -134,7 +134,7 @@ class Commander:
     def _press(
         self, machine: StopMachine, by: str, at: Instant, press: Press
     ) -> Command:
-        """Begin or join an episode; a press that came before is the same press."""
+        """Begin or join an episode; a repeated press is the same press."""
         known = self._presses.find(by, press, machine.robot_id, at)
         earlier = None if known is None else self.commands.get(known)
         if earlier is not None and not machine.follows(earlier):
@@ -149,7 +149,7 @@ class Commander:
     async def _write_down(
         self, pressed: Sequence[Command], by: str, at: Instant
     ) -> list[Command]:
-        """What is wanted and who wanted it, on disk before it counts as accepted.
+        """Write the desired state and its author to disk before the press is accepted.
 
         Returns:
             The commands as they are by then.
@@ -212,9 +212,10 @@ class Commander:
     # --- what comes back ----------------------------------------------------------
 
     def take(self, received: Received, age_s: float = 0.0) -> None:
-        """Show a robot's machine what arrived; only what is new gets here.
+        """Show a robot's machine a new observation.
 
-        It was at most ``age_s`` old when it came; infinite where nobody knows.
+        The observation was at most ``age_s`` old when it came; infinite where that is
+        unknown.
         """
         observation, at = received.observation, received.at
         machine = self.machines.get(getattr(observation, "robot_id", ""))
@@ -248,12 +249,12 @@ class Commander:
         self._perform(machine, effects, at)
 
     def tick(self, now: Instant) -> None:
-        """Deadlines and what must be sent again."""
+        """Deadlines, and orders that must be sent again."""
         for machine in self.machines.values():
             self._perform(machine, machine.tick(now, self._new_id()), now)
 
     def restore(self, wanted: Mapping[str, Wanted], now: Instant) -> None:
-        """After a restart: every robot that was to stand is stopped again."""
+        """After a restart: stop every robot again that was to stand."""
         for robot_id, one in wanted.items():
             machine = self.machines.get(robot_id)
             if machine is None:
@@ -263,8 +264,8 @@ class Commander:
     def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
         """Close the rows that an earlier run left open; nobody follows them any more.
 
-        A STOP whose robot was stopped again says under which name, and everything else
-        that it is not known how it ended.
+        The row of a STOP that was asserted again names its successor; of every other
+        row the end is unknown.
         """
         for row in left:
             if row.command_id in self.commands:
@@ -279,11 +280,11 @@ class Commander:
         self._sender.start(self._event_log.flushed(), "audit-earlier")
 
     def broker_back(self) -> None:
-        """The broker is there (again): it must hold every level."""
+        """Publish every desired state again: the broker is connected."""
         self._sender.levels_again()
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
-        """What is wrong with STOP."""
+        """Alert conditions of STOP."""
         yield from self.drills.conditions(now)
         yield from stop_conditions.of_machines(self.machines.values(), now)
         yield from stop_conditions.of_mistakes(self._mistakes.values())
@@ -320,7 +321,7 @@ class Commander:
                 self.commands[command.command_id] = command
 
     def _note_mistake(self, effect: OffTable) -> None:
-        """A mistake of the program in STOP: told once, counted each time, shown."""
+        """A mistake of the program in STOP: logged once, counted each time, shown."""
         self.counters["stop.off_table"] += 1
         if self._mistakes.get(effect.robot_id) != effect:
             _log.error("STOP: no step for %s", effect)
@@ -329,7 +330,7 @@ class Commander:
     def _came_back(
         self, machine: StopMachine, effects: list[Effect], at: Instant
     ) -> None:
-        """A transport took it or failed: its part of the command is news, too."""
+        """A transport took the order or failed: the command's display changes."""
         self._perform(machine, effects, at)
         self._show(machine)
 
@@ -362,7 +363,7 @@ class Commander:
         self._show(machine)
 
     def _note_end(self, command: Command, at: Instant) -> None:
-        """A release or resume that came true has moved the STOP on, too."""
+        """A release or resume that was confirmed also moves the STOP on."""
         for earlier in reversed(self.commands.values()):
             if earlier.robot_id == command.robot_id and earlier.kind == "stop":
                 if earlier is not command:
@@ -390,10 +391,10 @@ class Commander:
         )
 
     async def close(self) -> None:
-        """End what is being sent."""
+        """Cancel the sends that are under way."""
         await self._sender.close()
 
 
 def _open(machine: StopMachine) -> tuple[Command, ...]:
-    """What is followed of one robot, as it is now."""
+    """The commands of one robot that are followed now."""
     return tuple(one for one in (machine.stop, machine.once) if one is not None)

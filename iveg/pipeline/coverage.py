@@ -1,7 +1,6 @@
-"""Keeps account of where cameras have looked, beside the rule loop.
+"""Keeps the camera coverage up to date, beside the rule loop.
 
-Nobody stops for it, and aisles do not change: twice a second is often enough for a
-robot that drives a step in that time.
+No robot stops for it, and aisles do not change: twice a second is often enough.
 """
 
 import asyncio
@@ -17,7 +16,7 @@ TICK_S = 0.5
 
 
 class Watch:
-    """When each spot of the aisles was last looked at.
+    """When each cell of the aisles was last in view.
 
     Attributes:
         coverage: What was looked at, and when.
@@ -34,9 +33,9 @@ class Watch:
             await asyncio.sleep(TICK_S)
 
     def tick(self, now: Instant) -> None:
-        """Take in where the cameras look now."""
+        """Take in what the cameras have in view now."""
         self.coverage.look(self._world.live_robots(), now)
 
     def cameras(self, now: Instant) -> int:
-        """How many cameras look now, wherever they are."""
+        """Number of cameras that work now, wherever they are."""
         return sum(is_looking(robot, now) for robot in self._world.live_robots())

@@ -1,7 +1,7 @@
-"""From a look of one robot to people on the map, and the lines that tell of it.
+"""Detection frames become persons on the map and lines of the log.
 
-A sighting is logged at its start and written down once in two seconds, so that a
-person who stands before a camera for an hour does not fill the log.
+A sighting is logged at its start and recorded once in two seconds, so that a person who
+stands before a camera for an hour does not fill the log.
 """
 
 from iveg.domain.detection_rule import Rule
@@ -27,7 +27,7 @@ _KEYS = {
 
 
 class DetectionTracking:
-    """Takes the looks of the fleet.
+    """Takes the detection frames of the fleet.
 
     Attributes:
         placed: What each robot's newest look found, faint ones included.
@@ -55,15 +55,16 @@ class DetectionTracking:
 
     @property
     def subjects(self) -> int:
-        """Of how many it is remembered when they were last told."""
+        """Number of persons whose last log line is remembered."""
         return len(self._told)
 
     def take(
         self, frame: DetectionFrame, received: Received, verdict: Verdict, rule: Rule
     ) -> None:
-        """A late look still saw somebody; a late answer of Orion's is yesterday's.
+        """Take one frame; a late one may still protect somebody, Orion's answer not.
 
-        Later than a ring lives it protects nobody, and would only show ghosts.
+        A frame that is later than a ring lives protects nobody, and would only show
+        ghosts.
         """
         late = verdict == "late" and not received.asked
         if verdict != "new" and not (
@@ -86,7 +87,7 @@ class DetectionTracking:
             self._hub.changed(topics.DETECTIONS.of(robot_id))
 
     def _age_s(self, frame: DetectionFrame, received: Received) -> float:
-        """How old the look that has just come is (s)."""
+        """Age of a frame that has just come (s)."""
         seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
         return received.at.mono - seen_at.mono
 
@@ -118,7 +119,7 @@ class DetectionTracking:
             self._event_log.log(_line(one, robot_id, subject), at)
 
     def forget(self, now: Instant) -> None:
-        """Do not remember for ever what was told of whom."""
+        """Forget log lines about persons who are gone."""
         if len(self._told) > _MAX_SUBJECTS:
             self._told = {
                 key: at

@@ -1,7 +1,7 @@
-"""The rule at work: every observation into the world, every change into words.
+"""The rule at work: observations change the world, the world changes speed limits.
 
 ``take`` applies one observation and ``settle`` judges the fleet, once for all that was
-taken; ``tick`` does what only time brings: silence, expiry, overdue links.  The
+taken; ``tick`` does what time alone brings: silence, expiry, overdue links.  The
 heartbeat to the fleet is sent from here and nowhere else, so that a loop that hangs
 falls silent and slows the robots.
 """
@@ -79,7 +79,7 @@ class Evaluator:
         self._exposures = Exposures()
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
-        """How often a robot slowed for somebody whom it could not see itself."""
+        """How often a robot slowed for a person or peer out of its own sight."""
         self._speed_limits = SpeedLimits(greenhouse)
         overload = self._speed_limits.overload
         self.looks = DetectionTracking(
@@ -102,12 +102,12 @@ class Evaluator:
 
     @property
     def crossings(self) -> Iterable[Crossing]:
-        """Who is inside whose ring now."""
+        """Every robot that is inside a ring now, with the ring."""
         return self._speed_limits.crossings
 
     @property
     def placed(self) -> Mapping[str, list[Placed]]:
-        """What each robot's newest look found, faint ones included."""
+        """Detections of each robot's newest frame, faint ones included."""
         return self.looks.placed
 
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
@@ -116,7 +116,7 @@ class Evaluator:
         return None if decision is None else record_of(decision, now)
 
     def live_decisions(self) -> Iterable[Decision]:
-        """Those in memory that are of robots, not of recordings."""
+        """Decisions in memory about live robots, without recordings."""
         robots = self.world.robots
         return (
             one
@@ -126,7 +126,7 @@ class Evaluator:
 
     @property
     def exposure(self) -> Exposure | None:
-        """How close the fleet came to people today; None before the first look."""
+        """Today's exposure; None before the first evaluation."""
         return self._exposures.today
 
     # --- what arrives -------------------------------------------------------------
@@ -233,7 +233,7 @@ class Evaluator:
             for robot_id in changed
         )
         self._untold = self._untold or bool(changed or changes)
-        # Who must slow down never waits; what else is news, while robots can use it.
+        # A slow-down never waits; other news waits until robots can use more.
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
             self.tell(now)
 
@@ -258,7 +258,7 @@ class Evaluator:
             self._advance(ended, ended.closed(now), now)
 
     def tell(self, now: Instant) -> None:
-        """Send every robot what the fleet must know (Algorithm 2, line 13)."""
+        """Publish feedback to the fleet (Algorithm 2, line 13)."""
         self._untold = False
         self._feedback_publisher.tell(self.speed_limits, self.rule, now)
         for decision in self.decisions.every_open():
@@ -306,7 +306,7 @@ class Evaluator:
     ) -> None:
         """Close the rows that an earlier run left open; nobody follows them any more.
 
-        Their ids are random, so what is not in memory is not of this run.
+        Their ids are random, so a row that is not in memory is not of this run.
         """
         self._event_log.left_behind(
             [one for one in decisions if self.decisions.get(one.decision_id) is None],
@@ -315,7 +315,7 @@ class Evaluator:
         )
 
     def leave(self, now: Instant) -> None:
-        """Break off what is open: iVeg goes away, and the record says so."""
+        """Break off open decisions when iVeg stops, so that the record says so."""
         for decision in self.decisions.every_open():
             self._advance(decision, decision.broken_off(now), now)
 
@@ -330,7 +330,7 @@ class Evaluator:
     def _log_speed_limit(
         self, robot_id: str, before: SpeedLimit, after: SpeedLimit, at: Instant
     ) -> None:
-        """For a robot that reports nothing: what it was told, at least."""
+        """Log the speed limit of a robot that sends no reports."""
         if before.speed_factor == after.speed_factor:
             return
         report = SafetyReport(

@@ -1,7 +1,7 @@
-"""The minutes: what happened, told to people at once and written down for later.
+"""The event log: events for people at once, and rows for the history.
 
 One place turns domain values into log lines and history records, so that the page, the
-API and the database say the same.
+API and the database agree.
 """
 
 from collections import deque
@@ -39,7 +39,7 @@ _NOT_VALUES = ("robot_id", "origin")
 
 
 class EventLog:
-    """Tells and writes down.
+    """Writes log lines and history records.
 
     Attributes:
         lines: The newest log lines, oldest first.
@@ -82,7 +82,7 @@ class EventLog:
             self._hub.append(topics.EARLIER_LOG.name, before)
 
     def decision(self, decision: Decision, now: Instant) -> None:
-        """A decision is new or has grown a link."""
+        """Record a decision that is new or has a new link."""
         self._sink.offer(record_of(decision, now))
 
     def left_behind(
@@ -91,7 +91,7 @@ class EventLog:
         alerts: Iterable[AlertRecord],
         now: Instant,
     ) -> None:
-        """What an earlier run left open is over, and nobody knows how it ended."""
+        """Close decisions and alerts that an earlier run left open."""
         for decision in decisions:
             self._sink.offer(left_behind(decision, now.wall))
         for alert in alerts:
@@ -100,7 +100,7 @@ class EventLog:
     def detection(
         self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: str
     ) -> None:
-        """One detection that is worth a row."""
+        """Record one detection."""
         x, y, z = one.position
         self._sink.offer(
             DetectionRecord(
@@ -126,7 +126,7 @@ class EventLog:
     def odometry(
         self, robot: RobotState, mandated: float, link: str, at: Instant
     ) -> None:
-        """A pose, if it is one of the two a second that are kept."""
+        """Record a pose, if it is one of the two a second that are kept."""
         if robot.odometry is None:
             return
         pose, twist = robot.odometry.pose, robot.odometry.twist
@@ -150,7 +150,7 @@ class EventLog:
             self._sink.offer(record)
 
     def command(self, command: Command, changed: Changed | None, at: Instant) -> None:
-        """A command is new or has taken a step."""
+        """Record a command that is new or has taken a step."""
         times = command.times
         self._sink.offer(
             CommandRecord(
@@ -175,13 +175,13 @@ class EventLog:
         self._hub.append(topics.COMMAND.of(command.command_id), command)
 
     def closed(self, closed: Closed, at: Instant) -> None:
-        """A command is followed no more."""
+        """Record the end of a command that is no longer followed."""
         command = closed.command
         self.command(command, None, at)
         self._audit(command, command.state, closed.key, at)
 
     def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:
-        """A command of an earlier run is followed no more.
+        """Close a command of an earlier run.
 
         Args:
             row: As the crash left it.
@@ -194,11 +194,11 @@ class EventLog:
         self._audit(row, state, f"server restarted; {told}", at)
 
     async def flushed(self) -> None:
-        """Return when every command and audit row so far would outlive a crash."""
+        """Return when every command and audit row so far is durable."""
         await self._sink.flushed()
 
     def rule(self, event: LogEvent, at: Instant) -> None:
-        """Another version of the rule is in force: its rings are others, too."""
+        """Log a new version of the rule; its rings change, too."""
         self.log(event, at)
         for topic in (topics.RULE, topics.PEOPLE):
             self._hub.changed(topic.name)
@@ -217,7 +217,7 @@ class EventLog:
         )
 
     def climate(self, read: Climate, at: Instant) -> None:
-        """The air was measured: history keeps it once a minute."""
+        """Record a climate reading, once a minute."""
         # Devices that send every minute are late as often as early.
         kept = self._climate_kept
         if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:
@@ -233,7 +233,7 @@ class EventLog:
         )
 
     def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
-        """A small sensor spoke: history keeps each of them once a minute."""
+        """Record a reading of a small sensor, once a minute for each."""
         kind = type(read)
         kept = self._readings_kept.get((robot_id, kind))
         if kept is not None and at.mono - kept < 0.9 * READING_PERIOD_S:
@@ -250,7 +250,7 @@ class EventLog:
         )
 
     def alert(self, alert: Alert) -> None:
-        """An alert was raised, acknowledged or cleared."""
+        """Record an alert that was raised, acknowledged or cleared."""
         condition, last = alert.condition, alert.last
         self._sink.offer(
             AlertRecord(

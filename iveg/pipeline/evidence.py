@@ -1,4 +1,4 @@
-"""A decision as it is written down and read: each link with time, value and verdict."""
+"""A decision as it is recorded: each link with time, value and verdict."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, replace
@@ -51,7 +51,7 @@ def record_of(decision: Decision, now: Instant) -> DecisionRecord:
 
 
 def places_of(crossing: Crossing, world: World) -> Iterator[Place]:
-    """Where the robot that is slowed and the observer are now, as far as is known."""
+    """Places of the slowed robot and the observer now, where they are known."""
     for robot_id in dict.fromkeys((crossing.robot_id, crossing.zone.observer)):
         robot = world.robots.get(robot_id or "")
         if robot is not None and robot.odometry is not None:
@@ -62,7 +62,7 @@ def places_of(crossing: Crossing, world: World) -> Iterator[Place]:
 
 
 def left_behind(record: DecisionRecord, found: float) -> DecisionRecord:
-    """A decision that an earlier run left open: nobody knows how it went on.
+    """Close a decision that an earlier run left open, with an unknown end.
 
     Args:
         record: As the crash left it.
@@ -102,5 +102,5 @@ def _link(link: Link) -> dict[str, object]:
 
 
 def wall_of(at: Instant | None) -> float | None:
-    """The wall clock of what has happened (Unix s); None of what has not."""
+    """Wall-clock time of an instant (Unix s); None of None."""
     return None if at is None else at.wall

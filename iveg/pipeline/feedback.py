@@ -1,4 +1,4 @@
-"""What the fleet is told (Algorithm 2, line 13): one feedback for each observer."""
+"""Feedback to the fleet (Algorithm 2, line 13): one message for each observer."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -125,7 +125,7 @@ class FeedbackPublisher:
 
 
 def _newest(alerts: tuple[FeedbackAlert, ...]) -> tuple[FeedbackAlert, ...]:
-    """As many as a robot reads; the speed limits count the others, too."""
+    """The newest alerts, as many as a robot reads; speed limits count all of them."""
     if len(alerts) <= MOST_ALERTS:
         return alerts
     return tuple(sorted(alerts, key=lambda one: one.stamp)[-MOST_ALERTS:])

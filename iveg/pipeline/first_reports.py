@@ -1,11 +1,11 @@
-"""When iVeg was told of each person, so that a robot's answer can be timed from there.
+"""Notices: when iVeg was notified of each person; acknowledgement is timed from there.
 
-A robot judges what the feedback told it by its own pose and is often ahead of iVeg: its
-report that it slows for an alert comes before iVeg finds it inside the ring.  It is
-timed all the same, from the newest look that robots had been told of by then::
+A robot judges the feedback by its own pose and is often ahead of iVeg: its report that
+it slows for an alert comes before iVeg finds it inside the ring.  It is timed all the
+same, from the newest frame that robots had been told of by then::
 
-    look notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
-         └───────────── timed ─────────────┘
+    frame notified ──> feedback ──> robot slows, reports ──> (iVeg finds it inside)
+         └────────────── timed ──────────────┘
 """
 
 from collections import deque
@@ -23,7 +23,7 @@ _KEPT = 16
 
 @dataclass(frozen=True, slots=True)
 class FirstReport:
-    """The look that an answer is timed from.
+    """The notification that an acknowledgement is timed from.
 
     Attributes:
         at: Arrival of its notification (monotonic, s).
@@ -37,7 +37,7 @@ class FirstReport:
 
 @dataclass(slots=True)
 class FirstReports:
-    """Looks by person, and the robots that slowed for an alert by themselves."""
+    """Notifications by person, and robots that slowed for an alert by themselves."""
 
     _detections: dict[str, deque[float]] = field(default_factory=dict)
     _ahead: dict[str, tuple[str, float, float]] = field(default_factory=dict)
@@ -45,12 +45,12 @@ class FirstReports:
     _slow: set[str] = field(default_factory=set)
 
     def seen(self, person_id: str, at: Instant) -> None:
-        """A look that found this person was notified."""
+        """Note the notification of a frame that shows this person."""
         looks = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
         looks.append(at.mono)
 
     def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
-        """A robot said what it applies; feedback last went out at ``published_at``."""
+        """Note a safety report; feedback last went out at ``published_at``."""
         robot_id, alert = report.robot_id, report.decision_id or ""
         was_slow = robot_id in self._slow
         if report.speed_factor > HALF_SPEED:
@@ -65,7 +65,7 @@ class FirstReports:
             del self._ahead[robot_id]
 
     def of(self, crossing: Crossing) -> FirstReport | None:
-        """What the answer to a crossing is timed from; None where nothing tells."""
+        """The notice of a crossing; None where there is none."""
         zone = crossing.zone
         if zone.sighting is None:
             return None
@@ -88,6 +88,6 @@ class FirstReports:
         return FirstReport(looks[-1], answered)
 
     def forget(self, known: Container[str]) -> None:
-        """Keep only those who are still known."""
+        """Keep only persons who are still known."""
         for person_id in [one for one in self._detections if one not in known]:
             del self._detections[person_id]

@@ -1,14 +1,14 @@
-"""The chain from robot to screen, hop by hop, and which hop is broken.
+"""Health of the data path from robot to screen, hop by hop.
 
-Each hop is judged by what went through it, never by what it says of itself: a probe
-measure goes out over MQTT every two seconds and must come back as a notification
-(docs/faults.md, F4).  Where it was seen last tells which hop lost it::
+Each hop is judged by what went through it, never by its own word: a probe measure goes
+out over MQTT every two seconds and must come back as a notification (docs/faults.md,
+F4).  The last place where it was seen tells which hop lost it::
 
-    broker says "taken"  →  the broker lives
-    it is stored at Orion →  the agent hears and Orion takes
+    broker confirms it    →  the broker lives
+    it is stored at Orion →  the agent receives and Orion stores
     it came back          →  notifications arrive
 
-A hop behind a broken one is not accused: nobody knows how it does.
+A hop behind a broken one is unknown, never reported as the cause.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Earlier = Literal["known", "reading", "unknown"]
 PROBE_PERIOD_S = 2.0
 LATE_S, DOWN_S = 4.0, 5.5
 GRACE_S = 6.0
-"""After the start nobody is accused for this long."""
+"""For this long after the start no hop is reported as down."""
 SLOW_S = 1.0
 """A probe or an answer that takes longer is late."""
 EARLIER_GRACE_S = 2.0
@@ -73,7 +73,7 @@ class Pace:
 
 
 class HealthMonitor:
-    """Collects the evidence.
+    """Collects the evidence about each hop.
 
     Attributes:
         mqtt_connected: Whether our own connection to the broker stands.
@@ -184,7 +184,7 @@ class HealthMonitor:
     def _agent(self, now: Instant, *, broken: bool) -> HopHealth:
         """Deaf, overloaded or healthy: the probe knows, if the hops round it are well.
 
-        An agent that measures still pass is not down because it leaves questions
+        An agent that measures still pass is not down because it leaves requests
         unanswered: under load it answers them last.
         """
         age = _age(_newest(self.received_at, self.stored_at), now)
@@ -203,8 +203,8 @@ class HealthMonitor:
     def _lag(self, now: Instant) -> tuple[float | None, bool]:
         """How far the agent is behind (s), and whether that grows.
 
-        Of a probe that Orion has and that did not come back the agent is not at fault:
-        notifications are, and nothing tells its lag.
+        For a probe that Orion has and that did not come back, notifications are at
+        fault, and the lag of the agent is unknown.
         """
         if self.stored_at is not None and not self.probe.has_passed(self.stored_at):
             return None, False
@@ -227,7 +227,7 @@ class HealthMonitor:
 
     @property
     def _agent_down_s(self) -> float:
-        """After which silence the agent is deaf and not merely behind (s).
+        """Silence after which the agent counts as down and not merely behind (s).
 
         Behind a backlog that grows, probes come back ever farther apart.
         """

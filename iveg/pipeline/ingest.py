@@ -1,4 +1,4 @@
-"""The door of the pipeline: a bounded queue that prefers what people's safety needs.
+"""The input of the pipeline: a bounded queue that prefers what safety needs.
 
 All transports end here.  When more comes than can be taken, the oldest telemetry of the
 same robot and kind gives way, or of the stream that has most waiting, and is counted;
@@ -30,8 +30,8 @@ class Ingest:
     Args:
         known: Whether a robot id belongs to the fleet.
         rejected: Called once for each new kind of rejection, with source and reason.
-        is_past: What need not be read; whoever reads messages asks it.
-        passed: Told of each copy of a message of the fleet, before it waits.
+        is_past: Whether a message is too old to be read.
+        passed: Called with each copy of a message of the fleet, before it is queued.
     """
 
     def __init__(

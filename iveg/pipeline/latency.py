@@ -1,4 +1,4 @@
-"""The latency watch in the loop: taps, minutes for the history, lines for the log."""
+"""The latency watch in the loop: messages in, minutes and log lines out."""
 
 from collections.abc import Iterable, Sequence
 
@@ -18,7 +18,7 @@ _QUIET_S = 10.0
 
 
 class LatencyMonitor:
-    """Hands messages to the watch, and what it found to the history and the log."""
+    """Hands messages to the watch, and its findings to history and log."""
 
     def __init__(
         self, watch: LatencyWatch, sink: RecordSink, minutes: EventLog
@@ -29,7 +29,7 @@ class LatencyMonitor:
         self._told: dict[str, float] = {}
 
     def decided(self, taken: Iterable[Received], now: Instant) -> None:
-        """These became part of the state, and the fleet has been judged with them."""
+        """Note messages that became part of the state and were judged."""
         self.watch.decided(taken, now)
 
     def tick(self, now: Instant) -> None:
@@ -46,7 +46,7 @@ class LatencyMonitor:
         self.watch.remember(hours)
 
     def _tell(self, remark: Remark, now: Instant) -> None:
-        """Once, for as long as it goes on."""
+        """Log a remark once, for as long as it lasts."""
         what = "behind" if remark.what == "growing" else remark.what
         about = f"{what}/{remark.hop}/{remark.slots.get('robot', '')}"
         last = self._told.get(about, float("-inf"))

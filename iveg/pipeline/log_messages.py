@@ -1,4 +1,4 @@
-"""What the log says of speeds and alerts: which sentence, and what fills its holes."""
+"""Log lines about speeds and alerts: template, and what fills its holes."""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +19,7 @@ from iveg.domain.world import World
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Who was seen by whom, and how far from the robot that slowed down (m).
+    """The detection behind a slow-down, and its distance from the robot (m).
 
     Attributes:
         decision_id: The decision that opens; None where the robot was ahead of ours.
@@ -45,10 +45,10 @@ def evidence_of(
     world: World,
     greenhouse: Greenhouse,
 ) -> Evidence | None:
-    """What iVeg knows of the reason that a robot gives; None when nothing.
+    """Facts behind the reason that a robot reports; None when iVeg has none.
 
     A robot judges alerts by its own pose, too, and may be ahead of our decision; it
-    then names the alert, and what is known of that person is the evidence.
+    then names the alert, and that person's data are the evidence.
     """
     if report.reason not in ("person", "robot"):
         return None
@@ -167,7 +167,7 @@ def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
 
 
 def flood_line(before: Flood, after: Flood) -> LogEvent | None:
-    """A flood of alerts began or is over; None while neither."""
+    """A flood of alerts began or ended; None for neither."""
     if (before.since is None) == (after.since is None):
         return None
     key = "log.flood.over" if after.since is None else "log.flood.began"
@@ -180,7 +180,7 @@ def flood_line(before: Flood, after: Flood) -> LogEvent | None:
 
 
 def alert_line(alert: Alert) -> LogEvent:
-    """An alert came or went."""
+    """An alert was raised or cleared."""
     condition = alert.condition
     key = "log.alert.raised" if alert.cleared is None else "log.alert.cleared"
     slots: dict[str, Slot] = {

@@ -1,4 +1,4 @@
-"""The rule loop: takes what has arrived, lets time pass, and is the only heartbeat.
+"""The rule loop: takes arrived observations, lets time pass, is the only heartbeat.
 
 If this loop hangs, feedback stops and every robot slows down by itself (fault F14).
 """

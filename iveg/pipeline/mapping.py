@@ -1,8 +1,8 @@
-"""Keeps the costmaps up to date: one scan at a time, never one per message.
+"""Keeps the costmaps up to date: one scan at a time, never one for each message.
 
-A scan costs about as much as a hundred decisions, and nobody stops for the costmap; so
-it is drawn beside the rule loop, from the newest scan of the robot that has waited
-longest, and a fleet that sends more is simply drawn less often.
+A scan costs about as much as a hundred decisions, and no robot stops for the costmap.
+So it is drawn beside the rule loop, from the newest scan of the robot that has waited
+longest, and a fleet that sends more is drawn less often.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ _WIDEST_M = 1000.0
 
 
 class Mapper:
-    """One grid that the fleet shares, and one a robot.
+    """One grid that the fleet shares, and one for each robot.
 
     Args:
         bounds: The outer wall of the greenhouse.
@@ -54,13 +54,13 @@ class Mapper:
             await asyncio.sleep(TICK_S)
 
     def tick(self, now: Instant) -> None:
-        """Take the scan in that has waited longest, if one is due."""
+        """Take in the scan that has waited longest, if one is due."""
         due = [robot for robot in self._world.live_robots() if self._is_due(robot, now)]
         if due:
             self._draw(min(due, key=self._last_drawn), now)
 
     def shared(self, zones: Iterable[Zone], now: Instant) -> Costmap | None:
-        """What the fleet knows together; None while nobody has swept."""
+        """The fleet's costmap; None before the first scan."""
         return _costs(self._shared, zones, now)
 
     def age_s(self, robot_id: str | None, now: Instant) -> float | None:
@@ -71,7 +71,7 @@ class Mapper:
         return now.mono - max(drawn) if drawn else None
 
     def of(self, robot_id: str, zones: Iterable[Zone], now: Instant) -> Costmap | None:
-        """What one robot believes: its own scans, and whom feedback told it of."""
+        """Costmap of one robot: its own scans, people and peers of its feedback."""
         others = [zone for zone in zones if zone.cause != robot_id]
         return _costs(self._own.get(robot_id), others, now)
 
@@ -97,7 +97,7 @@ class Mapper:
         self._own[robot.robot_id] = _added(own, self._grid, sweep, now)
 
     def _place(self) -> None:
-        """In an open field the grids go where the robots go."""
+        """In an open field the grids move with the robots."""
         if self._is_open:
             robots = self._world.live_robots()
             poses = [robot.scan_pose for robot in robots if robot.scan_pose is not None]

@@ -1,4 +1,4 @@
-"""What the pipeline needs of the outside: a few verbs each."""
+"""Ports of the pipeline: what it needs of the outside, a few verbs each."""
 
 from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol
@@ -9,7 +9,7 @@ from iveg.domain.observations import Instant
 
 
 class CommandPort(Protocol):
-    """One transport's way out for orders; an answer of 2xx or a PUBACK is no evidence.
+    """A transport's port for orders; an answer of 2xx or a PUBACK is no evidence.
 
     A release or resume is sent once: never retained, never sent again.
     """
@@ -39,7 +39,7 @@ class CommandPort(Protocol):
 
 
 class Fleet(Protocol):
-    """What all robots are told, over MQTT."""
+    """The fleet's topics on MQTT: feedback and desired states."""
 
     def tell(self, feedback: Feedback) -> None:
         """Offer feedback to the fleet; the newest of each topic counts."""
@@ -65,7 +65,7 @@ class Journal(Protocol):
         by: str,
         at: Instant,
     ) -> None:
-        """Write down what is wanted of a robot; returns when it is on disk."""
+        """Write a robot's desired state down; returns when it is on disk."""
 
     async def named(
         self,
@@ -90,10 +90,10 @@ class RuleStore(Protocol):
 
 
 class Ids(Protocol):
-    """Where new names come from: random, sortable, never reused (ULID)."""
+    """Source of new ids: random, sortable, never reused (ULID)."""
 
     def __call__(self) -> str:
-        """A new one."""
+        """A new id."""
 
 
 class Clock(Protocol):

@@ -1,8 +1,8 @@
-"""One press is one STOP, however often and on whatever way it comes.
+"""One press is one STOP, however often and on whatever transport it comes.
 
-A page sends a press over HTTP and over its socket and repeats it until it is taken.
-What is remembered is bounded in time: a name that comes back later than that is taken
-for a new press, because a STOP too many is better than one too few.
+A page sends a press over HTTP and over its WebSocket and repeats it until it is taken.
+Presses are remembered for a while; one that comes back later counts as a new press,
+because a STOP too many is better than one too few.
 """
 
 from collections import OrderedDict
@@ -17,13 +17,13 @@ _Key = tuple[str, str, str]
 
 
 class Presses:
-    """Which command each press has become, for a while."""
+    """The command of each press, for a while."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[_Key, tuple[float, str]] = OrderedDict()
 
     def find(self, by: str, press: Press, robot_id: str, at: Instant) -> str | None:
-        """The command that this press is already; None for a new press."""
+        """The command that this press has begun; None for a new press."""
         if press.press_id is None:
             return None
         since, command_id = self._known.get(
@@ -34,7 +34,7 @@ class Presses:
     def note(
         self, by: str, press: Press, robot_id: str, command_id: str, at: Instant
     ) -> None:
-        """This press has become that command."""
+        """Remember the command of this press."""
         if press.press_id is None:
             return
         self._known[by, press.press_id, robot_id] = at.mono, command_id

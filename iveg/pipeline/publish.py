@@ -1,4 +1,4 @@
-"""From what changed to who looks: one hub, a slot a topic and browser.
+"""Publishing to browsers: one hub, one slot for each topic and browser.
 
 A state topic only remembers that it changed, so a slow browser gets the newest value
 and never a queue.  Log lines and command steps are events: each is kept until it is
@@ -17,7 +17,7 @@ MAX_PENDING = 1000
 
 
 class Subscriber:
-    """One browser's view of what it has not seen yet.
+    """Changes that one browser has not been sent yet.
 
     Attributes:
         wants_telemetry: False while no telemetry could be sent: a change is noted and
@@ -32,17 +32,17 @@ class Subscriber:
         self._wake = asyncio.Event()
 
     def wake(self) -> None:
-        """There is something to take."""
+        """Signal that there is something to take."""
         self._wake.set()
 
     def changed(self, topic: str) -> None:
-        """A state topic is new."""
+        """Mark a state topic as changed."""
         self.dirty[topic] = None
         if self.wants_telemetry or not is_telemetry(topic):
             self.wake()
 
     def append(self, topic: str, item: Any) -> None:
-        """An event that this browser may not miss."""
+        """Queue an event, which is never dropped."""
         if len(self.pending) >= MAX_PENDING:
             self.overflowed = True
         else:
@@ -50,7 +50,7 @@ class Subscriber:
         self.wake()
 
     async def news(self, within_s: float | None = None) -> None:
-        """Wait until there may be something to take, or that long (s)."""
+        """Wait until there may be something to take, or for that long (s)."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(within_s):
                 await self._wake.wait()
@@ -76,7 +76,7 @@ class Subscriber:
 
 
 class Hub:
-    """Who looks, and how often each topic has changed."""
+    """Connected browsers, and a version for each topic."""
 
     def __init__(self) -> None:
         self.versions: Counter[str] = Counter()
@@ -84,26 +84,26 @@ class Hub:
 
     @property
     def watchers(self) -> int:
-        """How many browsers look."""
+        """Number of connected browsers."""
         return len(self._subscribers)
 
     def join(self) -> Subscriber:
-        """A browser comes."""
+        """Add a browser."""
         subscriber = Subscriber()
         self._subscribers.add(subscriber)
         return subscriber
 
     def leave(self, subscriber: Subscriber) -> None:
-        """A browser goes."""
+        """Remove a browser."""
         self._subscribers.discard(subscriber)
 
     def changed(self, topic: str) -> None:
-        """The value behind a state topic is new."""
+        """Mark a state topic as changed."""
         self.versions[topic] += 1
         for subscriber in self._subscribers:
             subscriber.changed(topic)
 
     def append(self, topic: str, item: Any) -> None:
-        """An event that nobody may miss."""
+        """Queue an event for every browser; none is dropped."""
         for subscriber in self._subscribers:
             subscriber.append(topic, item)

@@ -1,7 +1,7 @@
-"""What is worth remembering, and what gives way when memory falls behind.
+"""Records on their way to the history, and which of them give way under pressure.
 
-Odometry is thinned before it is offered; the queue is bounded, and its overflow is a
-written decision: the oldest telemetry gives way and is counted, everything else stays.
+Odometry is thinned before it is offered.  The queue is bounded, and its overflow is a
+decision: the oldest telemetry gives way and is counted, everything else stays.
 """
 
 from collections import deque
@@ -16,13 +16,13 @@ ODOMETRY_PERIOD_S = 0.5
 
 
 class RecordSink(Protocol):
-    """Where the pipeline leaves what must be remembered."""
+    """Port of the history's recorder."""
 
     def offer(self, record: Record) -> None:
-        """Remember a record in a while; never blocks and never fails."""
+        """Queue a record; never blocks and never fails."""
 
     async def flushed(self) -> None:
-        """Return when every command and audit row so far would outlive a crash."""
+        """Return when every command and audit row so far is durable."""
 
 
 class OdometryThinner:
@@ -54,7 +54,7 @@ class OdometryThinner:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A record on its way to memory.
+    """A queued record.
 
     Attributes:
         revision: Grows with every record; of two states of one thing the higher counts.
@@ -67,7 +67,7 @@ class Waiting:
 
 
 class RecordQueue:
-    """A bounded queue in which telemetry gives way and nothing else does.
+    """A bounded queue in which telemetry alone gives way.
 
     Two lanes share one capacity, so that making room costs the same for the first and
     for the twenty-thousandth record.

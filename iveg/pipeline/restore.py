@@ -1,8 +1,8 @@
-"""What earlier runs left in the history, taken up while STOP serves already.
+"""Open rows of earlier runs in the history, taken up while STOP already works.
 
-A P1 that nobody saw waits on, the log goes on where it broke off, and what a crash left
-open is closed.  Nothing waits for this: until the history answers the page says that
-earlier alerts are unknown.
+A P1 that nobody acknowledged stays active, the log continues, and rows that a crash
+left open are closed.  Nothing waits for this: until the history answers the page says
+that earlier alerts are unknown.
 """
 
 import asyncio
@@ -37,10 +37,10 @@ _AGAIN_S = 5.0
 
 
 class History(Protocol):
-    """What is asked of the history; each raises HopError while it does not answer."""
+    """Questions to the history; each raises HopError while it does not answer."""
 
     async def open_commands(self) -> Sequence[CommandRecord]:
-        """Commands that still went on."""
+        """Commands without an end."""
 
     async def open_decisions(self) -> Sequence[DecisionRecord]:
         """Decisions without an end."""

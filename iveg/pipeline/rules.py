@@ -1,4 +1,4 @@
-"""Changing the rule: a new version, on disk first, in force at once, and in the log."""
+"""Changes of the rule: a new version, on disk first, in force at once, logged."""
 
 import asyncio
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from iveg.pipeline.ports import RuleStore
 
 
 class Judge(Protocol):
-    """Who applies the rule: the assessor."""
+    """The part that applies the rule: the assessor."""
 
     rule: Rule
 

@@ -1,7 +1,7 @@
-"""Carries what a STOP machine wants sent, on all transports at once.
+"""Carries the orders of a STOP machine, on all transports at once.
 
 Each send is a task of its own: nothing is awaited before a STOP's first byte is on its
-way, and nothing that fails on one transport holds up another.
+way, and a failure of one transport holds up no other.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ IsCut = Callable[[TransportId, Instant], bool]
 
 
 class Sender:
-    """The way out: STOPs, releases, resumes and levels, each in its own task.
+    """Sends STOPs, releases, resumes and desired states, each in its own task.
 
     Args:
         ports: The way out of each transport.
@@ -63,7 +63,7 @@ class Sender:
     def send(
         self, machine: StopMachine, effect: SendStop | SendOnce | SetDesiredState
     ) -> None:
-        """Begin to send; how it went comes back later."""
+        """Begin to send; the result comes back later."""
         match effect:
             case SendStop():
                 name = f"stop-{effect.transport}-{effect.robot_id}"
@@ -76,12 +76,12 @@ class Sender:
                 self._start_desired_state(effect)
 
     def levels_again(self) -> None:
-        """The broker is there (again): it must hold every level."""
+        """Publish every desired state again: the broker is connected."""
         for level in self._desired_states.values():
             self._start_desired_state(level)
 
     def start(self, work: Coroutine[Any, Any, None], name: str) -> None:
-        """Do this without waiting for it; a failure is logged."""
+        """Run this as a task; a failure is logged."""
         task = asyncio.get_running_loop().create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._finished)
@@ -92,7 +92,7 @@ class Sender:
             _log.error("%s failed", task.get_name(), exc_info=task.exception())
 
     async def close(self) -> None:
-        """End what is being sent."""
+        """Cancel the sends that are under way."""
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
@@ -107,7 +107,7 @@ class Sender:
         await self._attempt(machine, effect.transport, effect.command_id, sending)
 
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
-        """Once, and never without a trace: the audit row is on disk before it goes."""
+        """Send once, after the audit row is on disk."""
         await asyncio.gather(
             self._event_log.flushed(), self._note_named(machine, effect)
         )
@@ -122,7 +122,7 @@ class Sender:
             )
 
     async def _note_named(self, machine: StopMachine, effect: SendOnce) -> None:
-        """The disk knows which STOPs a release names: none is asserted as new again."""
+        """Write down which STOPs a release names: none is asserted as new again."""
         if machine.hold_id is None or not effect.ours:
             return
         by = "iveg" if machine.stop is None else machine.stop.requesters[0]
@@ -149,9 +149,9 @@ class Sender:
         command_id: str,
         sending: Coroutine[Any, Any, None],
     ) -> None:
-        """Send and tell the machine how it went, whatever went wrong.
+        """Send, and report the result to the machine, whatever went wrong.
 
-        A transport whose failure stayed untold would count as busy for ever.
+        A transport whose failure was not reported would count as busy for ever.
         """
         ok, left = False, self._clock()
         try:

@@ -1,4 +1,4 @@
-"""What only time brings: links that fall silent, people who are remembered and go."""
+"""Staleness: links that fall silent, people who are remembered and expire."""
 
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.greenhouse import Greenhouse
@@ -20,7 +20,7 @@ _STAGE_KEYS = {
 
 
 class Staleness:
-    """Lets the world grow older and logs each step of it."""
+    """Ages the world and logs each step of it."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Staleness:
         self._stages: dict[str, str] = {}
 
     def tick(self, now: Instant) -> None:
-        """Compare every link and every person with what was last said of them."""
+        """Compare every link and every person with the state that was logged last."""
         for robot in self._world.robots.values():
             self._watch_link(robot, now)
         people = self._people

@@ -1,8 +1,8 @@
-"""The live topics: what each is called, what its data are, where they are read.
+"""The live topics: name, model and source of each.
 
-This table is the only place that spells a topic.  The pipeline names what has changed
-by it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the
-table read once.  A topic without ``read`` is an event: each is told, none is a state.
+This table is the only place that spells a topic.  The pipeline names changed topics by
+it (``ROBOT.of("AGI")``), ``/live`` reads and paces by it, and the snapshot is the table
+read once.  A topic without ``read`` is an event: each event is sent, none is a state.
 """
 
 from collections.abc import Callable, Iterable
@@ -27,7 +27,7 @@ Pace = Literal["at once", "frame", "read-out", "picture"]
 
 
 class Reader(Protocol):
-    """Who knows the newest value of everything (``web.views``)."""
+    """Source of the newest value of every topic (``web.views``)."""
 
     def robot(self, robot_id: str, now: Instant) -> Robot:
         """One robot."""
@@ -36,13 +36,13 @@ class Reader(Protocol):
         """The fleet."""
 
     def people(self, now: Instant) -> list[Person]:
-        """Everyone who is known."""
+        """Every known person."""
 
     def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
         """A robot's newest detection frame."""
 
     def frames(self, now: Instant) -> dict[str, DetectionFrame]:
-        """Those of all robots that have one."""
+        """The newest detection frames of all robots that have one."""
 
     def command(self, command: StopCommand, now: Instant) -> Command:
         """A command at one of its steps."""
@@ -51,7 +51,7 @@ class Reader(Protocol):
         """Commands that go on."""
 
     def alerts(self) -> list[Alert]:
-        """All that is for people to see now."""
+        """All alerts that people should see now."""
 
     def flood(self) -> Flood:
         """How fast alerts come."""
