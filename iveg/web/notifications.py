@@ -1,9 +1,7 @@
-"""Orion → iVeg: authenticate, read, queue, answer at once (docs/interfaces/ngsi.md).
+"""Notifications of Orion: authenticate, read, queue, answer (docs/interfaces/ngsi.md).
 
 Hundreds come in a second, so this is plain ASGI beside the layers that pages need, with
-its own limit and secret.  What does not belong here, and everything that goes wrong, is
-answered as the rest of the application would.  ``web/prompt`` hands plain ones over
-without any of that.
+its own limit and secret.  Refusals look like those of the rest of the application.
 """
 
 from collections.abc import Callable, Mapping
@@ -30,7 +28,7 @@ _FORGED = Problem(401, "The notification secret is wrong.")
 
 
 class NotificationEndpoint:
-    """Takes what Orion posts; an ASGI application.
+    """Takes Orion's notifications; an ASGI application.
 
     Args:
         ingest: Where observations go and what cannot be used is counted.
@@ -43,7 +41,7 @@ class NotificationEndpoint:
     """
 
     action: Final[Action] = "open"
-    """What it declares: nobody signs in here; the secret is its door."""
+    """Its declared action: nobody signs in here; the secret authenticates Orion."""
 
     def __init__(
         self,
@@ -106,7 +104,7 @@ class NotificationEndpoint:
         return self._take(body, self._clock())
 
     def _refusal(self, scope: Scope, headers: Mapping[bytes, bytes]) -> Problem | None:
-        """Why the body is not even read."""
+        """The reason not to read the body at all; None to read it."""
         declared = headers.get(b"content-length", b"")
         if declared.isdigit() and int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.

@@ -1,4 +1,4 @@
-"""What a page says of a press, read so that nothing it says can refuse a STOP.
+"""A page's account of a press, read so that nothing in it can refuse a STOP.
 
 The keys are the same over HTTP and WebSocket (docs/interfaces/http.md).
 """
@@ -44,7 +44,7 @@ DESCRIBED: dict[str, Any] = {
 
 
 async def press_of(request: Request) -> Press:
-    """The press in a request's body; a body that is late or junk says nothing."""
+    """The press in a request's body; a late or unreadable body tells nothing."""
     try:
         async with asyncio.timeout(_BODY_WITHIN_S):
             body = await request.body()
@@ -54,7 +54,7 @@ async def press_of(request: Request) -> Press:
 
 
 def read_press(value: object) -> Press:
-    """The press in what was sent; a word that cannot be is left out."""
+    """The press in a message; an impossible value is left out."""
     if not isinstance(value, dict):
         return Press()
     press_id = value.get("press_id")

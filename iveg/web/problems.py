@@ -1,12 +1,12 @@
-"""Where errors become HTTP: the one file that knows both.
+"""Errors become HTTP here: the only file that knows both.
 
 The answer is ``application/problem+json`` (RFC 9457), or a page where a person's
-browser asked for one.  Nothing of the input is echoed, nothing of the inside is told.
+browser asked for one.  Answers echo no input and reveal nothing internal.
 
-What can only go wrong at this door, under the tree of ``domain/errors``::
+Errors of this boundary alone, under the tree of ``domain/errors``::
 
     IvegError
-    └── DoorError
+    └── AccessError
         ├── NotSignedInError    401
         ├── ForeignOriginError  403
         └── NotJsonError        415
@@ -37,11 +37,11 @@ _MOST_COMPLAINTS = 20
 
 
 class AccessError(IvegError):
-    """Root of what the door refuses before anybody inside is asked."""
+    """Root of errors at the boundary, before any part is asked."""
 
 
 class NotSignedInError(AccessError):
-    """Nobody is known behind this request."""
+    """The request is from nobody who is known."""
 
     def __init__(self) -> None:
         super().__init__("Sign in with the link that iVeg printed, or send a token.")

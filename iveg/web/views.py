@@ -1,4 +1,4 @@
-"""What is known, as models: built when somebody asks, never kept."""
+"""The state of the pipeline as models: built on request, never kept."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
@@ -85,7 +85,7 @@ class Views:
         return [self.robot(robot_id, now) for robot_id in self._world.robots]
 
     def margins(self, now: Instant) -> LeastMargins:
-        """Of all live robots and all people, for who asks for many at once."""
+        """Margins of all live robots and people, for callers that need many."""
         return LeastMargins(self._fleet(), self._people(), now)
 
     def robot(
@@ -132,9 +132,9 @@ class Views:
         return least(margins_of([robot], self._people(), now))
 
     def _mode(self, robot: RobotState, machine: StopMachine, now: Instant) -> Mode:
-        """What the robot has just said; while it says nothing, what it was told.
+        """The mode by the robot's newest report; without one, by its speed limit.
 
-        That a STOP is wanted is in ``stop_state``: here a robot stands by its own word
+        A wanted STOP shows in ``stop_state``: here a robot stands by its own report
         alone, and not by an old one.
         """
         factor = self._evaluator.speed_limits[robot.robot_id].speed_factor
@@ -175,7 +175,7 @@ class Views:
         return None if received is None else round(now.mono - received.mono, 3)
 
     def devices(self, now: Instant) -> list[Device]:
-        """What each robot has at the IoT Agent, and what was last heard of it."""
+        """Each robot's devices at the IoT Agent, and when each last sent something."""
         return [
             Device.of(robot, device.suffix, now)
             for robot in self._world.robots.values()
@@ -187,7 +187,7 @@ class Views:
     def people(
         self, now: Instant, margins: LeastMargins | None = None
     ) -> list[PersonModel]:
-        """Everyone who is known."""
+        """Every known person."""
         margins = margins or self.margins(now)
         return [
             self._person(one, margins, now)
@@ -231,7 +231,7 @@ class Views:
         return list(self._world.live_robots())
 
     def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
-        """One robot's newest look, faint detections included."""
+        """One robot's newest detection frame, faint detections included."""
         robot = self._world.robot(robot_id)
         if robot.frame is None or robot.detections_at is None:
             return None
@@ -255,7 +255,7 @@ class Views:
     # --- commands, alerts, log ----------------------------------------------------
 
     def command(self, command: Command, now: Instant) -> CommandModel:
-        """One command with the robot's last word."""
+        """One command with the robot's newest report."""
         return CommandModel.of(command, self._commander.machine(command.robot_id), now)
 
     def find_command(self, command_id: str, now: Instant) -> CommandModel | None:
@@ -264,7 +264,7 @@ class Views:
         return None if command is None else self.command(command, now)
 
     def open_commands(self, now: Instant) -> list[CommandModel]:
-        """Every command that still goes on."""
+        """Every command without an end."""
         return [
             self.command(command, now)
             for machine in self._commander.machines.values()
@@ -273,7 +273,7 @@ class Views:
         ]
 
     def alerts(self) -> list[Alert]:
-        """All that is for people to see now, gravest first."""
+        """All alerts that people should see now, gravest first."""
         waiting = self._evaluator.alerts.waiting
         waiting.sort(key=lambda one: (one.priority, -one.last.raised.wall))
         return [Alert.of(one) for one in waiting]
@@ -291,7 +291,7 @@ class Views:
         return self.log(list(self._event_log.lines)[-_FIRST_LINES:])
 
     def health(self, now: Instant) -> Health:
-        """Every hop with its state and age, all counters, and how the fleet is told."""
+        """Every hop with its state and age, all counters, and the safety figures."""
         hops = [_hop(one) for one in self._health_monitor.hops(now)]
         return Health(
             ok=all(hop.state == "ok" for hop in hops),

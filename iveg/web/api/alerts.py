@@ -1,4 +1,4 @@
-"""Acknowledging an alert: who has seen it, when, and what they say of it."""
+"""Acknowledgement of alerts: by whom, when, and with which note."""
 
 from collections.abc import Callable
 from typing import Annotated
@@ -17,7 +17,7 @@ from iveg.web.security.authentication import Principal, require
 
 
 class Acknowledgement(BaseModel):
-    """What the person says of it."""
+    """The note of the person."""
 
     model_config = ConfigDict(strict=True, extra="ignore")
 
@@ -25,7 +25,7 @@ class Acknowledgement(BaseModel):
 
 
 def router(evaluator: Evaluator, clock: Callable[[], Instant]) -> APIRouter:
-    """Alerts as people handle them."""
+    """Routes of alerts."""
     routes = APIRouter(prefix="/api/v1", tags=["alerts"])
 
     @routes.post("/alerts/{alert_id}/acknowledge", response_model=Alert)

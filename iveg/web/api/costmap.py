@@ -36,7 +36,7 @@ _NOTHING = CostmapModel(
 def router(
     mapper: Mapper, evaluator: Evaluator, clock: Callable[[], Instant]
 ) -> APIRouter:
-    """Where robots can drive, as their lasers have found."""
+    """Routes of the costmap."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
     )

@@ -1,4 +1,4 @@
-"""Where cameras have looked, over HTTP: the page shades the aisles by it."""
+"""Camera coverage over HTTP: the page shades the aisles by it."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ from iveg.web.security.authentication import require
 
 
 def router(watch: Watch, clock: Callable[[], Instant]) -> APIRouter:
-    """What nobody sees."""
+    """Routes of the camera coverage."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
     )

@@ -37,7 +37,7 @@ _MOST_PAGES = 20
 
 
 class Days:
-    """Reads days off the history.
+    """Reads days from the history.
 
     Args:
         queries: The history.

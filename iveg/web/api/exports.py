@@ -1,10 +1,10 @@
 """Lists as files: CSV for spreadsheets, NDJSON for programs.
 
 A CSV in a reader's language is one that Excel opens with a double click: a byte order
-mark, the separator and decimals of the language, and what happened as a sentence.
+mark, the separator and decimals of the language, and each event as a sentence.
 
-An export runs through every page of a list while it is sent, so that a month of rows
-is never held in memory.
+An export runs through every page of a list while it is sent, so that a month of rows is
+never held in memory.
 """
 
 import codecs
@@ -49,7 +49,7 @@ R = TypeVar("R", bound=Record)
 
 
 def form_of(headers: Headers) -> Form:
-    """What the ``Accept`` header likes best; JSON for whoever does not say."""
+    """The form that the ``Accept`` header prefers; JSON without one."""
     best: Form = "json"
     weight = 0.0
     for part in headers.get("accept", "").split(","):
@@ -105,7 +105,7 @@ def _of_transport(name: str, transport: TransportId, record: R) -> object:
 
 
 def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
-    """What says in words what a row is; None where it is numbers alone."""
+    """The sentence of a row; None for rows of numbers alone."""
     if kind in (LogRecord, AlertRecord):
         return lambda row: _safe(reader.say(row.key, row.slots))
     if kind is DecisionRecord:
@@ -152,7 +152,7 @@ def _cell(name: str, value: object, reader: Sentences | None) -> str:
 
 
 def _safe(text: str) -> str:
-    """A spreadsheet would run it; numbers are ours and stay numbers."""
+    """A cell that no spreadsheet runs as a formula; our numbers stay numbers."""
     return "'" + text if text.startswith(_FORMULA) else text
 
 

@@ -1,4 +1,4 @@
-"""Whether the chain is whole: for people, for supervisors, for Prometheus."""
+"""Health of the data path: for people, supervisors and Prometheus."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What is remembered, over HTTP: lists to filter and export, and figures to draw.
+"""The history over HTTP: lists to filter and export, and figures.
 
 Lists answer JSON, CSV or NDJSON, as ``Accept`` or ``format`` says.
 """
@@ -50,7 +50,7 @@ _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class _List(Generic[R]):
-    """One list: where it comes from and how it looks; ``more`` stands beside it."""
+    """One list: its source and its models; ``more`` stands beside it."""
 
     path: str
     of: ListOf[R]
@@ -75,7 +75,7 @@ def router(
 
     Args:
         queries: Where the past is asked for.
-        reader: Dependency that refuses whoever may not read.
+        reader: Dependency that refuses principals who may not read.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         flood: How fast alerts come.
@@ -215,7 +215,7 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
 def _each(
     view: Callable[[R], Model],
 ) -> Callable[[Sequence[R]], Awaitable[list[Model]]]:
-    """Rows of which each says all that is told of it."""
+    """A view of rows that need no other rows."""
 
     async def views(records: Sequence[R]) -> list[Model]:
         return [view(record) for record in records]
@@ -251,7 +251,7 @@ def _reader(language: str | None) -> Sentences | None:
 
 
 def _day(asked: Filter) -> str:
-    """The day that a file is about, for its name: the first that was asked for."""
+    """The first day that was asked for, for the name of the file."""
     at = clock.now().wall if asked.since is None else asked.since
     return f"-{in_madrid(at):%Y-%m-%d}"
 
@@ -320,6 +320,6 @@ def _readings(series: ClimateSeries) -> list[ClimateReading]:
 
 
 def _library() -> dict[str, object]:
-    """Where the browser finds what draws figures, and what a strict page must hold."""
+    """Address of the script that draws figures, and what a strict page must hold."""
     library = charts.library()
     return {"library": f"/vendor/{library.name}", "style_ids": library.style_ids}

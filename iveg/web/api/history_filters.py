@@ -1,4 +1,4 @@
-"""What may be asked of the past, read and checked where it enters.
+"""Questions about the past, read and checked at the boundary.
 
 Times are ISO-8601; one without an offset is UTC.  A name that is not a filter is
 refused: a misspelt filter that answers everything would mislead.

@@ -47,7 +47,7 @@ from iveg.web.security.authentication import require
 
 
 class Asked(BaseModel):
-    """Which window, of which robot."""
+    """Window and robot of the question."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -63,7 +63,7 @@ class Asked(BaseModel):
 
 
 def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
-    """What the watch has measured."""
+    """Routes of the latency table."""
     routes = APIRouter(
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
     )
@@ -90,7 +90,7 @@ _CSV = {
 
 
 def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
-    """What is read off the streams, in the loop's thread."""
+    """Values read from the streams, in the loop's thread."""
     streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
     traced = max(
         (one for one in streams if one.tracer.newest is not None),
@@ -188,7 +188,7 @@ def _bins(of: Sketch) -> HopBins:
 
 
 def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
-    """Hops of which some messages are not told: Orion is throttled, pages are paced."""
+    """Hops that measure only some messages: Orion is throttled, pages are paced."""
     throttled = {one.data for one in streams if one.is_throttled}
     return {
         data: [*(("fiware", "robot_orion") if data in throttled else ()), "screen"]

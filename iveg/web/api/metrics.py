@@ -1,6 +1,6 @@
-"""What Prometheus is told: counters, hops, latency, loss, queues, the safety tiles.
+"""Metrics for Prometheus: counters, hops, latency, loss, queues, safety tiles.
 
-``deploy/grafana`` draws them, and a test holds it to the names that stand here.
+``deploy/grafana`` draws them, and a test compares its names with these.
 """
 
 import asyncio
@@ -25,12 +25,12 @@ _Parts = list[tuple[str, Data, Hop, int, float, list[Sketch]]]
 
 @dataclass(frozen=True, slots=True)
 class Queues:
-    """How full the queues are, and what had to be done again.
+    """Depth of queues, drops and retries.
 
     Attributes:
-        depths: Queue → what waits in it now.
-        dropped: Queue → what gave way since the start.
-        retries: What → how often it was done again since the start.
+        depths: Queue → number of waiting items.
+        dropped: Queue → items dropped since the start.
+        retries: Operation → retries since the start.
     """
 
     depths: Mapping[str, int]

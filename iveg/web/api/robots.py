@@ -19,7 +19,7 @@ from iveg.web.views import Views
 
 
 def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
-    """What is known now."""
+    """Routes of the present state."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
     )
@@ -47,7 +47,7 @@ def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
 
     @routes.get("/people", response_model=Listing[Person])
     async def people() -> Response:
-        """Everyone who is known, in their three stages."""
+        """Every known person, in their three stages."""
         return Json(Listing(items=views.people(clock())))
 
     @routes.get("/devices", response_model=Listing[Device])
@@ -67,7 +67,7 @@ def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
 
     @routes.get("/health", response_model=Health)
     async def chain() -> Response:
-        """The chain from robot to screen, hop by hop, and what was counted."""
+        """The data path from robot to screen, hop by hop, and the counters."""
         return Json(views.health(clock()))
 
     return routes

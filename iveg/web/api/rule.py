@@ -1,4 +1,4 @@
-"""The alert rule over HTTP: the version in force, every earlier one, and a new one."""
+"""The detection rule over HTTP: the version in force, earlier ones, a new one."""
 
 from collections.abc import Callable
 from typing import Annotated, Literal, TypeVar
@@ -24,10 +24,10 @@ _MOST_ALIASES = 200
 
 
 class RuleChange(BaseModel):
-    """What is to be different; what is not named stays as it is.
+    """The parameters to change; others stay as they are.
 
-    A class that a detector may name must stand for `person` or `robot`; both names
-    always stand for themselves.
+    A detector's word must stand for `person` or `robot`; both names always stand for
+    themselves.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid")
@@ -95,7 +95,7 @@ def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
     async def change(
         body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
     ) -> Response:
-        """Put a new version in force at once; what is not named stays as it is."""
+        """Put a new version in force at once; parameters that are not named stay."""
         wanted = body.applied_to(rules.current)
         return Json(
             RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))

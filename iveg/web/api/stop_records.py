@@ -1,4 +1,4 @@
-"""How long STOP took, and the drills that prove it (docs/interfaces/http.md).
+"""Latency of STOP, and its drills (docs/interfaces/http.md).
 
 Both are read from the history, so they outlive a restart and can be printed.
 """
@@ -39,7 +39,7 @@ def router(
     clock: Callable[[], Instant],
     find: Callable[[str, Instant], Command | None],
 ) -> APIRouter:
-    """What is remembered of STOP; ``find`` knows the commands of this run."""
+    """Routes of past STOPs; ``find`` knows the commands of this run."""
     routes = APIRouter(
         prefix="/api/v1", tags=["commands"], dependencies=[Depends(require("read"))]
     )

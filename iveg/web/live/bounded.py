@@ -1,8 +1,8 @@
-"""A WebSocket whose buffers on this side are small.
+"""A WebSocket with small buffers on this side.
 
-What the kernel and the server keep for a browser that reads slowly is a queue in front
-of the slots where the newest wins.  Credit bounds it for ``iveg.2``; here it is bounded
-for everybody.
+Data that the kernel and the server hold for a slow browser form a queue in front of the
+slots where the newest wins.  Credit bounds it for ``iveg.2``; here it is bounded for
+everybody.
 """
 
 import asyncio

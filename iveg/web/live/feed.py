@@ -1,6 +1,6 @@
-"""What one browser is told of telemetry, and when: the newest, at a pace of its own.
+"""Telemetry for one browser: the newest values, at the browser's own pace.
 
-Positions go as often as the page paints.  The rest goes as often as eyes need: a scan
+Positions go as often as the page paints.  Other parts go as often as eyes need: a scan
 or a detection frame is looked at, not measured, and digits that change more than ten
 times a second cannot be read.
 """
@@ -26,7 +26,7 @@ _INF: Final = float("inf")
 
 
 class TelemetryFeed:
-    """Makes the frames of one browser from what has changed for it."""
+    """Makes the frames of one browser from the topics that have changed for it."""
 
     def __init__(
         self, encoder: TelemetryEncoder, subscriber: Subscriber, painting: Painting
@@ -87,7 +87,7 @@ class TelemetryFeed:
                 self._waiting[topics.ROBOT_STATE.of(robot_id)] = None
 
     def _due_at(self) -> float:
-        """When the first of what waits may go; what has no room waits for credit."""
+        """When the first waiting part may go; parts without room wait for credit."""
         times = (
             _next_after(topic, self._told.get(topic, _NEVER)[1])
             for topic in self._waiting
@@ -133,11 +133,11 @@ class _Frame:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing was worth saying."""
+        """Whether the frame has no content."""
         return not (self._moves or self._parts or self._scans)
 
     def take(self, topic: str, part: Part) -> bool:
-        """Take a part in; False where it would be too much on its way at once."""
+        """Add a part; False where too much would be on its way at once."""
         if _is_robot(topic):
             self._moves.append(part.head)
             return True

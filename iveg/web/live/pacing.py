@@ -1,9 +1,9 @@
-"""How much telemetry may be on its way to one browser: credit given by painting.
+"""Credit: how much telemetry may be on its way to one browser.
 
 Buffers of the kernel, of the server and of the browser are queues without a size, and
 telemetry that waits in them shows the past.  So the page says which frame it has
-painted, and no more than a window of frames that it has not painted is ever sent: what
-waits beyond it waits in slots, where the newest wins.
+painted, and no more than a window of unpainted frames is ever sent: further changes
+wait in slots, where the newest wins.
 """
 
 from collections import deque
@@ -40,17 +40,17 @@ class CreditWindow:
 
     @property
     def unpainted(self) -> int:
-        """How many frames are on their way."""
+        """Number of frames on their way."""
         return len(self._sent)
 
     @property
     def next_number(self) -> int:
-        """Of the frame that goes next, from 1."""
+        """Number of the next frame, from 1."""
         return self._number + 1
 
     @property
     def opens_at(self) -> float:
-        """From when on the next frame may go; ``inf``: not before one is painted."""
+        """When the next frame may go; ``inf``: not before one is painted."""
         if len(self._sent) >= FRAMES:
             return float("inf")
         return self._sent_at + max(GAP_S, self._round_trip_s / FRAMES)

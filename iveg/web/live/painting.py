@@ -1,7 +1,7 @@
-"""Δt₄: what a page tells of the frames that it has drawn, against what was in them.
+"""Δt₄: frames that a page reports as drawn, compared with their content.
 
-Only identities that the server sent itself are measured, so a page can be wrong about
-nothing but the moment; a moment that cannot be is counted and not used.
+Only frames that the server sent itself are measured, so a page can be wrong about the
+moment alone; an impossible moment is counted and not used.
 """
 
 from collections import deque
@@ -31,7 +31,7 @@ class Painting:
         self._samples: list[_Sample] = []
 
     def adds(self, topic: str, now: float) -> None:
-        """A topic goes with the next frame (``now`` monotonic, s)."""
+        """Note that a topic goes with the next frame (``now`` monotonic, s)."""
         if now - self._sampled.get(topic, float("-inf")) < SAMPLE_S:
             return
         of = _stream_of(topic)
@@ -41,12 +41,12 @@ class Painting:
             self._samples.append((*of, decided_at))
 
     def sent(self, number: int, now: float) -> None:
-        """That frame has gone."""
+        """Note that the frame was sent."""
         self._on_way.append((number, now, self._samples))
         self._samples = []
 
     def painted(self, number: int, at: object, within: object, now: float) -> None:
-        """A page says that it drew a frame, and all before, then.
+        """Take a page's report that it drew a frame, and all before, at a moment.
 
         Args:
             number: Of the frame; it was on its way.

@@ -1,10 +1,10 @@
-"""The WebSocket to browsers: a snapshot, then what changes.
+"""The WebSocket to browsers: a snapshot, then changes.
 
-A message is encoded once, whoever looks.  Each browser has one task that sends what is
-newest; a browser that reads nothing keeps no queue and is closed after a while (fault
-F23).  One that speaks ``iveg.2`` is sent telemetry in frames, as fast as it paints
-them; everything else passes beside them at once.  One that does not gets a message a
-topic, for one version more.
+A message is encoded once for all browsers.  Each browser has one task that sends the
+newest values; a browser that reads nothing keeps no queue and is closed after a while
+(fault F23).  A browser with ``iveg.2`` is sent telemetry in frames, as fast as it
+paints them; everything else passes beside them at once.  A browser without it gets a
+message for each topic, for one version more.
 """
 
 import asyncio
@@ -103,7 +103,7 @@ class Encoder:
         return len(head).to_bytes(4, "little") + head + points.tobytes()
 
     def event(self, topic: str, item: object) -> bytes:
-        """The frame of an event that nobody may miss."""
+        """The frame of an event, which is never dropped."""
         now = self._clock()
         return text(topic, topics.find(topic)[0].tell(self._views, item, now), now)
 
@@ -169,7 +169,7 @@ def router(
 
 
 class Line:
-    """What goes to one browser, one message after the other."""
+    """The messages to one browser, one after the other."""
 
     def __init__(
         self,
@@ -261,7 +261,7 @@ def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bo
 
 
 class Ear:
-    """What one browser says: pings, presses, and what it has painted.
+    """Messages from one browser: pings, presses, painted frames.
 
     Answers go out with all else, so that a press is read at once also where the way
     back is full.

@@ -1,8 +1,8 @@
-"""Telemetry in the parts that frames are made of, each version encoded once for all.
+"""Parts of telemetry frames, each version encoded once for all browsers.
 
-A part is JSON, and for a scan the integers that it counts; docs/interfaces/live.md has
-their shapes.  Browsers differ in when they take a part, never in its bytes: it
-says itself when it was true (``at``, the server's monotonic clock).
+A part is JSON, and for a scan also its integers; docs/interfaces/live.md has their
+shapes.  Browsers differ in when they take a part, never in its bytes: each part carries
+the moment of its truth (``at``, the server's monotonic clock).
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ from iveg.pipeline.publish import Hub
 from iveg.web.views import Views
 
 UNIT_M: Final = 0.005
-"""A range is told in these: finer than a map shows, and 327 m fit in 16 bits."""
+"""Unit of a range: finer than a map shows, and 327 m fit in 16 bits."""
 NO_RETURN: Final = 0xFFFF
 
 _MOVES: Final = frozenset({"pose", "twist", "stamp", "age_s"})
-"""What of a robot goes by itself, with each measure."""
+"""Members of a robot that go by themselves, with each measure."""
 
 
 class Part(NamedTuple):
@@ -48,7 +48,7 @@ class Part(NamedTuple):
 
 
 class TelemetryEncoder:
-    """Encodes what browsers ask for, when the first of them does."""
+    """Encodes each part when the first browser asks for it."""
 
     def __init__(self, views: Views, hub: Hub) -> None:
         self._views = views
@@ -60,11 +60,11 @@ class TelemetryEncoder:
         self._margins: LeastMargins | None = None
 
     def begin(self) -> None:
-        """A frame begins: what was worked out for the one before is of the past."""
+        """Begin a frame: values computed for the one before are dropped."""
         self._margins = None
 
     def move(self, robot_id: str, now: Instant) -> Part | None:
-        """Where a robot is and how it moves; None before its first odometry."""
+        """Pose and motion of a robot; None before its first odometry."""
         odometry, age_s = self._views.motion(robot_id, now)
         if odometry is None:
             return None
@@ -81,7 +81,7 @@ class TelemetryEncoder:
         return self._parts[topic]
 
     def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
-        """What else of a robot has changed since a version; None: nothing."""
+        """Other members of a robot that have changed since a version; None for none."""
         topic = topics.ROBOT.of(robot_id)
         state = self._states.setdefault(robot_id, _RobotState())
         if state.version != self._hub.versions[topic]:
@@ -90,7 +90,7 @@ class TelemetryEncoder:
         return state.changes(topic, since)
 
     def people(self, since: int, now: Instant) -> Part | None:
-        """Who there is, and whoever has changed since a version; None: nothing has."""
+        """The list of people, and changes since a version; None without a change."""
         version = self._hub.versions[topics.PEOPLE.name]
         if self._people.version != version:
             told = self._views.people(now, self._margins_at(now))
@@ -98,7 +98,7 @@ class TelemetryEncoder:
         return self._people.changes(since)
 
     def part(self, topic: str, now: Instant) -> Part | None:
-        """A scan or one detection frame; None: nothing is known."""
+        """A scan or one detection frame; None where there is none."""
         version = self._hub.versions[topic]
         kept = self._parts.get(topic)
         if kept is not None and kept.version == version:
@@ -157,7 +157,7 @@ class _RobotState:
         self._members: dict[str, tuple[int, bytes]] = {}
 
     def update(self, told: Robot, version: int, at: float) -> None:
-        """Compare with what was told before."""
+        """Compare with the members of the last update."""
         self.version, self._at = version, at
         for name, value in told.__dict__.items():
             if name in _MOVES or self._values.get(name, self) == value:
@@ -180,7 +180,7 @@ class _RobotState:
 
 
 class _People:
-    """Everyone who is known, each encoded when there is more to say than an age."""
+    """All known people, each encoded when more than an age has changed."""
 
     def __init__(self) -> None:
         self.version = -1
@@ -191,7 +191,7 @@ class _People:
         self._texts: dict[str, tuple[int, bytes]] = {}
 
     def update(self, told: Sequence[Person], version: int, at: float) -> None:
-        """Compare with who was told of before."""
+        """Compare with the people of the last update."""
         self.version, self._at = version, at
         ids = [person.person_id for person in told]
         if ids != self._ids:
@@ -203,13 +203,13 @@ class _People:
             if self._values[person.person_id] == value:
                 continue
             self._values[person.person_id] = value
-            # Its age counts from here, whoever takes it later.
+            # Its age counts from here, whichever browser takes it later.
             text = orjson.dumps({**person.model_dump(), "at": at})
             self._texts[person.person_id] = version, text
             self._changed = version
 
     def changes(self, since: int) -> Part | None:
-        """Who is there, and what has changed of whom since a version."""
+        """The list of people, and those who changed since a version."""
         if self._changed <= since:
             return None
         newer = [text for version, text in self._texts.values() if version > since]

@@ -1,4 +1,4 @@
-"""Rows → Plotly figures: plotly's one door.
+"""Rows become Plotly figures; the only importer of plotly.
 
 The package checks every figure as it is made; the browser draws it with the library
 that lies in the same package, so the two always fit.  ``meta`` names what a trace or an
@@ -35,11 +35,11 @@ _BIN = 1.0 / CONFIDENCE_BINS
 
 
 def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> bytes:
-    """Speed (m/s) with the limited to limit as a step line, a strip a robot, as JSON.
+    """Speed (m/s) with the speed limit as a step line, a strip for each robot, as JSON.
 
-    The limit is the limited to factor of the robot's greatest speed; while it is lower
-    the strip is shaded.  Lines break where nothing was heard for 5 s: a line through
-    silence would be invented.
+    The limit is the factor times the robot's greatest speed; while it is lower the
+    strip is shaded.  Lines break where no data came for 5 s: a line through silence
+    would be invented.
     """
     traces: list[_Trace] = []
     layout: dict[str, object] = {}
@@ -60,13 +60,13 @@ def speed_figure(series: Sequence[SpeedSeries], fleet: FleetDescription) -> byte
 
 
 def _strip(n: int, of: int) -> list[float]:
-    """Where the n-th of so many strips lies, from the top down (0–1)."""
+    """Position of the n-th strip, from the top down (0–1)."""
     top = 1.0 - n / of
     return [round(top - (0.86 if of > 1 else 1.0) / of, 4), round(top, 4)]
 
 
 def _slow_downs(series: SpeedSeries, axis: str) -> Iterator[_Trace]:
-    """A shade for each time in which less than full speed was limited to."""
+    """A shade for each time with a speed limit below full speed."""
     since: float | None = None
     for at, factor in zip(series.at, series.mandated, strict=True):
         if factor < FULL_SPEED and since is None:
@@ -241,7 +241,7 @@ def _room(values: Sequence[float], least: float) -> list[float] | None:
 
 
 def _gaps(at: Sequence[float], longest: float) -> list[int]:
-    """Places after which nothing was heard for too long."""
+    """Places after which no data came for too long."""
     pairs = enumerate(pairwise(at))
     return [place for place, (one, other) in pairs if other - one > longest]
 

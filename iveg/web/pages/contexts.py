@@ -1,4 +1,4 @@
-"""What each template may say: one frozen dataclass a template, and nothing beside it.
+"""Contexts of the templates: one frozen dataclass for each template.
 
 A template sees its own dataclass as ``page`` and the functions ``t`` (a sentence),
 ``say`` (a sentence that follows the language switch) and ``label`` (the same, as an
@@ -18,7 +18,7 @@ THEMES: tuple[Theme, ...] = ("auto", "light", "dark", "sunlight")
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """What is the same on every page while this server runs.
+    """Facts about this server that every page shows.
 
     Attributes:
         greenhouse: Name as people say it.
@@ -34,7 +34,7 @@ class Site:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How this browser wants the page; remembered in its cookies."""
+    """Appearance that this browser chose; remembered in its cookies."""
 
     language: str = "es"
     theme: Theme = "auto"
@@ -43,7 +43,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What ``base.html`` draws around every page.
+    """Context of ``base.html``, which surrounds every page.
 
     Attributes:
         route: Which entry of the navigation is current.
@@ -92,7 +92,7 @@ class CommandsPage:
 
 @dataclass(frozen=True, slots=True)
 class FleetPage:
-    """``fleet.html``: the chain from robot to screen, the robots, their devices."""
+    """``fleet.html``: the data path from robot to screen, the robots, their devices."""
 
     template: ClassVar[str] = "fleet.html"
     frame: Frame
@@ -108,7 +108,7 @@ class ClimatePage:
 
 @dataclass(frozen=True, slots=True)
 class LatencyPage:
-    """``latency.html``: where the milliseconds go, hop by hop."""
+    """``latency.html``: latency, hop by hop."""
 
     template: ClassVar[str] = "latency.html"
     frame: Frame
@@ -198,7 +198,7 @@ class SignInPage:
 
 @dataclass(frozen=True, slots=True)
 class ErrorPage:
-    """``error.html``: what went wrong, for a person.
+    """``error.html``: an error, explained for a person.
 
     Attributes:
         status: HTTP status.

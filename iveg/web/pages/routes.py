@@ -1,7 +1,7 @@
-"""HTML: each page is one context drawn by its template, in the reader's language.
+"""HTML pages: each is one context drawn by its template, in the reader's language.
 
-``Pages`` draws; ``router`` says which page stands where.  Who may read is decided by
-the dependencies that are handed in.
+``Pages`` draws; ``router`` gives each page its address.  The dependencies that are
+handed in decide who may read.
 """
 
 import json
@@ -60,7 +60,7 @@ _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
 
 
 class Visitor(Protocol):
-    """Whom a page is for; ``auth.Principal`` is one."""
+    """The reader of a page; ``auth.Principal`` is one."""
 
     @property
     def name(self) -> str:
@@ -88,7 +88,7 @@ class Pages:
     def frame(
         self, request: Request, route: str, visitor: Visitor | None = None
     ) -> Frame:
-        """What surrounds a page for this reader."""
+        """The frame around a page for this reader."""
         look = _look(request)
         if visitor is None:
             return Frame(self._site, look, route)
@@ -106,7 +106,7 @@ class Pages:
         return HTMLResponse(html, status, {"Vary": "Cookie, Accept-Language"})
 
     def problem(self, request: Request, problem: Problem) -> Response:
-        """A problem as a page: the way in for a stranger, an explanation else."""
+        """A problem as a page: sign-in for a stranger, an explanation for others."""
         if problem.status == 401:
             return self.sign_in(request, 401)
         known = problem.status if problem.status in _EXPLAINED else "other"
@@ -126,7 +126,7 @@ class Pages:
     def sign_in(
         self, request: Request, status: int = 200, *, wrong: bool = False
     ) -> Response:
-        """How to get in."""
+        """The sign-in page."""
         address = str(request.base_url).rstrip("/")
         page = SignInPage(self.frame(request, "signin"), address, wrong)
         return self.draw(page, status)

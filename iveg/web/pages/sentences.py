@@ -1,7 +1,7 @@
-"""Sentences as the page says them, for files and paper: templates, slots and formats.
+"""Sentences for files and paper, as the page writes them: templates, slots, formats.
 
-The formats are those of ``static/js/core/i18n.js``; a missing template shows its
-key, so that a row of an older version is never lost.
+The formats are those of ``static/js/i18n.js``; a missing template shows its key, so
+that a row of an older version is never lost.
 """
 
 import re
@@ -28,7 +28,7 @@ Slots = Mapping[str, object]
 
 
 class Sentences:
-    """Says what happened in one language."""
+    """Writes events as sentences in one language."""
 
     def __init__(self, translations: Translations) -> None:
         self.translations = translations

@@ -9,7 +9,7 @@ from iveg.web.security.authentication import require
 
 
 def router() -> APIRouter:
-    """One file; it holds nothing that strangers may not see."""
+    """One file, without anything that strangers may not see."""
     routes = APIRouter(include_in_schema=False)
 
     @routes.get("/sw.js", dependencies=[Depends(require("open"))])

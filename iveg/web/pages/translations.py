@@ -1,4 +1,4 @@
-"""The words of the page on the server: the same templates that the browser reads.
+"""Texts of the page on the server: the same templates that the browser reads.
 
 ``iveg/static/i18n/{es,en}.json`` hold nested blocks; a key such as ``nav.live`` walks
 down them.  Holes are ``{name}``, ``{name:2}`` (decimals) and ``{name:percent}``; the

@@ -1,14 +1,14 @@
-"""The door: who is there, and what may they do.
+"""Authentication and authorisation of people, programs and Orion.
 
 People come with a session cookie, programs with a bearer token, Orion with a shared
-secret.  Every route declares what it asks for with ``require``; ``undeclared`` finds
-those that forgot::
+secret.  Every route declares its requirement with ``require``; ``undeclared`` finds
+routes that declare none::
 
     link with token ──> session cookie ──> operator: read, stop, release
     bearer token ─────────────────────────> program:  read, stop
     session past its age ─────────────────> expired:  stop, 12 h longer
 
-STOP outlives the session (SECURITY.md): whoever was let in once can still stop.
+STOP outlives the session (SECURITY.md): a person who was signed in once can still stop.
 """
 
 import hmac
@@ -57,7 +57,7 @@ _log = logging.getLogger(__name__)
 
 
 class Authenticator:
-    """Tells people and programs from strangers.
+    """Authenticates people and programs.
 
     Args:
         sign_in_token: The link's token (hex); it signs a browser in as operator.
@@ -114,7 +114,7 @@ class Authenticator:
         return response
 
     def sign_out(self, request: Request) -> Response:
-        """End the session of this browser and go where one signs in."""
+        """End the session of this browser and redirect to the sign-in page."""
         principal = self.identify(request)
         if principal is not None:
             self.sessions.revoke(principal)
@@ -126,7 +126,7 @@ class Authenticator:
         return response
 
     def _tell_refused(self, now: float) -> None:
-        """Count it and say so once a minute, so that nobody can flood the log."""
+        """Count a refused sign-in; log it once a minute, against floods of the log."""
         self.refused += 1
         if self._told_at is None or now - self._told_at >= 60.0:
             self._told_at = now
@@ -135,7 +135,7 @@ class Authenticator:
     # --- who is it --------------------------------------------------------------
 
     def identify(self, connection: HTTPConnection) -> Principal | None:
-        """Whose cookie or bearer token this is; None for a stranger."""
+        """The owner of the cookie or bearer token; None for a stranger."""
         scheme, _, token = connection.headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
             known = bool(self._api_token) and _same(token.strip(), self._api_token)
@@ -227,7 +227,7 @@ class Requirement:
         self.action = action
 
     async def __call__(self, connection: HTTPConnection) -> Principal:
-        """Who comes in, or the error that keeps them out."""
+        """The authorised principal, or the error that refuses the request."""
         authenticator: Authenticator = connection.app.state.authenticator
         if self.action == "open":
             return authenticator.identify(connection) or NOBODY
@@ -243,12 +243,12 @@ _REQUIREMENTS: Final[Mapping[Action, Requirement]] = {
 
 
 def require(action: Action) -> Requirement:
-    """What a route declares: ``Depends(require("stop"))``; ``open`` asks nothing."""
+    """Requirement of a route: ``Depends(require("stop"))``; ``open`` asks nothing."""
     return _REQUIREMENTS[action]
 
 
 def declared_action(route: Any) -> Action | None:
-    """What a route, or its FastAPI context, declares; None when it forgot."""
+    """The action that a route, or its FastAPI context, declares; None without one."""
     dependant = getattr(route, "dependant", None)
     if not isinstance(dependant, Dependant):
         # A plain ASGI endpoint says it itself.

@@ -1,4 +1,4 @@
-"""Telling a request of our own page from one that another page sent with our cookie."""
+"""Cross-site request forgery: requests of other sites' pages with our cookie."""
 
 from urllib.parse import urlsplit
 
@@ -8,10 +8,10 @@ from iveg.web.problems import ForeignOriginError, NotJsonError
 
 
 def refuse_forgery(request: Request) -> None:
-    """Cookies come along with anybody's request; these two signs do not.
+    """Refuse a request without the two signs of our own page.
 
-    Browsers send Sec-Fetch-Site to trustworthy addresses only, so over plain HTTP in
-    a greenhouse Origin has to do.
+    Cookies come with anybody's request.  Browsers send Sec-Fetch-Site to trustworthy
+    addresses only, so over plain HTTP in a greenhouse Origin has to do.
 
     Raises:
         ForeignOriginError: one of them is missing or another site's.
@@ -28,7 +28,7 @@ def refuse_forgery(request: Request) -> None:
 
 
 def refuse_other_bodies(request: Request) -> None:
-    """Forms of other sites can send anything but JSON.
+    """Refuse bodies that are not JSON: forms of other sites can send anything else.
 
     Raises:
         NotJsonError: a body that is not declared as JSON.

@@ -1,4 +1,4 @@
-"""What stands in front of every route: headers that bind browsers, and a size limit.
+"""Headers and the size limit in front of every route.
 
 Pure ASGI.  Notifications come hundreds of times a second and no browser reads their
 answers, so their path is told apart first and pays for the size limit alone.

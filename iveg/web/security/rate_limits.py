@@ -1,7 +1,7 @@
-"""How often somebody may try the door, and how much a page may say (SECURITY.md).
+"""Limits of sign-ins and of WebSocket messages (SECURITY.md).
 
-STOP is never limited: not over HTTP, and not on a socket that says too much.  What a
-page has painted is counted apart: it says so with every frame that its screen shows.
+STOP is never limited: not over HTTP, and not on a WebSocket that sends too much.
+Painted frames are counted apart: a page reports every frame that its screen shows.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ from iveg.web.security.roles import Principal
 SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
 MESSAGES_PER_S = 20
 PAINTED_PER_S = 300
-"""More than frames are ever sent in a second: no honest page is not heard."""
+"""More than frames are ever sent in a second: every honest report counts."""
 SOCKETS = 5
 TOO_MANY_SOCKETS: Final = 4429
 """Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
@@ -34,8 +34,8 @@ _SILENT_S = 3.0
 class Attempts:
     """Wrong sign-ins by address: five a minute, then one a minute.
 
-    Never a lock-out: what is tried while somebody has to wait does not make the wait
-    longer, and whoever gets in begins anew.
+    Never a lock-out: tries during the wait do not make it longer, and a successful
+    sign-in begins anew.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class Attempts:
         return max(0.0, wrong[-1] + SIGN_INS_WITHIN_S - now)
 
     def failed(self, address: str, now: float) -> None:
-        """One more that was wrong."""
+        """Count a wrong sign-in."""
         wrong = self._wrong.setdefault(address, deque(maxlen=SIGN_INS))
         self._wrong.move_to_end(address)
         while wrong and now - wrong[0] > SIGN_INS * SIGN_INS_WITHIN_S:
@@ -64,7 +64,7 @@ class Attempts:
             self._wrong.popitem(last=False)
 
     def succeeded(self, address: str) -> None:
-        """Whoever gets in has nothing to wait for."""
+        """Forget the wrong sign-ins of this address."""
         self._wrong.pop(address, None)
 
 
@@ -102,14 +102,14 @@ class _Socket:
 
 
 class SocketLimits:
-    """Five sockets a session, twenty messages a second each (what was painted: 300).
+    """Five WebSockets a session, twenty messages a second each (painted frames: 300).
 
-    Of more sockets the one that has been silent gives way: it is a page that lost its
-    line and came back.  When all of them are alive the new one is refused, so that the
-    pages of one person do not push each other out in turn.
+    Of more WebSockets the silent one gives way: it is a page that lost its line and
+    came back.  When all of them are alive the new one is refused, so that the pages of
+    one person do not push each other out in turn.
 
     Args:
-        identify: Who it is; strangers are left to the door.
+        identify: The principal; strangers are left to authentication.
         clock: Read at each message.
     """
 
@@ -167,7 +167,7 @@ class SocketLimits:
                     await send({"type": "websocket.close", "code": TOO_MANY_SOCKETS})
 
     def _listening(self, socket: _Socket, receive: Receive) -> Receive:
-        """What the page says, without what is too much."""
+        """The messages of a page, within its limits."""
 
         async def receive_limited() -> Message:
             while True:
@@ -184,7 +184,7 @@ class SocketLimits:
 
 
 def _make_room(sockets: list[_Socket], now: float) -> bool:
-    """Whether one more may come in; ends a silent one where it must."""
+    """Whether one more WebSocket may come in; ends a silent one where it must."""
     served = [socket for socket in sockets if not socket.ended]
     if len(served) < SOCKETS:
         return True
@@ -196,12 +196,12 @@ def _make_room(sockets: list[_Socket], now: float) -> bool:
 
 
 def _is_painted(message: Message) -> bool:
-    """Whether this says that a frame was painted, as pages write it."""
+    """Whether a message reports a painted frame, as pages write it."""
     return (message.get("text") or "").startswith('{"type":"painted"')
 
 
 def _is_stop(message: Message) -> bool:
-    """Whether this may be a STOP; the reader tells for sure."""
+    """Whether a message may be a STOP; its reader decides."""
     return '"stop"' in (message.get("text") or "")
 
 

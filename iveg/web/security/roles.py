@@ -1,4 +1,4 @@
-"""Who somebody is and what they may do (SECURITY.md)."""
+"""Roles of people and programs, and what each may do (SECURITY.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ MAY: Final[Mapping[Role, frozenset[Action]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """Somebody the door knows.
+    """An authenticated person or program.
 
     Attributes:
         name: For the audit and the page; opaque to robots.

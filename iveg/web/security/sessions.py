@@ -1,7 +1,7 @@
-"""Sessions of people: who holds which token, and what is left of it by now.
+"""Sessions of people: their tokens, and what each still allows.
 
 Only digests of the tokens are kept, in memory and in a store that outlives a restart.
-Ages are told by the wall clock, because no other goes on counting while iVeg is down::
+Ages follow the wall clock, because no other goes on counting while iVeg is down::
 
     signed in ──12 h idle, or 24 h──> expired: STOP alone ──12 h──> gone
         └──────── signed out ─────────────────────────────────────> gone
@@ -35,7 +35,7 @@ class SessionStore(Protocol):
 
 
 class Sessions:
-    """Who is signed in.
+    """People who are signed in.
 
     Bounded: when it is full, the session that was idle longest ends.
 
@@ -74,7 +74,7 @@ class Sessions:
         return token
 
     def find(self, token: str) -> Principal | None:
-        """Who holds this token; counts as a sign of life."""
+        """The owner of this token; counts as a sign of life."""
         return self._principal(_digest(token), touch=True)
 
     def current(self, principal: Principal) -> Principal | None:

@@ -1,4 +1,4 @@
-"""The sign-in link: its token is removed from the address before it can be kept."""
+"""The sign-in link: its token is taken off the URL before anything can log it."""
 
 from collections.abc import Callable
 from urllib.parse import parse_qs
@@ -12,7 +12,7 @@ from iveg.web.security.authentication import Authenticator
 
 
 class SignInLink:
-    """Takes ``GET /?token=…`` out of the address before anything can log or keep it.
+    """Takes the token off ``GET /?token=…`` before anything can log or keep it.
 
     Args:
         authenticator: Where the token is looked at.
