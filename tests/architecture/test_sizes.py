@@ -39,14 +39,12 @@ LARGE_FUNCTIONS = {
     "iveg/emulator/replay.py run_replay": LIST,
     "iveg/robot/node.py RobotNode.__init__": LIST,
     "iveg/static/js/core/i18n.js createI18n": STATE,
-    "iveg/static/js/map/map.js createMap": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
     "iveg/static/js/core/socket.js connect": STATE,
     "iveg/static/js/core/store.js createStore": STATE,
     "iveg/web/views.py Views.robot": TABLE,
 }
 LARGE_CLOSURES = {
-    "iveg/static/js/map/map.js createMap": STATE,
     "iveg/static/js/panels/robots.js createCard": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
     "iveg/static/js/core/socket.js connect": STATE,

@@ -1,4 +1,5 @@
 import { createPace } from "../../iveg/static/js/core/pace.js";
+import { createPainting } from "../../iveg/static/js/core/painting.js";
 import { equal, test } from "./harness.js";
 
 /** A pace whose screen paints when the test says so. */
@@ -41,7 +42,7 @@ test("a page that is not painted says seldom, but says", async () => {
   const real = globalThis.requestAnimationFrame;
   globalThis.requestAnimationFrame = () => 0;
   try {
-    createPace((frame) => said.push(frame)).took(1);
+    createPace((frame) => said.push(frame), createPainting().when).took(1);
   } finally {
     globalThis.requestAnimationFrame = real;
   }

@@ -46,6 +46,11 @@ class Files(SimpleHTTPRequestHandler):
         else:
             super().do_GET()
 
+    def translate_path(self, path: str) -> str:
+        """Static files are where the dashboard has them, too."""
+        at_home = f"/iveg{path}" if path.startswith("/static/") else path
+        return super().translate_path(at_home)
+
     def end_headers(self) -> None:
         self.send_header("Content-Security-Policy", self._policy)
         super().end_headers()

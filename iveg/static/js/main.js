@@ -6,6 +6,7 @@
  */
 
 import { loadI18n, switchLanguage } from "./core/i18n.js";
+import { createPainting } from "./core/painting.js";
 import { connect } from "./core/socket.js";
 import { createStore } from "./core/store.js";
 import { createBanner } from "./panels/banner.js";
@@ -21,6 +22,7 @@ import { createThemePanel } from "./panels/theme.js";
  *   store: import("./core/store.js").Store,
  *   i18n: import("./core/i18n.js").I18n,
  *   line: ReturnType<typeof connect>,
+ *   painting: ReturnType<typeof createPainting>,
  *   dialogs: import("./panels/dialogs.js").Dialogs,
  *   stops: ReturnType<typeof createStopPanel>,
  * }} App
@@ -34,8 +36,9 @@ async function start() {
   if (!document.querySelector("#stops")) return;
   const store = createStore();
   const draws = document.querySelector("#map") !== null;
-  const line = connect({ url: liveUrl(), store, draws });
-  const app = /** @type {App} */ ({ store, i18n, line, dialogs });
+  const painting = createPainting();
+  const line = connect({ url: liveUrl(), store, draws, whenPainted: painting.when });
+  const app = /** @type {App} */ ({ store, i18n, line, painting, dialogs });
   app.stops = createStopPanel(app);
   createBanner(app);
   const { startPage } = await import("./core/page.js");

@@ -41,6 +41,19 @@ export async function loadI18n() {
 }
 
 /**
+ * I18n of blocks that are here already: in a worker, which has no page.
+ *
+ * @param {string} language
+ * @param {Blocks} blocks
+ * @returns {Promise<I18n>}
+ */
+export async function i18nOf(language, blocks) {
+  const i18n = createI18n(async () => blocks);
+  await i18n.use(languageOf(language));
+  return i18n;
+}
+
+/**
  * Switches the whole page, and remembers it for the next one.
  *
  * @param {Language} language
@@ -129,16 +142,6 @@ export function createI18n(load) {
     sentence: (value, slots) => sentenceOf(value, slots),
   };
 
-  /** A time that people read: `42 s`, `3 min 42 s`. @param {number} seconds */
-  function spanOf(seconds) {
-    const whole = Math.round(seconds);
-    const [minutes, rest] = [Math.floor(whole / 60), whole % 60];
-    if (!minutes) return `${whole} s`;
-    return minutes < 60
-      ? `${minutes} min ${rest} s`
-      : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
-  }
-
   /** `P3` is a person's number in the greenhouse; on a page it would read as a priority.
    * @param {unknown} value */
   function trackOf(value) {
@@ -184,6 +187,8 @@ export function createI18n(load) {
     number,
     time,
     language: () => language,
+    /** Some blocks as they are, for who says them elsewhere. @param {string[]} names */
+    blocks: (...names) => Object.fromEntries(names.map((name) => [name, blocks[name]])),
     /**
      * Calls `fn` after every switch.
      *
@@ -225,6 +230,16 @@ export function translate(root, say) {
       element.setAttribute(attribute, say(key, slotsOf(element)));
     }
   }
+}
+
+/** A time that people read: `42 s`, `3 min 42 s`. @param {number} seconds */
+function spanOf(seconds) {
+  const whole = Math.round(seconds);
+  const [minutes, rest] = [Math.floor(whole / 60), whole % 60];
+  if (!minutes) return `${whole} s`;
+  return minutes < 60
+    ? `${minutes} min ${rest} s`
+    : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
 /** @param {Element} element @returns {Slots} */

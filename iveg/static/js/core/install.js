@@ -6,6 +6,8 @@
  * @typedef {"ready" | "installed" | "none" | "insecure"} InstallState
  */
 
+import { scriptUrl } from "./scripturl.js";
+
 const WORKER = "/sw.js";
 
 /** Keeps what a browser tells of installing; one for the life of a page. */
@@ -53,17 +55,4 @@ export async function registerWorker() {
   } catch {
     // The offline sentence is a comfort, and its lack no fault of this page.
   }
-}
-
-/**
- * As browsers that check script addresses want it (Trusted Types).
- *
- * @param {string} path
- * @returns {string}
- */
-function scriptUrl(path) {
-  const types = /** @type {any} */ (globalThis).trustedTypes;
-  if (!types) return path;
-  const only = { createScriptURL: (/** @type {string} */ url) => url };
-  return types.createPolicy("iveg-worker", only).createScriptURL(path);
 }

@@ -10,8 +10,12 @@
  * }} Limits those that pages use; names carry the unit
  */
 
+/** A worker has no page to read them from; it is called by them (`remotebrush.js`). */
+const written =
+  typeof document === "undefined" ? self.name : document.body.dataset.limits;
+
 /** @type {Readonly<Limits>} */
-export const LIMITS = Object.freeze(JSON.parse(document.body.dataset.limits ?? ""));
+export const LIMITS = Object.freeze(JSON.parse(written ?? ""));
 
 /**
  * How wide a ring is that was `radiusM` wide at an age of `thenS`, at an older age (m).

@@ -3,19 +3,11 @@
  * than a small window of them.  So a page that paints slowly skips, and never lags.
  */
 
-import { onNextFrame } from "./hub.js";
-
-/** A page that is not painted says seldom that it has heard (ms). */
-const HIDDEN_MS = 1000;
-
 /**
  * @param {(frame: number, isDrawn: boolean) => void} say
- * @param {(fn: () => void) => void} [whenPainted] after the map has drawn what has come
+ * @param {(fn: () => void) => void} whenPainted after the map has drawn what has come
  */
-export function createPace(
-  say,
-  whenPainted = (/** @type {() => void} */ fn) => onNextFrame(fn, HIDDEN_MS),
-) {
+export function createPace(say, whenPainted) {
   let newest = 0;
   let told = 0;
 

@@ -14,6 +14,7 @@
 
 import { createServerClock } from "./clock.js";
 import { createPace } from "./pace.js";
+import { createPainting } from "./painting.js";
 import {
   ProtocolError,
   readFrame,
@@ -65,13 +66,14 @@ export function retryDelay(tries, luck) {
  *   probe?: () => Promise<boolean>,
  *   page?: PageSight,
  *   draws?: boolean,
- * }} options `draws`: this page shows telemetry, so when it paints is worth telling;
+ *   whenPainted?: (fn: () => void) => void,
+ * }} options `draws`: this page shows telemetry, so when it paints (`whenPainted`) is worth telling;
  *   `onCommandFallback` is told of a STOP that could not be sent at once: the
  *   page tries its other transport, this one keeps the press and sends it when it can.
  */
 export function connect(options) {
   const { url, store, onState, onCommandFallback, page = document } = options;
-  const { draws = true } = options;
+  const { draws = true, whenPainted = createPainting().when } = options;
   const isServerThere = options.probe ?? (() => probeHealth(url));
   const clock = createServerClock();
   const presses = createPresses();
@@ -83,7 +85,7 @@ export function connect(options) {
   let hiddenAtMs = 0;
   let tries = 0;
   let isFirstPong = true;
-  let pace = createPace(() => {});
+  let pace = createPace(() => {}, whenPainted);
   let malformed = 0;
   let ended = false;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -107,7 +109,7 @@ export function connect(options) {
       if (opened.readyState !== WebSocket.OPEN) return;
       const drawn = draws && isDrawn ? clock.serverOf(performance.now()) : null;
       opened.send(writePainted(frame, drawn));
-    });
+    }, whenPainted);
     opened.addEventListener("open", ping);
     opened.addEventListener("message", (event) => hear(opened, event.data));
     opened.addEventListener("close", (event) => onClose(opened, event.code));

@@ -1,8 +1,5 @@
 /**
- * The live map: one canvas, one frame loop that runs only when there is something new.
- *
- * A message asks for the very next animation frame the moment it arrives; however many
- * arrive before it, that frame draws the newest of each, so there is no queue to grow.
+ * The live map: what is to be seen, put together here and drawn by a brush.
  *
  * @typedef {import("../core/store.js").Store} Store
  * @typedef {import("./camera.js").Camera} Camera
@@ -12,22 +9,25 @@
  * @typedef {{
  *   now?: () => number, storage?: Storage | null,
  *   onFollow?: (robotId: string | null) => void, onLegend?: () => void,
- *   onMeasure?: (measure: {on: boolean, points: number, metres: number | null}) => void,
- * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's
+ *   onMeasure?: (measure: import("./measuring.js").Measure) => void,
+ *   brush?: import("./brush.js").Brush,
+ * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's; `brush`
+ *   draws, this thread if none is given
  */
 
 import { followShortcuts } from "../core/shortcuts.js";
+import { createLocalBrush } from "./brush.js";
 import { createCamera } from "./camera.js";
 import { createCovers, onResize } from "./covers.js";
+import { createFrames } from "./frames.js";
 import { listen } from "./gestures.js";
 import { believedBy, hears } from "./layers/belief.js";
 import { createLabels } from "./layers/labels.js";
-import { laidTo, lengthOf } from "./layers/measure.js";
 import { browserStorage, createChoices } from "./layers/memory.js";
 import { pick } from "./layers/pick.js";
 import { readTheme } from "./layers/theme.js";
-import { createTrails } from "./layers/trail.js";
-import { createPicture, LAYERS } from "./picture.js";
+import { createMeasuring } from "./measuring.js";
+import { LAYERS } from "./picture.js";
 import { readScene } from "./scene.js";
 import { worldX, worldY } from "./viewport.js";
 
@@ -45,131 +45,115 @@ const DOUBLE_TAP_ZOOM = 2;
  */
 export function createMap(canvas, store, options = {}) {
   const { now = () => performance.now(), storage = browserStorage() } = options;
-  const choices = createChoices(storage, invalidate);
-  const trails = createTrails();
-  const covers = createCovers(canvas, invalidate);
-  const picture = createPicture(canvas, trails, choices.isOn, choices.trailSeconds);
-  /** @type {Set<Picker>} */
-  const pickers = new Set();
-  /** @type {Set<(hasScans: boolean) => void>} */
-  const drawn = new Set();
-  let theme = readTheme(canvas);
-  let labels = createLabels();
+  const { brush = createLocalBrush(canvas), onMeasure } = options;
+  const frames = createFrames(brush, compose);
+  const choices = createChoices(storage, frames.ask);
+  const covers = createCovers(canvas, frames.ask);
+  const measuring = createMeasuring((measure) => {
+    onMeasure?.(measure);
+    frames.ask();
+  });
+  const looks = createLooks(canvas, frames.ask);
   let scene = readScene(store, now());
-  /** @type {import("./layers/measure.js").Tape} */
-  let tape = { points: [] };
-  let isMeasuring = false;
-  let frame = 0;
-  /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let later;
   const camera = redrawing(
     createCamera(() => scene, options.onFollow, covers),
-    invalidate,
+    frames.ask,
+  );
+  const picking = createPicking((px, py) =>
+    pick(scene, camera.view(), px, py, choices.isOn),
   );
 
-  function invalidate() {
-    if (!frame) frame = requestAnimationFrame(draw);
-  }
-
-  function draw() {
-    frame = 0;
-    scene = seen(readScene(store, now()));
+  function compose() {
+    scene = believed(readScene(store, now()), store, choices.believer());
     camera.settle();
     const view = camera.view();
-    if (!view.width || !view.height) return;
-    const followed = camera.followed();
-    const missingMs = picture.draw({ view, theme, scene, labels, followed, tape });
-    for (const fn of drawn) fn(missingMs === 0);
-    clearTimeout(later);
-    if (missingMs) later = setTimeout(invalidate, missingMs);
-  }
-
-  /** @param {import("./scene.js").Scene} whole */
-  function seen(whole) {
-    const robot = store.robots().get(choices.believer() ?? "");
-    return robot ? believedBy(whole, robot.robot_id, hears(robot)) : whole;
-  }
-
-  /** @param {boolean} on */
-  function setMeasuring(on) {
-    isMeasuring = on;
-    layTape({ points: [] });
-  }
-
-  /** @param {import("./layers/measure.js").Tape} next */
-  function layTape(next) {
-    tape = next;
-    const [points, metres] = [tape.points.length, lengthOf(tape)];
-    options.onMeasure?.({ on: isMeasuring, points, metres });
-    invalidate();
+    if (!view.width || !view.height) return null;
+    return {
+      ...{ view, scene, followed: camera.followed(), tape: measuring.tape() },
+      ...{ theme: looks.theme(), labels: looks.labels(), ratio: devicePixelRatio },
+      ...{ off: choices.off(), trailS: choices.trailSeconds() },
+    };
   }
 
   /** @param {number} px @param {number} py */
   function mark(px, py) {
-    if (!isMeasuring) return;
     const view = camera.view();
-    layTape(laidTo(tape, { x: worldX(view, px), y: worldY(view, py) }));
+    measuring.mark({ x: worldX(view, px), y: worldY(view, py) });
   }
 
   function resize() {
     covers.forget();
     camera.resize(canvas.clientWidth, canvas.clientHeight);
-    // Drawn at once: a resized canvas is blank until it is.
-    cancelAnimationFrame(frame);
-    draw();
-  }
-
-  /** @param {number} px @param {number} py */
-  const pickAt = (px, py) => pick(scene, camera.view(), px, py, choices.isOn);
-  /** @param {Picked} picked */
-  const tell = (picked) => {
-    for (const fn of pickers) fn(picked);
-  };
-  /** @param {number} px @param {number} py */
-  function tap(px, py) {
-    if (isMeasuring) return mark(px, py);
-    const picked = pickAt(px, py);
-    if (picked) tell(picked);
+    frames.draw();
   }
 
   const endings = [
-    wireGestures(canvas, camera, pickAt, tap, () => isMeasuring),
+    wireGestures(canvas, camera, picking, measuring.isOn, mark),
     wireKeys(canvas, camera, store, choices.hasShortcuts, {
-      measure: () => setMeasuring(!isMeasuring),
+      measure: () => measuring.set(!measuring.isOn()),
       mark: () => mark(camera.view().width / 2, camera.view().height / 2),
       legend: () => options.onLegend?.(),
     }),
     store.watch((data, topic) => {
-      leaveTrail(trails, store, topic, data);
-      invalidate();
+      leaveTrail(brush.trails, store, topic, data);
+      frames.ask();
     }),
-    every(AGEING_MS, invalidate),
+    every(AGEING_MS, frames.ask),
     onResize([canvas], resize),
     covers.end,
-    () => cancelAnimationFrame(frame),
-    () => clearTimeout(later),
+    frames.end,
+    picking.end,
+    brush.end,
   ];
-  invalidate();
+  frames.ask();
 
   return {
-    fit: camera.fit,
-    fitFleet: camera.fitFleet,
-    follow: camera.follow,
-    followed: camera.followed,
-    zoomBy: camera.zoomBy,
-    view: camera.view,
+    ...{ fit: camera.fit, fitFleet: camera.fitFleet, follow: camera.follow },
+    ...{ followed: camera.followed, zoomBy: camera.zoomBy, view: camera.view },
+    ...choicesOf(choices),
+    ...{ setTheme: looks.setTheme, setLanguage: looks.setLanguage },
+    ...{ setMeasuring: measuring.set, isMeasuring: measuring.isOn },
+    ...{ onPick: picking.onPick, onPicture: frames.onPicture },
+    afterDrawn: frames.afterDrawn,
+    /** Forgets trails: for a replay that jumps. */
+    clearTrails() {
+      brush.trails.clear();
+      frames.ask();
+    },
+    destroy() {
+      for (const end of endings) end();
+    },
+  };
+}
+
+/** What a person may switch. @param {ReturnType<typeof createChoices>} choices */
+function choicesOf(choices) {
+  return {
     setLayer: choices.setLayer,
     /** @returns {{name: string, on: boolean}[]} from the ground up */
     layers: () => LAYERS.map((name) => ({ name, on: choices.isOn(name) })),
     /** Whose belief is drawn; null draws what all robots know together. */
     setBeliever: choices.setBeliever,
     believer: choices.believer,
-    setMeasuring,
-    isMeasuring: () => isMeasuring,
     setTrail: choices.setTrail,
     trailSeconds: choices.trailSeconds,
     setShortcuts: choices.setShortcuts,
     hasShortcuts: choices.hasShortcuts,
+  };
+}
+
+/**
+ * The colours and the words that the map is drawn with.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {() => void} onChange
+ */
+function createLooks(canvas, onChange) {
+  let theme = readTheme(canvas);
+  let labels = createLabels();
+  return {
+    theme: () => theme,
+    labels: () => labels,
     /**
      * Reads the page's colours again; call it after the theme has changed.
      *
@@ -177,39 +161,49 @@ export function createMap(canvas, store, options = {}) {
      */
     setTheme(overrides) {
       theme = readTheme(canvas, overrides);
-      invalidate();
+      onChange();
     },
-    /** @param {Translate} translate as for `createLabels` */
-    setLanguage(translate) {
-      labels = createLabels(translate);
-      invalidate();
+    /**
+     * @param {Translate} translate as for `createLabels`
+     * @param {import("../core/i18n.js").Blocks} [blocks]
+     */
+    setLanguage(translate, blocks) {
+      labels = createLabels(translate, undefined, blocks);
+      onChange();
+    },
+  };
+}
+
+/** @param {(px: number, py: number) => Picked | null} at what lies there */
+function createPicking(at) {
+  /** @type {Set<Picker>} */
+  const pickers = new Set();
+  return {
+    at,
+    /** @param {number} px @param {number} py */
+    tap(px, py) {
+      const picked = at(px, py);
+      if (picked) for (const fn of pickers) fn(picked);
     },
     /** @param {Picker} fn @returns {() => void} */
     onPick(fn) {
       pickers.add(fn);
       return () => void pickers.delete(fn);
     },
-    /**
-     * Tells each frame that was drawn, and whether the newest scans are in it.
-     *
-     * @param {(hasScans: boolean) => void} fn
-     * @returns {() => void}
-     */
-    onDrawn(fn) {
-      drawn.add(fn);
-      return () => void drawn.delete(fn);
-    },
-    /** Forgets trails: for a replay that jumps. */
-    clearTrails() {
-      trails.clear();
-      invalidate();
-    },
-    destroy() {
-      for (const end of endings) end();
-      pickers.clear();
-      drawn.clear();
-    },
+    end: () => pickers.clear(),
   };
+}
+
+/**
+ * The scene as one robot believes it, where somebody has chosen one.
+ *
+ * @param {import("./scene.js").Scene} whole
+ * @param {Store} store
+ * @param {string | null} believer
+ */
+function believed(whole, store, believer) {
+  const robot = store.robots().get(believer ?? "");
+  return robot ? believedBy(whole, robot.robot_id, hears(robot)) : whole;
 }
 
 /**
@@ -242,23 +236,23 @@ function redrawing(camera, invalidate) {
 /**
  * @param {HTMLCanvasElement} canvas
  * @param {Camera} camera
- * @param {(px: number, py: number) => Picked | null} pickAt
- * @param {(px: number, py: number) => void} tap
+ * @param {ReturnType<typeof createPicking>} picking
  * @param {() => boolean} isMeasuring
+ * @param {(px: number, py: number) => void} mark
  */
-function wireGestures(canvas, camera, pickAt, tap, isMeasuring) {
+function wireGestures(canvas, camera, picking, isMeasuring, mark) {
   return listen(canvas, {
     pan: camera.pan,
     zoom: camera.zoom,
     pinch: camera.pinch,
-    tap,
+    tap: (px, py) => (isMeasuring() ? mark(px, py) : picking.tap(px, py)),
     doubleTap(px, py) {
-      const picked = pickAt(px, py);
+      const picked = picking.at(px, py);
       if (picked?.kind === "robot") camera.follow(picked.id);
       else camera.zoom(px, py, DOUBLE_TAP_ZOOM);
     },
     hover(px, py) {
-      const idle = pickAt(px, py) ? "pointer" : "grab";
+      const idle = picking.at(px, py) ? "pointer" : "grab";
       canvas.style.cursor = isMeasuring() ? "crosshair" : idle;
     },
   });
@@ -286,7 +280,7 @@ function wireKeys(canvas, camera, store, isEnabled, measuring) {
 }
 
 /**
- * @param {import("./layers/trail.js").Trails} trails
+ * @param {import("./brush.js").Brush["trails"]} trails
  * @param {Store} store
  * @param {string} topic
  * @param {any} data

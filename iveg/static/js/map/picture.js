@@ -6,6 +6,9 @@
  *
  * @typedef {import("./layers/paint.js").Paint} Paint
  * @typedef {import("./layers/trail.js").Trails} Trails
+ * @typedef {Omit<Paint, "ctx" | "places"> & {ratio: number, off: readonly string[],
+ *   trailS: number}} Picture what is to be seen: `ratio` device pixels per CSS pixel,
+ *   `off` the layers that are not drawn, `trailS` how much of the trails (s)
  */
 
 import { createCostmapLayer } from "./layers/costmap.js";
@@ -50,15 +53,16 @@ const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
 const DEEPEST_SAVE = 8;
 
 /**
- * @param {HTMLCanvasElement} canvas
+ * @param {HTMLCanvasElement | OffscreenCanvas} canvas
  * @param {Trails} trails
- * @param {(layer: string) => boolean} isOn
- * @param {() => number} trailSeconds
  */
-export function createPicture(canvas, trails, isOn, trailSeconds) {
-  const ctx = /** @type {CanvasRenderingContext2D} */ (
+export function createPicture(canvas, trails) {
+  const ctx = /** @type {import("./layers/paint.js").Context} */ (
     canvas.getContext("2d", { alpha: false })
   );
+  /** @type {Pick<Picture, "off" | "trailS">} */
+  let chosen = { off: [], trailS: 0 };
+  const isOn = (/** @type {string} */ layer) => !chosen.off.includes(layer);
   const still = createStaticImage([
     ["grid", grid.draw],
     ["greenhouse", greenhouse.draw],
@@ -68,7 +72,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
     measure: (paint) => measure.draw(paint, paint.tape),
     coverage: coverage.draw,
     costmap: createCostmapLayer(),
-    trail: (paint) => trail.draw(paint, trails, trailSeconds()),
+    trail: (paint) => trail.draw(paint, trails, chosen.trailS),
     scan: scan.draw,
     intent: intent.draw,
     links: links.draw,
@@ -80,7 +84,7 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
   const ground = createGround(
     still,
     GROUND.map((name) => [name, (paint) => drawLayer(name, paint)]),
-    () => [trails.changes(), trailSeconds(), ...LAYERS.map(isOn)],
+    () => [trails.changes(), chosen.trailS, ...chosen.off],
   );
   /** @type {Set<string>} */
   const broken = new Set();
@@ -98,23 +102,25 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
     } catch (error) {
       if (!broken.has(layer)) reportError(error);
       broken.add(layer);
-      recover(paint.ctx);
+      recover(paint);
     }
   }
 
   return {
     /**
-     * @param {Omit<Paint, "ctx">} what
+     * @param {Picture} what
      * @returns {number} when the scans that are not in it may be drawn (ms from now); 0:
      *   all are
      */
     draw(what) {
+      const { ratio } = what;
       const paint = { ...what, ctx, places: createPlaces() };
-      matchPixels(canvas, paint.view);
-      const missingMs = ground.update(paint, devicePixelRatio, isOn);
+      chosen = what;
+      matchPixels(canvas, what);
+      const missingMs = ground.update(paint, ratio, isOn);
       ctx.setTransform(1, 0, 0, 1, 0, 0);
       ctx.drawImage(ground.canvas, 0, 0);
-      ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+      ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
       for (const layer of OVER_GROUND) if (isOn(layer)) drawLayer(layer, paint);
       if (paint.tape.points.length) drawLayer("measure", paint);
       if (paint.scene.isVeiled) drawVeil(paint);
@@ -124,12 +130,12 @@ export function createPicture(canvas, trails, isOn, trailSeconds) {
 }
 
 /**
- * @param {HTMLCanvasElement} canvas
- * @param {{width: number, height: number}} view (CSS px)
+ * @param {HTMLCanvasElement | OffscreenCanvas} canvas
+ * @param {Pick<Picture, "view" | "ratio">} picture
  */
-function matchPixels(canvas, view) {
-  const width = Math.round(view.width * devicePixelRatio);
-  const height = Math.round(view.height * devicePixelRatio);
+function matchPixels(canvas, { view, ratio }) {
+  const width = Math.round(view.width * ratio);
+  const height = Math.round(view.height * ratio);
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;
 }
@@ -137,11 +143,11 @@ function matchPixels(canvas, view) {
 /**
  * Brings a context back from wherever a layer left it, without clearing the picture.
  *
- * @param {CanvasRenderingContext2D} ctx
+ * @param {Paint} paint
  */
-function recover(ctx) {
+function recover({ ctx, ratio = 1 }) {
   for (let depth = 0; depth < DEEPEST_SAVE; depth += 1) ctx.restore();
-  ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   ctx.globalAlpha = 1;
   ctx.setLineDash([]);
 }

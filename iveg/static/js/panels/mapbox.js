@@ -6,8 +6,10 @@
 
 import { ageOf } from "../core/clock.js";
 import { installPaintHook } from "../core/painthook.js";
+import { createBrush } from "../map/brush.js";
 import { followCostmap, followCoverage } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
+import { SAID_ON_MAPS } from "../map/layers/labels.js";
 import { TRAIL_SPANS_S } from "../map/layers/trail.js";
 import { createMap } from "../map/map.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
@@ -31,11 +33,13 @@ export function createMapbox(app, decision) {
   const { store, i18n } = app;
   const canvas = /** @type {HTMLCanvasElement} */ (need("#map"));
   const map = createMap(canvas, store, {
+    brush: createBrush(canvas),
     onFollow: showFollowed,
     onMeasure: showMeasure,
     onLegend: () =>
       app.dialogs.open(/** @type {HTMLDialogElement} */ (need("#legend-panel"))),
   });
+  app.painting.follow(map);
   installPaintHook(store, map);
 
   /** @param {string | null} robotId */
@@ -132,7 +136,7 @@ export function createMapbox(app, decision) {
   const showHidden = () => drawHidden(map.layers(), i18n);
 
   function drawWords() {
-    map.setLanguage(i18n.t);
+    map.setLanguage(i18n.t, i18n.blocks(...SAID_ON_MAPS));
     drawLayers(app, map, showBeliever);
     showHidden();
     showBeliever();
@@ -149,9 +153,7 @@ export function createMapbox(app, decision) {
     if (event.key === "Escape") map.setMeasuring(false);
   });
   need("#layers").addEventListener("change", showHidden);
-  need("#map-fit").addEventListener("click", () => map.fit());
-  need("#map-in").addEventListener("click", () => map.zoomBy(1));
-  need("#map-out").addEventListener("click", () => map.zoomBy(-1));
+  wireZoom(map);
   document.addEventListener("iveg:follow", (event) => {
     map.follow(/** @type {CustomEvent<string>} */ (event).detail);
   });
@@ -174,6 +176,13 @@ export function createMapbox(app, decision) {
   i18n.onChange(drawWords);
   drawWords();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
+}
+
+/** @param {LiveMap} map */
+function wireZoom(map) {
+  need("#map-fit").addEventListener("click", () => map.fit());
+  need("#map-in").addEventListener("click", () => map.zoomBy(1));
+  need("#map-out").addEventListener("click", () => map.zoomBy(-1));
 }
 
 /**

@@ -15,7 +15,7 @@ const DARKEST = 0.2;
 
 /** Draws grids, keeping the image of the newest. */
 export function createCostmapLayer() {
-  const image = document.createElement("canvas");
+  const image = new OffscreenCanvas(1, 1);
   /** @type {Costmap | null} */
   let drawn = null;
   let inkOf = "";
@@ -24,7 +24,9 @@ export function createCostmapLayer() {
   function redraw(grid, ink) {
     image.width = grid.width;
     image.height = grid.height;
-    const ctx = /** @type {CanvasRenderingContext2D} */ (image.getContext("2d"));
+    const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
+      image.getContext("2d")
+    );
     const pixels = ctx.createImageData(grid.width, grid.height);
     writeAlpha(pixels.data, grid);
     ctx.putImageData(pixels, 0, 0);

@@ -61,13 +61,13 @@ function drawLane({ ctx, view }, lane, sinceS) {
   }
 }
 
-/** @type {Map<string, HTMLCanvasElement>} */
+/** @type {Map<string, OffscreenCanvas>} */
 const tiles = new Map();
 
 /**
  * Slanting lines that run on from cell to cell.
  *
- * @param {CanvasRenderingContext2D} ctx
+ * @param {import("./paint.js").Context} ctx
  * @param {string} ink
  */
 function hatchOf(ctx, ink) {
@@ -78,9 +78,8 @@ function hatchOf(ctx, ink) {
 
 /** @param {string} ink */
 function makeTile(ink) {
-  const tile = document.createElement("canvas");
-  tile.width = tile.height = HATCH_PX;
-  const ctx = /** @type {CanvasRenderingContext2D} */ (tile.getContext("2d"));
+  const tile = new OffscreenCanvas(HATCH_PX, HATCH_PX);
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (tile.getContext("2d"));
   ctx.strokeStyle = ink;
   ctx.lineWidth = 1;
   ctx.beginPath();

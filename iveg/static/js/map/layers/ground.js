@@ -18,13 +18,13 @@ const FADING_MS = 250;
 
 /**
  * @param {{image: (paint: Paint, ratio: number, isOn: (layer: string) => boolean) =>
- *   HTMLCanvasElement}} still what lies under it and never moves
+ *   OffscreenCanvas}} still what lies under it and never moves
  * @param {Layer[]} layers from the ground up
  * @param {() => unknown[]} look what else decides how they look
  */
 export function createGround(still, layers, look) {
-  const canvas = document.createElement("canvas");
-  const ctx = /** @type {CanvasRenderingContext2D} */ (
+  const canvas = new OffscreenCanvas(1, 1);
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
     canvas.getContext("2d", { alpha: false })
   );
   /** @type {unknown[]} */

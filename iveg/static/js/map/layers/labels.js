@@ -3,16 +3,25 @@
  *
  * @typedef {(key: string, slots?: Record<string, string | number>) => string} Translate
  * @typedef {ReturnType<typeof createLabels>} Labels
+ * @typedef {{language: string, blocks: import("../../core/i18n.js").Blocks}} Vocabulary
  */
 
 import { laneName } from "../../core/lanes.js";
+
+/** Blocks of sentences that are said on a map. */
+export const SAID_ON_MAPS = ["lane", "map", "task"];
 
 /**
  * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
  *   `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
+ * @param {Vocabulary["blocks"] | null} [blocks] what `t` says, for a worker to say it
  */
-export function createLabels(t = wordless, locale = document.documentElement.lang) {
+export function createLabels(
+  t = wordless,
+  locale = document.documentElement.lang,
+  blocks = null,
+) {
   const tongue = locale || "es";
   const plain = new Intl.NumberFormat(tongue, { maximumFractionDigits: 1 });
   const tenths = new Intl.NumberFormat(tongue, {
@@ -25,6 +34,8 @@ export function createLabels(t = wordless, locale = document.documentElement.lan
   });
   const percents = new Intl.NumberFormat(tongue, { style: "percent" });
   return {
+    /** @type {Vocabulary | null} for a worker */
+    vocabulary: blocks && { language: tongue, blocks },
     /** @param {string} lane */
     lane: (lane) => laneName(lane, t),
     /** A length of the scale bar. @param {number} m */

@@ -52,7 +52,7 @@ export function draw(paint, tape) {
   });
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {string} colour @param {number} width */
+/** @param {import("./paint.js").Context} ctx @param {string} colour @param {number} width */
 function stroke(ctx, colour, width) {
   ctx.strokeStyle = colour;
   ctx.lineWidth = width;

@@ -33,6 +33,8 @@ export function createChoices(storage, onChange) {
   return {
     /** @param {string} layer */
     isOn: (layer) => !off.has(layer),
+    /** Layers that are switched off. */
+    off: () => [...off],
     /** @param {string} layer one of LAYERS @param {boolean} on */
     setLayer(layer, on) {
       if (on) off.delete(layer);

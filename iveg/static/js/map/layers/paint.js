@@ -8,12 +8,13 @@
  * @typedef {import("../viewport.js").Viewport} Viewport
  * @typedef {import("./theme.js").Theme} Theme
  * @typedef {import("./labels.js").Labels} Labels
- * @typedef {CanvasRenderingContext2D} Context
+ * @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Context
+ *   on the page, or in the worker
  * @typedef {{
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, labels: Labels,
  *   followed: string | null, tape: import("./measure.js").Tape,
- *   places?: import("./places.js").Places,
- * }} Paint `places`: of the words of this frame
+ *   places?: import("./places.js").Places, ratio?: number,
+ * }} Paint `places`: of the words of this frame; `ratio`: device pixels per CSS pixel
  */
 
 /**

@@ -7,8 +7,8 @@
 
 /** @param {StaticLayer[]} layers from the ground up */
 export function createStaticImage(layers) {
-  const canvas = document.createElement("canvas");
-  const ctx = /** @type {CanvasRenderingContext2D} */ (
+  const canvas = new OffscreenCanvas(1, 1);
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
     canvas.getContext("2d", { alpha: false })
   );
   /** @type {unknown[]} */
@@ -30,7 +30,7 @@ export function createStaticImage(layers) {
      * @param {Paint} paint
      * @param {number} ratio device pixels per CSS pixel
      * @param {(layer: string) => boolean} isOn
-     * @returns {HTMLCanvasElement}
+     * @returns {OffscreenCanvas}
      */
     image(paint, ratio, isOn) {
       const shown = layers.filter(([name]) => isOn(name));

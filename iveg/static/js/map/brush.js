@@ -1,0 +1,71 @@
+/**
+ * Who draws the pictures of a map: this thread, or a worker that has nothing else to do.
+ *
+ * A canvas that is drawn here costs the page's thread its rasterising and its handing
+ * over in every frame (half of all it did with ten robots), so a worker draws wherever
+ * it can be given the canvas.
+ *
+ * @typedef {import("./picture.js").Picture} Picture
+ * @typedef {import("./layers/trail.js").Trails} Trails
+ * @typedef {(missingMs: number) => void} WhenDrawn `missingMs`: when the scans that are
+ *   not in it may be drawn (ms from now); 0: all are
+ * @typedef {{
+ *   trails: Pick<Trails, "add" | "keepOnly" | "clear">,
+ *   soon: (compose: () => void) => void,
+ *   draw: (picture: Picture, whenDrawn: WhenDrawn) => void,
+ *   end: () => void,
+ * }} Brush `soon`: calls back when the next picture may be composed; `draw`: of pictures
+ *   that a newer one overtook nothing is said
+ */
+
+import { createTrails } from "./layers/trail.js";
+import { createPicture } from "./picture.js";
+import { createRemoteBrush } from "./remotebrush.js";
+
+/** @param {HTMLCanvasElement} canvas @returns {Brush} */
+export function createLocalBrush(canvas) {
+  const trails = createTrails();
+  const picture = createPicture(canvas, trails);
+  return {
+    trails,
+    soon: (compose) => void requestAnimationFrame(compose),
+    draw: (what, whenDrawn) => whenDrawn(picture.draw(what)),
+    end() {},
+  };
+}
+
+/**
+ * The worker's, and this thread's where no worker comes up: a map that costs more is
+ * better than none.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @returns {Brush}
+ */
+export function createBrush(canvas) {
+  if (!("transferControlToOffscreen" in canvas)) return createLocalBrush(canvas);
+  /** @type {(() => void) | null} */
+  let waiting = null;
+  /** @type {Brush} */
+  let brush = createRemoteBrush(canvas, () => {
+    brush.end();
+    brush = createLocalBrush(canvas);
+    if (waiting) brush.soon(waiting);
+    waiting = null;
+  });
+  return {
+    trails: {
+      add: (...crumb) => brush.trails.add(...crumb),
+      keepOnly: (robots) => brush.trails.keepOnly(robots),
+      clear: () => brush.trails.clear(),
+    },
+    soon(compose) {
+      waiting = compose;
+      brush.soon(() => {
+        waiting = null;
+        compose();
+      });
+    },
+    draw: (picture, whenDrawn) => brush.draw(picture, whenDrawn),
+    end: () => brush.end(),
+  };
+}

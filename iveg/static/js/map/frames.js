@@ -1,0 +1,79 @@
+/**
+ * The map's frame loop, which runs only when there is something new.
+ *
+ * A message asks for the very next picture the moment it arrives; however many arrive
+ * before it, that picture has the newest of each, so there is no queue to grow.
+ *
+ * @typedef {import("./brush.js").Brush} Brush
+ * @typedef {import("./picture.js").Picture} Picture
+ * @typedef {(hasScans: boolean) => void} Seen whether the newest scans are in it, too
+ */
+
+/**
+ * @param {Brush} brush
+ * @param {() => Picture | null} compose what is to be seen now; null: there is no place
+ */
+export function createFrames(brush, compose) {
+  /** @type {Set<() => Seen>} */
+  const watchers = new Set();
+  let isAsked = false;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let later;
+
+  function ask() {
+    if (isAsked) return;
+    isAsked = true;
+    brush.soon(() => {
+      if (isAsked) draw();
+    });
+  }
+
+  function draw() {
+    isAsked = false;
+    const picture = compose();
+    if (!picture) return;
+    const seen = [...watchers].map((watch) => watch());
+    brush.draw(picture, (missingMs) => {
+      for (const tell of seen) tell(missingMs === 0);
+      clearTimeout(later);
+      if (missingMs) later = setTimeout(ask, missingMs);
+    });
+  }
+
+  return {
+    ask,
+    /** At once: a resized canvas is blank until it is drawn. */
+    draw,
+    /**
+     * Calls `watch` as a picture is composed, and what it gives back when that picture,
+     * or a newer one with all that it had, is on the canvas.
+     *
+     * @param {() => Seen} watch
+     * @returns {() => void} ends it
+     */
+    onPicture(watch) {
+      watchers.add(watch);
+      return () => void watchers.delete(watch);
+    },
+    /**
+     * Calls `fn` once what is known now is on the canvas.
+     *
+     * @param {() => void} fn
+     */
+    afterDrawn(fn) {
+      const end = () => void watchers.delete(watch);
+      /** @returns {Seen} */
+      const watch = () => () => {
+        if (watchers.has(watch)) fn();
+        end();
+      };
+      watchers.add(watch);
+      ask();
+    },
+    end() {
+      isAsked = false;
+      clearTimeout(later);
+      watchers.clear();
+    },
+  };
+}
