@@ -324,9 +324,12 @@ function bell() {
     element.id = id;
     document.body.append(element);
   }
+  const panel = document.createElement("dialog");
+  panel.id = "alerts-panel";
   const list = document.createElement("ul");
   list.id = "alerts";
-  document.body.append(list);
+  panel.append(list);
+  document.body.append(panel);
   /** @type {string[]} */
   const heard = [];
   const tone = /** @type {import("../../iveg/static/js/panels/tone.js").Tone} */ (
@@ -349,7 +352,7 @@ function bell() {
     })
   );
   createAlertsPanel(heardBy, tone);
-  return { tell, heard };
+  return { tell, heard, panel, list };
 }
 
 test("each time that a group repeats it chimes, and once", () => {
@@ -370,6 +373,19 @@ test("a group that holds a P1 sounds, whatever it began as", () => {
   tell([alert({ priority: "P1", count: 2 })]);
   equal(heard.at(-1), "loud");
   equal(document.querySelector("#alerts-button")?.getAttribute("data-worst"), "P1");
+  document.body.replaceChildren();
+});
+
+test("a list that is closed is not written with each change, the bell is", () => {
+  const { tell, panel, list } = bell();
+  const said = () => list.querySelector("small")?.textContent ?? "";
+  const count = () => document.querySelector("#alerts-count")?.textContent;
+  tell([alert()]);
+  tell([alert(), alert({ alert_id: "second" })]);
+  equal([list.children.length, count()], [0, "2"]);
+  panel.show();
+  document.dispatchEvent(new CustomEvent("iveg:panel"));
+  equal([list.children.length, said() !== ""], [2, true]);
   document.body.replaceChildren();
 });
 

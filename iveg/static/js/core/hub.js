@@ -5,8 +5,6 @@
  * @typedef {(data: any, topic: string) => void} Listener
  */
 
-/** Digits that change more often than this cannot be read (ms). */
-const READING_MS = 100;
 /** A hidden page gets no animation frames; alerts must be heard there all the same. */
 const HIDDEN_FLUSH_MS = 250;
 
@@ -108,20 +106,6 @@ export function matches(pattern, topic) {
 /** @param {string} topic */
 function isReading(topic) {
   return /^(robots|detections)\/|^people$/.test(topic);
-}
-
-/** The next frame that is not too soon after the last of these. */
-export function readingFrames() {
-  let lastMs = Number.NEGATIVE_INFINITY;
-  return (/** @type {() => void} */ flush) => {
-    const told = () => {
-      lastMs = performance.now();
-      flush();
-    };
-    const waitMs = lastMs + READING_MS - performance.now();
-    if (waitMs > 0) setTimeout(onNextFrame, waitMs, told);
-    else onNextFrame(told);
-  };
 }
 
 /**

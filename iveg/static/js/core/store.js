@@ -3,7 +3,7 @@
  *
  * A snapshot replaces everything; after it the newest wins per topic, so memory is
  * bounded by the fleet and not by time.  Panels hear of a topic at most once per
- * animation frame, of telemetry at most ten times a second; `log` and `commands/{id}` are told one by one, because each of them
+ * animation frame, of telemetry with the page's beat; `log` and `commands/{id}` are told one by one, because each of them
  * is a fact and not a state.
  *
  * On a snapshot `snapshot` is told first and every topic it brought after it, except the
@@ -23,7 +23,8 @@
  * @typedef {ReturnType<typeof createStore>} Store
  */
 
-import { createHub, onNextFrame, readingFrames } from "./hub.js";
+import { onBeat } from "./beat.js";
+import { createHub, onNextFrame } from "./hub.js";
 
 /** Entries of the log that a browser keeps. */
 export const LOG_SIZE = 500;
@@ -40,7 +41,7 @@ const ROBOT_HUES = 8;
  */
 export function createStore(options = {}) {
   const { now = () => performance.now(), schedule } = options;
-  const hub = createHub(schedule ?? onNextFrame, schedule ?? readingFrames());
+  const hub = createHub(schedule ?? onNextFrame, schedule ?? onBeat);
   /** @type {Map<string, any>} */
   let values = new Map();
   /** @type {Map<string, Robot>} */

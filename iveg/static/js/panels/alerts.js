@@ -5,11 +5,15 @@
  * come.  The server groups repetitions and keeps who, when and the note.
  */
 
+import { onBeat } from "../core/beat.js";
 import { byUrgency, createAlertList } from "./alert_list.js";
 import { floodSaid } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
+
+/** How often a list that is closed is written anew (ms). */
+const CLOSED_MS = 1000;
 
 /**
  * @param {import("../main.js").App} app
@@ -18,6 +22,10 @@ import { need, setAttribute, setHidden, setText } from "./dom.js";
 export function createAlertsPanel({ store, i18n }, tone) {
   const list = createAlertList(need("#alerts"), i18n);
   const button = need("#alerts-button");
+  const panel = document.querySelector("#alerts-panel");
+  let drawnAtMs = Number.NEGATIVE_INFINITY;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  let later;
   /** @type {Map<string, number> | null} occurrences told before; null before the first */
   let known = null;
 
@@ -35,12 +43,25 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const flood = store.get("flood");
     const rate = floodSaid(flood, i18n);
     const active = i18n.t("header.alerts_count", { count: open.length });
-    button.title = rate ? `${active} · ${rate}` : active;
+    setAttribute(button, "title", rate ? `${active} · ${rate}` : active);
     button.toggleAttribute("data-flood", Boolean(flood?.since));
     setText(need("#alerts-flood"), rate);
     need("#alerts-flood").toggleAttribute("data-flood", Boolean(flood?.since));
     setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
-    list.draw(alerts);
+    drawList();
+  }
+
+  /** A list that is closed is not written with each change: nobody reads it. */
+  function drawList() {
+    clearTimeout(later);
+    const isClosed = panel !== null && !panel.hasAttribute("open");
+    const waitMs = isClosed ? drawnAtMs + CLOSED_MS - performance.now() : 0;
+    if (waitMs > 0) {
+      later = setTimeout(onBeat, waitMs, drawList);
+      return;
+    }
+    drawnAtMs = performance.now();
+    list.draw(store.get("alerts") ?? []);
   }
 
   function sound() {
@@ -61,6 +82,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
   });
   store.subscribe("flood", draw);
   store.subscribe("health", draw);
+  document.addEventListener("iveg:panel", drawList);
   i18n.onChange(draw);
   draw();
 }

@@ -2,6 +2,7 @@
  * Says that the browser's own line is down: old data must never look like new ones.
  */
 
+import { onBeat } from "../core/beat.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 const TICK_MS = 250;
@@ -64,6 +65,6 @@ export function createBanner({ store, i18n }) {
   }).observe(messages);
   store.subscribe("connection", draw);
   i18n.onChange(draw);
-  setInterval(draw, TICK_MS);
+  setInterval(onBeat, TICK_MS, draw);
   draw();
 }

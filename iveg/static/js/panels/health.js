@@ -2,6 +2,7 @@
  * The chain from robot to screen: a chip with the worst hop, a list with a sentence each.
  */
 
+import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { sentenceOf } from "../pages/health_sentence.js";
 import { make, need, setAttribute, setText } from "./dom.js";
@@ -79,7 +80,7 @@ export function createHealthPanel({ store, i18n, line }) {
   store.subscribe("health", draw);
   store.subscribe("connection", draw);
   i18n.onChange(draw);
-  setInterval(draw, TICK_MS);
+  setInterval(onBeat, TICK_MS, draw);
   draw();
 }
 

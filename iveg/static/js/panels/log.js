@@ -2,6 +2,7 @@
  * The action and inference log: newest first, every entry a plain sentence.
  */
 
+import { onBeat } from "../core/beat.js";
 import { make, need, setHidden, setText } from "./dom.js";
 import { createChosen, createLogChips } from "./log_filter.js";
 
@@ -21,6 +22,8 @@ export function createLogPanel(app, decision) {
   const empty = need("#log-empty");
   const clear = need("#log-clear");
   const chosen = createChosen();
+  /** @type {Entry[]} told since the last beat, oldest first */
+  let fresh = [];
   /** @type {Set<string>} */
   const robots = new Set(store.robots().keys());
   const chips = createLogChips({
@@ -61,9 +64,16 @@ export function createLogPanel(app, decision) {
 
   /** @param {Entry} entry */
   function add(entry) {
-    learn([entry]);
-    if (!chosen.admits(entry)) return;
-    list.prepend(makeItem(entry));
+    fresh.push(entry);
+    onBeat(addFresh);
+  }
+
+  function addFresh() {
+    const entries = fresh.splice(0);
+    learn(entries);
+    const shown = entries.filter(chosen.admits).slice(-SHOWN).reverse();
+    if (!shown.length) return;
+    list.prepend(...shown.map(makeItem));
     while (list.children.length > SHOWN) list.lastElementChild?.remove();
     setHidden(empty, true);
     setHidden(clear, true);
@@ -79,6 +89,7 @@ export function createLogPanel(app, decision) {
 
   function rebuild() {
     const entries = store.log();
+    fresh = [];
     learn(entries);
     const shown = entries.filter(chosen.admits).slice(-SHOWN).reverse();
     list.replaceChildren(...shown.map(makeItem));

@@ -4,6 +4,7 @@
  * Picking a person opens the decision behind its ring; picking a robot goes to its card.
  */
 
+import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { installPaintHook } from "../core/painthook.js";
 import { createBrush } from "../map/brush.js";
@@ -165,7 +166,7 @@ export function createMapbox(app, decision) {
   );
   followCoverage(store);
   createLegend(app);
-  setInterval(drawCostmapAge, AGE_MS);
+  setInterval(onBeat, AGE_MS, drawCostmapAge);
   onThemeChange(() => map.setTheme());
   store.subscribe("robots/", showBeliever);
   store.subscribe("snapshot", drawWords);

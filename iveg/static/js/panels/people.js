@@ -2,6 +2,7 @@
  * Who is on the map, in words: for readers of the screen, and for whoever asks why.
  */
 
+import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { readPerson } from "../map/scene.js";
 import { make, need, setHidden, setText } from "./dom.js";
@@ -39,7 +40,7 @@ export function createPeoplePanel({ store, i18n }) {
 
   document.addEventListener("iveg:panel", draw);
   i18n.onChange(draw);
-  setInterval(draw, TICK_MS);
+  setInterval(onBeat, TICK_MS, draw);
   draw();
 }
 

@@ -4,6 +4,7 @@
  * Ages are counted here, by the browser's clock, so that silence shows by itself.
  */
 
+import { onBeat } from "../core/beat.js";
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { all, make, need, needPart, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
@@ -102,7 +103,7 @@ export function createRobotsPanel(app) {
   store.subscribe("robots/", take);
   store.subscribe("snapshot", drawAll);
   i18n.onChange(drawAll);
-  setInterval(tick, TICK_MS);
+  setInterval(onBeat, TICK_MS, tick);
   drawAll();
 }
 
@@ -156,6 +157,7 @@ function createCard(app, card) {
     all("[data-field]", card).map((field) => [field.dataset.field, field]),
   );
   const ages = all("[data-age]", card);
+  const isSmall = () => card.parentElement?.hasAttribute("data-many") ?? false;
 
   /** @param {string} name */
   function partOf(name) {
@@ -177,14 +179,21 @@ function createCard(app, card) {
     setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
     setHidden(partOf("replay"), !robot?.replay);
     drawMode(robot);
-    drawReadouts(robot, ageS);
+    drawAge(robot, ageS);
     drawGauge(robot);
+    if (!isSmall()) drawDetails(robot);
+    if (dialogs.isOpen(panel)) drawMarginParts(robot?.margin ?? null);
+    release.draw(robot);
+    drill.draw(release.factsOf(robot));
+  }
+
+  /** What a small card has no room for. @param {Robot | undefined} robot */
+  function drawDetails(robot) {
+    drawReadouts(robot);
     setText(partOf("certainty"), certaintyOf(robotId));
     drawMargin(robot?.margin ?? null);
     drawTask(robot);
     drawReadings(robot);
-    release.draw(robot);
-    drill.draw(release.factsOf(robot));
   }
 
   /** @param {Robot | undefined} robot */
@@ -197,16 +206,20 @@ function createCard(app, card) {
   }
 
   /** @param {Robot | undefined} robot @param {number} ageS */
-  function drawReadouts(robot, ageS) {
+  function drawAge(robot, ageS) {
+    const said = Number.isFinite(ageS) ? aboutAge(robot, agoOf(ageS), i18n) : "";
+    if (!isSmall()) for (const age of ages) setText(age, said);
+    setText(fields.age, said);
+  }
+
+  /** @param {Robot | undefined} robot */
+  function drawReadouts(robot) {
     const { pose, twist } = robot ?? {};
     readout("x", pose?.x, 2, "m");
     readout("y", pose?.y, 2, "m");
     readout("yaw", pose && pose.yaw * DEGREES, 1, "deg");
     readout("v", twist?.linear, 2, "ms");
     readout("w", twist?.angular, 2, "rads");
-    const said = Number.isFinite(ageS) ? aboutAge(robot, agoOf(ageS), i18n) : "";
-    for (const age of ages) setText(age, said);
-    setText(fields.age, said);
   }
 
   /**
@@ -258,12 +271,16 @@ function createCard(app, card) {
     return i18n.t(key, slots);
   }
 
-  /** The least margin to a person, and what it is made of. @param {Margin | null} margin */
+  /** The least margin to a person. @param {Margin | null} margin */
   function drawMargin(margin) {
-    const parts = partOf("margin-parts");
-    setHidden(parts, margin === null);
     setAttribute(partOf("margin-line"), "data-band", margin?.band ?? "none");
     setText(partOf("margin"), marginSaid(margin, i18n));
+  }
+
+  /** @param {Margin | null} margin */
+  function drawMarginParts(margin) {
+    const parts = partOf("margin-parts");
+    setHidden(parts, margin === null);
     if (!margin) return;
     const slots = { ...margin, ...margin.parts };
     setText(parts, i18n.t("robot.margin_parts", slots));

@@ -8,6 +8,7 @@
  */
 
 import { readApi } from "../core/api.js";
+import { onBeat } from "../core/beat.js";
 import { ageOf, linkOfRobot } from "../core/clock.js";
 import { all, make, need, setAttribute, setHidden, setText } from "./dom.js";
 import { createPresser } from "./press.js";
@@ -187,7 +188,7 @@ export function createStopPanel(app) {
   store.subscribe("robots/", takeRobot);
   store.subscribe("connection", onConnection);
   i18n.onChange(drawAll);
-  setInterval(drawAll, TICK_MS);
+  setInterval(onBeat, TICK_MS, drawAll);
   presser.goOn();
   drawAll();
   return {

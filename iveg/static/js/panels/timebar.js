@@ -3,6 +3,7 @@
  * press on it, or the arrow keys, jump to the log at that time.
  */
 
+import { onBeat } from "../core/beat.js";
 import { makeSvg, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
@@ -71,7 +72,7 @@ export function createTimebar({ store, i18n, line }) {
   }
 
   i18n.onChange(draw);
-  setInterval(draw, TICK_MS);
+  setInterval(onBeat, TICK_MS, draw);
   draw();
 }
 

@@ -1,0 +1,51 @@
+/**
+ * The page's beat: what is written again and again is written together, in few frames.
+ *
+ * Each frame in which any text changes costs style, layout, paint and a hand-over of the
+ * whole page, whether one word is new or a hundred; a dozen panels with clocks of their
+ * own would make thirty such frames a second.
+ */
+
+import { onNextFrame } from "./hub.js";
+
+/** Digits that change more often than this cannot be read (ms). */
+export const BEAT_MS = 200;
+
+/** @param {(fn: () => void) => void} [schedule] the next animation frame */
+export function createBeat(schedule = onNextFrame) {
+  /** @type {Set<() => void>} */
+  let waiting = new Set();
+  let lastMs = Number.NEGATIVE_INFINITY;
+
+  function beat() {
+    lastMs = performance.now();
+    const told = waiting;
+    waiting = new Set();
+    for (const fn of told) guarded(fn);
+  }
+
+  /**
+   * Calls `fn` in the next of these frames, once however often it is asked for.
+   *
+   * @param {() => void} fn
+   */
+  return function onBeat(fn) {
+    waiting.add(fn);
+    if (waiting.size > 1) return;
+    const waitMs = lastMs + BEAT_MS - performance.now();
+    if (waitMs > 0) setTimeout(schedule, waitMs, beat);
+    else schedule(beat);
+  };
+}
+
+/** One panel's error must not silence the others. @param {() => void} fn */
+function guarded(fn) {
+  try {
+    fn();
+  } catch (error) {
+    reportError(error);
+  }
+}
+
+/** The one beat of this page. */
+export const onBeat = createBeat();
