@@ -1,9 +1,9 @@
-"""The adapter for ROS bags: odometry and laser scans, recorded by ROS 1 or ROS 2.
+"""ROS bags: odometry and laser scans from recordings of ROS 1 and ROS 2.
 
 Reads ``.db3`` and ``.mcap`` files, directories of ROS 2 and ``.bag`` files through
 rosbags.  The two messages are alike in all releases of ROS, so their usual definitions
-serve and no other definition of a bag is looked at.  What is left out: transforms; the
-odometry frame is taken for ``map``, and the laser sits where the robot's profile says.
+serve and no other definition of a bag is used.  Left out: transforms; the odometry
+frame is taken for ``map``, and the laser sits where the robot's profile says.
 """
 
 import logging
@@ -40,7 +40,7 @@ _LONGEST_RANGE_M = 1e4
 
 @dataclass(frozen=True, slots=True)
 class BagTopics:
-    """Which topics are read; None takes the only one of its type."""
+    """Topics to read; None takes the only one of its type."""
 
     odometry: str | None = None
     scan: str | None = None
@@ -221,7 +221,7 @@ def _odometry(message: "RosOdometry") -> Odometry:
 
 
 def _scan(message: "RosScan", mount: Pose2D) -> LaserScan:
-    """Whatever is no distance (nan, inf, below zero) is no return."""
+    """A value that is no distance (nan, inf, below zero) is no return."""
     ranges = np.array(message.ranges, np.float32)
     if ranges.size > _MOST_BEAMS:
         raise UnreadableError("too_long", f"more than {_MOST_BEAMS} ranges")

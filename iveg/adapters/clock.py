@@ -1,4 +1,4 @@
-"""The one place that reads the machine's clocks."""
+"""The machine's clocks; no other module reads them."""
 
 import time
 

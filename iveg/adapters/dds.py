@@ -1,9 +1,9 @@
-"""The adapter for DDS, the network of ROS 2: raw payloads in and out, and who is there.
+"""DDS, the network of ROS 2: raw payloads in and out, and its endpoints.
 
-Speaks through Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else
-imports it.  Payloads stay bytes here: DDS checks them against the type, and
-``iveg.ros2.cdr`` reads the few that are wanted.  Of Cyclone's threads none calls iVeg;
-one thread of ours waits for what must be answered at once and wakes the event loop.
+Uses Eclipse Cyclone DDS, an optional extra (``iveg[ros2]``); nothing else imports it.
+Payloads stay bytes here:  DDS checks them against the type, and ``iveg.ros2.cdr`` reads
+the few that are wanted.  None of Cyclone's threads calls iVeg; one thread of ours waits
+for messages that must be answered at once and wakes the event loop.
 """
 
 import asyncio
@@ -54,7 +54,7 @@ _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 @dataclass(frozen=True, slots=True)
 class DdsNetwork:
-    """Which part of which network.
+    """Domain, interface and peers of the network.
 
     Attributes:
         domain: 0 to 232, as ``ROS_DOMAIN_ID``.
@@ -225,7 +225,7 @@ class DdsReader:
         self.entity = reader
 
     def take(self) -> list[bytes]:
-        """Everything that waits, with its encapsulation, oldest first.
+        """Every waiting message, oldest first.
 
         Raises:
             HopError: DDS refuses.
@@ -237,7 +237,7 @@ class DdsReader:
 
     @property
     def writers(self) -> int:
-        """How many writers serve it."""
+        """Number of writers that serve it."""
         return len(self.entity.get_matched_publications())
 
 
@@ -260,7 +260,7 @@ class DdsWriter:
 
     @property
     def readers(self) -> int:
-        """How many readers it serves."""
+        """Number of readers that it serves."""
         return len(self._writer.get_matched_subscriptions())
 
 
@@ -338,7 +338,7 @@ def write_qos(qos: Qos) -> DdsQos:
         reliability,
         durability,
         history,
-        # Who comes late gets as many as whoever was there could have kept.
+        # A late reader gets as many as an early one could have kept.
         Policy.DurabilityService(0, history, -1, -1, -1),
         # ROS 2 sends and takes plain CDR of version 1.
         Policy.DataRepresentation(use_cdrv0_representation=True),
@@ -357,7 +357,7 @@ def _read_qos(qos: DdsQos) -> Qos:
 
 
 class _Watch:
-    """A thread that waits for news and wakes the loop, which takes it."""
+    """A thread that waits for data and wakes the loop, which takes them."""
 
     def __init__(
         self,
@@ -378,7 +378,7 @@ class _Watch:
         self._thread.start()
 
     def stop(self) -> None:
-        """Wait for nothing more."""
+        """End the thread."""
         self._ended.set()
         self._thread.join()
 

@@ -1,8 +1,8 @@
-"""The direct transport in: what robots publish, read from MQTT without FIWARE.
+"""Input of the direct transport: robots' messages, read from MQTT without FIWARE.
 
-All of it also comes through Orion, or used to; whichever copy is first counts.  The
-agent drops a whole message for one apostrophe and falls seconds behind under load
-(docs/fiware.md), and neither people nor poses must vanish for that.
+All of it also comes through Orion; whichever copy is first counts.  The agent drops a
+whole message for one apostrophe and falls seconds behind under load (docs/fiware.md),
+and neither people nor poses must vanish for that.
 """
 
 from collections.abc import Callable, Iterable

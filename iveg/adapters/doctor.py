@@ -1,6 +1,6 @@
-"""Doors that only ``iveg doctor`` opens: a probe device, a look at the database.
+"""Adapters of ``iveg doctor`` alone: a probe device, a check of the database.
 
-They tell the reason of a failure where the doors of a running iVeg try again.
+They report the reason of a failure where a running iVeg tries again.
 """
 
 import asyncio
@@ -27,13 +27,13 @@ _REFUSED = 128
 
 
 class Ear:
-    """Waits for messages by a mark that nobody else can know."""
+    """Waits for messages by a mark that no other program can know."""
 
     def __init__(self) -> None:
         self._awaited: dict[bytes, asyncio.Event] = {}
 
     def mark(self) -> str:
-        """A new mark to send; from now on it is listened for."""
+        """A new mark to send; from now on the ear waits for it."""
         mark = secrets.token_hex(8)
         self._awaited[mark.encode()] = asyncio.Event()
         return mark
@@ -55,7 +55,7 @@ class Ear:
 
 
 class ProbeDevice:
-    """A device at the broker that hears a few topics and may publish."""
+    """A device at the broker that subscribes to a few topics and may publish."""
 
     def __init__(self, client: aiomqtt.Client, ear: Ear) -> None:
         self._client = client
@@ -77,7 +77,7 @@ class ProbeDevice:
 async def probe_device(
     address: BrokerAddress, topics: Sequence[str], within_s: float
 ) -> AsyncIterator[ProbeDevice]:
-    """Be connected while the block lasts; a lost connection is not mended.
+    """Be connected while the block lasts, without reconnecting.
 
     Args:
         address: The broker.
@@ -137,7 +137,7 @@ async def _leave(client: aiomqtt.Client) -> None:
 
 
 def check_database(database_url: str) -> None:
-    """See that the history can be read and has the newest shape; change nothing.
+    """Check that the history can be read and has the newest shape; change nothing.
 
     Raises:
         HopError: it is not there, cannot be read, or has another shape.

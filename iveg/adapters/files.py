@@ -1,7 +1,7 @@
 """iVeg's own files: JSON lines that are on the disk whole, or not at all.
 
-Each begins with a line that says what it is and in which version; a file of the time
-before that has none and is version 0.  One that a newer iVeg wrote is not guessed at.
+Each file begins with a line that names its content and version; a file without that
+line is of version 0.  A file of a newer iVeg is refused.
 """
 
 import os
@@ -19,7 +19,7 @@ _OWNER_ALONE = 0o600
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """What a file holds: its first line."""
+    """Content and version of a file: its first line."""
 
     name: str
     version: int = 1
@@ -31,7 +31,7 @@ class Form:
 
 
 def write_lines(path: Path, form: Form, values: Iterable[object]) -> None:
-    """Put a file in the place of the one that was; whoever reads finds one of the two.
+    """Replace a file; a reader finds the old or the new one, never a part.
 
     Raises:
         OSError: the disk did not take it; the old file stands.
@@ -108,7 +108,7 @@ class AppendedFile:
         """The last line may be half written: the next one must not be glued to it."""
 
     def append(self, value: object) -> None:
-        """One line more.
+        """Append one line.
 
         Raises:
             OSError: the disk did not take it.

@@ -1,8 +1,8 @@
-"""The adapter for fleet files: TOML and short words in, a checked fleet out.
+"""Fleet files: TOML and short words in, a checked fleet out.
 
-Who is in the fleet: the words of ``IVEG_ROBOTS``, or else every robot of the file of
-``IVEG_FLEET``, or else every robot that iVeg itself describes.  What each one is: the
-file says, or else iVeg's own, or else nobody.
+Members of the fleet are the words of ``IVEG_ROBOTS``, or else every robot of the file
+of ``IVEG_FLEET``, or else every robot that iVeg itself describes.  The description of
+each comes from the file, or else from iVeg's own fleet; a robot may have none.
 """
 
 import math

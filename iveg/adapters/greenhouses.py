@@ -1,7 +1,7 @@
-"""The adapter for greenhouse files: TOML in, a checked ``Greenhouse`` out.
+"""Greenhouse files: TOML in, a checked ``Greenhouse`` out.
 
-A file that cannot be used is refused with its line, its field and the reason, so that
-a grower who measured a greenhouse can mend the file without reading this code.
+An unusable file is refused with its line, its field and the reason, so that a grower
+who measured a greenhouse can mend the file without reading this code.
 """
 
 import re

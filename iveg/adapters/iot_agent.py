@@ -1,8 +1,8 @@
-"""The adapter for the IoT Agent's north port, and provisioning a fleet through it.
+"""The IoT Agent's north port, and provisioning a fleet through it.
 
-Provisioning looks first and changes only what is not as it should be, so it can run at
-every start.  It leaves commands a way to the robot: the traps are in
-docs/fiware.md, "Provisioning".
+Provisioning reads first and changes only what differs, so it can run at every start.
+It keeps the way of commands to the robot clear; the traps are in docs/fiware.md,
+"Provisioning".
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,7 +19,7 @@ _PAGE, _MOST_PAGES = 100, 100
 
 
 class IotAgentClient:
-    """What iVeg asks of the IoT Agent JSON.
+    """Requests to the IoT Agent JSON.
 
     Args:
         url: Address of the north port, such as ``http://127.0.0.1:4041``.
@@ -121,7 +121,7 @@ class IotAgentClient:
 
 
 class CommandRegistrations(Entities, Protocol):
-    """What provisioning looks at in Orion."""
+    """Registrations in Orion, as provisioning needs them."""
 
     async def read_registrations(self) -> list[Document]:
         """All of our tenant, oldest first."""
@@ -273,7 +273,7 @@ async def _ensure_device(
 
 
 def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What of a device must be as wanted."""
+    """The parts of a device that must be as wanted."""
     return (
         device.get("apikey"),
         device.get("entity_name"),
@@ -288,7 +288,7 @@ def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 async def _clear_registration(orion: CommandRegistrations, robot_id: str) -> list[str]:
-    """See that nothing at Orion stands between a command and the agent."""
+    """Remove whatever at Orion stands between a command and the agent."""
     mended = []
     registered = _registered(await orion.read_registrations(), robot_id)
     if not registered:
@@ -319,7 +319,7 @@ def _registered(registrations: Sequence[Document], robot_id: str) -> list[Docume
 
 
 def _thieves(devices: Iterable[Document], robot_id: str) -> list[str]:
-    """Devices of other people that commands for a robot may go to instead."""
+    """Conflicting devices: foreign ones that a robot's commands may go to instead."""
     ours = {robot_id + device.suffix for device in names.ROBOT_DEVICES}
     return [
         f"Device {one['device_id']} also feeds {robot_id}; commands may go to it and "

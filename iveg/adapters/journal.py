@@ -1,8 +1,8 @@
-"""What is wanted of each robot, on disk before anybody is told that it was accepted.
+"""The journal of STOP: each robot's desired state, on disk before it is accepted.
 
 A file of JSON lines, flushed to the disk at each; it outlives a crash of iVeg and a
-lost database.  It is read once, at the start, and then written anew with what it still
-says, so that it does not grow for ever.
+lost database.  It is read once, at the start, and then rewritten with the lines that
+still count, so that it does not grow for ever.
 """
 
 import asyncio
@@ -37,7 +37,7 @@ class FileJournal:
         self._is_newer = False
 
     def read(self) -> dict[str, Wanted]:
-        """Robots that were to stand when iVeg last ran → what was wanted of them.
+        """Robots that were to stand when iVeg last ran, with their desired state.
 
         A line that a crash cut short is skipped.  The file is compacted unless a newer
         iVeg wrote it.
@@ -104,7 +104,7 @@ class FileJournal:
         by: str,
         at: Instant,
     ) -> None:
-        """Append what a release is about to name; likewise."""
+        """Append the STOPs that a release is about to name; likewise."""
         entry = _entry(robot_id, "stopped", hold_id, by, at.wall, ids, challenge)
         await self._write(entry)
 
@@ -141,7 +141,7 @@ def _entry(
 
 
 class _Memory:
-    """What the lines of one robot have said so far."""
+    """The content of one robot's lines so far."""
 
     def __init__(self) -> None:
         self.wanted: Wanted | None = None
@@ -151,7 +151,7 @@ class _Memory:
         self._challenge: str | None = None
 
     def take(self, entry: Mapping[str, Any], by: str, *, stopped: bool) -> None:
-        """One line more."""
+        """Read one line more."""
         # A line of the earlier version does not say what a release has named.
         told = entry.get("named")
         hold_id = None if told is None else entry["hold_id"]
@@ -166,7 +166,7 @@ class _Memory:
         self.wanted = Wanted(by, hold_id, self._named, self._asked, self._challenge)
 
     def entries(self, robot_id: str) -> Iterator[dict[str, Any]]:
-        """The fewest lines that say the same."""
+        """The fewest lines with the same content."""
         by, at, hold_id = self._by, self._at, None
         if self.wanted is not None:
             hold_id = self.wanted.hold_id

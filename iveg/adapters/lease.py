@@ -9,7 +9,7 @@ from iveg.domain.errors import HopError
 
 
 class Lease:
-    """Held from ``with`` to its end; the kernel lets go of what a killed one held.
+    """A lock held within ``with``; the kernel frees the lock of a killed process.
 
     Args:
         file: Where; its folder is made.

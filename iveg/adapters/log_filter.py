@@ -1,4 +1,4 @@
-"""Complaints of libraries that come by the thousand, told once and once more.
+"""Floods of log messages by libraries, logged once at their beginning and their end.
 
 Under load amqtt and aiomqtt complain of every message that waits.  That is one fact
 with a beginning and an end: the first complaint passes, the others are counted, and
@@ -34,10 +34,10 @@ class _Flood:
 
 
 class LossFilter(logging.Filter):
-    """Lets a complaint through when it begins and says when it is over.
+    """Lets a complaint through when it begins and logs when it is over.
 
     Numbers do not matter: the 17th message that waits is the same complaint as the
-    first.  Tracebacks of what is told are left out.
+    first.  Tracebacks are left out.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class LossFilter(logging.Filter):
         self._floods: dict[str, _Flood] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether this is news."""
+        """Whether this complaint is new."""
         said = record.getMessage()
         complaint = _NUMBER.sub("…", said).partition(":")[0].partition(" for ")[0]
         _count(said)
@@ -89,6 +89,6 @@ def _running_loop() -> asyncio.AbstractEventLoop | None:
 
 
 def quiet(*loggers: str) -> None:
-    """Tell each complaint of these loggers once a loss."""
+    """Log each complaint of these loggers once."""
     for name in loggers:
         logging.getLogger(name).addFilter(LossFilter())

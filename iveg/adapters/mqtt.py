@@ -1,8 +1,9 @@
-"""The adapter for MQTT: one connection that comes back by itself.
+"""MQTT: one connection that reconnects by itself.
 
 ``run`` connects, subscribes and hands every message on; when the broker goes it tries
-again with a growing, jittered pause.  ``publish`` waits for the broker's word (QoS 1)
-and fails loudly; ``offer`` keeps only the newest message of each topic, for telemetry.
+again with a growing, jittered pause.  ``publish`` waits for the broker's confirmation
+(QoS 1) and raises; ``offer`` keeps only the newest message of each topic, for
+telemetry.
 """
 
 import asyncio
@@ -31,7 +32,7 @@ _MAX_INCOMING = 2000
 
 @dataclass(frozen=True, slots=True)
 class BrokerAddress:
-    """Where the broker is and who we are there."""
+    """Address of the broker, user and password."""
 
     host: str
     port: int
@@ -91,7 +92,7 @@ class MqttLink:
 
     @property
     def offered(self) -> int:
-        """How many topics wait to be sent."""
+        """Number of topics with a message that waits to be sent."""
         return len(self._offered)
 
     @property
@@ -194,7 +195,7 @@ class MqttLink:
         _heed_cancellation()
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
-        """Send when there is time; a newer message of the topic takes its place."""
+        """Send when possible; a newer message of the topic takes its place."""
         if topic in self._offered:
             self.replaced += 1
         self._offered[topic] = (payload, qos)
@@ -220,7 +221,7 @@ class MqttLink:
 
 
 def _heed_cancellation() -> None:
-    """Be cancelled if somebody asked for it.
+    """Raise the cancellation that somebody asked for.
 
     Before Python 3.12 ``asyncio.wait_for``, which aiomqtt uses, may swallow a
     cancellation that meets its result; the task would live on and the part never end.

@@ -1,9 +1,8 @@
-"""How MQTT is read: all that has come in one call, and of telemetry only the newest.
+"""Reading MQTT: all that has arrived in one call, and of telemetry only the newest.
 
-The client library reads a packet's parts one by one from the socket, makes four objects
-of it and wakes a task for it, one packet a turn of the loop.  Telemetry is most of what
-comes and nobody confirms it, so it is taken here from the bytes; every other packet is
-the library's as ever.
+The client library reads a packet's parts one by one from the socket, and one packet a
+turn of the loop.  While the loop has much else to do, that is slower than a fleet
+sends: messages on the wire grow old, and robots' answers to a STOP behind them.
 """
 
 import socket
@@ -24,7 +23,7 @@ Take = Callable[[Mapping[str, bytes]], None]
 
 
 class GreedyClient(aiomqtt.Client):
-    """A client that reads whatever has come whenever its socket can be read.
+    """A client that reads all that has arrived whenever its socket is readable.
 
     Args:
         take: Told the telemetry that has come, the newest of each topic.  It speaks
@@ -73,7 +72,7 @@ class ReadAhead:
         return bytes(part)
 
     def pending(self) -> int:
-        """What can be read without a further event (bytes)."""
+        """Bytes that can be read without a further event."""
         if self._held:
             return len(self._held)
         self._may_take = True

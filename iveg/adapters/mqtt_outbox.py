@@ -1,9 +1,9 @@
-"""How MQTT is written: telemetry together and at once.
+"""Writing MQTT: telemetry together and at once.
 
 The client library's ``publish`` makes an event, a task and two tables for each message
-and takes three turns of the loop, which is most of what a robot's telemetry costs.
-What goes at QoS 0 is confirmed by nobody, so here it is put into one piece, written at
-once, and waits only while the socket is full.
+and takes three turns of the loop, which is most of the cost of a robot's telemetry.
+Nobody confirms messages at QoS 0, so here they are handed over together, written at
+once, and wait only while the socket is full.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ _PUBLISH, _UNTOLD = b"\x30", 0
 
 
 class PromptClient(GreedyClient):
-    """A client with a short way for telemetry, that waits only for a full socket."""
+    """A client with a short way for telemetry, which waits only for a full socket."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

@@ -1,7 +1,7 @@
-"""The adapter for Orion, for commands and for reading once after a gap.
+"""Orion: commands, and reads after a gap.
 
 Orion's 204 to a command proves nothing: it also answers so when the command went
-nowhere (docs/fiware.md).  Who wants to know waits for the robot's own answer.
+nowhere (docs/fiware.md).  The evidence is the robot's own answer.
 """
 
 from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ ROBOT_ATTRIBUTES = (
 
 
 class OrionClient(OrionSubscriptions):
-    """What iVeg asks of Orion.
+    """Requests to Orion.
 
     Args:
         url: Address of Orion, such as ``http://127.0.0.1:1026``.

@@ -1,9 +1,9 @@
-"""Entities that an agent made for devices it did not know, and their removal.
+"""Stray entities that an agent made for unknown devices, and their removal.
 
 A measure of an unknown device makes an entity ``{type}:{device_id}``, such as
-``Robot:AGI_odom``: so it was while an agent that keeps its registry in memory had
+``Robot:AGI_odom``: that happened while an agent with its registry in memory had
 forgotten our devices, and after a doctor whose measure came when its device was gone.
-Our group forbids that now (``autoprovision``); what is there already is removed here.
+Our group forbids that now (``autoprovision``); existing strays are removed here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ _AT_ONCE = 50
 
 
 class Entities(Protocol):
-    """What is looked at and removed in Orion."""
+    """Port to Orion's entities."""
 
     async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
         """Id and type of those of these entities that are there."""

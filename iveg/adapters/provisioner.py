@@ -1,11 +1,11 @@
-"""Keeps the FIWARE chain whole with no hand on it.
+"""Provisioner: keeps the FIWARE data path working by itself.
 
-Devices and subscriptions are made at the start and looked after for ever; after a gap
-one read of all robots brings the world up to date; a probe measure goes out every two
-seconds, because only what comes back proves that the chain is alive.
+Devices and subscriptions are made at the start and checked for ever; after a gap one
+read of all robots brings the world up to date; a probe measure goes out every two
+seconds, because only its return proves that the path works.
 
-Three things go on beside each other, so that none of them waits for a slow neighbour:
-the probe, a short question to Orion and to the agent, and the repairs.
+Three tasks run beside each other, so that none of them waits for a slow neighbour: the
+probe, a short question to Orion and to the agent, and the repairs.
 """
 
 import asyncio
@@ -95,7 +95,7 @@ class Provisioner:
 
     @property
     def subscription_ids(self) -> frozenset[str]:
-        """The subscriptions that are ours."""
+        """Ids of our subscriptions."""
         return self._subscription_ids | self.throttle.ids
 
     async def run(self) -> None:
@@ -127,7 +127,7 @@ class Provisioner:
             await asyncio.sleep(max(0.1, PROBE_PERIOD_S - spent))
 
     async def _publish(self, topic: str, origin: Origin) -> str:
-        """What the broker says to a probe; empty when it takes it."""
+        """The broker's complaint about a probe; empty when it takes it."""
         try:
             await self._link.publish(topic, codec.write_heartbeat(origin))
         except HopError:
@@ -147,7 +147,7 @@ class Provisioner:
                 pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
     async def _ask_orion(self) -> bool:
-        """Proves Orion, and how far the probe came."""
+        """Prove that Orion answers, and how far the probe came."""
         before = self._clock()
         try:
             entity = await self._orion.read_probe()
@@ -202,7 +202,7 @@ class Provisioner:
     # --- devices, subscriptions, reads --------------------------------------------
 
     async def _look_after(self) -> None:
-        """For ever; sooner after a gap, ever later while it does not succeed."""
+        """Repair for ever; sooner after a gap, ever later while it does not succeed."""
         rounds, pause = 0, _FIRST_PAUSE_S
         while True:
             self._gap.clear()
@@ -230,7 +230,7 @@ class Provisioner:
             return
 
     async def _repair(self, *, devices: bool) -> bool:
-        """Devices, then subscriptions, then the read that fills what was missed.
+        """Devices, then subscriptions, then the read that fills the gap.
 
         Orion sends nothing when a subscription is made, so the read comes last.
         """
@@ -263,7 +263,7 @@ class Provisioner:
         return self._tell("devices", None)
 
     def _wait_longer(self) -> None:
-        """What was not answered is asked again ever later: it may still be queued."""
+        """Repeat an unanswered question ever later: it may still be queued."""
         longer = max(_REPAIR_PERIOD_S, 2 * self._devices_wait_s)
         self._devices_wait_s = min(_LONGEST_DEVICES_WAIT_S, longer)
         self._devices_at = self._clock().mono + self._devices_wait_s
@@ -293,7 +293,7 @@ class Provisioner:
         return self._tell("subscriptions", trouble)
 
     async def _reconcile(self) -> bool:
-        """Read all robots: mends what a gap has lost."""
+        """Read all robots, to restore what a gap has lost."""
         try:
             await _made_sense("orion", self._read_robots())
         except HopError as error:
@@ -301,7 +301,7 @@ class Provisioner:
         return self._tell("reading", None)
 
     async def _blame(self, what: str, error: HopError) -> bool:
-        """A neighbour that is down has been told of already; anything else is news."""
+        """Report a failure; a neighbour that is down was reported already."""
         ask = self._ask_agent if error.hop == "iot_agent" else self._ask_orion
         return await ask() and self._tell(what, error)
 
@@ -320,7 +320,7 @@ class Provisioner:
             _log.info("%s", sentence)
 
     def _warn(self, problems: Sequence[str]) -> None:
-        """What only a person can put right: on the health page while it lasts."""
+        """Show what only a person can mend on the health page, while it lasts."""
         self._health_monitor.agent_warning = _in_short(problems)
         for sentence in problems:
             if sentence not in self._warned:
@@ -339,7 +339,7 @@ class Provisioner:
 
 
 async def _made_sense(hop: str, work: Awaitable[T]) -> T:
-    """Carry out what reads a neighbour's JSON; its shape is known only by using it."""
+    """Run the reader of a neighbour's JSON, whose shape is known only by use."""
     try:
         return await work
     except (AttributeError, KeyError, TypeError, ValueError) as error:

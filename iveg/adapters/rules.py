@@ -1,8 +1,7 @@
-"""Every version of the rule, in a small file of JSON lines that is replaced as a whole.
+"""Versions of the rule, in a small file of JSON lines that is replaced as a whole.
 
-The settings make the first version.  What a person changed outlives a restart, until
-somebody changes the settings themselves: then these are the newer word, and a version
-of their own.
+The settings make the first version.  A person's change outlives a restart, until the
+settings themselves change: then these are newer, and a version of their own.
 """
 
 import asyncio
@@ -101,12 +100,12 @@ class _StoredRule(BaseModel):
     since: float | None = None
 
     def rule(self) -> Rule:
-        """The version that it says."""
+        """The version of this line."""
         return Rule(**dict(self))
 
 
 def _first(error: ValidationError) -> str:
-    """What is wrong, in a few words."""
+    """The first complaint, in a few words."""
     told = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in told["loc"])
     return f"{place}: {told['msg']}" if place else told["msg"]

@@ -1,8 +1,7 @@
-"""Who is signed in, in a small file of JSON lines that is replaced as a whole.
+"""Sessions, in a small file of JSON lines that is replaced as a whole.
 
-Written beside the requests: a disk that is slow or full holds up neither a sign-in nor
-a STOP, it only costs the memory of who was there.  No token is in the file, only its
-SHA-256.
+Written beside the requests: a slow or full disk holds up neither a sign-in nor a STOP,
+it only costs sessions after a restart.  The file holds no token, only its SHA-256.
 """
 
 import logging
@@ -25,7 +24,7 @@ FORM = Form("sessions")
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Somebody who signed in.
+    """A signed-in person.
 
     Attributes:
         digest: SHA-256 of the token (hex).
@@ -68,7 +67,7 @@ class FileSessions:
         return tuple(sessions)
 
     def keep(self, sessions: Iterable[Session]) -> None:
-        """Have these on disk soon; returns at once.  What is newest wins."""
+        """Write these to disk soon; returns at once. The newest call wins."""
         with self._lock:
             is_writing = self._newest is not None
             self._newest = tuple(sessions)

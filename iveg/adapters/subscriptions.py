@@ -1,10 +1,11 @@
-"""The subscriptions that iVeg wants at Orion, and keeping them as they should be.
+"""The subscriptions that iVeg wants at Orion, and their repair.
 
-They are found again after a restart by how their description begins, so there is
+They are found again after a restart by the beginning of their description, so there is
 always one of each, however often iVeg starts.
 
-Odometry and scans have one a robot: Orion throttles a subscription as a whole, so in a
-common one the robot that sends first in each second would silence the others.
+Odometry and scans have one subscription for each robot:  Orion throttles a subscription
+as a whole, so in a common one the robot that sends first in each second would silence
+the others.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -23,7 +24,7 @@ _TIMEOUT_MS = 2000
 
 
 class SubscriptionStore(Protocol):
-    """Where subscriptions are kept: Orion, or a fake of it."""
+    """Port to the subscriptions: Orion, or a fake of it."""
 
     async def read_subscriptions(self) -> list[dict[str, Any]]:
         """All of our tenant."""
@@ -62,7 +63,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class Ensured:
-    """What stands at Orion now.
+    """Subscriptions at Orion now.
 
     Attributes:
         ids: The subscriptions that are ours.
@@ -105,7 +106,7 @@ WANTED_OF_ALL = (
 
 
 def wanted_for(robots: Iterable[str]) -> tuple[Wanted, ...]:
-    """Everything that iVeg wants to hear of a fleet."""
+    """All subscriptions for a fleet."""
     copies = [one for robot_id in robots for one in _copies_of(robot_id)]
     return (*copies, *WANTED_OF_ALL)
 
@@ -173,12 +174,12 @@ async def ensure_subscriptions(
 
 
 def is_throttled(subscription: Mapping[str, Any]) -> bool:
-    """Whether Orion leaves notifications of it out."""
+    """Whether Orion leaves out notifications of this subscription."""
     return bool(subscription.get("throttling"))
 
 
 def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """What Orion says of the deliveries that fail now; one sentence for all."""
+    """Orion's account of failing deliveries; one sentence for all."""
     deliveries = [
         one.get("notification", {}) for known in ours.values() for one in known
     ]
@@ -217,7 +218,7 @@ async def _ensure(
 
 
 def _limits(want: Wanted, kept: Mapping[str, Any]) -> list[str]:
-    """What a subscription must not have; a copy may be throttled our own way."""
+    """Limits that a subscription must not have; a copy may be throttled our own way."""
     limits = [part for part in ("throttling", "expires") if kept.get(part)]
     if want.copied is not None and kept.get("throttling") == THROTTLING_S:
         limits.remove("throttling")
@@ -225,7 +226,7 @@ def _limits(want: Wanted, kept: Mapping[str, Any]) -> list[str]:
 
 
 def _differs(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    """What is wrong with a subscription; empty when nothing is."""
+    """The difference from the wanted subscription; empty for none."""
     if kept.get("status") != "active":
         return f"it was {kept.get('status')}"
     subject, notification = kept.get("subject", {}), kept.get("notification", {})

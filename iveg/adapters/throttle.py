@@ -1,8 +1,8 @@
 """Throttles Orion's copies of odometry and scans while the direct ones are fresh.
 
-``domain.transports`` decides; here is what it takes at Orion.  The robots' entities are
-read once after every switch: throttling drops the last value, and nothing is notified
-when a subscription changes.
+``domain.feeds`` decides; here are the changes at Orion.  The robots' entities are read
+once after every switch: throttling drops the last value, and nothing is notified when a
+subscription changes.
 """
 
 import asyncio
@@ -63,7 +63,7 @@ class Throttle:
     def found(
         self, copies: Mapping[Wanted, tuple[str, bool]], switches: int = 0
     ) -> None:
-        """Take what stood at Orion, unless something was switched since then."""
+        """Take the state at Orion, unless something was switched since then."""
         if switches == self.switches:
             self.copies = dict(copies)
             self._index()
@@ -79,7 +79,7 @@ class Throttle:
         return subscription_id in self._thinned
 
     async def run(self) -> None:
-        """Until cancelled; who watches Orion tells what fails."""
+        """Until cancelled; the watcher of Orion reports failures."""
         while True:
             await asyncio.sleep(_LOOKS_EVERY_S)
             try:
@@ -89,7 +89,7 @@ class Throttle:
                 await asyncio.sleep(_AGAIN_S)
 
     async def look(self) -> None:
-        """Switch what must be switched.
+        """Switch every copy that must be switched.
 
         Raises:
             HopError: Orion did not do it.

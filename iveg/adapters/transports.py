@@ -1,6 +1,6 @@
-"""What carries orders: straight over MQTT, and through Orion and the IoT Agent.
+"""Transports of orders: straight over MQTT, and through Orion and the IoT Agent.
 
-Both share nothing, so that what breaks one leaves the other alone.
+They share nothing, so that a fault of one leaves the other alone.
 """
 
 from collections.abc import Iterable, Mapping
@@ -42,7 +42,7 @@ class MqttTransport:
         await self._once(robot_id, codec.write_resume(challenge, attempt))
 
     async def _once(self, robot_id: str, value: Mapping[str, Any]) -> None:
-        """At QoS 0, so that no client sends it again after a lost connection."""
+        """Publish at QoS 0: no client sends it again after a lost connection."""
         topic = names.command_topic(self._apikey, robot_id)
         await self._link.publish(topic, codec.write_command(value), qos=0)
 

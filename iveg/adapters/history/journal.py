@@ -1,4 +1,4 @@
-"""A file beside the database that keeps what may not be lost while it is away.
+"""The history's journal: a file beside the database for rows that may not be lost.
 
 One JSON line a record, on the disk before ``append`` returns.  Ten megabytes are held
 in reserve: a full disk stops the history long before it stops the journal.

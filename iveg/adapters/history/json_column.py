@@ -1,4 +1,4 @@
-"""A column that holds JSON and hands out values: PostgreSQL's JSONB, SQLite's text."""
+"""A JSON column that hands out values: PostgreSQL's own type, SQLite's text."""
 
 from typing import Any
 

@@ -1,7 +1,7 @@
-"""The history's reading side: questions that the REST API asks.
+"""The history's reading side: queries of the REST API.
 
-Every question runs in a thread of its own small pool, so that a long look back neither
-holds up the event loop nor takes the threads that a STOP's journal needs.
+Every query runs in a thread of its own small pool, so that a long query neither holds
+up the event loop nor takes the threads that a STOP's journal needs.
 """
 
 import asyncio
@@ -71,7 +71,7 @@ class Queries:
         return await self._ask(lambda c: lists.read_page(c, lists.LOG, asked))
 
     async def readings(self, asked: Filter) -> Page[ReadingRecord]:
-        """What small sensors said, by ``at``; the class filter asks for the kind."""
+        """Readings of small sensors, by ``at``; the class filter asks for the kind."""
         return await self._ask(lambda c: lists.read_page(c, lists.READINGS, asked))
 
     async def decision(self, decision_id: str) -> DecisionRecord | None:

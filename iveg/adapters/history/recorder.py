@@ -1,4 +1,4 @@
-"""Moves what the pipeline offers into the database, without ever making it wait.
+"""Moves offered records into the database, without ever making the pipeline wait.
 
 One task gathers batches, one thread writes them.  While the database is away, records
 that may not be lost go to the journal and telemetry waits its turn in the queue::
@@ -6,8 +6,8 @@ that may not be lost go to the journal and telemetry waits its turn in the queue
     offer ──> queue ──> batch ──> database
                 └─ away ─> journal ─┘  on its return, and at the next start
 
-What was commanded does not wait for a batch: ``flushed`` puts it into the journal at
-once, and what is then written twice is stored once.
+Commands do not wait for a batch:  ``flushed`` puts them into the journal at once, and a
+row that is then written twice is stored once.
 """
 
 import asyncio
@@ -36,7 +36,7 @@ _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 5.0
 
 @dataclass(frozen=True, slots=True)
 class RecorderHealth:
-    """How memory is doing.
+    """Health of the recorder.
 
     Attributes:
         state: ``ok``, ``late`` (something waits longer than 2 s) or ``down``.
@@ -57,7 +57,7 @@ class Recorder:
     Args:
         database_url: Brought to the newest shape before the first write.
         journal: File of the journal, beside the database.
-        read_clock: For the age of what waits and the order of revisions.
+        read_clock: For the age of waiting records and the order of revisions.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class Recorder:
     # --- what the pipeline calls --------------------------------------------------
 
     def offer(self, record: Record) -> None:
-        """Remember a record in a while; never blocks, never awaits, never fails."""
+        """Queue a record; never blocks, never awaits, never fails."""
         waiting = self._stamp(record)
         if isinstance(record, CommandRecord | CommandEventRecord):
             self._unflushed.append(waiting)
@@ -113,7 +113,7 @@ class Recorder:
         await self._caught_up.wait()
 
     def health(self, now: Instant) -> RecorderHealth:
-        """How memory is doing at this moment."""
+        """The recorder's health at this moment."""
         oldest = self._queue.oldest_since()
         age = 0.0 if oldest is None else max(0.0, now.mono - oldest)
         if self._lost_since is not None:
@@ -144,7 +144,7 @@ class Recorder:
             await self._round()
 
     async def close(self) -> None:
-        """Store what is left, or journal it, and let go of the database."""
+        """Store or journal the rest, and close the database."""
         self._closing = True
         self._awake.set()
         self._full.set()
@@ -214,7 +214,7 @@ class Recorder:
         await self._spill()
 
     def _write(self, batch: list[Waiting]) -> None:
-        """In the thread: what the journal holds is older, so it goes first."""
+        """Write in the thread; the journal's rows are older, so they go first."""
         position = 0
         while position < (end := self._journal.size):
             rows, position = self._journal.read(position, _BATCH)
@@ -241,7 +241,7 @@ class Recorder:
         self._pause_s = _FIRST_PAUSE_S
 
     async def _spill(self) -> None:
-        """Move what may not be lost from memory to the journal."""
+        """Move records that may not be lost from memory to the journal."""
         kept = self._queue.take_kept(len(self._queue))
         safe = not kept
         try:

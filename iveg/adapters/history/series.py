@@ -32,7 +32,7 @@ CONFIDENCE_BINS = 20
 
 @dataclass(frozen=True, slots=True)
 class SpeedSeries:
-    """How fast one robot went and what it was told, over a range.
+    """Speed and speed limits of one robot over a range.
 
     Attributes:
         at: Unix seconds, rising; the others have its length.

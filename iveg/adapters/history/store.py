@@ -130,7 +130,7 @@ def _insert(connection: Connection, rows: Sequence[Waiting]) -> None:
 def _forget(
     connection: Connection, table: Table, values: list[_Row], keep_s: float
 ) -> None:
-    """Delete what is older than the newest of these by more than its time."""
+    """Delete rows that are older than the newest of these by more than their time."""
     newest = max(float(str(one["at"])) for one in values)
     connection.execute(delete(table).where(table.c.at < newest - keep_s))
 
@@ -166,7 +166,7 @@ def _statement(mapping: TableMapping, dialect: str) -> Insert:
 
 
 def _is_fault_of_row(error: Exception, engine: Engine) -> bool:
-    """Whether the values are to blame; else it is the database, and all can wait."""
+    """Whether the values are the cause; else it is the database, and all can wait."""
     if not isinstance(error, DBAPIError):
         return True
     if isinstance(error, IntegrityError | DataError):

@@ -266,7 +266,7 @@ readings = Table(
 
 @dataclass(frozen=True, slots=True)
 class TableMapping:
-    """Where one kind of record is kept.
+    """Table of one kind of record.
 
     Attributes:
         identity: Columns that name the thing or fact; empty where every row is new.
