@@ -119,7 +119,7 @@ async def _subscribe(client: aiomqtt.Client, topic: str) -> None:
 
 
 async def _hear(client: aiomqtt.Client, ear: Ear) -> None:
-    # A lost connection shows in what does not arrive; nobody waits for this task.
+    # A lost connection shows in missing messages; nothing awaits this task.
     with contextlib.suppress(aiomqtt.MqttError):
         async for message in client.messages:
             if isinstance(message.payload, bytes):

@@ -50,7 +50,7 @@ class FileSessions:
         self._failing = False
 
     def load(self) -> tuple[Session, ...]:
-        """All that were kept; a line that cannot be read is nobody's session."""
+        """All stored sessions; an unreadable line is skipped."""
         sessions = []
         try:
             for number, line in read_lines(self._path, FORM):

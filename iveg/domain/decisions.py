@@ -1,7 +1,7 @@
-"""The decision record: from who was seen to the observed slow-down, link by link.
+"""The decision record: from the detection to the observed slow-down, link by link.
 
 One ``Decision`` opens when a robot enters a ring and closes when it is let go.  Every
-link has a time and a verdict; a link that does not come in time is itself an alert
+link has a time and a verdict; a link that does not come in time raises an alert
 (docs/dashboard.md, "Decisions")::
 
     detection ─> filter ─> geometry ─> rule ─> feedback ─> applied ─> observed

@@ -63,7 +63,7 @@ class Feedback:
 
     Attributes:
         robot_id: The observer that this topic belongs to.
-        alert: The newest; None when nobody is known.
+        alert: The newest; None without one.
         alerts: All that are alive.
         pose: Where iVeg believes the observer to be; None when unknown.
         seen: Newest safety-report ``seq`` that iVeg has of each robot.

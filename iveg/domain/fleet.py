@@ -56,7 +56,7 @@ class RobotProfile:
 
 CAUTIOUS = RobotProfile()
 UNDESCRIBED_SPEED = 0.5
-"""What software on a robot that nobody described lets it drive at most (m/s)."""
+"""Greatest speed that the software of a robot without description allows (m/s)."""
 
 
 @dataclass(frozen=True, slots=True)

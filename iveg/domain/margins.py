@@ -125,8 +125,8 @@ class LeastMargins:
     """The least margin of each robot and each person, all pairs at once.
 
     Args:
-        robots: Whose margins are asked for.
-        people: To whom.
+        robots: The robots of the pairs.
+        people: The people of the pairs.
     """
 
     def __init__(

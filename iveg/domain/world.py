@@ -40,8 +40,8 @@ class World:
     """All robots of the fleet and the air around them.
 
     Args:
-        fleet: Who is in it; ids alone are robots that nobody described.
-        probe: Tells how late FIWARE is; without one nobody asks.
+        fleet: Its robots; ids alone are robots without a description.
+        probe: Lag of FIWARE; without one FIWARE's lag is not used.
 
     Attributes:
         ledger: When iVeg's own feedback was composed, which robots echo.
@@ -118,7 +118,7 @@ class World:
         if isinstance(observation, DetectionFrame):
             seen_at = self._measured_at(origin, received, likely)
             if seen_at is None:
-                # A person counts, though nobody can prove how fresh the look is.
+                # A person counts, though the age of the frame is not proven.
                 seen_at = at.mono - (likely or 0.0)
             robot.sighted_at = dated(at, seen_at)
         if verdict == "new":

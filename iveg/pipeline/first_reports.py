@@ -17,7 +17,7 @@ from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.rule.speed_limits import Crossing
 
 FRESH_S = 0.25
-"""A ring that nobody has looked at for longer is known: who enters it is not timed."""
+"""Without a newer frame a ring was known: a robot that enters it is not timed."""
 _KEPT = 16
 
 

@@ -35,7 +35,7 @@ _SCOPES: dict[Scope, int] = {"off": 0, "safety": 1, "all": 2}
 
 @dataclass(frozen=True, slots=True)
 class Low:
-    """A value that people are told of once it is low.
+    """A value that raises an alert when it is low.
 
     Attributes:
         value: Reads it; None where it is unknown or nothing is wrong with it being low.

@@ -23,8 +23,8 @@ class Evidence:
 
     Attributes:
         decision_id: The decision that opens; None where the robot was ahead of ours.
-        radius_m: Of the ring that it came into, where it had grown: nobody had looked
-            for ``unseen_s`` seconds.
+        radius_m: Of the ring that it came into, where it had grown: the cause was not
+            in view for ``unseen_s`` seconds.
     """
 
     cause: str

@@ -88,7 +88,7 @@ class NotificationEndpoint:
     def takes_at_once(self, headers: Mapping[bytes, bytes]) -> bool:
         """Whether nothing but the body can be wrong; names are in lower case.
 
-        A body that does not say how long it is goes to those who count.
+        A body of undeclared length takes the slow path, which counts bytes.
         """
         length = headers.get(b"content-length", b"")
         return (

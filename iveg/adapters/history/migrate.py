@@ -113,7 +113,7 @@ def _prepare_file(file: Path) -> None:
 def _damage(file: Path) -> str | None:
     """What is wrong with a file's structure; None when nothing was found in 5 s.
 
-    A locked file is not a damaged one; it is left to those who come next.
+    A locked file is not a damaged one; later calls deal with it.
     """
     deadline = clock.now().mono + _CHECK_LIMIT_S
     connection = sqlite3.connect(file, isolation_level=None)

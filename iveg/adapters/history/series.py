@@ -85,7 +85,7 @@ class ConfidenceCount:
 class CommandLatency:
     """How long one STOP took from the press (ms); None where it never came.
 
-    Where nobody told when it was pressed, the press is when it was accepted.
+    Without a told press, the press is when it was accepted.
 
     Attributes:
         answer_ms: To the robot's answer by each transport that brought one.

@@ -12,10 +12,10 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.overload import Overload
 
 ESTIMATED_SHOWN_AFTER_S = 5.0
-"""So long a robot may take to hear its first feedback."""
+"""Time that a robot may take to receive its first feedback (s)."""
 UNREADABLE_SHOWN_S = 10.0
 KIND_SHOWN_S = 10.0
-"""How long after its last message a robot of the wrong kind is told of."""
+"""How long after its last message a robot of the wrong kind is reported (s)."""
 STORM_SHOWN_S = 10.0
 """So that a detector at its bound is one alert and not one a second."""
 

@@ -72,7 +72,7 @@ class ClockOffset:
     def take(
         self, stamp_s: float, at: Instant, composed_at: float | None
     ) -> float | Exclusion:
-        """One message: what it took from stamp to arrival (s), or why nobody can say.
+        """Take one message; returns its transit (s), or the reason for none.
 
         Args:
             stamp_s: By the robot's clock (Unix s).

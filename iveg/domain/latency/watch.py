@@ -104,7 +104,7 @@ class LatencyWatch:
             stream.excluded["screen", "negative"] += 1
 
     def not_painted(self, robot_id: str, data: Data, why: Exclusion) -> None:
-        """A page told of this what cannot be, or cannot be used."""
+        """A page reported an impossible or unusable moment."""
         stream = self._streams.get((robot_id, data))
         if stream is not None:
             stream.excluded["screen", why] += 1

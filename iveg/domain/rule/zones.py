@@ -197,7 +197,7 @@ def _peers_near(
     limit = ring_radius(rule.radius_m, ages, np.minimum, np.maximum) + 2 * NOT_FAR_M
     chosen: dict[str, set[int]] = {}
     for robot_id, column in placed.within(places[:, 0], places[:, 1], limit):
-        # Everybody is near itself, which slows nobody.
+        # A robot is near itself, which does not slow it.
         if peers[column][0].robot_id != robot_id:
             chosen.setdefault(robot_id, set()).add(column)
     place = {peer.robot_id: column for column, (peer, _) in enumerate(peers)}

@@ -65,8 +65,8 @@ class Times:
     """When each step of a command was taken; all but ``pressed`` on our clocks.
 
     Attributes:
-        pressed: Unix time (s); None where nobody said, or it was not believed.
-        pressed_doubted: Somebody said a time that cannot be.
+        pressed: Unix time (s); None where it was not told, or is impossible.
+        pressed_doubted: The page told an impossible time.
         sent: By transport, when it first took it.
         answered: By transport, when the robot first said that it has it.
     """
@@ -143,7 +143,7 @@ class Command:
             times = replace(times, sent={transport.id: left, **times.sent})
         confirms = transport.confirms and self.kind == "stop"
         if self.transports[transport.id] == "ok" and not confirms:
-            # The robot's answer was faster than the word of who took it.
+            # The robot's answer was faster than the transport's.
             return replace(self, times=times)
         taken = "ok" if confirms else "pending"
         now = ("unknown" if doubtful else taken) if ok else "failed"

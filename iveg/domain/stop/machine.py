@@ -206,7 +206,7 @@ class StopMachine(Evidence):
             at: This moment.
             ok: Whether it was taken.
             doubtful: It is known that what lies behind does not pass anything on.
-            left: When it was handed to the transport; this moment, if nobody says.
+            left: When it was handed to the transport; this moment unless told.
         """
         way = self._transports[transport]
         if self.stop is not None and _is(self.stop, command_id):
@@ -343,7 +343,7 @@ class StopMachine(Evidence):
         return self._take(Event("delivered", at))
 
     def _lifted(self, at: Instant, new_id: str) -> list[Effect]:
-        """The hold is lost, and nobody has asked for that."""
+        """The hold is lost without a release."""
         lost: Key = "moved" if self._doubt is None else "release_unconfirmed"
         return self._stop_again(lost, at, new_id)
 

@@ -164,7 +164,7 @@ class Tracker:
         *,
         is_live: bool,
     ) -> None:
-        """Give detections without a track one of those that nobody has taken."""
+        """Assign free tracks to detections without one."""
         wanting = [index for index, track in enumerate(tracks) if track is None]
         if not wanting:
             return

@@ -123,7 +123,7 @@ def router(
 ) -> APIRouter:
     """The live endpoint.
 
-    ``snapshot`` says everything that is known to one who has just come; ``stop``
+    ``snapshot`` gives the present state to a new browser; ``stop``
     presses STOP for one robot, or for all, by somebody; ``latency`` is told when pages
     have drawn what was decided.
     """
@@ -246,7 +246,7 @@ async def _sent(sending: Coroutine[Any, Any, None]) -> None:
     """Send; of a socket that has closed meanwhile a server says RuntimeError.
 
     Raises:
-        ConnectionResetError: nobody is there any more.
+        ConnectionResetError: the browser is gone.
     """
     try:
         await sending

@@ -32,7 +32,7 @@ class Part(NamedTuple):
     """One topic's share of a frame.
 
     Attributes:
-        version: Of the topic when it was encoded; who has it needs no other.
+        version: Of the topic when it was encoded; a browser that has it needs no newer.
         head: JSON.
         body: What follows the JSON of the frame; a multiple of four bytes.
     """

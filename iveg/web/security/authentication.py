@@ -132,7 +132,7 @@ class Authenticator:
             self._told_at = now
             _log.warning("sign-in refused: wrong token (%d so far)", self.refused)
 
-    # --- who is it --------------------------------------------------------------
+    # --- identification ---------------------------------------------------------
 
     def identify(self, connection: HTTPConnection) -> Principal | None:
         """The owner of the cookie or bearer token; None for a stranger."""

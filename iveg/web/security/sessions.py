@@ -63,7 +63,7 @@ class Sessions:
         return len(self._sessions)
 
     def open(self, name: str, role: Role) -> str:
-        """Begin a session; returns its token, which is known to nobody else."""
+        """Begin a session; returns its token, which is stored nowhere."""
         if len(self._sessions) >= self._most:
             del self._sessions[min(self._sessions, key=self._last_seen)]
         token = secrets.token_urlsafe(32)
