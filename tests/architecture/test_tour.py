@@ -67,3 +67,11 @@ def test_the_map_has_the_layers_that_imports_are_held_to() -> None:
     drawn = re.findall(r"^(\S+(?: \| \S+)*) {2,}", page, re.M)
 
     assert drawn == held
+
+
+def test_every_class_that_the_glossary_names_is_in_the_code() -> None:
+    page = (documents.DOCS / "glossary.md").read_text()
+    named = set(re.findall(r"`([A-Z][a-z]+(?:[A-Z]\w*|\w*))`", page))
+    classes = {name for path in (ROOT / "iveg").rglob("*.py") for name in _names(path)}
+
+    assert named - classes == set()
