@@ -121,7 +121,7 @@ class FiwareHttp:
         return told
 
     def read_count(self, text: Any) -> int:
-        """How many there are in all, as the neighbour says it.
+        """The total number, as the neighbour reports it.
 
         Raises:
             HopError: it does not.
@@ -153,7 +153,7 @@ class FiwareHttp:
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:
-    """What a refusal says, short; Orion and the agent use different words."""
+    """The reason of a refusal, short; Orion and the agent use different words."""
     said = ""
     try:
         told = orjson.loads(response.content)

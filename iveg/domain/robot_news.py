@@ -106,7 +106,7 @@ def _not_before(
     origin: Origin,
     moment: float | None,
 ) -> float | None:
-    """The moment of the newest; it was measured after the one before it was.
+    """The moment of the newest message, which was measured after the one before it.
 
     That holds within a boot, and where messages are counted.
     """

@@ -34,7 +34,7 @@ GAIN_OVER_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Sensed:
-    """The newest of one kind, and the moment it was not measured before.
+    """The newest observation of one kind, and the earliest moment it can be of.
 
     Attributes:
         at: None while nobody knows.
@@ -46,7 +46,7 @@ class Sensed:
 
 @dataclass(slots=True)
 class RobotState:
-    """What is known of one robot.
+    """The known state of one robot.
 
     Attributes:
         pose_at: The newest odometry was not measured before this moment (monotonic,
@@ -125,14 +125,14 @@ class RobotState:
 
     @property
     def profile(self) -> RobotProfile:
-        """What this robot is."""
+        """The robot's profile."""
         return self.description.profile
 
     @property
     def is_replay(self) -> bool:
-        """Whether a recording plays this robot: by the fleet, while no live one speaks.
+        """Whether a recording plays this robot: by the fleet, while no live one sends.
 
-        What a robot calls its task has no say in it.
+        The name of its task does not count.
         """
         return self.description.kind == "recording" and self.live_at is None
 
@@ -186,7 +186,8 @@ class RobotState:
     ) -> Verdict:
         """Place a message in its stream's order.
 
-        What Orion kept of an earlier boot must not make the present one look old.
+        A message of an earlier boot that Orion kept must not make the present boot look
+        old.
         """
         kind = kind_of(observation)
         order = self._orders.get(kind)
@@ -197,10 +198,7 @@ class RobotState:
         return order.judge(origin)
 
     def is_past(self, kind: type[Observation], boot: str, seq: int) -> bool:
-        """Whether a message of this identity cannot be news.
-
-        What a late look saw may still protect somebody: only its twin is past.
-        """
+        """Whether a message of this identity cannot be new."""
         order = self._orders.get(kind)
         if order is None:
             return False
@@ -216,7 +214,7 @@ class RobotState:
         )
 
     def forget_poses(self) -> None:
-        """Nothing that was kept for ``pose_at_stamp`` counts any more."""
+        """Drop every pose that was kept for ``pose_at_stamp``."""
         self._poses.clear()
 
     def remember_pose(self, moment: float, pose: Pose2D) -> None:
