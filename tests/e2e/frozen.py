@@ -149,9 +149,7 @@ def _history() -> Iterator[Record]:
         detection_record(at=NOW - 60 * n - 30, probability=0.5 + n / 30)
         for n in range(15)
     )
-    yield decision_record(
-        started_at=NOW - 600, ended_at=NOW - 480, links=json.dumps(_CHAIN)
-    )
+    yield decision_record(started_at=NOW - 600, ended_at=NOW - 480, links=_CHAIN)
     yield command_record(
         state="RUNNING",
         requested_at=NOW - 300,
@@ -164,7 +162,7 @@ def _history() -> Iterator[Record]:
     yield alert_record(
         raised_at=NOW - 600,
         cleared_at=NOW - 480,
-        slots='{"robot":"AGII","person":"P1","distance":1.4}',
+        slots={"robot": "AGII", "person": "P1", "distance": 1.4},
     )
 
 

@@ -11,11 +11,19 @@ from sqlalchemy.types import TypeDecorator, TypeEngine
 class JsonValue(TypeDecorator[Any]):
     """JSON as PostgreSQL keeps it (JSONB); in SQLite, whose JSON is text, its text.
 
-    A text that is damaged reads as null: one bad row must not hide a list.
+    What is damaged, or JSON of another shape, reads as null: one bad row must not hide
+    a list.
+
+    Attributes:
+        shape: ``dict`` or ``list``, of what is kept.
     """
 
     impl = JSON
     cache_ok = True
+
+    def __init__(self, shape: type[dict[str, Any]] | type[list[Any]] = dict) -> None:
+        super().__init__()
+        self.shape = shape
 
     def load_dialect_impl(self, dialect: Dialect) -> TypeEngine[Any]:
         """What the database knows."""
@@ -28,9 +36,13 @@ class JsonValue(TypeDecorator[Any]):
 
     def process_result_value(self, value: Any, dialect: Dialect) -> Any:
         """A value on its way out."""
-        if dialect.name != "sqlite" or value is None:
-            return value
-        try:
-            return orjson.loads(value)
-        except orjson.JSONDecodeError:
-            return None
+        if dialect.name == "sqlite" and value is not None:
+            value = _loaded(value)
+        return value if isinstance(value, self.shape) else None
+
+
+def _loaded(text: str) -> Any:
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError:
+        return None

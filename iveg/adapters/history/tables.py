@@ -57,8 +57,13 @@ def _text(name: str, *, null: bool = True, key: str | None = None) -> Column[str
     return Column(name, Text, nullable=null, key=key or name)
 
 
-def _json(name: str, *, null: bool = False) -> Column[Any]:
-    return Column(name, JsonValue, nullable=null)
+def _json(
+    name: str,
+    shape: type[dict[str, Any]] | type[list[Any]] = dict,
+    *,
+    null: bool = False,
+) -> Column[Any]:
+    return Column(name, JsonValue(shape), nullable=null)
 
 
 def _row_id() -> Column[int]:
@@ -97,7 +102,7 @@ decisions = Table(
     _number("ended_at"),
     _number("speed_before"),
     _number("speed_after"),
-    _json("links"),
+    _json("links", list),
     _revision(),
     Index(None, "started_at", "decision_id"),
     Index(None, "robot_id", "started_at"),
@@ -176,7 +181,7 @@ alerts = Table(
     _text("note"),
     Column("count", Integer, nullable=False),
     _number("last_raised_at", null=False),
-    _json("members"),
+    _json("members", list),
     _revision(),
     Index(None, "last_raised_at", "alert_id"),
     Index(None, "robot_id", "raised_at"),

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from alembic import command
@@ -128,6 +130,19 @@ async def test_what_is_stored_is_found_by_its_members(
 
     [line] = (await queries.log(Filter(since=NOON))).items
     assert (robot, line.slots) == ("AGI", {"robot": "AGI"})
+
+
+async def test_a_row_whose_json_has_another_shape_hides_no_other(
+    database_url: str, queries: Queries
+) -> None:
+    store = Store(database_url)
+    other: Any = ["a list"]
+    rows = replace(log_record(), slots=other), log_record()
+    store.write([Waiting(record, n, 0.0) for n, record in enumerate(rows, 1)])
+    store.close()
+
+    lines = (await queries.log(Filter(since=NOON))).items
+    assert sorted(len(line.slots) for line in lines) == [0, 1]
 
 
 @contextmanager
