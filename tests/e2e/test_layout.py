@@ -153,6 +153,37 @@ def test_13_19_the_stop_of_each_of_six_robots_is_in_sight(fleet: Fleet) -> None:
             expect(stop).to_be_in_viewport(ratio=1)
 
 
+@pytest.mark.parametrize("fleet", [2, 6], indirect=True)
+def test_13_19_a_cards_stop_keeps_its_distance_however_it_is_scrolled(
+    fleet: Fleet,
+) -> None:
+    near = [evaluate(fleet.at(size), WITHIN_REACH) for size in OTHERS]
+
+    assert near == [[] for _ in OTHERS]
+
+
+WITHIN_REACH = """() => {
+  const all = document.querySelector('#stops [data-stop="fleet"]');
+  const near = new Set();
+  for (const stop of document.querySelectorAll('.card .stop')) {
+    if (!stop.checkVisibility({visibilityProperty: true})) continue;
+    for (const into of [8, 40]) {
+      const box = all.getBoundingClientRect();
+      scrollBy(0, stop.getBoundingClientRect().bottom - box.top - into);
+      for (let px = 1; px < 24; px += 2) {
+        const side = [box.left - px, stop.getBoundingClientRect().top + 4];
+        const above = [stop.getBoundingClientRect().left + 20, box.top - px];
+        for (const [x, y] of [above, side]) {
+          const hit = document.elementFromPoint(x, y);
+          if (hit && stop.contains(hit)) near.add(`${stop.dataset.stop} ${px}`);
+        }
+      }
+    }
+  }
+  scrollTo(0, 0);
+  return [...near];
+}"""
+"""STOPs of cards that a finger finds within 24 px of that of all, when scrolled."""
 CARD_HEIGHT = """() => {
   const box = (part) => document.querySelector(`[data-robot="AGI"] ${part}`)
     .getBoundingClientRect();

@@ -69,7 +69,7 @@ def test_a_drill_is_one_tap_and_ends_with_its_time_in_the_history(
         re.compile(r"Superado: parado en \d+ ms\. Sigue parado: rearme y reanude\."),
         timeout=WITHIN_MS,
     )
-    expect(why).to_have_text("Ya tiene un PARAR: primero rearme y reanude.")
+    expect(why).to_have_text("Ya tiene una parada: primero rearme y reanude.")
     expect(panel.locator('[data-part="drill-last"]')).to_have_text(
         re.compile(r"El último: [\d/]+ [\d:]+, por operator\. Superado"),
         timeout=WITHIN_MS,

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Protocol
 
 from fastapi import APIRouter, Depends, Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
@@ -278,7 +278,17 @@ def _environment(translations: Translations) -> Environment:
             attribute, translations.say(key, **slots), attribute, key, data
         )
 
+    def greenhouse(name: str) -> str:
+        known = translations.sentences.get(f"greenhouse.{name}")
+        return name if known is None else known
+
+    def say_house(name: str) -> Markup:
+        key = f"greenhouse.{name}"
+        return say(key) if key in translations.sentences else escape(name)
+
     environment.globals.update(
+        greenhouse=greenhouse,
+        say_house=say_house,
         t=translations.say,
         say=say,
         label=label,

@@ -107,7 +107,7 @@ def test_people_can_be_read_as_sentences(page: Page, stack: Site) -> None:
         return told.filter(has_text="AGI").count() > 0
 
     until(is_told, 60.0, "whom AGI sees")
-    expect(page.locator("#people-nlos")).to_contain_text("Sin línea de vista")
+    expect(page.locator("#people-nlos")).to_contain_text("Por alguien que no ven")
 
 
 def test_a_decision_has_an_address_that_opens_and_prints(

@@ -9,7 +9,7 @@
 
 import { ageOf } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
-import { make, need, needPart, setText } from "./dom.js";
+import { make, need, needPart, setAttribute, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -123,7 +123,8 @@ export function createRelease(app, card, robotId) {
         i18n.t(`release.hold_source.${hold.source}`),
       );
       const ack = i18n.t(`release.hold_ack.${hold.ack}`);
-      setText(need("small", list.children[i]), `${ack}${by} · ${hold.id}`);
+      setText(need("small", list.children[i]), `${ack}${by}`);
+      setAttribute(list.children[i], "title", hold.id);
     });
     if (!holds.length) {
       setText(need("b", list.children[0]), i18n.t("release.no_holds"));

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import httpx
 import pytest
 from fastapi import FastAPI
+from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from iveg.domain.detection_rule import Rule
-from iveg.web.pages.contexts import Site
+from iveg.web.pages.contexts import LivePage, Site
 from iveg.web.pages.openapi import (
     AnswerDoc,
     ApiDoc,
@@ -294,3 +295,28 @@ async def test_a_stranger_has_nothing_to_sign_out_of(
     authenticator.visitor = None
     assert (await browser.post("/signout")).status_code == 401
     assert authenticator.left == 0
+
+
+@pytest.mark.parametrize(
+    ("language", "name", "said"),
+    [
+        ("es", "mvsim-20x20", "Invernadero virtual"),
+        ("en", "mvsim-20x20", "Virtual greenhouse"),
+        ("es", "none", "Campo abierto"),
+        ("es", "Finca Sol", "Finca Sol"),
+    ],
+)
+def test_13_16_a_greenhouse_of_iveg_has_a_name_in_the_readers_language(
+    language: str, name: str, said: str
+) -> None:
+    pages = Pages(replace(SITE, greenhouse=name))
+    scope = {
+        "type": "http",
+        "headers": [(b"cookie", f"iveg_language={language}".encode())],
+    }
+    frame = pages.frame(Request(scope), "live", Principal("ana", "operator"))
+
+    drawn = bytes(pages.draw(LivePage(frame)).body).decode()
+
+    assert f"<title>iVeg · {said}</title>" in drawn
+    assert re.search(rf'brand__house">(<[^>]+>)?{re.escape(said)}', drawn)

@@ -21,7 +21,7 @@ _PAGE = (
     b"<!doctype html><link rel=icon href=data:,><script type=module"
     b" src=/static/js/register.js></script><p>open</p>"
 )
-_REGISTER = b"import {registerWorker} from './installing.js'; registerWorker();"
+_REGISTER = b"import {registerWorker} from './core/install.js'; registerWorker();"
 
 
 class Served(SimpleHTTPRequestHandler):

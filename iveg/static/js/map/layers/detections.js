@@ -1,6 +1,7 @@
 /** What a camera says it saw just now: footprints, faint below the threshold. */
 
 import { screenX, screenY } from "../viewport.js";
+import { mayStand } from "./claims.js";
 import { isolated, label } from "./paint.js";
 
 /**
@@ -35,6 +36,8 @@ function drawDetection(paint, detection) {
   ctx.restore();
   if (detection.named || view.scale < WORDS_FROM_SCALE) return;
   const text = `${detection.item.class_id} ${labels.percent(detection.probability)}`;
+  const [x, y] = [screenX(view, detection.x), screenY(view, detection.y)];
+  if (!mayStand(paint, text, x, y - width / 2 - 9, 11)) return;
   ctx.globalAlpha = detection.confident ? 1 : 0.75;
   label(paint, text, 0, -width / 2 - 9, { size: 11, weight: 500 });
 }

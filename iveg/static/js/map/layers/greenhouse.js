@@ -26,7 +26,7 @@ export function draw(paint) {
     for (const row of map.rows) drawRow(paint, row);
     for (const thing of map.obstacles) drawObstacle(paint, thing);
     for (const post of map.posts) drawPost(paint, post);
-    for (const lane of map.lanes) drawLaneLabel(paint, lane);
+    drawLaneWords(paint);
   });
 }
 
@@ -150,33 +150,43 @@ function drawObstacle(paint, thing) {
 }
 
 /**
- * The lane's name at its near end, turned along a lane that is taller than wide.
+ * Where the names of lanes stand: at the near end, turned along a lane that is taller than
+ * wide; none where a lane is too small for its name.
  *
  * @param {Paint} paint
- * @param {{label: string} & Box2D} lane
  */
-function drawLaneLabel(paint, lane) {
-  const { ctx, theme, view, labels } = paint;
-  const [x, y, width, height] = rectOf(paint, lane);
-  const isTall = height > width;
-  const thickness = isTall ? width : height;
-  const length = isTall ? height : width;
-  const text = labels.lane(lane.label);
-  const size = Math.min(13, thickness * 0.6);
-  if (size < 8 || length < text.length * size * 0.7) return;
-  ctx.save();
-  ctx.globalAlpha = 0.72;
-  const inset = text.length * size * 0.3 + 8;
-  if (isTall) {
-    const end = Math.min(y + height, view.height) - inset;
-    ctx.translate(x + width / 2, Math.max(y + inset, end));
-    ctx.rotate(-Math.PI / 2);
-  } else {
-    const start = Math.max(x, 0) + inset;
-    ctx.translate(Math.min(start, x + width - inset), y + height / 2);
+export function* laneWords(paint) {
+  const { view, labels } = paint;
+  for (const lane of paint.scene.map?.lanes ?? []) {
+    const [x, y, width, height] = rectOf(paint, lane);
+    const isTall = height > width;
+    const [thickness, length] = isTall ? [width, height] : [height, width];
+    const text = labels.lane(lane.label);
+    const size = Math.min(13, thickness * 0.6);
+    if (size < 8 || length < text.length * size * 0.7) continue;
+    const inset = text.length * size * 0.3 + 8;
+    if (isTall) {
+      const end = Math.min(y + height, view.height) - inset;
+      yield { text, size, isTall, x: x + width / 2, y: Math.max(y + inset, end) };
+    } else {
+      const start = Math.min(Math.max(x, 0) + inset, x + width - inset);
+      yield { text, size, isTall, x: start, y: y + height / 2 };
+    }
   }
-  label({ ...paint, theme: { ...theme, bg: theme.lane } }, text, 0, 0, { size });
-  ctx.restore();
+}
+
+/** @param {Paint} paint */
+function drawLaneWords(paint) {
+  const { ctx, theme } = paint;
+  const onLanes = { ...paint, theme: { ...theme, bg: theme.lane } };
+  for (const { text, size, isTall, x, y } of laneWords(paint)) {
+    ctx.save();
+    ctx.globalAlpha = 0.72;
+    ctx.translate(x, y);
+    if (isTall) ctx.rotate(-Math.PI / 2);
+    label(onLanes, text, 0, 0, { size });
+    ctx.restore();
+  }
 }
 
 /** @param {Paint} paint @param {Box2D} box @param {string} colour */

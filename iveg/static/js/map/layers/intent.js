@@ -1,6 +1,7 @@
 /** What a robot means to do: its path, its goal and the name of its task. */
 
 import { screenX, screenY } from "../viewport.js";
+import { mayStand } from "./claims.js";
 import { circle, isolated, label } from "./paint.js";
 
 /**
@@ -58,5 +59,7 @@ function drawGoal(paint, robot, goal) {
   }
   ctx.stroke();
   if (!robot.task || view.scale < 18) return;
-  label(paint, labels.task(robot.task), x, y + 18, { size: 11, weight: 500 });
+  const task = labels.task(robot.task);
+  if (!mayStand(paint, task, x, y + 18, 11)) return;
+  label(paint, task, x, y + 18, { size: 11, weight: 500 });
 }

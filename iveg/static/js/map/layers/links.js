@@ -6,6 +6,7 @@
  */
 
 import { screenX, screenY } from "../viewport.js";
+import { mayStand } from "./claims.js";
 import { isolated, label } from "./paint.js";
 
 /**
@@ -70,7 +71,8 @@ function drawBlind(paint, robot, person, distanceM) {
   // Beside the line and not on it, nearer to the person than to the robot's body.
   const x = x1 + 0.6 * (x2 - x1) + (BESIDE_PX * (y1 - y2)) / length;
   const y = y1 + 0.6 * (y2 - y1) - (BESIDE_PX * Math.abs(x2 - x1)) / length;
-  label(paint, labels.distance(distanceM), x, y, { size: 11 });
+  const said = labels.distance(distanceM);
+  if (mayStand(paint, said, x, y, 11)) label(paint, said, x, y, { size: 11 });
 }
 
 /** @param {Paint} paint @param {SceneRobot} robot @param {ScenePerson} person */

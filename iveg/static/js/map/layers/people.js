@@ -8,6 +8,7 @@
 
 import { MARK_LIMIT_S } from "../scene.js";
 import { screenX, screenY } from "../viewport.js";
+import { claim } from "./claims.js";
 import { circle, isolated, label } from "./paint.js";
 
 /**
@@ -88,7 +89,8 @@ function drawAge(paint, person) {
  *
  * @param {Paint} paint @param {string} text @param {number} x @param {number} y
  */
-function placeOfAge({ ctx, theme, places }, text, x, y) {
+function placeOfAge(paint, text, x, y) {
+  const { ctx, theme, places } = paint;
   const heights = [20, -22];
   if (!places) return heights[0];
   ctx.font = `600 11px ${theme.font}`;
@@ -97,7 +99,7 @@ function placeOfAge({ ctx, theme, places }, text, x, y) {
     const [top, bottom] = [y + dy - WORDS_ABOVE_PX / 2, y + dy + WORDS_ABOVE_PX / 2];
     return { left: x - half, right: x + half, top, bottom };
   });
-  const found = places.claim(rects);
+  const found = claim(paint, rects);
   return found === null ? null : heights[found];
 }
 

@@ -7,6 +7,7 @@
 
 import { LIMITS } from "../../core/limits.js";
 import { screenX, screenY } from "../viewport.js";
+import { claim } from "./claims.js";
 import { circle, isolated, label, pill } from "./paint.js";
 
 /**
@@ -293,7 +294,7 @@ function heightOfWords(paint, robot, length) {
     const [top, bottom] = [y + dy - PADLOCK_PX, y + dy + PADLOCK_PX];
     return { left, right, top, bottom };
   });
-  return heights[places.claim(rects) ?? 0];
+  return heights[claim(paint, rects) ?? 0];
 }
 
 /**

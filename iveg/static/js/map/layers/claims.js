@@ -1,0 +1,81 @@
+/**
+ * Places of words in a frame: the names of aisles, people and bodies stand where they are,
+ * so that whatever else is written gives way to them.
+ *
+ * @typedef {import("./paint.js").Paint} Paint
+ * @typedef {import("../viewport.js").Rect} Rect
+ */
+
+import { screenX, screenY } from "../viewport.js";
+import { laneWords } from "./greenhouse.js";
+
+/** Half a figure, and half the shortest body (px). */
+const FIGURE_PX = 10;
+/** Of a letter's height: how wide it is at most. */
+const LETTER = 0.6;
+
+/** Frames in which the standing signs have their places. */
+const settled = new WeakSet();
+
+/**
+ * Takes the first place that is free.
+ *
+ * @param {Paint} paint
+ * @param {readonly Rect[]} wished the best first
+ * @returns {number | null} which one; null where all are taken
+ */
+export function claim(paint, wished) {
+  const { places } = paint;
+  if (!places) return 0;
+  if (!settled.has(places)) {
+    settled.add(places);
+    for (const rect of standing(paint)) places.claim([rect]);
+  }
+  return places.claim(wished);
+}
+
+/**
+ * Whether a word may stand there; it has the place then.
+ *
+ * @param {Paint} paint
+ * @param {string} text
+ * @param {number} x centre (px)
+ * @param {number} y middle (px)
+ * @param {number} size of its letters (px)
+ */
+export function mayStand(paint, text, x, y, size) {
+  const half = (text.length * size * LETTER) / 2;
+  const rect = {
+    left: x - half,
+    right: x + half,
+    top: y - size / 2,
+    bottom: y + size / 2,
+  };
+  return claim(paint, [rect]) !== null;
+}
+
+/** @param {Paint} paint @returns {Iterable<Rect>} */
+function* standing(paint) {
+  const { scene, view } = paint;
+  for (const { text, size, x, y, isTall } of laneWords(paint)) {
+    const half = (text.length * size * LETTER) / 2;
+    yield isTall ? around(x, y, size / 2, half) : around(x, y, half, size / 2);
+  }
+  for (const { x, y } of scene.people) {
+    yield around(screenX(view, x), screenY(view, y), FIGURE_PX, FIGURE_PX);
+  }
+  for (const { pose, length, width } of scene.robots) {
+    const half = Math.max(FIGURE_PX, (Math.min(length, width) * view.scale) / 2);
+    yield around(screenX(view, pose.x), screenY(view, pose.y), half, half);
+  }
+}
+
+/**
+ * @param {number} x @param {number} y middle (px)
+ * @param {number} across half the width (px)
+ * @param {number} up half the height (px)
+ * @returns {Rect}
+ */
+function around(x, y, across, up) {
+  return { left: x - across, right: x + across, top: y - up, bottom: y + up };
+}

@@ -1,0 +1,33 @@
+import { mayStand } from "../../iveg/static/js/map/layers/claims.js";
+import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
+import { equal, test } from "./harness.js";
+
+/** A frame of 20 × 20 m at 30 px a metre, its south-western corner at 0, 600. */
+const frame = () =>
+  /** @type {import("../../iveg/static/js/map/layers/paint.js").Paint} */ (
+    /** @type {unknown} */ ({
+      view: { scale: 30, x: 10, y: 10, width: 600, height: 600 },
+      labels: { lane: (/** @type {string} */ label) => label },
+      places: createPlaces(),
+      scene: {
+        map: { lanes: [{ label: "Pasillo 1", xmin: 0, ymin: 0, xmax: 2, ymax: 20 }] },
+        people: [{ x: 10, y: 10 }],
+        robots: [{ pose: { x: 15, y: 5, yaw: 0 }, length: 1, width: 0.6 }],
+      },
+    })
+  );
+
+test("13.19: words give way to an aisle's name, to figures and to robots", () => {
+  const paint = frame();
+  const at = (/** @type {number} */ x, /** @type {number} */ y) =>
+    mayStand(paint, "1,4 m", x, y, 11);
+  equal([at(30, 560), at(300, 300), at(450, 450)], [false, false, false]);
+  equal([at(30, 100), at(300, 330), at(450, 500)], [true, true, true]);
+});
+
+test("13.19: of two words at one place the first one is written", () => {
+  const paint = frame();
+  equal(mayStand(paint, "recorrido", 400, 100, 11), true);
+  equal(mayStand(paint, "farmer 75 %", 420, 104, 11), false);
+  equal(mayStand(frame(), "farmer 75 %", 420, 104, 11), true);
+});

@@ -1,0 +1,53 @@
+"""Issue 13.16, 13.20: sentences are in a grower's words, in both languages."""
+
+import re
+
+import pytest
+
+from iveg.web.pages.translations import read_translations
+
+INSIDE = ("docs", "error")
+"""Pages for programmers, and codes of HTTP."""
+
+
+def sentences(language: str) -> dict[str, str]:
+    found = read_translations(language).sentences
+    return {key: text for key, text in found.items() if key.split(".")[0] not in INSIDE}
+
+
+@pytest.mark.parametrize("language", ["es", "en"])
+def test_no_sentence_shows_a_name_from_inside(language: str) -> None:
+    names = re.compile(
+        r"\bULID\b|\bnone\b\W*$|\bnull\b|challenge|\{(?:decision|hold)\}"
+    )
+
+    assert [k for k, text in sentences(language).items() if names.search(text)] == []
+
+
+def test_13_20_in_spanish_the_button_is_parar_and_what_it_does_a_parada() -> None:
+    said = sentences("es").items()
+    stop = [key for key, text in said if re.search(r"\bSTOP\b", text)]
+    verb = [
+        key for key, text in said if re.search(r"\b(?:un|el|los|órdenes) PARAR\b", text)
+    ]
+
+    assert (stop, verb) == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("language", "one", "others"),
+    [
+        ("es", "zona", r"círculo que|\banillo\b"),
+        ("en", "zone", r"\bring\b"),
+        ("es", "simulacro", r"[Pp]rueba de parada"),
+        ("es", "aparato", r"este (?:equipo|dispositivo)|Según el equipo"),
+        ("es", "certeza", r"\bconfianza\b"),
+        ("en", "certainty", r"\bconfidence\b"),
+    ],
+)
+def test_13_20_one_thing_has_one_word(language: str, one: str, others: str) -> None:
+    told = sentences(language).items()
+    known = {key: re.sub(r"\{[^}]*\}", "", text) for key, text in told}
+
+    assert [key for key, text in known.items() if re.search(others, text)] == []
+    assert any(one in text.lower() for text in known.values())
