@@ -17,7 +17,8 @@ from starlette.staticfiles import StaticFiles
 from ulid import ULID
 
 from iveg import __version__
-from iveg.adapters import clock, log_filter
+from iveg.adapters import clock, log_filter, web_push
+from iveg.adapters.contacts import FileContacts
 from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
@@ -26,12 +27,15 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
+from iveg.adapters.mail import MailSender
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
+from iveg.adapters.outside import Outside, is_public_target
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.adapters.transports import MqttTransport, OrionTransport
+from iveg.adapters.webhook import WebhookSender
 from iveg.domain.detection_rule import Rule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
@@ -48,6 +52,7 @@ from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.coverage import Watch
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.restore import remember
 from iveg.pipeline.rules import Rules
 from iveg.settings import Settings
@@ -62,9 +67,11 @@ from iveg.web.api import (
     health,
     history,
     latency,
+    messages,
     metrics,
     robots,
     rule,
+    sign_in_code,
     stop_records,
 )
 from iveg.web.live import socket
@@ -188,6 +195,21 @@ class Dss:
         self.evaluator, self.commander = parts.evaluator, parts.commander
         world = parts.world
         self.rules = Rules(self.evaluator, rule_store, self.event_log, versions)
+        self.outside = Outside()
+        contacts, write = FileContacts(directory / "contacts.jsonl"), messages.writer()
+        self.messenger = Messenger(
+            contacts.load(),
+            contacts,
+            {
+                "push": web_push.PushSender(self.outside, write),
+                "email": MailSender(self.outside, write),
+                "webhook": WebhookSender(self.outside),
+            },
+            self.evaluator.alerts,
+            self.event_log,
+            clock.now,
+        )
+        self.evaluator.alerts.on_raised = self.messenger.offer
         self.provisioner = Provisioner(
             self.orion,
             self.agent,
@@ -241,6 +263,7 @@ class Dss:
             await self.recorder.close()
             await self.orion.close()
             await self.agent.close()
+            self.outside.close()
             self.queries.close()
             self.journal.close()
             self.sessions.close()
@@ -253,6 +276,7 @@ class Dss:
             tasks.create_task(self.watch.run(clock.now), name="coverage")
             tasks.create_task(self.provisioner.run(), name="provisioner")
             tasks.create_task(self.recorder.run(), name="recorder")
+            tasks.create_task(self.messenger.run(), name="messages")
             self.commander.restore(self.journal.read(), clock.now())
             tasks.create_task(self._remember(), name="remember")
 
@@ -300,6 +324,7 @@ class Dss:
         total.update(self.commander.counters)
         total.update(self.recorder.counters)
         total.update(log_filter.counted)
+        total.update(self.messenger.counters)
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
         return total
@@ -416,6 +441,17 @@ def create_app(dss: Dss) -> FastAPI:
     app.include_router(commands.router(dss.commander, clock.now))
     app.include_router(alerts.router(dss.evaluator, clock.now))
     app.include_router(rule.router(dss.rules, clock.now))
+    told_outside = messages.Desk(
+        dss.messenger,
+        web_push.new_key,
+        web_push.public_key,
+        web_push.is_public_key,
+        is_public_target,
+        new_id,
+        clock.now,
+    )
+    app.include_router(messages.router(told_outside))
+    app.include_router(sign_in_code.router(dss.sign_in_token))
     app.include_router(
         history.router(
             dss.queries,

@@ -312,6 +312,8 @@ def describe() -> str:
         "the start with one sentence that names the setting, the value and what is "
         "allowed.",
         "This page is generated: `python -m iveg settings > docs/settings.md`.",
+        "Who is told of alerts by push, mail or webhook is no setting of the start: an "
+        "operator says so on the page Settings.",
         "",
     ]
     for row in fields(Settings):

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import socket
 import sys
 from collections.abc import Coroutine
 from typing import Any, TextIO
@@ -17,6 +18,7 @@ import uvloop
 
 from iveg.settings import Settings
 
+EVERY_ADDRESS = ("0.0.0.0", "::")  # noqa: S104 - told apart, not bound
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -46,8 +48,24 @@ def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
 
 def sign_in_link(settings: Settings, token: str) -> str:
     """The address that signs a browser in."""
-    host = f"[{settings.host}]" if ":" in settings.host else settings.host
+    host = reached_at(settings.host)
+    host = f"[{host}]" if ":" in host else host
     return f"http://{host}:{settings.port}/?token={token}"
+
+
+def reached_at(host: str) -> str:
+    """The address that others reach a server at: of every address, one that routes."""
+    if host not in EVERY_ADDRESS:
+        return host
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    somewhere = "2001:db8::1" if ":" in host else "192.0.2.1"
+    with socket.socket(family, socket.SOCK_DGRAM) as asking:
+        try:
+            # Nothing is sent: the system only chooses the way.
+            asking.connect((somewhere, 9))
+        except OSError:
+            return "localhost"
+        return str(asking.getsockname()[0])
 
 
 def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None:

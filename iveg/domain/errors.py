@@ -8,6 +8,7 @@ IvegError
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
+├── OutsideError            an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
@@ -90,6 +91,18 @@ class ExperimentRefusedError(IvegError):
 
     def __init__(self, why: str) -> None:
         super().__init__(f"No experiment may be started now: {why}.")
+        self.why = why
+
+
+class OutsideError(IvegError):
+    """An address outside iVeg took no message.
+
+    Attributes:
+        why: A stable code that people are shown a sentence for, such as ``not_public``.
+    """
+
+    def __init__(self, why: str) -> None:
+        super().__init__(f"The message was not taken: {why}.")
         self.why = why
 
 

@@ -5,10 +5,37 @@ from typing import cast
 from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
+from iveg.domain.messages import Channel, Delivery
 from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
 from iveg.models.remembered import read_slots, read_stamp
+
+
+class Told(Model):
+    """Somebody who was told outside iVeg, or was to be: ``failed`` says why not."""
+
+    channel: Channel
+    to: str
+    at: str
+    failed: str | None
+
+    @classmethod
+    def of(cls, one: Delivery) -> "Told":
+        """One that is in memory."""
+        at = format_stamp(one.at.wall)
+        return cls(channel=one.channel, to=one.to, at=at, failed=one.failed)
+
+    @classmethod
+    def of_object(cls, one: Json) -> "Told":
+        """One that is remembered."""
+        failed = one.get("failed")
+        return cls(
+            channel=cast("Channel", one.get("channel")),
+            to=str(one.get("to")),
+            at=read_stamp(one.get("at")) or "",
+            failed=None if failed is None else str(failed),
+        )
 
 
 class Occurrence(Model):
@@ -20,6 +47,8 @@ class Occurrence(Model):
     acknowledged_at: str | None
     acknowledged_by: str | None
     note: str | None
+    told: list[Told]
+    """Who was told outside iVeg."""
 
     @classmethod
     def of(cls, one: alert_book.Occurrence) -> "Occurrence":
@@ -31,6 +60,7 @@ class Occurrence(Model):
             acknowledged_at=moment(one.acknowledged),
             acknowledged_by=one.acknowledged_by,
             note=one.note or None,
+            told=[Told.of(told) for told in one.told],
         )
 
     @classmethod
@@ -44,7 +74,14 @@ class Occurrence(Model):
             acknowledged_at=read_stamp(one.get("acknowledged_at")),
             acknowledged_by=None if by is None else str(by),
             note=None if note is None else str(note),
+            told=_told(one),
         )
+
+
+def _told(member: Json) -> list[Told]:
+    found = member.get("told")
+    items = found if isinstance(found, list) else []
+    return [Told.of_object(one) for one in items if isinstance(one, dict)]
 
 
 class Alert(Model):
@@ -63,6 +100,8 @@ class Alert(Model):
     acknowledged_by: str | None
     note: str | None
     count: int
+    told: list[Told]
+    """Who was told of the newest occurrence outside iVeg."""
     members: list[Occurrence]
     """The newest occurrences, oldest first."""
 
@@ -83,12 +122,14 @@ class Alert(Model):
             acknowledged_by=last.acknowledged_by,
             note=last.note or None,
             count=alert.count,
+            told=[Told.of(one) for one in last.told],
             members=[Occurrence.of(one) for one in alert.members],
         )
 
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
+        members = read_objects(record.members)
         return cls(
             alert_id=record.alert_id,
             priority=cast("alert_book.Priority", record.priority),
@@ -102,6 +143,7 @@ class Alert(Model):
             acknowledged_by=record.acknowledged_by,
             note=record.note,
             count=record.count,
+            told=_told(record.members[-1]) if record.members else [],
             members=[Occurrence.of_object(one) for one in record.members],
         )
 

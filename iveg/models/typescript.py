@@ -17,8 +17,10 @@ from iveg.models.command import Drill, FleetPressed, Latency
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
 from iveg.models.latency import HopLatency
+from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
+from iveg.models.signing_in import SignInCode
 from iveg.models.snapshot import Snapshot
 
 TOLD: tuple[type[Model], ...] = (
@@ -35,6 +37,9 @@ TOLD: tuple[type[Model], ...] = (
     AlertListing,
     ClimateReading,
     Reading,
+    Messages,
+    MessageTest,
+    SignInCode,
 )
 """All that a page reads; what they are made of comes with them."""
 _PLAIN = {

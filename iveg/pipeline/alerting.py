@@ -1,10 +1,11 @@
 """Alerts: raised, cleared, acknowledged, logged, and how fast they come."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from iveg.domain.alerts.alert_book import Alert, AlertBook, Condition
 from iveg.domain.alerts.flood import Flood, FloodGauge
 from iveg.domain.events import LogEvent, Slot
+from iveg.domain.messages import Delivery
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
@@ -14,9 +15,14 @@ from iveg.pipeline.publish import Hub
 
 
 class Alerting:
-    """Raises, clears and acknowledges alerts, and records each step."""
+    """Raises, clears and acknowledges alerts, and records each step.
+
+    Attributes:
+        on_raised: Given every alert that is raised; must neither wait nor fail.
+    """
 
     def __init__(self, event_log: EventLog, hub: Hub, new_id: Ids) -> None:
+        self.on_raised: Callable[[Sequence[Alert]], None] = lambda _: None
         self._event_log = event_log
         self._hub = hub
         self._new_id = new_id
@@ -48,7 +54,18 @@ class Alerting:
         for alert in changed:
             self._event_log.alert(alert)
             self._event_log.log(alert_line(alert), now)
-        self._watch_flood(sum(one.cleared is None for one in changed), now)
+        raised = [one for one in changed if one.cleared is None]
+        if raised:
+            self.on_raised(raised)
+        self._watch_flood(len(raised), now)
+
+    def told(
+        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
+    ) -> None:
+        """Write down who was told of an alert outside iVeg."""
+        alert = self._book.told(alert_id, raised, deliveries)
+        if alert is not None:
+            self._event_log.alert(alert)
 
     def acknowledge(
         self, alert_id: str, by: str, note: str, now: Instant

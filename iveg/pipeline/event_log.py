@@ -7,6 +7,7 @@ API and the database agree.
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import asdict, fields, replace
+from typing import Any
 
 from iveg.domain.alerts.alert_book import Alert, Occurrence
 from iveg.domain.decisions import Decision
@@ -276,7 +277,7 @@ def _number(line: LogRecord) -> int:
     return line.id
 
 
-def _member(one: Occurrence) -> dict[str, str | float | None]:
+def _member(one: Occurrence) -> dict[str, Any]:
     return {
         "priority": one.priority,
         "raised_at": one.raised.wall,
@@ -284,4 +285,13 @@ def _member(one: Occurrence) -> dict[str, str | float | None]:
         "acknowledged_at": wall_of(one.acknowledged),
         "acknowledged_by": one.acknowledged_by,
         "note": one.note or None,
+        "told": [
+            {
+                "channel": told.channel,
+                "to": told.to,
+                "at": told.at.wall,
+                "failed": told.failed,
+            }
+            for told in one.told
+        ],
     }

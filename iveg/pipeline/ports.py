@@ -5,6 +5,7 @@ from typing import Literal, Protocol
 
 from iveg.domain.detection_rule import Rule
 from iveg.domain.feedback import Feedback
+from iveg.domain.messages import Contacts, Delivery, Message
 from iveg.domain.observations import Instant
 
 
@@ -87,6 +88,22 @@ class RuleStore(Protocol):
 
     async def append(self, rule: Rule) -> None:
         """Write a new version down; returns when it is on disk. Raises HopError."""
+
+
+class ContactStore(Protocol):
+    """Who is told outside iVeg."""
+
+    async def save(self, contacts: Contacts) -> None:
+        """Put them in the place of those before; returns on disk. Raises HopError."""
+
+
+class Sender(Protocol):
+    """One channel to people who are not before a page."""
+
+    async def send(
+        self, contacts: Contacts, message: Message, now: Instant
+    ) -> Sequence[Delivery]:
+        """Send to each that the channel reaches; says of each what came of it."""
 
 
 class Ids(Protocol):

@@ -17,6 +17,7 @@ from iveg.domain.alerts.alert_book import (
     Priority,
 )
 from iveg.domain.errors import HopError
+from iveg.domain.messages import Delivery
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
     AlertRecord,
@@ -131,7 +132,13 @@ def _occurrence(told: Mapping[str, Any], now: Instant) -> Occurrence:
         None if seen is None else _moment(seen, now),
         told["acknowledged_by"],
         told["note"] or "",
+        tuple(_delivery(one, now) for one in told.get("told", ())),
     )
+
+
+def _delivery(one: Mapping[str, Any], now: Instant) -> Delivery:
+    at = _moment(one["at"], now)
+    return Delivery(one["channel"], one["to"], at, one["failed"])
 
 
 def _moment(wall: float, now: Instant) -> Instant:

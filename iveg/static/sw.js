@@ -1,5 +1,6 @@
 /**
- * The installed page without a connection: one sentence in place of the browser's error.
+ * The installed page without a connection: one sentence in place of the browser's error;
+ * and what the server has people told while no page is open.
  *
  * Navigation fallback and nothing else: API, live line, sign-in and whatever an open page
  * asks for go to the network as if this were not here.  Where the browser can be told so
@@ -48,3 +49,25 @@ self.addEventListener("fetch", (event) => {
   if (!isFallback(event.request)) return;
   event.respondWith(fetch(event.request).catch(() => caches.match(OFFLINE)));
 });
+
+self.addEventListener("push", (event) => {
+  const { title = "iVeg", body = "" } = event.data?.json() ?? {};
+  event.waitUntil(
+    self.registration.showNotification(title, {
+      body,
+      icon: "/static/icons/192.png",
+      requireInteraction: true,
+    }),
+  );
+});
+
+self.addEventListener("notificationclick", (event) => {
+  event.notification.close();
+  event.waitUntil(openAlerts());
+});
+
+/** A page that is open comes forward as it is: somebody may be at its STOP. */
+async function openAlerts() {
+  const pages = await self.clients.matchAll({ type: "window" });
+  return pages.length ? pages[0].focus() : self.clients.openWindow("/alerts");
+}

@@ -41,6 +41,7 @@ function alert(differs = {}) {
     acknowledged_by: null,
     note: null,
     count: 1,
+    told: [],
     members: [],
     ...differs,
   });
@@ -294,6 +295,28 @@ test("whoever reads the occurrences keeps reading while more come", () => {
   ]);
   equal([list.contains(details), details.open], [true, true]);
   equal(details.querySelectorAll("li").length, 3);
+});
+
+test("13.23 an alert says who was told outside the page, and who could not be", () => {
+  const element = document.createElement("ul");
+  const list = createAlertList(element, i18n);
+  const told = [
+    { channel: "email", to: "Ana", at: "2026-11-20T12:00:01Z", failed: null },
+    { channel: "push", to: "", at: "2026-11-20T12:00:02Z", failed: "no_answer" },
+  ];
+  list.draw([alert({ told })]);
+  const facts = element.querySelector("small")?.textContent ?? "";
+  equal(
+    facts
+      .split(" · ")
+      .slice(-2)
+      .map((one) => one.trim()),
+    [
+      "messages.told Ana messages.channel.email 2026-11-20T12:00:01Z",
+      "messages.told_failed messages.everybody messages.channel.push " +
+        "2026-11-20T12:00:02Z messages.why.no_answer",
+    ],
+  );
 });
 
 test("what happened once has nothing to open", () => {

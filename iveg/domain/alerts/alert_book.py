@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from iveg.domain.events import Slot
+from iveg.domain.messages import Delivery, newest
 from iveg.domain.observations import Instant
 
 Priority = Literal["P1", "P2", "P3"]
@@ -40,7 +41,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """One time that a condition held, and its acknowledgement."""
+    """One time that a condition held, who was told of it, and who acknowledged it."""
 
     priority: Priority
     raised: Instant
@@ -48,6 +49,7 @@ class Occurrence:
     acknowledged: Instant | None = None
     acknowledged_by: str | None = None
     note: str = ""
+    told: tuple[Delivery, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,23 @@ class AlertBook:
         if alert is not None:
             alert = _see(alert, by, note, now)
             self._alerts[alert.condition.key, alert.condition.subject] = alert
+        return alert
+
+    def told(
+        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
+    ) -> Alert | None:
+        """Who was told of one occurrence outside iVeg; None when it is forgotten."""
+        alert = self.find(alert_id)
+        if alert is None or all(one.raised != raised for one in alert.members):
+            return None
+        members = tuple(
+            replace(one, told=newest((*one.told, *deliveries)))
+            if one.raised == raised
+            else one
+            for one in alert.members
+        )
+        alert = replace(alert, members=members)
+        self._alerts[alert.condition.key, alert.condition.subject] = alert
         return alert
 
     def remember(self, alerts: Iterable[Alert]) -> None:

@@ -25,6 +25,8 @@ export type Alert = {
   acknowledged_by: string | null;
   note: string | null;
   count: number;
+  /** Who was told of the newest occurrence outside iVeg. */
+  told: Told[];
   /** The newest occurrences, oldest first. */
   members: Occurrence[];
 };
@@ -283,6 +285,21 @@ export type Drill = {
   passed: boolean | null;
   standstill_ms: number | null;
   command: Command;
+};
+
+/** Mail; its password is never told. */
+export type EmailChannel = {
+  on: boolean;
+  server: string;
+  port: number;
+  security: string;
+  user: string;
+  has_password: boolean;
+  sender: string;
+  recipients: Recipient[];
+  least: "P1" | "P2";
+  language: "es" | "en";
+  last: Told[];
 };
 
 /** One experiment, on its way or over. */
@@ -560,6 +577,20 @@ export type MarginParts = {
   uncertainty_m: number;
 };
 
+/** What came of a test, to each. */
+export type MessageTest = {
+  told: Told[];
+};
+
+/** Everybody who is told outside iVeg, and how that goes. */
+export type Messages = {
+  push: PushChannel;
+  email: EmailChannel;
+  webhook: WebhookChannel;
+  /** ``sent.email`` and so on, since the start. */
+  counts: Record<string, number>;
+};
+
 /** The robot's intent, in ``map`` (m). */
 export type Navigation = {
   task: string;
@@ -603,6 +634,8 @@ export type Occurrence = {
   acknowledged_at: string | null;
   acknowledged_by: string | null;
   note: string | null;
+  /** Who was told outside iVeg. */
+  told: Told[];
 };
 
 /** A person, or a robot that is none of the fleet. */
@@ -674,12 +707,36 @@ export type Profile = {
   turning_radius: number;
 };
 
+/** Web push; ``public_key`` is null until it was on once. */
+export type PushChannel = {
+  on: boolean;
+  contact: string;
+  public_key: string | null;
+  devices: PushDevice[];
+  /** What came of the newest message, to each. */
+  last: Told[];
+};
+
+/** One browser that is told. */
+export type PushDevice = {
+  device_id: string;
+  who: string;
+  language: "es" | "en";
+  since: string;
+};
+
 /** One reading: the sensor's own fields by name. */
 export type Reading = {
   at: string;
   robot_id: string;
   kind: string;
   value: Record<string, JsonValue>;
+};
+
+/** Somebody with an address. */
+export type Recipient = {
+  who: string;
+  address: string;
 };
 
 /** One robot with the age of what is said of it. */
@@ -782,6 +839,14 @@ export type Server = {
   wall: number;
 };
 
+/** The sign-in link, and its QR code as a data address of an image. */
+export type SignInCode = {
+  link: string;
+  image: string;
+  /** The address works on the server's own computer alone. */
+  local: boolean;
+};
+
 /** The first frame of ``/live``. */
 export type Snapshot = {
   t: string;
@@ -811,6 +876,14 @@ export type SpeedLimit = {
   decision_id: string | null;
 };
 
+/** Somebody who was told outside iVeg, or was to be: ``failed`` says why not. */
+export type Told = {
+  channel: "push" | "email" | "webhook";
+  to: string;
+  at: string;
+  failed: string | null;
+};
+
 /** Speed (m/s) and turn rate (rad/s). */
 export type Twist = {
   linear: number;
@@ -821,6 +894,15 @@ export type Twist = {
 export type User = {
   name: string;
   role: string;
+};
+
+/** The address is a secret: only its host is told, null where there is none. */
+export type WebhookChannel = {
+  on: boolean;
+  who: string;
+  host: string | null;
+  least: "P1" | "P2";
+  last: Told[];
 };
 
 /** The least margin of today, when it was, and of how many looks. */

@@ -10,12 +10,16 @@ import httpx
 import uvicorn
 from fastapi import FastAPI
 
+from iveg.adapters import web_push
+from iveg.adapters.outside import is_public_target
+from iveg.domain.messages import CHANNELS, Contacts
 from iveg.domain.observations import Instant
 from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.rules import Rules
 from iveg.web import notifications, problems
 from iveg.web.api import (
@@ -24,6 +28,7 @@ from iveg.web.api import (
     costmap,
     health,
     latency,
+    messages,
     metrics,
     robots,
     rule,
@@ -39,6 +44,7 @@ from iveg.web.security.authentication import (
     Role,
 )
 from iveg.web.views import Views
+from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.rule_store import FakeRuleStore
 from tests.unit.pipeline.desk import Desk
 
@@ -63,6 +69,16 @@ class WebDesk(Desk):
         self.mapper = Mapper(self.world, self.evaluator.greenhouse.bounds)
         self.rule_store = FakeRuleStore()
         self.rules = Rules(self.evaluator, self.rule_store, self.event_log, [])
+        self.contact_store = FakeContacts()
+        self.senders = {name: FakeSender(name) for name in CHANNELS}
+        self.messenger = Messenger(
+            Contacts(),
+            self.contact_store,
+            {**self.senders},
+            self.evaluator.alerts,
+            self.event_log,
+            self.clock,
+        )
         self.views = Views(
             self.evaluator,
             self.commander,
@@ -105,6 +121,17 @@ class WebDesk(Desk):
             commands.router(self.commander, self.clock),
             alerts.router(self.evaluator, self.clock),
             rule.router(self.rules, self.clock),
+            messages.router(
+                messages.Desk(
+                    self.messenger,
+                    web_push.new_key,
+                    web_push.public_key,
+                    web_push.is_public_key,
+                    is_public_target,
+                    self.ids,
+                    self.clock,
+                )
+            ),
             health.router(self.clock, self.views.health),
             latency.router(self.latency.watch, self.clock),
             metrics.router(

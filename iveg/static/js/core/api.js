@@ -16,7 +16,7 @@ export function readApi(path) {
 /**
  * Sends JSON with the sign by which the server tells its own page from others.
  *
- * @param {"POST" | "PUT"} method
+ * @param {"POST" | "PUT" | "DELETE"} method
  * @param {string} path
  * @param {unknown} body
  * @returns {Promise<Answer>}

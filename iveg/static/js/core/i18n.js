@@ -23,7 +23,7 @@ const LOCALES = { es: "es-ES", en: "en-GB" };
 const TIME_ZONE = "Europe/Madrid";
 const COOKIE = "iveg_language";
 const CHANGED = "iveg:language";
-const TRANSLATED = ["aria-label", "title", "placeholder"];
+const TRANSLATED = ["aria-label", "title", "placeholder", "alt"];
 const NOTHING = "—";
 
 /**

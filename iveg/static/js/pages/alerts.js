@@ -7,6 +7,7 @@ import { createMembers, floodSaid } from "../panels/alert_members.js";
 import { earlierUnknown, isKnown } from "../panels/alerts.js";
 import { make, need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
+import { toldSaid } from "../panels/told.js";
 import { dayAndTime } from "./history/local_time.js";
 import { createChips, createRows, soon } from "./rows.js";
 
@@ -96,6 +97,8 @@ function whatOf(alert, i18n, opened) {
     else opened.delete(alert.alert_id);
   });
   cell.append(element);
+  const told = toldSaid(alert.told, i18n);
+  if (told) cell.append(make("p", "block__note", told));
   return cell;
 }
 

@@ -7,7 +7,9 @@ import { need, setHidden, setText } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { createClassForm } from "./classes.js";
 import { createGuard } from "./guard.js";
+import { createMessagesForm } from "./messages.js";
 import { createRuleForm } from "./rule.js";
+import { createSignInCode } from "./sign_in_code.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
 
@@ -21,9 +23,11 @@ export function start({ store, i18n, tone, wake, installing }) {
     createRuleForm(store, i18n, guard),
     createClassForm(store, i18n, guard),
   ];
+  const messages = createMessagesForm(i18n);
+  createSignInCode(i18n);
   addEventListener("beforeunload", (event) => {
     // The browser asks, in its own words, before what was typed is lost.
-    if (forms.some((form) => form.isDirty())) event.preventDefault();
+    if ([...forms, messages].some((form) => form.isDirty())) event.preventDefault();
   });
 
   function draw() {

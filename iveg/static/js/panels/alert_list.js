@@ -8,6 +8,7 @@
 import { sendApi } from "../core/api.js";
 import { createMembers } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
+import { toldSaid } from "./told.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -142,6 +143,7 @@ function factsOf(alert, i18n) {
         at: alert.acknowledged_at,
       }),
     alert.note,
+    toldSaid(alert.told, i18n),
   ]
     .filter(Boolean)
     .join(" · ");

@@ -3,6 +3,7 @@
  */
 
 import { make, setHidden, setText } from "./dom.js";
+import { toldSaid } from "./told.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 /** @typedef {import("../core/protocol.js").Occurrence} Occurrence */
@@ -44,6 +45,7 @@ function lineOf(member, i18n) {
         at: acknowledged_at,
       }),
     note,
+    toldSaid(member.told, i18n),
   ]
     .filter(Boolean)
     .join(" · ");

@@ -214,6 +214,7 @@ async def test_alerts_and_log_read_as_their_live_topics_do(
         "acknowledged_by": None,
         "note": None,
         "count": 1,
+        "told": [],
         "members": [
             {
                 "priority": "P2",
@@ -222,6 +223,7 @@ async def test_alerts_and_log_read_as_their_live_topics_do(
                 "acknowledged_at": None,
                 "acknowledged_by": "ana",
                 "note": None,
+                "told": [],
             }
         ],
     }

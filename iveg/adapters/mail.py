@@ -1,0 +1,108 @@
+"""Messages as mail: one connection a message, a letter each, always encrypted."""
+
+import asyncio
+import ssl
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from email.message import EmailMessage
+from email.utils import format_datetime, make_msgid
+
+import aiosmtplib
+
+from iveg.adapters.outside import Outside
+from iveg.domain.errors import OutsideError
+from iveg.domain.messages import (
+    Contacts,
+    Delivery,
+    Email,
+    Language,
+    Message,
+    Recipient,
+    Text,
+)
+from iveg.domain.observations import Instant
+
+Write = Callable[[Message, Language], Text]
+
+
+class MailSender:
+    """Sends by the server of the settings.
+
+    Args:
+        outside: The way there.
+        write: The message in words.
+    """
+
+    def __init__(self, outside: Outside, write: Write) -> None:
+        self._outside = outside
+        self._write = write
+
+    async def send(
+        self, contacts: Contacts, message: Message, now: Instant
+    ) -> Sequence[Delivery]:
+        """A letter to each recipient, where a server is known."""
+        email = contacts.email
+        if not email.server or not email.recipients:
+            return []
+        text = self._write(message, email.language)
+        try:
+            async with asyncio.timeout(self._outside.timeout_s):
+                return await self._send(email, text, now)
+        except TimeoutError:
+            why = "no_answer"
+        except (OutsideError, aiosmtplib.SMTPException, OSError) as error:
+            why = _why(error)
+        return [Delivery("email", one.who, now, why) for one in email.recipients]
+
+    async def _send(self, email: Email, text: Text, now: Instant) -> list[Delivery]:
+        connection = await self._outside.connect(email.server, email.port)
+        own = connection.getsockname()[0]
+        client = aiosmtplib.SMTP(
+            hostname=email.server,
+            sock=connection,
+            # Its own question for this machine's name would wait for a name server.
+            local_hostname=f"[IPv6:{own}]" if ":" in own else f"[{own}]",
+            use_tls=email.security == "tls",
+            start_tls=email.security == "starttls",
+            tls_context=await self._outside.tls(),
+            username=email.user or None,
+            password=email.password or None,
+            timeout=self._outside.timeout_s,
+        )
+        async with client:
+            return [
+                await _letter(client, email, one, text, now) for one in email.recipients
+            ]
+
+
+async def _letter(
+    client: aiosmtplib.SMTP, email: Email, to: Recipient, text: Text, now: Instant
+) -> Delivery:
+    letter = EmailMessage()
+    letter["From"], letter["To"] = email.sender, to.address
+    letter["Subject"] = text.title
+    letter["Date"] = format_datetime(datetime.fromtimestamp(now.wall, UTC))
+    letter["Message-ID"] = make_msgid(domain=email.sender.rpartition("@")[2])
+    # Absent people's machines are not to answer it (RFC 3834).
+    letter["Auto-Submitted"] = "auto-generated"
+    letter.set_content(text.body)
+    try:
+        await client.send_message(letter)
+    except aiosmtplib.SMTPResponseException as error:
+        return Delivery("email", to.who, now, _why(error))
+    except aiosmtplib.SMTPRecipientsRefused:
+        return Delivery("email", to.who, now, "refused")
+    return Delivery("email", to.who, now)
+
+
+def _why(error: Exception) -> str:
+    match error:
+        case OutsideError():
+            return error.why
+        case aiosmtplib.SMTPAuthenticationError():
+            return "sign_in"
+        case ssl.SSLCertVerificationError():
+            return "certificate"
+        case aiosmtplib.SMTPResponseException() | aiosmtplib.SMTPRecipientsRefused():
+            return "refused"
+    return "certificate" if "certificate" in str(error).lower() else "no_answer"

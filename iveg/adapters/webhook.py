@@ -1,0 +1,53 @@
+"""Messages as JSON to an https address (docs/interfaces/http.md, "Messages")."""
+
+from collections.abc import Sequence
+
+import orjson
+
+from iveg.adapters.outside import Outside
+from iveg.domain.errors import OutsideError
+from iveg.domain.messages import Contacts, Delivery, Message
+from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
+
+_HEADERS = {"Content-Type": "application/json", "User-Agent": "iVeg"}
+
+
+class WebhookSender:
+    """Posts each message once."""
+
+    def __init__(self, outside: Outside) -> None:
+        self._outside = outside
+
+    async def send(
+        self, contacts: Contacts, message: Message, now: Instant
+    ) -> Sequence[Delivery]:
+        """Post to the address, where there is one."""
+        hook = contacts.webhook
+        if not hook.url:
+            return []
+        body = orjson.dumps(body_of(message, now))
+        try:
+            status = await self._outside.post(hook.url, body, _HEADERS)
+        except OutsideError as error:
+            return [Delivery("webhook", hook.who, now, error.why)]
+        failed = None if 200 <= status < 300 else "refused"
+        return [Delivery("webhook", hook.who, now, failed)]
+
+
+def body_of(message: Message, now: Instant) -> dict[str, object]:
+    """What a program is told: how grave, of which kind, since when; no more."""
+    return {
+        "iveg": "test" if message.is_test else "alert",
+        "sent_at": format_stamp(now.wall),
+        "priority": None if message.is_test else message.priority,
+        "alerts": [
+            {
+                "alert_id": one.alert_id,
+                "priority": one.priority,
+                "key": one.key,
+                "raised_at": format_stamp(one.raised.wall),
+            }
+            for one in message.items
+        ],
+    }

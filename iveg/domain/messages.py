@@ -1,0 +1,176 @@
+"""Messages to people who are not before a page: to whom, how, and what came of it.
+
+A message says how grave it is and when, never where or about whom: it passes through
+other people's servers (docs/interfaces/http.md, "Messages").
+"""
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+from iveg.domain.observations import Instant
+
+Channel = Literal["push", "email", "webhook"]
+Language = Literal["es", "en"]
+Level = Literal["P1", "P2"]
+Priority = Literal["P1", "P2", "P3"]
+
+CHANNELS: Final[tuple[Channel, ...]] = ("push", "email", "webhook")
+MOST_DEVICES = 20
+MOST_RECIPIENTS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Recipient:
+    """Somebody with an address; ``who`` is what other people are shown."""
+
+    who: str
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class Email:
+    """Mail through somebody's server, always encrypted.
+
+    Attributes:
+        security: ``tls`` from the first byte, or ``starttls`` after a greeting.
+        least: The least priority that is told.
+    """
+
+    on: bool = False
+    server: str = ""
+    port: int = 465
+    security: Literal["tls", "starttls"] = "tls"
+    user: str = ""
+    password: str = field(default="", repr=False)
+    sender: str = ""
+    recipients: tuple[Recipient, ...] = ()
+    least: Level = "P1"
+    language: Language = "es"
+
+
+@dataclass(frozen=True, slots=True)
+class Webhook:
+    """An https address that takes JSON; the address itself is the secret."""
+
+    on: bool = False
+    who: str = ""
+    url: str = field(default="", repr=False)
+    least: Level = "P1"
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One browser that asked to be told (Push API, ``PushSubscription``).
+
+    Attributes:
+        p256dh: Its public key, ``auth`` its secret, both base64url.
+        since: When it asked (Unix s).
+    """
+
+    device_id: str
+    who: str
+    endpoint: str = field(repr=False)
+    p256dh: str = field(repr=False)
+    auth: str = field(repr=False)
+    language: Language
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Web push, for P1 alone.
+
+    Attributes:
+        contact: Address at which push services find whoever runs this server.
+        key: iVeg's private key (P-256), base64url; empty before the first use.
+    """
+
+    on: bool = False
+    contact: str = ""
+    devices: tuple[Device, ...] = ()
+    key: str = field(default="", repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """Everybody who is told outside the pages; nobody at first."""
+
+    push: Push = Push()
+    email: Email = Email()
+    webhook: Webhook = Webhook()
+
+    def wants(self, channel: Channel, priority: Priority) -> bool:
+        """Whether a channel is on and is told of this priority."""
+        if channel == "push":
+            return self.push.on and priority == "P1"
+        chosen = self.email if channel == "email" else self.webhook
+        return chosen.on and priority <= chosen.least
+
+    def without(self, device_ids: Container[str]) -> "Contacts":
+        """The same, but for these devices."""
+        devices = tuple(
+            one for one in self.push.devices if one.device_id not in device_ids
+        )
+        return replace(self, push=replace(self.push, devices=devices))
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One occurrence of one alert, in a message.
+
+    Attributes:
+        tries: How often it was sent to nobody's reach.
+    """
+
+    alert_id: str
+    priority: Priority
+    key: str
+    raised: Instant
+    tries: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """What people are told at once; no items: a test."""
+
+    items: Sequence[Item] = ()
+
+    @property
+    def is_test(self) -> bool:
+        """Whether somebody only tries the channel."""
+        return not self.items
+
+    @property
+    def priority(self) -> Priority:
+        """The gravest of them."""
+        return min((one.priority for one in self.items), default="P3")
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A message in one language."""
+
+    title: str
+    body: str
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """What became of a message to one person or device.
+
+    Attributes:
+        failed: None where it was taken, else why not, as a code.
+        device_id: Of a push.
+    """
+
+    channel: Channel
+    to: str
+    at: Instant
+    failed: str | None = None
+    device_id: str | None = None
+
+
+def newest(deliveries: Sequence[Delivery]) -> tuple[Delivery, ...]:
+    """The last word on each person and channel, in the order of the first ones."""
+    return tuple({(one.channel, one.to): one for one in deliveries}.values())

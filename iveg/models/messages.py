@@ -1,0 +1,146 @@
+"""Who is told outside iVeg, as an operator reads it: no password and no key."""
+
+from collections.abc import Mapping, Sequence
+from urllib.parse import urlsplit
+
+from iveg.domain import messages
+from iveg.domain.messages import Channel, Contacts, Delivery
+from iveg.domain.stamps import format_stamp
+from iveg.models.alert import Told
+from iveg.models.base import Model
+
+
+class PushDevice(Model):
+    """One browser that is told."""
+
+    device_id: str
+    who: str
+    language: messages.Language
+    since: str
+
+
+class PushChannel(Model):
+    """Web push; ``public_key`` is null until it was on once."""
+
+    on: bool
+    contact: str
+    public_key: str | None
+    devices: list[PushDevice]
+    last: list[Told]
+    """What came of the newest message, to each."""
+
+
+class Recipient(Model):
+    """Somebody with an address."""
+
+    who: str
+    address: str
+
+
+class EmailChannel(Model):
+    """Mail; its password is never told."""
+
+    on: bool
+    server: str
+    port: int
+    security: str
+    user: str
+    has_password: bool
+    sender: str
+    recipients: list[Recipient]
+    least: messages.Level
+    language: messages.Language
+    last: list[Told]
+
+
+class WebhookChannel(Model):
+    """The address is a secret: only its host is told, null where there is none."""
+
+    on: bool
+    who: str
+    host: str | None
+    least: messages.Level
+    last: list[Told]
+
+
+class Messages(Model):
+    """Everybody who is told outside iVeg, and how that goes."""
+
+    push: PushChannel
+    email: EmailChannel
+    webhook: WebhookChannel
+    counts: dict[str, int]
+    """``sent.email`` and so on, since the start."""
+
+    @classmethod
+    def of(
+        cls,
+        contacts: Contacts,
+        public_key: str | None,
+        last: Mapping[Channel, Sequence[Delivery]],
+        counts: Mapping[str, int],
+    ) -> "Messages":
+        """As it stands."""
+        told = {
+            channel: [Told.of(one) for one in last.get(channel, ())]
+            for channel in messages.CHANNELS
+        }
+        return cls(
+            push=_push(contacts.push, public_key, told["push"]),
+            email=_email(contacts.email, told["email"]),
+            webhook=_webhook(contacts.webhook, told["webhook"]),
+            counts={
+                name.removeprefix("messages."): n for name, n in sorted(counts.items())
+            },
+        )
+
+
+class MessageTest(Model):
+    """What came of a test, to each."""
+
+    told: list[Told]
+
+
+def _push(push: messages.Push, public_key: str | None, last: list[Told]) -> PushChannel:
+    devices = [
+        PushDevice(
+            device_id=one.device_id,
+            who=one.who,
+            language=one.language,
+            since=format_stamp(one.since),
+        )
+        for one in push.devices
+    ]
+    return PushChannel(
+        on=push.on,
+        contact=push.contact,
+        public_key=public_key,
+        devices=devices,
+        last=last,
+    )
+
+
+def _email(email: messages.Email, last: list[Told]) -> EmailChannel:
+    recipients = [
+        Recipient(who=one.who, address=one.address) for one in email.recipients
+    ]
+    return EmailChannel(
+        on=email.on,
+        server=email.server,
+        port=email.port,
+        security=email.security,
+        user=email.user,
+        has_password=bool(email.password),
+        sender=email.sender,
+        recipients=recipients,
+        least=email.least,
+        language=email.language,
+        last=last,
+    )
+
+
+def _webhook(hook: messages.Webhook, last: list[Told]) -> WebhookChannel:
+    host = urlsplit(hook.url).hostname if hook.url else None
+    return WebhookChannel(
+        on=hook.on, who=hook.who, host=host, least=hook.least, last=last
+    )

@@ -1,0 +1,12 @@
+"""The way in for another device."""
+
+from iveg.models.base import Model
+
+
+class SignInCode(Model):
+    """The sign-in link, and its QR code as a data address of an image."""
+
+    link: str
+    image: str
+    local: bool
+    """The address works on the server's own computer alone."""

@@ -1,0 +1,179 @@
+"""Tells people outside iVeg of alerts: beside everything, in the way of nothing.
+
+``offer`` is called where alerts are raised and only fills a bounded queue; each channel
+has a task of its own that waits, sends, and rests::
+
+    raised ──> queue of the channel ──> everything that waits, as one message ──> rest
+                    ^                                  │ nobody was reached, twice more
+                    └──────────────────────────────────┘
+
+What fails is counted and shown, beside the alert and on the Settings page.
+"""
+
+import asyncio
+import contextlib
+import logging
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+from iveg.domain.alerts.alert_book import Alert
+from iveg.domain.errors import HopError
+from iveg.domain.events import LogEvent
+from iveg.domain.messages import (
+    CHANNELS,
+    Channel,
+    Contacts,
+    Delivery,
+    Item,
+    Message,
+)
+from iveg.domain.observations import Instant
+from iveg.pipeline.event_log import EventLog
+from iveg.pipeline.ports import Clock, ContactStore, Sender
+
+_log = logging.getLogger(__name__)
+
+MOST_WAITING = 100
+"""Alerts that wait for one channel; the oldest gives way and is counted."""
+REST_S = 30.0
+"""Between two messages of one channel: a flood of alerts is two messages a minute."""
+TRIES = 3
+LIMIT_S = 15.0
+"""For one message to everybody of a channel, however slowly a server answers."""
+
+
+class Told(Protocol):
+    """Who keeps what came of a message: the alerts."""
+
+    def told(
+        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
+    ) -> None:
+        """Write it down beside one occurrence."""
+
+
+class Messenger:
+    """Everybody who is told outside iVeg, and the messages on their way.
+
+    Attributes:
+        contacts: Whom, as an operator wants it.
+        last: What came of the newest message of each channel.
+        counters: Sent, failed and dropped.
+    """
+
+    def __init__(
+        self,
+        contacts: Contacts,
+        store: ContactStore,
+        senders: Mapping[Channel, Sender],
+        told: Told,
+        event_log: EventLog,
+        clock: Clock,
+        rest_s: float = REST_S,
+        limit_s: float = LIMIT_S,
+    ) -> None:
+        self.contacts = contacts
+        self.last: dict[Channel, Sequence[Delivery]] = {}
+        self.counters: Counter[str] = Counter()
+        self._store = store
+        self._senders = senders
+        self._told = told
+        self._event_log = event_log
+        self._clock = clock
+        self._rest_s = rest_s
+        self._limit_s = limit_s
+        self._changing = asyncio.Lock()
+        self._waiting: dict[Channel, deque[Item]] = {name: deque() for name in CHANNELS}
+        self._arrived = {name: asyncio.Event() for name in CHANNELS}
+
+    def offer(self, raised: Iterable[Alert]) -> None:
+        """Have people told of alerts that were raised; returns at once."""
+        for alert in raised:
+            last, key = alert.last, alert.condition.key
+            item = Item(alert.alert_id, last.priority, key, last.raised)
+            for channel in CHANNELS:
+                if self.contacts.wants(channel, item.priority):
+                    self._wait(channel, item)
+
+    async def run(self) -> None:
+        """Send for ever, each channel by itself."""
+        async with asyncio.TaskGroup() as tasks:
+            for channel in CHANNELS:
+                tasks.create_task(self._serve(channel), name=f"message-{channel}")
+
+    async def test(self, channel: Channel) -> Sequence[Delivery]:
+        """Try a channel now, whether or not it is on."""
+        return await self._send(channel, Message())
+
+    async def change(
+        self, update: Callable[[Contacts], Contacts], channel: Channel, by: str
+    ) -> None:
+        """Tell others, or otherwise, from now on.
+
+        Raises:
+            HopError: it could not be written down; all stays as it was.
+        """
+        await self._change(update)
+        line = LogEvent("system", f"log.messages_changed.{channel}", {"by": by})
+        self._event_log.log(line, self._clock())
+
+    async def _change(self, update: Callable[[Contacts], Contacts]) -> None:
+        async with self._changing:
+            changed = update(self.contacts)
+            await self._store.save(changed)
+            self.contacts = changed
+
+    def _wait(self, channel: Channel, item: Item) -> None:
+        waiting = self._waiting[channel]
+        if len(waiting) == MOST_WAITING:
+            waiting.popleft()
+            self.counters["messages.dropped"] += 1
+        waiting.append(item)
+        self._arrived[channel].set()
+
+    async def _serve(self, channel: Channel) -> None:
+        while True:
+            await self._arrived[channel].wait()
+            items = tuple(self._waiting[channel])
+            self._waiting[channel].clear()
+            self._arrived[channel].clear()
+            try:
+                await self._deliver(channel, items)
+            except Exception:
+                # A message must never end what supervises robots.
+                _log.exception("what came of a message by %s is not known", channel)
+            await asyncio.sleep(self._rest_s)
+
+    async def _deliver(self, channel: Channel, items: Sequence[Item]) -> None:
+        deliveries = await self._send(channel, Message(items))
+        for item in items:
+            self._told.told(item.alert_id, item.raised, deliveries)
+        if deliveries and all(one.failed for one in deliveries):
+            for item in items:
+                if item.tries + 1 < TRIES:
+                    self._wait(channel, replace(item, tries=item.tries + 1))
+
+    async def _send(self, channel: Channel, message: Message) -> Sequence[Delivery]:
+        now, sender = self._clock(), self._senders[channel]
+        try:
+            async with asyncio.timeout(self._limit_s):
+                deliveries = await sender.send(self.contacts, message, now)
+        except TimeoutError:
+            deliveries = [Delivery(channel, "", now, "no_answer")]
+        except Exception:
+            _log.exception("a message by %s failed", channel)
+            deliveries = [Delivery(channel, "", now, "internal")]
+        self.last[channel] = deliveries
+        for one in deliveries:
+            outcome = "failed" if one.failed else "sent"
+            self.counters[f"messages.{outcome}.{channel}"] += 1
+        await self._forget_gone(deliveries)
+        return deliveries
+
+    async def _forget_gone(self, deliveries: Sequence[Delivery]) -> None:
+        """A browser that its push service no longer knows has left."""
+        gone = {one.device_id or "" for one in deliveries if one.failed == "gone"}
+        if gone:
+            with contextlib.suppress(HopError):
+                await self._change(lambda contacts: contacts.without(gone))

@@ -1,0 +1,34 @@
+/**
+ * Asking this browser for a subscription to push messages (Push API).
+ */
+
+/** @returns {"ready" | "insecure" | "denied"} */
+export function pushState() {
+  if (!isSecureContext || !navigator.serviceWorker || !("PushManager" in window)) {
+    return "insecure";
+  }
+  return Notification.permission === "denied" ? "denied" : "ready";
+}
+
+/**
+ * @param {string} key this server's public key, base64url
+ * @returns {Promise<PushSubscription | null>} null where the browser or person refuses
+ */
+export async function subscribe(key) {
+  if ((await Notification.requestPermission()) !== "granted") return null;
+  const { pushManager } = await navigator.serviceWorker.ready;
+  try {
+    return await pushManager.subscribe({
+      userVisibleOnly: true,
+      applicationServerKey: bytesOf(key),
+    });
+  } catch {
+    return null;
+  }
+}
+
+/** @param {string} text base64url */
+export function bytesOf(text) {
+  const plain = text.replaceAll("-", "+").replaceAll("_", "/");
+  return Uint8Array.from(atob(plain), (letter) => letter.charCodeAt(0));
+}

@@ -1,0 +1,338 @@
+"""Who is told outside iVeg, over HTTP: an operator reads, changes and tries it.
+
+What goes in as a secret never comes out: a password, the address of a webhook and the
+keys of browsers are written, replaced, and told to nobody.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from iveg.domain import messages
+from iveg.domain.messages import Channel, Contacts, Language, Level, Message, Text
+from iveg.domain.observations import Instant
+from iveg.models.alert import Told
+from iveg.models.messages import Messages, MessageTest
+from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.messenger import Messenger
+from iveg.web.api.answers import Json
+from iveg.web.pages.sentences import Sentences
+from iveg.web.pages.translations import LANGUAGES, read_translations
+from iveg.web.problems import Problem
+from iveg.web.security.authentication import Principal, require
+
+TEST_REST_S = 5.0
+"""Between two tests: nobody sends mail or looks for servers with them."""
+
+
+def _clean(who: str) -> str:
+    cleaned = clean_text(who).strip()
+    if not cleaned:
+        raise ValueError("who must not be empty")
+    return cleaned
+
+
+_ADDRESS = r"^[^\s@<>\"',;:()\\]{1,64}@[A-Za-z0-9.-]{1,190}$"
+_HOST = r"^[A-Za-z0-9.-]{1,253}$"
+_PORTS = Literal[25, 465, 587, 2525]
+_URL = Annotated[str, Field(max_length=1024, pattern=r"^https://[!-~]+$")]
+_Who = Annotated[str, Field(min_length=1, max_length=40), AfterValidator(_clean)]
+_Address = Annotated[str, Field(pattern=_ADDRESS)]
+_Secret = Annotated[str, Field(max_length=256)]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+
+class RecipientBody(_Body):
+    """Somebody with an address."""
+
+    who: _Who
+    address: _Address
+
+
+class EmailBody(_Body):
+    """The whole of it; `password` null keeps the one that is there.
+
+    It has to be typed anew where server, port or user are others: nobody reads it by
+    having it sent to a server of their own.
+    """
+
+    on: bool
+    server: Annotated[str, Field(pattern=_HOST)]
+    port: _PORTS
+    security: Literal["tls", "starttls"]
+    user: Annotated[str, Field(max_length=128)] = ""
+    password: _Secret | None = None
+    sender: _Address
+    recipients: Annotated[
+        list[RecipientBody],
+        Field(min_length=1, max_length=messages.MOST_RECIPIENTS),
+    ]
+    least: Level = "P1"
+    language: Language = "es"
+
+    def applied_to(self, before: messages.Email) -> messages.Email | None:
+        """What it makes of the settings; None where a password is missing."""
+        password = before.password if self.password is None else self.password
+        if self.password is None and password and self._goes_elsewhere(before):
+            return None
+        return messages.Email(
+            on=self.on,
+            server=self.server.lower(),
+            port=self.port,
+            security=self.security,
+            user=self.user,
+            password=password,
+            sender=self.sender,
+            recipients=tuple(
+                messages.Recipient(one.who, one.address) for one in self.recipients
+            ),
+            least=self.least,
+            language=self.language,
+        )
+
+    def _goes_elsewhere(self, before: messages.Email) -> bool:
+        now = self.server.lower(), self.port, self.security, self.user
+        return now != (before.server, before.port, before.security, before.user)
+
+
+class WebhookBody(_Body):
+    """The whole of it; `url` null keeps the one that is there."""
+
+    on: bool
+    who: _Who
+    url: _URL | None = None
+    least: Level = "P1"
+
+    def applied_to(self, before: messages.Webhook) -> messages.Webhook:
+        """What it makes of the settings."""
+        url = before.url if self.url is None else self.url
+        return messages.Webhook(self.on, self.who, url, self.least)
+
+
+class PushBody(_Body):
+    """`contact`: where push services find whoever runs this server."""
+
+    on: bool
+    contact: _Address
+
+
+class KeysBody(_Body):
+    """As `PushSubscription.toJSON` writes them."""
+
+    p256dh: Annotated[str, Field(max_length=128)]
+    auth: Annotated[str, Field(min_length=20, max_length=32)]
+
+
+class DeviceBody(_Body):
+    """A browser that asks to be told."""
+
+    who: _Who
+    endpoint: _URL
+    keys: KeysBody
+    language: Language
+
+    def device(self, device_id: str, since: float) -> messages.Device:
+        """The browser under a name of its own."""
+        return messages.Device(
+            device_id,
+            self.who,
+            self.endpoint,
+            self.keys.p256dh,
+            self.keys.auth,
+            self.language,
+            since,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """What the routes are made of.
+
+    Attributes:
+        messenger: Who keeps and tells people.
+        new_key: Makes this server's key; ``public_key`` is what browsers are told.
+        is_key: Whether a browser's key is one (these three: ``adapters.web_push``).
+        is_reachable: Whether an https address may be used at all, by its looks.
+        new_id: Names a device.
+        clock: The time.
+    """
+
+    messenger: Messenger
+    new_key: Callable[[], str]
+    public_key: Callable[[str], str]
+    is_key: Callable[[str], bool]
+    is_reachable: Callable[[str], bool]
+    new_id: Callable[[], str]
+    clock: Callable[[], Instant]
+
+    @property
+    def contacts(self) -> Contacts:
+        """Everybody as of now."""
+        return self.messenger.contacts
+
+    def answer(self) -> Response:
+        """All of it, as operators read it."""
+        key = self.contacts.push.key
+        public = self.public_key(key) if key else None
+        last, counts = self.messenger.last, self.messenger.counters
+        return Json(Messages.of(self.contacts, public, last, counts))
+
+    async def change(
+        self, channel: Channel, who: Principal, update: Callable[[Contacts], Contacts]
+    ) -> Response:
+        """On disk, in force, in the log."""
+        await self.messenger.change(update, channel, who.name)
+        return self.answer()
+
+    def refusal(self, body: DeviceBody) -> str:
+        """Why a browser cannot be told; empty where it can."""
+        push = self.contacts.push
+        if not push.key:
+            return "Web push was never on here."
+        if len(_others(push, body.endpoint)) >= messages.MOST_DEVICES:
+            return "There are as many devices as can be told."
+        if not self.is_key(body.keys.p256dh) or not self.is_reachable(body.endpoint):
+            return "That is no subscription of a public push service."
+        return ""
+
+
+_Operator = Annotated[Principal, Depends(require("release"))]
+
+
+def router(desk: Desk) -> APIRouter:
+    """Operators alone: here are people's addresses."""
+    routes = APIRouter(prefix="/api/v1/messages", tags=["messages"])
+    tests = _Tests(desk.messenger, desk.clock)
+    _add_channels(routes, desk)
+    _add_devices(routes, desk)
+
+    @routes.get("", response_model=Messages)
+    async def read(_: _Operator) -> Response:
+        """Who is told, by which channel, and what came of the newest message."""
+        return desk.answer()
+
+    @routes.post("/{channel}/test", response_model=MessageTest)
+    async def test(channel: Channel, _: _Operator) -> Response:
+        """Send a test now, whether or not the channel is on."""
+        return await tests.run(channel)
+
+    return routes
+
+
+def _add_channels(routes: APIRouter, desk: Desk) -> None:
+    @routes.put("/email", response_model=Messages)
+    async def put_email(body: EmailBody, who: _Operator) -> Response:
+        """Change the mail."""
+        email = body.applied_to(desk.contacts.email)
+        if email is None:
+            return _refused("Type the password again: server or user are others.")
+        return await desk.change("email", who, lambda all_: replace(all_, email=email))
+
+    @routes.put("/webhook", response_model=Messages)
+    async def put_webhook(body: WebhookBody, who: _Operator) -> Response:
+        """Change the webhook."""
+        hook = body.applied_to(desk.contacts.webhook)
+        if not desk.is_reachable(hook.url):
+            return _refused("The address must be a public https one.")
+        return await desk.change(
+            "webhook", who, lambda all_: replace(all_, webhook=hook)
+        )
+
+    @routes.put("/push", response_model=Messages)
+    async def put_push(body: PushBody, who: _Operator) -> Response:
+        """Change web push; the first time makes this server's key."""
+        return await desk.change(
+            "push", who, lambda all_: _switched(all_, body, desk.new_key)
+        )
+
+
+def _add_devices(routes: APIRouter, desk: Desk) -> None:
+    @routes.post("/devices", response_model=Messages)
+    async def add_device(body: DeviceBody, who: _Operator) -> Response:
+        """Have this browser told; the same one again takes its own place."""
+        refusal = desk.refusal(body)
+        if refusal:
+            return _refused(refusal)
+        device = body.device(desk.new_id(), desk.clock().wall)
+        return await desk.change("push", who, lambda all_: _joined(all_, device))
+
+    @routes.delete("/devices/{device_id}", response_model=Messages)
+    async def remove_device(device_id: str, who: _Operator) -> Response:
+        """Have a browser told no more."""
+        known = {one.device_id for one in desk.contacts.push.devices}
+        if device_id not in known:
+            return Problem(404, "There is no such device.").response()
+        return await desk.change("push", who, lambda all_: all_.without({device_id}))
+
+
+def _switched(all_: Contacts, body: PushBody, new_key: Callable[[], str]) -> Contacts:
+    key = all_.push.key or new_key()
+    push = replace(all_.push, on=body.on, contact=body.contact, key=key)
+    return replace(all_, push=push)
+
+
+def _joined(all_: Contacts, device: messages.Device) -> Contacts:
+    devices = (*_others(all_.push, device.endpoint), device)
+    return replace(all_, push=replace(all_.push, devices=devices))
+
+
+def _others(push: messages.Push, endpoint: str) -> list[messages.Device]:
+    return [one for one in push.devices if one.endpoint != endpoint]
+
+
+class _Tests:
+    """One test at a time, and seldom."""
+
+    def __init__(self, messenger: Messenger, clock: Callable[[], Instant]) -> None:
+        self._messenger = messenger
+        self._clock = clock
+        self._lock = asyncio.Lock()
+        self._last: float | None = None
+
+    async def run(self, channel: Channel) -> Response:
+        now = self._clock().mono
+        rested = self._last is None or now - self._last >= TEST_REST_S
+        if self._lock.locked() or not rested:
+            headers = {"Retry-After": str(int(TEST_REST_S))}
+            return Problem(429, "One test at a time.", headers=headers).response()
+        async with self._lock:
+            self._last = now
+            told = await self._messenger.test(channel)
+        if not told:
+            return _refused("Nobody is to be told by this channel.", 409)
+        return Json(MessageTest(told=[Told.of(one) for one in told]))
+
+
+def _refused(why: str, status: int = 422) -> Response:
+    return Problem(status, why).response()
+
+
+def writer() -> Callable[[Message, Language], Text]:
+    """Messages in words: how grave and when, and nothing of where or about whom."""
+    sentences = {one: Sentences(read_translations(one)) for one in LANGUAGES}
+
+    def write(message: Message, language: Language) -> Text:
+        said = sentences[language]
+        if message.is_test:
+            return Text(
+                said.say("messages.test_title", {}), said.say("messages.test_body", {})
+            )
+        slots = {
+            "priority": message.priority,
+            "count": len(message.items),
+            "at": min(one.raised.wall for one in message.items),
+        }
+        key = "one" if len(message.items) == 1 else "more"
+        return Text(
+            said.say("messages.title", slots), said.say(f"messages.body_{key}", slots)
+        )
+
+    return write
