@@ -129,7 +129,6 @@ class Alert(Model):
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
-        members = read_objects(record.members)
         return cls(
             alert_id=record.alert_id,
             priority=cast("alert_book.Priority", record.priority),
