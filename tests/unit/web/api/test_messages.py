@@ -100,7 +100,7 @@ async def test_a_change_is_on_disk_and_in_the_log_with_its_author() -> None:
     assert desk.contact_store.saved[-1].email.password == "tomato"
     line = desk.event_log.lines[-1]
     assert line.key == "log.messages_changed.email"
-    assert "ana" in line.slots
+    assert line.slots == {"by": "ana"}
     assert "tomato" not in line.slots
 
 
