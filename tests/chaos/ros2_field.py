@@ -9,9 +9,6 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
-
-import httpx
 
 from iveg.domain.errors import UnreadableError
 from iveg.ros2 import cdr, names
@@ -85,46 +82,6 @@ class Witness:
         """Newest speed before a moment (Unix s)."""
         before = [speed for at, speed in list(self._heard) if at <= when]
         return before[-1] if before else 0.0
-
-
-class Operator:
-    """Somebody at the page, through its API."""
-
-    def __init__(self, place: Site) -> None:
-        self._browser = httpx.Client(
-            base_url=place.url,
-            headers={"X-IVEG": "1", "Sec-Fetch-Site": "same-origin"},
-            timeout=5.0,
-            trust_env=False,
-            follow_redirects=True,
-        )
-        self._browser.get(place.sign_in_link).raise_for_status()
-
-    def close(self) -> None:
-        self._browser.close()
-
-    def look(self) -> dict[str, Any]:
-        """What the page says of the robot."""
-        found: dict[str, Any] = self._browser.get(f"/api/v1/robots/{ROBOT}").json()
-        return found
-
-    def stop(self) -> int:
-        """Press STOP; the status."""
-        return self._post("stop", {})
-
-    def let_go(self) -> str:
-        """Release what is shown, then resume; where that stands."""
-        robot = self.look()
-        if robot["stop_state"] == "READY":
-            self._post("resume", {})
-        else:
-            holds = [hold["id"] for hold in robot["holds"]]
-            self._post("release", {"holds": holds})
-        return str(robot["stop_state"])
-
-    def _post(self, what: str, body: object) -> int:
-        path = f"/api/v1/robots/{ROBOT}/{what}"
-        return self._browser.post(path, json=body).status_code
 
 
 class Ros2Field:

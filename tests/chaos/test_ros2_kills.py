@@ -7,7 +7,6 @@ Three kills in ``make test``; ``make chaos`` does a series, each line of which i
 import json
 import os
 from collections.abc import Iterator
-from contextlib import closing
 from typing import Any
 
 import pytest
@@ -18,7 +17,6 @@ from tests.chaos.ros2_field import (
     ROBOT,
     SETTINGS,
     STAND_S,
-    Operator,
     Ros2Field,
     Witness,
     ros2_field,
@@ -40,25 +38,6 @@ def driven(
     folder = tmp_path_factory.mktemp("ros2")
     with site(folder, **SETTINGS) as place, ros2_field(place) as found:
         yield found
-
-
-@pytest.mark.slow
-def test_over_the_whole_path_stop_stands_and_only_a_resume_drives_on(
-    driven: tuple[Ros2Field, Witness],
-) -> None:
-    field, witness = driven
-    field.drive(witness)
-
-    def drives_on() -> bool:
-        return operator.let_go() == "RUNNING" and witness.drives
-
-    with closing(Operator(field.place)) as operator:
-        accepted = operator.stop()
-        until(lambda: operator.look()["stop_state"] == "STANDING", 30.0, "it stands")
-        stood = witness.drives
-        until(drives_on, 30.0, "it drives on")
-
-    assert (accepted, stood) == (202, False)
 
 
 @pytest.mark.slow

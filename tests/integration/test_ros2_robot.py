@@ -1,6 +1,7 @@
-"""``iveg robot`` as a process: one gate a robot, and a flood on a real DDS."""
+"""``iveg robot`` as a process: one gate a robot, a flood on a real DDS, and a check."""
 
 import asyncio
+import re
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ class Riding:
     Attributes:
         here: On the same machine.
         elsewhere: On one that shares but DDS with it.
+        words: What each was started with, but the first.
     """
 
     place: Site
@@ -39,20 +41,22 @@ class Riding:
     gate: Program
     here: Program
     elsewhere: Program
+    words: list[str]
 
 
 @pytest.fixture(scope="module")
 def riding(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Riding]:
     domain = free_domain()
-    words = ["robot", "--id", ROBOT, "--attended", "--ros-domain", str(domain)]
-    words += ["--ros-interface", "127.0.0.1", "--ros-peer", "127.0.0.1"]
+    who = ["--id", ROBOT, "--ros-domain", str(domain)]
+    who += ["--ros-interface", "127.0.0.1", "--ros-peer", "127.0.0.1"]
+    words = ["robot", "--attended", *who]
     one, other = (tmp_path_factory.mktemp(name) for name in ("one", "other"))
     with site(one, IVEG_ROBOTS=ROBOT) as place:
         gate = place.start(*words)
         gate.wait_until_ready()
         with site(other, **place.settings | {"XDG_DATA_HOME": str(other)}) as second:
             here, elsewhere = place.start(*words), second.start(*words)
-            yield Riding(place, domain, gate, here, elsewhere)
+            yield Riding(place, domain, gate, here, elsewhere, who)
 
 
 class Iveg:
@@ -148,6 +152,20 @@ async def test_a_flood_on_dds_is_named_and_slows_the_robot_until_it_is_over(
 
     assert "AGI: flood, /odom" in riding.gate.text()
     assert "AGI: over: flood, /odom" in riding.gate.text()
+
+
+async def test_a_check_tells_a_robot_that_talks_what_it_lacks(riding: Riding) -> None:
+    async with at_work(riding):
+        check = riding.place.start("robot", "check", *riding.words)
+        code = await asyncio.to_thread(check.process.wait, 30)
+
+    said = check.text()
+    assert code == 1
+    assert re.search(r"^/odom +nav_msgs/msg/Odometry +1 +\d", said, re.MULTILINE)
+    assert "TF: map → odom → base_link" in said
+    assert "Nobody publishes /scan (sensor_msgs/msg/LaserScan): if it has one." in said
+    assert "Somebody else publishes /cmd_vel: only the gate may" in said
+    assert "broker" not in said
 
 
 def test_a_second_gate_refuses_and_says_who_drives(riding: Riding) -> None:

@@ -141,6 +141,11 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 07000000 'person' 5*-- {HALF} "
         f"{POSE} {SURE} {ONE} {TWO} {ZERO} {HALF} {TWO} 01000000 ''",
     ),
+    "Detection2DArray, score after 46 bytes": (
+        m.Detection2DArray(IN_MAP, (m.Detection2D(IN_MAP, _seen("x"), id="12"),)),
+        f"{STAMP} {MAP} 01000000 {STAMP} {MAP} 01000000 02000000 'x' 2*-- {HALF} "
+        f"{POSE} {SURE} 5*{ZERO} 03000000 '12'",
+    ),
     "Image": (
         m.Image(IN_MAP, 1, 2, "16UC1", 0, 4, _b(1, 2, 3, 4)),
         f"{STAMP} {MAP} 01000000 02000000 06000000 '16UC1' 00 -- 04000000 04000000 "
@@ -184,7 +189,28 @@ CASES: dict[str, tuple[Any, str]] = {
         f"{STAMP} {MAP} 01000000 01000000 01000000 02000000 'x' 2*-- 00000000 07 3*-- "
         "01000000 00 3*-- 04000000 04000000 04000000 00 00 80 3f 01",
     ),
-    "MarkerArray": (
+    "MarkerArray, pose after 40 bytes": (
+        m.MarkerArray(
+            (
+                m.Marker(
+                    IN_MAP,
+                    "p",
+                    *(7, 3, 0),
+                    HERE,
+                    m.Vector3(2.0, 2.0, 0.5),
+                    m.ColorRGBA(1.0, 0.5, 0.0, 0.5),
+                    m.Duration(1, 0),
+                ),
+            )
+        ),
+        f"01000000 {STAMP} {MAP} 02000000 'p' 2*-- 07000000 03000000 00000000 "
+        f"{POSE} {TWO} {TWO} {HALF} 0000803f 0000003f 00000000 0000003f "
+        "01000000 00000000 00 3*-- 00000000 00000000 "
+        "01000000 '' 3*-- 00000000 00000000 01000000 '' 3*-- 01000000 '' 3*-- "
+        "00000000 00000000 01000000 '' 3*-- 01000000 '' 3*-- 01000000 '' 3*-- "
+        "00000000 00",
+    ),
+    "MarkerArray, pose after 48 bytes": (
         m.MarkerArray(
             (
                 m.Marker(
