@@ -1,6 +1,7 @@
 """Issue 13.23: installable, and one honest sentence without a connection."""
 
 import json
+from collections.abc import Iterator
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -8,7 +9,9 @@ from threading import Thread
 from typing import Any
 
 import httpx
+import pytest
 from fastapi import FastAPI
+from playwright.sync_api import Browser
 
 from iveg.web.pages import service_worker
 from iveg.web.security.authentication import Authenticator
@@ -76,23 +79,28 @@ def test_the_manifest_names_icons_that_are_there() -> None:
         assert (STATIC / path.removeprefix("/static/")).is_file()
 
 
-def test_without_a_server_a_page_says_use_the_red_button_and_api_fails_as_ever() -> (
-    None
-):
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    with running_browser() as found:
+        yield found
+
+
+def test_without_a_server_a_page_says_use_the_red_button_and_api_fails_as_ever(
+    browser: Browser,
+) -> None:
     handler = partial(Served, directory=str(STATIC))
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     Thread(target=server.serve_forever, daemon=True).start()
     url = f"http://127.0.0.1:{server.server_port}"
 
-    with running_browser() as browser:
-        page = browser.new_page()
-        page.goto(f"{url}/")
-        page.evaluate("() => navigator.serviceWorker.ready.then(() => true)")
-        server.shutdown()
-        server.server_close()
-        page.goto(f"{url}/settings")
-        said = page.inner_text("body")
-        api = page.evaluate("() => fetch('/api/v1/robots').catch((e) => e.name)")
+    page = browser.new_page()
+    page.goto(f"{url}/")
+    page.evaluate("() => navigator.serviceWorker.ready.then(() => true)")
+    server.shutdown()
+    server.server_close()
+    page.goto(f"{url}/settings")
+    said = page.inner_text("body")
+    api = page.evaluate("() => fetch('/api/v1/robots').catch((e) => e.name)")
 
     assert "use la seta roja" in said
     assert "use the red button" in said
