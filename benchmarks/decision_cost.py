@@ -28,7 +28,7 @@ import orjson
 from iveg.adapters import clock
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.observations import Instant, Received
 from iveg.domain.records import Record
@@ -97,7 +97,7 @@ def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
     return Evaluator(
         World(load_fleet(words=robots)),
         load_greenhouse("agroconnect"),
-        Rule(),
+        DetectionRule(),
         fleet,
         EventLog(hub, Sink(), start),
         hub,

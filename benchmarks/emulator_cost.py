@@ -13,7 +13,7 @@ from iveg.domain.observations import Instant
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Camera, World
+from iveg.emulator.world import Camera, SimulatedWorld
 from iveg.robot.uplink import Uplink
 
 RATE_HZ = 30.0
@@ -28,7 +28,7 @@ CASES: tuple[tuple[str, tuple[str, ...], Camera], ...] = (
 )
 
 
-def spent(world: World) -> dict[str, float]:
+def spent(world: SimulatedWorld) -> dict[str, float]:
     """CPU seconds of each part over ``SECONDS`` of the world's own time."""
     parts = dict.fromkeys(("people", "drive", "laser", "camera"), 0.0)
     uplinks = {
@@ -66,7 +66,7 @@ def main() -> None:
     for name, robots, camera in CASES:
         greenhouse = load_greenhouse(name)
         layout = lay_out(scenario_named("demo"), robots, greenhouse)
-        world = World(greenhouse, layout, DETECTORS["simulation"], 1, camera)
+        world = SimulatedWorld(greenhouse, layout, DETECTORS["simulation"], 1, camera)
         parts = spent(world)
         each = [one / SECONDS / len(robots) for one in parts.values()]
         shares = "".join(f"{share:9.2%}" for share in each)

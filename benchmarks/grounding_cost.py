@@ -15,7 +15,7 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
-from iveg.emulator.depth import DepthCamera, Foliage, View, person_shape, take
+from iveg.emulator.depth import DepthCamera, DepthView, Foliage, person_shape, take
 from iveg.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.locate import Mount, body_of, look
 
@@ -43,7 +43,7 @@ def cost(work: Callable[[], object]) -> float:
     return best
 
 
-def picture(ahead: float) -> View:
+def picture(ahead: float) -> DepthView:
     person = person_shape(Disc(AGI.camera.x + ahead, 0.0, 0.25))
     rng = np.random.default_rng(1)
     return take(DepthCamera.of(AGI), AGI.camera, [person], AISLE, Foliage(), rng)

@@ -12,7 +12,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Rig, World
+from iveg.emulator.world import Rig, SimulatedWorld
 from iveg.ngsi.codec import write_scan
 
 RATE_HZ = 30.0
@@ -36,7 +36,7 @@ def cost(work: Callable[[], object]) -> float:
     return best
 
 
-def message(rig: Rig, world: World) -> bytes:
+def message(rig: Rig, world: SimulatedWorld) -> bytes:
     return write_scan(rig.scan(world))
 
 
@@ -45,7 +45,7 @@ def main() -> None:
     for name, robots in CASES:
         greenhouse = load_greenhouse(name)
         layout = lay_out(scenario_named("demo"), robots, greenhouse)
-        world = World(greenhouse, layout, DETECTORS["simulation"], seed=1)
+        world = SimulatedWorld(greenhouse, layout, DETECTORS["simulation"], seed=1)
         rig = world.rigs[robots[0]]
         sweep = cost(partial(rig.scan, world))
         both = cost(partial(message, rig, world))

@@ -17,7 +17,7 @@ import numpy as np
 
 from iveg.adapters.fleet_files import built_in
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Origin, Received
@@ -27,8 +27,7 @@ from iveg.domain.world import World
 from iveg.emulator.camera import DETECTORS, person_target
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Rig
-from iveg.emulator.world import World as Emulated
+from iveg.emulator.world import Rig, SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")
 SEEDS = (1, 2, 3, 4, 5)
@@ -67,8 +66,8 @@ class Run:
         self.greenhouse: Greenhouse = load_greenhouse("mvsim-20x20")
         layout = lay_out(scenario_named(self.scenario), ROBOTS, self.greenhouse)
         detector = DETECTORS[layout.detector or self.profile]
-        self.emulated = Emulated(self.greenhouse, layout, detector, self.seed)
-        self.world, self.rule = World(built_in()), Rule()
+        self.emulated = SimulatedWorld(self.greenhouse, layout, detector, self.seed)
+        self.world, self.rule = World(built_in()), DetectionRule()
         self.people = People(self.greenhouse.bounds)
         self.all_clear, self.truth = AllClear(), Truth()
         self.score = motmetrics.MOTAccumulator(auto_id=True)

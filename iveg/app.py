@@ -36,7 +36,7 @@ from iveg.adapters.rules import FileRules
 from iveg.adapters.sessions import FileSessions
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.webhook import WebhookSender
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.latency.hops import WINDOW_S
@@ -157,7 +157,7 @@ class Dss:
         mqtt = MqttTransport(self.link, settings.apikey)
         rule_store = FileRules(directory / "rules.jsonl")
         versions = rule_store.load(
-            Rule(
+            DetectionRule(
                 threshold=settings.confidence_threshold,
                 radius_m=settings.safety_radius_m,
             ),

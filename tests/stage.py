@@ -10,7 +10,7 @@ from iveg.domain.records import DecisionRecord, DetectionRecord
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import World
+from iveg.emulator.world import SimulatedWorld
 from iveg.experiment import stage as staging
 from iveg.experiment.stage import STEP_S
 from iveg.web.views import Views
@@ -38,7 +38,9 @@ class Stage:
     ) -> None:
         greenhouse = load_greenhouse(scenario_named(scenario).greenhouse)
         layout = lay_out(scenario_named(scenario), robots, greenhouse)
-        world = World(greenhouse, layout, DETECTORS[layout.detector or profile], seed)
+        world = SimulatedWorld(
+            greenhouse, layout, DETECTORS[layout.detector or profile], seed
+        )
         self._desk = desk = Desk(robots, greenhouse)
         self._views = Views(
             desk.evaluator, desk.commander, desk.event_log, desk.health_monitor, Counter

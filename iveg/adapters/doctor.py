@@ -26,7 +26,7 @@ _REFUSED = 128
 """From this code on, a broker's answer to a subscription is a refusal."""
 
 
-class Ear:
+class TopicListener:
     """Waits for messages by a mark that no other program can know."""
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class Ear:
 class ProbeDevice:
     """A device at the broker that subscribes to a few topics and may publish."""
 
-    def __init__(self, client: aiomqtt.Client, ear: Ear) -> None:
+    def __init__(self, client: aiomqtt.Client, ear: TopicListener) -> None:
         self._client = client
         self.ear = ear
 
@@ -96,7 +96,7 @@ async def probe_device(
         tls_context=ssl.create_default_context() if address.tls else None,
         socket_options=_NODELAY,
     )
-    device = ProbeDevice(client, Ear())
+    device = ProbeDevice(client, TopicListener())
     async with contextlib.AsyncExitStack() as stack:
         try:
             await client.__aenter__()
@@ -118,7 +118,7 @@ async def _subscribe(client: aiomqtt.Client, topic: str) -> None:
             raise HopError("mqtt", f"gives no echo: it refuses to let us hear {topic}")
 
 
-async def _hear(client: aiomqtt.Client, ear: Ear) -> None:
+async def _hear(client: aiomqtt.Client, ear: TopicListener) -> None:
     # A lost connection shows in missing messages; nothing awaits this task.
     with contextlib.suppress(aiomqtt.MqttError):
         async for message in client.messages:

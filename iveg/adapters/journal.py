@@ -17,7 +17,7 @@ import orjson
 from iveg.adapters.files import AppendedFile, Form, read_lines, write_lines
 from iveg.domain.errors import DataFileError
 from iveg.domain.observations import Instant
-from iveg.domain.stop import Wanted
+from iveg.domain.stop import DesiredRecord
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +36,7 @@ class FileJournal:
         self._lock = asyncio.Lock()
         self._is_newer = False
 
-    def read(self) -> dict[str, Wanted]:
+    def read(self) -> dict[str, DesiredRecord]:
         """Robots that were to stand when iVeg last ran, with their desired state.
 
         A line that a crash cut short is skipped.  The file is compacted unless a newer
@@ -144,7 +144,7 @@ class _Memory:
     """The content of one robot's lines so far."""
 
     def __init__(self) -> None:
-        self.wanted: Wanted | None = None
+        self.wanted: DesiredRecord | None = None
         self._by, self._at = "", 0.0
         self._named: tuple[str, ...] = ()
         self._asked: tuple[str, ...] = ()
@@ -163,7 +163,9 @@ class _Memory:
         if not stopped:
             self.wanted, self._asked, self._challenge = None, (), None
             return
-        self.wanted = Wanted(by, hold_id, self._named, self._asked, self._challenge)
+        self.wanted = DesiredRecord(
+            by, hold_id, self._named, self._asked, self._challenge
+        )
 
     def entries(self, robot_id: str) -> Iterator[dict[str, Any]]:
         """The fewest lines with the same content."""

@@ -13,14 +13,14 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from iveg.adapters.files import Form, read_lines, write_lines
-from iveg.domain.detection_rule import ALIASES, Class, Rule
+from iveg.domain.detection_rule import ALIASES, Class, DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
 FORM = Form("rules")
 _SETTINGS = "settings"
-_FIRST = Rule()
+_FIRST = DetectionRule()
 _Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 
 
@@ -29,9 +29,9 @@ class FileRules:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._versions: list[Rule] = []
+        self._versions: list[DetectionRule] = []
 
-    def load(self, settings: Rule, now: Instant) -> Sequence[Rule]:
+    def load(self, settings: DetectionRule, now: Instant) -> Sequence[DetectionRule]:
         """All versions, oldest first; the last is to be in force.
 
         Args:
@@ -56,7 +56,7 @@ class FileRules:
             self._write([*self._versions, changed])
         return tuple(self._versions)
 
-    async def append(self, rule: Rule) -> None:
+    async def append(self, rule: DetectionRule) -> None:
         """Write a version down; returns when it is on disk.
 
         Raises:
@@ -67,7 +67,7 @@ class FileRules:
         except OSError as error:
             raise HopError("disk", str(error)) from error
 
-    def _read(self) -> list[Rule]:
+    def _read(self) -> list[DetectionRule]:
         rules = []
         for number, line in read_lines(self._path, FORM):
             try:
@@ -77,7 +77,7 @@ class FileRules:
                 raise DataFileError(str(self._path), where, _first(error)) from error
         return rules
 
-    def _write(self, versions: list[Rule]) -> None:
+    def _write(self, versions: list[DetectionRule]) -> None:
         write_lines(self._path, FORM, map(_fields, versions))
         self._versions = versions
 
@@ -99,9 +99,9 @@ class _StoredRule(BaseModel):
     author: str = _SETTINGS
     since: float | None = None
 
-    def rule(self) -> Rule:
+    def rule(self) -> DetectionRule:
         """The version of this line."""
-        return Rule(**dict(self))
+        return DetectionRule(**dict(self))
 
 
 def _first(error: ValidationError) -> str:
@@ -111,11 +111,11 @@ def _first(error: ValidationError) -> str:
     return f"{place}: {told['msg']}" if place else told["msg"]
 
 
-def _agree(one: Rule, other: Rule) -> bool:
+def _agree(one: DetectionRule, other: DetectionRule) -> bool:
     return (one.threshold, one.radius_m) == (other.threshold, other.radius_m)
 
 
-def _fields(rule: Rule) -> dict[str, object]:
+def _fields(rule: DetectionRule) -> dict[str, object]:
     fields = asdict(rule)
     return {
         **fields,

@@ -42,7 +42,7 @@ class SubscriptionStore(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class WantedSubscription:
     """One subscription that iVeg wants.
 
     Attributes:
@@ -75,29 +75,29 @@ class Ensured:
     ids: frozenset[str]
     mended: tuple[str, ...]
     failing: str = ""
-    copies: Mapping[Wanted, tuple[str, bool]] = field(default_factory=dict)
+    copies: Mapping[WantedSubscription, tuple[str, bool]] = field(default_factory=dict)
 
 
 _ROBOTS = (("idPattern", ".*"), ("type", names.ROBOT_TYPE))
 
 WANTED_OF_ALL = (
-    Wanted("detections", _ROBOTS, (names.BOXES, names.BOXES_HEADER)),
-    Wanted("safety", _ROBOTS, (names.SAFETY,)),
-    Wanted("navigation", _ROBOTS, (names.NAVIGATION,)),
-    *(Wanted(one.attribute, _ROBOTS, (one.attribute,)) for one in SENSORS),
-    Wanted("commands", _ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)),
-    Wanted(
+    WantedSubscription("detections", _ROBOTS, (names.BOXES, names.BOXES_HEADER)),
+    WantedSubscription("safety", _ROBOTS, (names.SAFETY,)),
+    WantedSubscription("navigation", _ROBOTS, (names.NAVIGATION,)),
+    *(WantedSubscription(one.attribute, _ROBOTS, (one.attribute,)) for one in SENSORS),
+    WantedSubscription("commands", _ROBOTS, (names.COMMAND_STATUS, names.COMMAND_INFO)),
+    WantedSubscription(
         "single uplink",
         _ROBOTS,
         names.ALGORITHM_1,
         condition=("timestamp", "pose", "class"),
     ),
-    Wanted(
+    WantedSubscription(
         "climate",
         (("id", names.CLIMATE_ID), ("type", names.CLIMATE_TYPE)),
         ("temperature", "relativeHumidity", "co2"),
     ),
-    Wanted(
+    WantedSubscription(
         "canary",
         (("id", names.HEARTBEAT_ID), ("type", names.HEARTBEAT_TYPE)),
         ("probe",),
@@ -105,22 +105,22 @@ WANTED_OF_ALL = (
 )
 
 
-def wanted_for(robots: Iterable[str]) -> tuple[Wanted, ...]:
+def wanted_for(robots: Iterable[str]) -> tuple[WantedSubscription, ...]:
     """All subscriptions for a fleet."""
     copies = [one for robot_id in robots for one in _copies_of(robot_id)]
     return (*copies, *WANTED_OF_ALL)
 
 
-def _copies_of(robot_id: str) -> tuple[Wanted, Wanted]:
+def _copies_of(robot_id: str) -> tuple[WantedSubscription, WantedSubscription]:
     entity = (("id", robot_id), ("type", names.ROBOT_TYPE))
     return (
-        Wanted(
+        WantedSubscription(
             f"odometry {robot_id}",
             entity,
             (names.ODOMETRY,),
             copied=(robot_id, Odometry),
         ),
-        Wanted(
+        WantedSubscription(
             f"lidar {robot_id}",
             entity,
             (names.LIDAR, names.LIDAR_HEADER),
@@ -133,7 +133,7 @@ async def ensure_subscriptions(
     orion: SubscriptionStore,
     notify_url: str,
     token: str,
-    wanted: Sequence[Wanted],
+    wanted: Sequence[WantedSubscription],
 ) -> Ensured:
     """Make what stands at Orion what iVeg wants, and nothing more of ours.
 
@@ -193,7 +193,7 @@ def _failing(ours: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
 
 async def _ensure(
     orion: SubscriptionStore,
-    want: Wanted,
+    want: WantedSubscription,
     document: dict[str, Any],
     known: list[dict[str, Any]],
 ) -> tuple[str, list[str]]:
@@ -217,7 +217,7 @@ async def _ensure(
     return str(kept["id"]), mended
 
 
-def _limits(want: Wanted, kept: Mapping[str, Any]) -> list[str]:
+def _limits(want: WantedSubscription, kept: Mapping[str, Any]) -> list[str]:
     """Limits that a subscription must not have; a copy may be throttled our own way."""
     limits = [part for part in ("throttling", "expires") if kept.get(part)]
     if want.copied is not None and kept.get("throttling") == THROTTLING_S:
@@ -255,7 +255,9 @@ def _same_receiver(kept: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
     )
 
 
-def write_subscription(want: Wanted, notify_url: str, token: str) -> dict[str, Any]:
+def write_subscription(
+    want: WantedSubscription, notify_url: str, token: str
+) -> dict[str, Any]:
     """The document that Orion is sent."""
     return {
         "description": PREFIX + want.name,

@@ -12,7 +12,7 @@ from iveg.adapters.mqtt import MqttLink
 from iveg.adapters.subscriptions import (
     THROTTLING_S,
     SubscriptionStore,
-    Wanted,
+    WantedSubscription,
     is_throttled,
     write_subscription,
 )
@@ -56,12 +56,12 @@ class Throttle:
         self._must_read = False
         self._thinned: frozenset[str] = frozenset()
         self.ids: frozenset[str] = frozenset()
-        self.copies: dict[Wanted, tuple[str, bool]] = {}
+        self.copies: dict[WantedSubscription, tuple[str, bool]] = {}
         self.switches = 0
         self.allowed = True
 
     def found(
-        self, copies: Mapping[Wanted, tuple[str, bool]], switches: int = 0
+        self, copies: Mapping[WantedSubscription, tuple[str, bool]], switches: int = 0
     ) -> None:
         """Take the state at Orion, unless something was switched since then."""
         if switches == self.switches:
@@ -104,7 +104,7 @@ class Throttle:
             await self._reread()
             self._must_read = False
 
-    def _changes(self) -> dict[Wanted, bool]:
+    def _changes(self) -> dict[WantedSubscription, bool]:
         # Before the first connection nobody knows how the direct transport does.
         connected = self._link.connected or not self._link.connects
         now = self._clock().mono
@@ -116,14 +116,14 @@ class Throttle:
                 changes[want] = wish and self.allowed
         return changes
 
-    async def _switch(self, want: Wanted, throttled: bool) -> None:
+    async def _switch(self, want: WantedSubscription, throttled: bool) -> None:
         known, _ = self.copies[want]
         seconds = THROTTLING_S if throttled else 0
         await self._orion.update_subscription(known, {"throttling": seconds})
         self.copies[want] = known, throttled
         self._index()
 
-    async def _verify(self, changes: Mapping[Wanted, bool]) -> None:
+    async def _verify(self, changes: Mapping[WantedSubscription, bool]) -> None:
         """An Orion that takes the change and does nothing gets a new subscription."""
         stands = {one["id"]: one for one in await self._orion.read_subscriptions()}
         for want, throttled in changes.items():
@@ -131,7 +131,9 @@ class Throttle:
             if known in stands and is_throttled(stands[known]) != throttled:
                 await self._renew(want, known, throttled)
 
-    async def _renew(self, want: Wanted, known: str, throttled: bool) -> None:
+    async def _renew(
+        self, want: WantedSubscription, known: str, throttled: bool
+    ) -> None:
         document = write_subscription(want, self._notify_url, self._notify_token)
         if throttled:
             document["throttling"] = THROTTLING_S

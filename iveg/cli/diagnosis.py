@@ -89,7 +89,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class DiagnosisRow:
     """One line of the table; ``sentence`` is empty where all is well."""
 
     check: Check
@@ -108,17 +108,17 @@ def missing(check: Check, findings: Findings) -> tuple[Check, ...]:
     )
 
 
-def judge(findings: Findings, stack: Stack) -> list[Row]:
+def judge(findings: Findings, stack: Stack) -> list[DiagnosisRow]:
     """Every hop with its state and, where it failed, what to look at."""
     return [_row(check, findings, stack) for check in Check]
 
 
-def exit_code(rows: Sequence[Row]) -> int:
+def exit_code(rows: Sequence[DiagnosisRow]) -> int:
     """0 where every hop is well, else 1."""
     return int(any(row.state != "ok" for row in rows))
 
 
-def table(rows: Sequence[Row]) -> str:
+def table(rows: Sequence[DiagnosisRow]) -> str:
     """The rows as text: hop, state, milliseconds, and sentences below their row."""
     wide = max(len(check) for check in Check)
     lines = [f"{'hop':<{wide}}  {'state':<9}  {'ms':>6}"]
@@ -130,22 +130,28 @@ def table(rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _row(check: Check, findings: Findings, stack: Stack) -> Row:
+def _row(check: Check, findings: Findings, stack: Stack) -> DiagnosisRow:
     finding = findings.get(check)
     if finding is None and stack.lag is not None and check.hop is Hop.AGENT:
-        return Row(check, "not tried", None, "The agent is behind: nothing is added.")
+        return DiagnosisRow(
+            check, "not tried", None, "The agent is behind: nothing is added."
+        )
     if finding is None:
         because = " and ".join(f"“{need}”" for need in missing(check, findings))
-        return Row(check, "not tried", None, f"Stands on {because}." if because else "")
+        return DiagnosisRow(
+            check, "not tried", None, f"Stands on {because}." if because else ""
+        )
     if finding.trouble is None:
         late = check == Check.MEASURE and finding.took_s > LATE_S
-        return Row(check, "ok", finding.took_s, _late(finding.took_s) if late else "")
+        return DiagnosisRow(
+            check, "ok", finding.took_s, _late(finding.took_s) if late else ""
+        )
     said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
     away = check == Check.AGENT and not _is_silence(said)
     if stack.lag is not None and check.hop is Hop.AGENT and not away:
         sentence = _overloaded(check, said, stack, stack.lag)
-        return Row(check, "failed", finding.took_s, sentence)
-    return Row(
+        return DiagnosisRow(check, "failed", finding.took_s, sentence)
+    return DiagnosisRow(
         check, "failed", finding.took_s, _SENTENCES[check](said, stack, findings)
     )
 

@@ -24,7 +24,12 @@ from urllib.parse import urlsplit
 import orjson
 
 from iveg.adapters import clock
-from iveg.adapters.doctor import Ear, ProbeDevice, check_database, probe_device
+from iveg.adapters.doctor import (
+    ProbeDevice,
+    TopicListener,
+    check_database,
+    probe_device,
+)
 from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, sqlite_url
 from iveg.adapters.iot_agent import IotAgentClient
@@ -263,7 +268,7 @@ class Examination:
 
     async def _be_notified(self) -> None:
         """Past the agent, so that only Orion and the way from it are on trial."""
-        ear = Ear()
+        ear = TopicListener()
 
         async def take(request: Request) -> Response:
             ear.hear(request.body)

@@ -23,7 +23,7 @@ from iveg.adapters.extras import require_extra
 from iveg.adapters.orion import OrionClient
 from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
 from iveg.cli.running import run_until_told
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment import compare
@@ -37,7 +37,7 @@ from iveg.experiment.outcome import (
     read_truth,
     stack_of,
 )
-from iveg.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, Step
+from iveg.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, PlannedRun
 from iveg.experiment.progress import Progress
 from iveg.experiment.rehearsal import Rehearsal
 from iveg.settings import Settings
@@ -165,7 +165,7 @@ class Lab:
         return part
 
     async def _step(
-        self, step: Step, environment: Mapping[str, str], progress: Progress
+        self, step: PlannedRun, environment: Mapping[str, str], progress: Progress
     ) -> None:
         progress.begin(step, "counting", clock.now().mono)
         rehearsal = Rehearsal(step, self.profile, self._rule, WATCHED)
@@ -183,13 +183,15 @@ class Lab:
         progress.end(step, clock.now().mono)
 
     @property
-    def _rule(self) -> Rule:
+    def _rule(self) -> DetectionRule:
         """As the iVeg that is started has it."""
         told = self.settings
-        return Rule(threshold=told.confidence_threshold, radius_m=told.safety_radius_m)
+        return DetectionRule(
+            threshold=told.confidence_threshold, radius_m=told.safety_radius_m
+        )
 
     async def _real(
-        self, step: Step, environment: Mapping[str, str], truth: Path
+        self, step: PlannedRun, environment: Mapping[str, str], truth: Path
     ) -> Outcome:
         """The same run by all programs, which may die."""
         words = ["emulator", "--scenario", step.family, "--seed", str(step.seed)]

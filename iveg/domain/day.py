@@ -30,7 +30,7 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class DaySighting:
     """Where a person was seen in one second, and by whom."""
 
     second: int
@@ -108,7 +108,7 @@ def _length(spans: list[tuple[float, float]]) -> float:
 
 
 def closest_passes(
-    poses: Sequence[Pose], seen: Iterable[Seen], greenhouse: Greenhouse
+    poses: Sequence[Pose], seen: Iterable[DaySighting], greenhouse: Greenhouse
 ) -> list[Passing]:
     """The closest passes of moving robots near people, nearest first."""
     by_second: dict[int, list[Pose]] = defaultdict(list)
@@ -129,7 +129,7 @@ def closest_passes(
     return chosen
 
 
-def _passing(pose: Pose, one: Seen, greenhouse: Greenhouse) -> Passing:
+def _passing(pose: Pose, one: DaySighting, greenhouse: Greenhouse) -> Passing:
     return Passing(
         at=float(pose.second),
         robot_id=pose.robot_id,

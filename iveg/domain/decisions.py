@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.observations import Instant, SafetyReport
 from iveg.domain.rule.speed_limits import Crossing
@@ -75,7 +75,7 @@ class Decision:
     """
 
     crossing: Crossing
-    rule: Rule
+    rule: DetectionRule
     feedback: Instant | None = None
     applied: Instant | None = None
     observed: Instant | None = None

@@ -28,7 +28,7 @@ ALIASES: Mapping[str, Class] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class RuleVerdict:
     """What the rule says of one detection.
 
     Attributes:
@@ -40,7 +40,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class DetectionRule:
     """One version of the rule; part of every decision that it makes.
 
     Attributes:
@@ -71,12 +71,12 @@ class Rule:
         """The class that a detector's word stands for."""
         return self.aliases.get(class_id.strip().lower())
 
-    def judge(self, class_id: str, confidence: float) -> Verdict:
+    def judge(self, class_id: str, confidence: float) -> RuleVerdict:
         """Judge one detection (Algorithm 2, lines 4-10)."""
         class_ = self.canonical(class_id)
         if confidence < self.threshold_of(class_):
-            return Verdict("faint", class_)
-        return Verdict("other" if class_ is None else "alert", class_)
+            return RuleVerdict("faint", class_)
+        return RuleVerdict("other" if class_ is None else "alert", class_)
 
     def radius_at(self, age_s: float) -> float:
         """The ring of a sighting that is ``age_s`` old (m)."""

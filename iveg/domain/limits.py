@@ -151,7 +151,7 @@ LIMITS = SafetyLimits()
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class LimitRow:
     """One number of the table as documents print it."""
 
     name: str
@@ -161,12 +161,12 @@ class Row:
     says: str
 
 
-def rows() -> Iterator[Row]:
+def rows() -> Iterator[LimitRow]:
     """The table, in order."""
     for one in fields(LIMITS):
         facts = one.metadata
         value = getattr(LIMITS, one.name)
-        yield Row(one.name, value, facts["unit"], facts["source"], facts["says"])
+        yield LimitRow(one.name, value, facts["unit"], facts["source"], facts["says"])
 
 
 def ring_radius(

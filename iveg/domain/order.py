@@ -10,7 +10,7 @@ from typing import Literal
 
 from iveg.domain.observations import Origin
 
-Verdict = Literal["new", "late", "duplicate", "refused"]
+OrderVerdict = Literal["new", "late", "duplicate", "refused"]
 """``refused``: it calls itself a replay, and its robot is live."""
 
 _REMEMBERED_SEQS = 512
@@ -20,7 +20,7 @@ _GROWN_TO_RETURN = 5
 
 
 @dataclass(slots=True)
-class Order:
+class StreamOrder:
     """The position of one stream (robot and kind).
 
     A straggler of an unknown boot looks like a new start, and would make the present
@@ -49,7 +49,7 @@ class Order:
         """Whether :meth:`judge` will call this message a duplicate."""
         return boot == self.boot and seq in self._known
 
-    def judge(self, origin: Origin) -> Verdict:
+    def judge(self, origin: Origin) -> OrderVerdict:
         """Judge whether a message is newer than all before, and remember it.
 
         A message without identity is new by arrival.

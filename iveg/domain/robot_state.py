@@ -23,7 +23,7 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.order import Order, Verdict
+from iveg.domain.order import OrderVerdict, StreamOrder
 from iveg.domain.transports import FIWARE, TransportId
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
@@ -94,7 +94,7 @@ class RobotState:
     map_frame: str | None = None
     sensed: dict[type[Observation], Sensed] = field(default_factory=dict)
     clock: RobotClock = field(default_factory=RobotClock)
-    _orders: dict[type[Observation], Order] = field(default_factory=dict)
+    _orders: dict[type[Observation], StreamOrder] = field(default_factory=dict)
     _poses: deque[tuple[float, Pose2D]] = field(
         default_factory=lambda: deque(maxlen=_HISTORY)
     )
@@ -183,7 +183,7 @@ class RobotState:
 
     def judge(
         self, observation: Observation, origin: Origin, *, asked: bool = False
-    ) -> Verdict:
+    ) -> OrderVerdict:
         """Place a message in its stream's order.
 
         A message of an earlier boot that Orion kept must not make the present boot look
@@ -192,7 +192,7 @@ class RobotState:
         kind = kind_of(observation)
         order = self._orders.get(kind)
         if order is None:
-            order = self._orders[kind] = Order()
+            order = self._orders[kind] = StreamOrder()
         if asked and order.knows_better_than(origin):
             return "late"
         return order.judge(origin)

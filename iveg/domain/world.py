@@ -27,7 +27,7 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.order import Verdict
+from iveg.domain.order import OrderVerdict
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_news import dated, learn_kind, take_in
 from iveg.domain.robot_state import RobotState
@@ -82,7 +82,7 @@ class World:
         robot = self.robots.get(robot_id)
         return robot is not None and robot.is_past(kind, boot, seq)
 
-    def apply(self, received: Received) -> Verdict:
+    def apply(self, received: Received) -> OrderVerdict:
         """Take one observation in.
 
         Returns:
@@ -189,8 +189,12 @@ class World:
         return inf if moment is None else max(0.0, received.at.mono - moment)
 
     def _fed(
-        self, robot: RobotState, received: Received, origin: Origin, verdict: Verdict
-    ) -> Verdict:
+        self,
+        robot: RobotState,
+        received: Received,
+        origin: Origin,
+        verdict: OrderVerdict,
+    ) -> OrderVerdict:
         """Note which transport brought it; without a count the direct copy wins."""
         kind = kind_of(received.observation)
         if kind not in (Odometry, LaserScan):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from iveg.embedded.context_broker import ContextBroker
-from iveg.embedded.entities import Change
+from iveg.embedded.entities import EntityChange
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, read_id
 from iveg.embedded.orion_errors import bad_request
@@ -21,7 +21,7 @@ class _Item:
 
     id: str
     kind: str
-    changes: Mapping[str, Change]
+    changes: Mapping[str, EntityChange]
 
 
 async def batch_update(broker: ContextBroker, call: Call) -> Response:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 
 from iveg.adapters import clock
 from iveg.embedded.entities import (
-    Change,
     Entity,
+    EntityChange,
     Touched,
     apply,
     fresh,
@@ -69,7 +69,7 @@ class ContextBroker:
         scope: Scope,
         entity_id: str,
         entity_type: str,
-        changes: Mapping[str, Change],
+        changes: Mapping[str, EntityChange],
     ) -> Entity:
         """Make a new entity and tell of it.
 
@@ -90,7 +90,7 @@ class ContextBroker:
         scope: Scope,
         entity_id: str,
         entity_type: str,
-        changes: Mapping[str, Change],
+        changes: Mapping[str, EntityChange],
     ) -> None:
         """Make an entity, or add to and change its attributes."""
         entity = self.tenant(scope.service).entities.get(
@@ -105,7 +105,7 @@ class ContextBroker:
         self,
         scope: Scope,
         entity: Entity,
-        changes: Mapping[str, Change],
+        changes: Mapping[str, EntityChange],
         *,
         forced: bool = False,
     ) -> None:
@@ -115,7 +115,11 @@ class ContextBroker:
             self._tell(scope, entity, touched, "entityChange")
 
     def append_new(
-        self, scope: Scope, entity: Entity, changes: Mapping[str, Change], kind: str
+        self,
+        scope: Scope,
+        entity: Entity,
+        changes: Mapping[str, EntityChange],
+        kind: str,
     ) -> Outcome:
         """Make attributes; those that are there stay as they are.
 
@@ -138,7 +142,7 @@ class ContextBroker:
         )
 
     def replace(
-        self, scope: Scope, entity: Entity, changes: Mapping[str, Change]
+        self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
     ) -> None:
         """Put attributes in place of all there were."""
         fresh(entity, scope.now)
@@ -169,7 +173,7 @@ class ContextBroker:
         scope: Scope,
         entity_id: str,
         entity_type: str,
-        changes: Mapping[str, Change],
+        changes: Mapping[str, EntityChange],
         *,
         forced: bool = False,
     ) -> None:
@@ -188,7 +192,7 @@ class ContextBroker:
         scope: Scope,
         entity_id: str,
         entity_type: str,
-        changes: Mapping[str, Change],
+        changes: Mapping[str, EntityChange],
         *,
         forced: bool = False,
     ) -> Outcome:

@@ -70,7 +70,7 @@ class Attribute:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class EntityChange:
     """What a request asks of one attribute; ``None`` leaves what is there."""
 
     type: str | None
@@ -171,7 +171,11 @@ def under(paths: str, path: str) -> bool:
 
 
 def apply(
-    entity: Entity, changes: Mapping[str, Change], now: float, *, forced: bool = False
+    entity: Entity,
+    changes: Mapping[str, EntityChange],
+    now: float,
+    *,
+    forced: bool = False,
 ) -> Touched:
     """Carry out changes; attributes that are not there yet are made.
 
@@ -198,7 +202,7 @@ def apply(
     return Touched(tuple(changes), frozenset(changed), frozenset(values), before)
 
 
-def _changed(old: Attribute | None, change: Change, now: float) -> Attribute:
+def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribute:
     kind = change.type or (old.type if old else default_type(change.value))
     value = change.value
     if isinstance(value, dict) and any(key.startswith("$") for key in value):
@@ -264,7 +268,7 @@ def fresh(entity: Entity, now: float) -> None:
 
 def read_changes(
     attributes: Mapping[str, Any], *, key_values: bool, clean: bool
-) -> dict[str, Change]:
+) -> dict[str, EntityChange]:
     """Read attributes from a request.
 
     Args:
@@ -281,7 +285,7 @@ def read_changes(
     }
 
 
-def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> Change:
+def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> EntityChange:
     check_name(name, "attribute name")
     if key_values:
         raw = {"value": raw}
@@ -298,7 +302,7 @@ def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> Chang
     if kind == "DateTime" and value is not None:
         date_text(value)
     metadata = raw.get("metadata")
-    return Change(
+    return EntityChange(
         kind, value, None if metadata is None else _read_metadata(metadata, clean=clean)
     )
 

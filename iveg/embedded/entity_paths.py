@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from iveg.embedded.context_broker import ContextBroker
-from iveg.embedded.entities import Attribute, Change, Entity
+from iveg.embedded.entities import Attribute, Entity, EntityChange
 from iveg.embedded.forwarding import bare_entities, foreign
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, names, paging, pattern, read_id
@@ -184,7 +184,7 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
 
 
 async def update(
-    broker: ContextBroker, call: Call, changes: Mapping[str, Change]
+    broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
 ) -> None:
     """Change what the entity or its providers have, as the options say."""
     await broker.update(

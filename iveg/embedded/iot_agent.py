@@ -23,7 +23,7 @@ from iveg.embedded.devices import (
     Tenancy,
     read_device,
 )
-from iveg.embedded.entities import Change
+from iveg.embedded.entities import EntityChange
 from iveg.embedded.measures import read_measures, read_single, status_changes
 from iveg.embedded.mqtt_broker import MqttBroker
 from iveg.embedded.orion_errors import NgsiError
@@ -110,7 +110,9 @@ class IotAgent:
             self._write(device, status_changes(known, now), now)
         return bool(known)
 
-    def _write(self, device: Device, changes: Mapping[str, Change], now: float) -> None:
+    def _write(
+        self, device: Device, changes: Mapping[str, EntityChange], now: float
+    ) -> None:
         scope = self._scope(device.tenancy, now)
         self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
@@ -179,7 +181,9 @@ class IotAgent:
         tenant = self._broker.tenant(new.tenancy.service)
         key = (new.tenancy.subservice, new.entity_name, new.entity_type)
         if gained and tenant.entities.get(*key) is not None:
-            self._write(new, {name: Change(kind, None) for name, kind in gained}, now)
+            self._write(
+                new, {name: EntityChange(kind, None) for name, kind in gained}, now
+            )
 
     def forget(self, device: Device) -> None:
         """Forget a device and what was registered for it."""

@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from iveg.embedded.devices import Device
-from iveg.embedded.entities import Change, date_json, date_text, default_type
+from iveg.embedded.entities import EntityChange, date_json, date_text, default_type
 from iveg.embedded.orion_errors import NgsiError, bad_request
 from iveg.embedded.orion_text import (
     UNRESTRICTED,
@@ -30,7 +30,7 @@ _NOTHING: dict[str, Any] = {"undefined": None}
 
 def read_measures(
     device: Device, payload: bytes, now: float
-) -> list[dict[str, Change]] | None:
+) -> list[dict[str, EntityChange]] | None:
     """Read what came on an ``attrs`` topic.
 
     Returns:
@@ -56,7 +56,7 @@ def read_measures(
 
 def read_single(
     device: Device, name: str, payload: bytes, now: float
-) -> dict[str, Change] | None:
+) -> dict[str, EntityChange] | None:
     """Read what came on ``attrs/{name}``; what is not JSON is kept as hexadecimal.
 
     Raises:
@@ -80,7 +80,7 @@ def _check(payload: bytes) -> bool:
 
 def _read_one(
     device: Device, measure: Mapping[str, Any], now: float, *, clean: bool
-) -> dict[str, Change] | None:
+) -> dict[str, EntityChange] | None:
     given = measure.get(_INSTANT)
     if given is None:
         instant = date_json(now)
@@ -100,20 +100,20 @@ def _read_one(
         check_name(name, "attribute name")
         if not clean and kind != UNRESTRICTED and holds_forbidden(value):
             raise bad_request("Invalid characters in attribute value")
-        changes[name] = Change(kind, value, metadata)
+        changes[name] = EntityChange(kind, value, metadata)
     for one in device.static_attributes:
-        changes[one["name"]] = Change(
+        changes[one["name"]] = EntityChange(
             one.get("type") or default_type(one.get("value")),
             one.get("value"),
             metadata,
         )
-    changes[_INSTANT] = Change("DateTime", instant.decode().strip('"'))
+    changes[_INSTANT] = EntityChange("DateTime", instant.decode().strip('"'))
     return changes
 
 
 def status_changes(
     results: Mapping[str, tuple[str, Any]], now: float
-) -> dict[str, Change]:
+) -> dict[str, EntityChange]:
     """What the agent writes about commands.
 
     Args:
@@ -127,10 +127,10 @@ def status_changes(
     metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
     changes = {}
     for name, (status, answer) in results.items():
-        changes[f"{name}_status"] = Change("commandStatus", status, metadata)
+        changes[f"{name}_status"] = EntityChange("commandStatus", status, metadata)
         if status == "OK":
             if holds_forbidden(answer):
                 raise bad_request("Invalid characters in attribute value")
-            changes[f"{name}_info"] = Change("commandResult", answer, metadata)
-    changes[_INSTANT] = Change("DateTime", instant.decode().strip('"'))
+            changes[f"{name}_info"] = EntityChange("commandResult", answer, metadata)
+    changes[_INSTANT] = EntityChange("DateTime", instant.decode().strip('"'))
     return changes

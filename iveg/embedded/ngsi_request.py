@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from iveg.embedded.entities import Change, read_changes
+from iveg.embedded.entities import EntityChange, read_changes
 from iveg.embedded.http_server import Request
 from iveg.embedded.orion_errors import NgsiError, bad_request, parse_error
 from iveg.embedded.orion_text import check_name, load_json, looks_clean
 from iveg.embedded.tenants import Scope
-from iveg.embedded.views import View
+from iveg.embedded.views import EntityView
 
 MAX_BODY = 1 << 20
 _SERVICE = re.compile(r"[a-z0-9_]{0,50}")
@@ -65,7 +65,7 @@ class Call:
             raise parse_error()
         return value
 
-    def changes(self, raw: Mapping[str, Any]) -> dict[str, Change]:
+    def changes(self, raw: Mapping[str, Any]) -> dict[str, EntityChange]:
         """Read attributes of the body.
 
         Raises:
@@ -77,7 +77,7 @@ class Call:
             clean=looks_clean(self.request.body),
         )
 
-    def view(self) -> View:
+    def view(self) -> EntityView:
         """What is to be shown.
 
         Raises:
@@ -86,7 +86,7 @@ class Call:
         forms = self.options & {"keyValues", "values", "unique"}
         form = next(iter(forms), "normalized")
         query = self.request.query
-        return View(form, names(query.get("attrs")), names(query.get("metadata")))
+        return EntityView(form, names(query.get("attrs")), names(query.get("metadata")))
 
 
 def check_size(request: Request) -> None:

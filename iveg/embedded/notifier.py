@@ -26,7 +26,7 @@ CLOSED = "Server returned nothing (no headers, no data)"
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class NotificationTarget:
     """Where a lane goes."""
 
     host: str
@@ -34,7 +34,7 @@ class Target:
     tls: bool = False
 
     @classmethod
-    def from_url(cls, url: str) -> "Target":
+    def from_url(cls, url: str) -> "NotificationTarget":
         """The server of an ``http`` or ``https`` address."""
         parts = urlsplit(url)
         tls = parts.scheme == "https"
@@ -57,10 +57,10 @@ class Delivery:
     tried: bool = False
 
 
-class Lane:
+class DeliveryLane:
     """A queue and one connection to one receiver; what is sent first arrives first."""
 
-    def __init__(self, target: Target) -> None:
+    def __init__(self, target: NotificationTarget) -> None:
         self._target = target
         self._waiting: deque[Delivery] = deque()
         self._flying: deque[Delivery] = deque()
@@ -193,7 +193,7 @@ class Lane:
 class _Wire(asyncio.Protocol):
     """One connection of a lane: writes requests, reads answers."""
 
-    def __init__(self, lane: Lane) -> None:
+    def __init__(self, lane: DeliveryLane) -> None:
         self._lane = lane
         self._parser = httptools.HttpResponseParser(self)
         self._body: list[bytes] = []
@@ -247,7 +247,7 @@ class _Wire(asyncio.Protocol):
 
 
 async def exchange(
-    target: Target, request: bytes, timeout_s: float
+    target: NotificationTarget, request: bytes, timeout_s: float
 ) -> tuple[int, bytes | str]:
     """Send one request on a connection of its own and wait for the answer.
 
@@ -262,7 +262,7 @@ async def exchange(
         if not answer.done():
             answer.set_result((status, body))
 
-    lane = Lane(target)
+    lane = DeliveryLane(target)
     lane.send(Delivery(request, timeout_s, done))
     try:
         return await answer

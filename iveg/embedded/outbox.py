@@ -9,10 +9,10 @@ from urllib.parse import urlsplit
 import orjson
 
 from iveg.embedded.entities import Entity, Touched
-from iveg.embedded.notifier import Delivery, Lane, Target
+from iveg.embedded.notifier import Delivery, DeliveryLane, NotificationTarget
 from iveg.embedded.orion_text import quoted
 from iveg.embedded.subscriptions import Subscription
-from iveg.embedded.views import View, annotated, write_entity
+from iveg.embedded.views import EntityView, annotated, write_entity
 
 AGENT = "orion/4.7.0-next libcurl/7.88.1"
 _MACRO = re.compile(r"\$\{([^}]*)\}")
@@ -28,7 +28,7 @@ class Outbox:
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
-        self._lanes: dict[str, tuple[Target, Lane]] = {}
+        self._lanes: dict[str, tuple[NotificationTarget, DeliveryLane]] = {}
         self._heads: dict[str, tuple[dict[str, object], bytes]] = {}
         self._correlators = itertools.count(1)
         self._prefix = f"{secrets.token_hex(4)}-e4ec-11f1-9a0b-"
@@ -62,7 +62,11 @@ class Outbox:
         self._lane(subscription).send(Delivery(request, subscription.timeout_s, done))
 
     def _body(
-        self, subscription: Subscription, entity: Entity, view: View, alteration: str
+        self,
+        subscription: Subscription,
+        entity: Entity,
+        view: EntityView,
+        alteration: str,
     ) -> bytes:
         endpoint = subscription.endpoint
         if "payload" in endpoint:
@@ -95,12 +99,12 @@ class Outbox:
             self._heads[subscription.id] = known
         return known[1]
 
-    def _lane(self, subscription: Subscription) -> Lane:
-        target = Target.from_url(subscription.endpoint["url"])
+    def _lane(self, subscription: Subscription) -> DeliveryLane:
+        target = NotificationTarget.from_url(subscription.endpoint["url"])
         known = self._lanes.get(subscription.id)
         if known is None or known[0] != target:
             self.forget(subscription.id)
-            known = (target, Lane(target))
+            known = (target, DeliveryLane(target))
             self._lanes[subscription.id] = known
         return known[1]
 

@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 
 import orjson
 
-from iveg.embedded.entities import Attribute, Change, default_type, metadata_json
-from iveg.embedded.notifier import Target, exchange
+from iveg.embedded.entities import Attribute, EntityChange, default_type, metadata_json
+from iveg.embedded.notifier import NotificationTarget, exchange
 from iveg.embedded.orion_errors import bad_request
 from iveg.embedded.orion_numbers import print_value
 from iveg.embedded.outbox import AGENT
@@ -112,7 +112,7 @@ async def forward_update(
     registration: Registration,
     entity_id: str,
     entity_type: str,
-    changes: Mapping[str, Change],
+    changes: Mapping[str, EntityChange],
     asking: Asking,
 ) -> bool:
     """Send attributes to their provider; whether it took them."""
@@ -195,4 +195,6 @@ async def _ask(
             "",
         )
     )
-    return await exchange(Target.from_url(url), head.encode() + body, PATIENCE_S)
+    return await exchange(
+        NotificationTarget.from_url(url), head.encode() + body, PATIENCE_S
+    )

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from iveg.embedded.entities import Touched, date_iso, date_text
 from iveg.embedded.orion_errors import NgsiError, bad_request
 from iveg.embedded.orion_text import FORBIDDEN
-from iveg.embedded.views import View
+from iveg.embedded.views import EntityView
 
 FORMATS = (
     "normalized",
@@ -53,7 +53,7 @@ class Subscription:
     last_failure: float | None = None
     last_failure_reason: str = ""
     fails: int = 0
-    view: View = field(default_factory=View)
+    view: EntityView = field(default_factory=EntityView)
     _entities: list[tuple[re.Pattern[str] | str, re.Pattern[str] | str]] = field(
         default_factory=list
     )
@@ -65,7 +65,7 @@ class Subscription:
     def prepare(self) -> None:
         """Read the document again after it has changed."""
         notification = self.notification
-        self.view = View(
+        self.view = EntityView(
             notification.get("attrsFormat", "normalized"),
             tuple(notification.get("attrs", ())),
             tuple(notification.get("metadata", ())),
@@ -143,13 +143,13 @@ class Subscription:
             return bool(changed) or alteration == "entityCreate"
         return not changed.isdisjoint(watched)
 
-    def shown(self, touched: Touched) -> View:
+    def shown(self, touched: Touched) -> EntityView:
         """What the notification shows of the entity."""
         if not self.notification.get("onlyChangedAttrs"):
             return self.view
         names = self.view.names or touched.named
         chosen = tuple(name for name in names if name in touched.changed)
-        return View(self.view.form, chosen or ("",), self.view.metadata)
+        return EntityView(self.view.form, chosen or ("",), self.view.metadata)
 
     def sent(self, now: float) -> None:
         """A notification goes out."""

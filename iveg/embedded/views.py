@@ -20,7 +20,7 @@ _NOTIFIED = frozenset(("actionType", "previousValue"))
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class EntityView:
     """What a client wants to see.
 
     Attributes:
@@ -41,7 +41,7 @@ class View:
 
 def write_entity(
     entity: Entity,
-    view: View,
+    view: EntityView,
     foreign: Mapping[str, Attribute] | None = None,
     alteration: str = "",
 ) -> bytes:
@@ -89,7 +89,7 @@ def annotated(
 
 
 def write_attributes(
-    entity: Entity, view: View, foreign: Mapping[str, Attribute] | None = None
+    entity: Entity, view: EntityView, foreign: Mapping[str, Attribute] | None = None
 ) -> bytes:
     """The attributes of one entity, without its id and type."""
     chosen = _chosen(entity, view, foreign or {}, "")
@@ -98,7 +98,7 @@ def write_attributes(
     return b"{%b}" % b",".join(_named(chosen, view))
 
 
-def _named(chosen: Sequence[tuple[str, Attribute]], view: View) -> list[bytes]:
+def _named(chosen: Sequence[tuple[str, Attribute]], view: EntityView) -> list[bytes]:
     if view.bare:
         return [quoted(name) + b":" + one.json for name, one in chosen]
     return [
@@ -114,7 +114,7 @@ def _values(values: list[bytes], form: str) -> bytes:
 
 
 def _chosen(
-    entity: Entity, view: View, foreign: Mapping[str, Attribute], alteration: str
+    entity: Entity, view: EntityView, foreign: Mapping[str, Attribute], alteration: str
 ) -> list[tuple[str, Attribute]]:
     own = entity.attributes
     if not view.names:

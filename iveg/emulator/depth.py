@@ -89,7 +89,7 @@ class Upright:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class DepthView:
     """What a camera sees.
 
     Attributes:
@@ -142,13 +142,13 @@ def take(
     scenery: Scenery,
     foliage: Foliage | None,
     rng: np.random.Generator,
-) -> View:
+) -> DepthView:
     """One picture.
 
     Args:
         camera: Its data sheet.
         sensor: Its pose in ``map``.
-        targets: Who is there; the first is number 1 of ``View.instances``.
+        targets: Who is there; the first is number 1 of ``DepthView.instances``.
         scenery: What stands still.
         foliage: Leaves about every target; None where nothing grows.
         rng: Where leaves and noise come from.
@@ -165,7 +165,7 @@ def take(
         for number in range(1, len(targets) + 1):
             _hang(camera.lens, foliage, number, depth, instances, leaked, rng)
     measured = _measure(camera, depth, rng)
-    return View(DepthPicture(camera.lens, measured), instances, leaked)
+    return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
 
 
 # --- rays -----------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, in_slots
 from iveg.emulator.relay import Relay
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import REST, Rig, World
+from iveg.emulator.world import REST, Rig, SimulatedWorld
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
@@ -71,7 +71,7 @@ class EmulatedRobot:
     def __init__(
         self,
         rig: Rig,
-        world: World,
+        world: SimulatedWorld,
         settings: FleetSettings,
         relay: Relay | None = None,
     ) -> None:

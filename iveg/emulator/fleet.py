@@ -29,7 +29,7 @@ from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import Camera, Rig, World, climate_at
+from iveg.emulator.world import Camera, Rig, SimulatedWorld, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
 from iveg.robot.ros2.config import RobotConfig
@@ -101,7 +101,7 @@ async def run_emulator(
         raise DataFileError(f"profile {profile!r}", "", f"is not one of {known}.")
     layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
-    world = World(greenhouse, layout, detector, seed, camera)
+    world = SimulatedWorld(greenhouse, layout, detector, seed, camera)
     settings = FleetSettings(
         address,
         apikey,
@@ -119,7 +119,7 @@ async def run_emulator(
     if network is not None:
         bases = partial(_base, world, network, ros2 or {}, rate_hz)
     radio_seed = seed if is_radio_bad and network is None else None
-    fleet = Fleet(world, settings, radio_seed=radio_seed, bases=bases)
+    fleet = SimulatedFleet(world, settings, radio_seed=radio_seed, bases=bases)
     if fault_port is None:
         await fleet.run(incidents)
         return
@@ -132,7 +132,7 @@ async def run_emulator(
 
 
 def _base(
-    world: World,
+    world: SimulatedWorld,
     network: Network,
     configs: Mapping[str, RobotConfig],
     rate_hz: float,
@@ -143,7 +143,7 @@ def _base(
     return Ros2Base(rig, world, network, config, rate_hz)
 
 
-class Fleet:
+class SimulatedFleet:
     """The robots and people of a run, kept going in time.
 
     Args:
@@ -154,7 +154,7 @@ class Fleet:
 
     def __init__(
         self,
-        world: World,
+        world: SimulatedWorld,
         settings: FleetSettings,
         radio_seed: int | None = None,
         bases: Callable[[Rig], Ros2Base] | None = None,

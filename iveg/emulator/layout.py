@@ -14,7 +14,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane
-from iveg.emulator.people import Stop
+from iveg.emulator.people import WalkStop
 from iveg.emulator.routes import route_of
 from iveg.emulator.scripts import TESTBED, Incident, RobotScript, Scenario
 
@@ -30,7 +30,7 @@ class Layout:
 
     robots: Mapping[str, RobotScript]
     profiles: Mapping[str, RobotProfile]
-    people: tuple[tuple[Stop, ...], ...]
+    people: tuple[tuple[WalkStop, ...], ...]
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
 
@@ -113,12 +113,12 @@ def _in_a_field(robots: Sequence[str]) -> dict[str, RobotScript]:
     return scripts
 
 
-def _around_the_field(robots: Sequence[str]) -> tuple[tuple[Stop, ...], ...]:
+def _around_the_field(robots: Sequence[str]) -> tuple[tuple[WalkStop, ...], ...]:
     return tuple(
         (
-            Stop(x + 6.0, 1.4, 4.0, 8.0),
-            Stop(x + 10.6, 6.0, 4.0, 8.0),
-            Stop(x + 6.0, 10.6, 4.0, 8.0),
+            WalkStop(x + 6.0, 1.4, 4.0, 8.0),
+            WalkStop(x + 10.6, 6.0, 4.0, 8.0),
+            WalkStop(x + 6.0, 10.6, 4.0, 8.0),
         )
         for x in (place * _FIELD_PITCH_M for place in range(min(4, len(robots))))
     )
@@ -187,8 +187,8 @@ def _free_stretch(
     return (float(ax), float(ay)), (float(bx), float(by))
 
 
-def _beside(area: Rectangle) -> tuple[Stop, ...]:
+def _beside(area: Rectangle) -> tuple[WalkStop, ...]:
     narrow = min(area.xmax - area.xmin, area.ymax - area.ymin)
     (ax, ay), (bx, by) = _ends(area, max(0.0, narrow / 2 - 0.3))
-    middle = Stop((ax + bx) / 2, (ay + by) / 2, 3.0, 8.0)
-    return (middle, Stop(bx, by, 2.0, 6.0), middle, Stop(ax, ay, 2.0, 6.0))
+    middle = WalkStop((ax + bx) / 2, (ay + by) / 2, 3.0, 8.0)
+    return (middle, WalkStop(bx, by, 2.0, 6.0), middle, WalkStop(ax, ay, 2.0, 6.0))

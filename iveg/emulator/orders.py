@@ -19,7 +19,7 @@ class _Order(BaseModel):
     )
 
 
-class Place(_Order):
+class OrderPlace(_Order):
     """A point in ``map`` (m)."""
 
     x: Metres
@@ -60,7 +60,7 @@ class FaultOrder(_Order):
     release_locally: bool = False
     kill: bool = False
     revive: bool = False
-    false_person: Place | None = None
+    false_person: OrderPlace | None = None
     hide_people: bool | None = None
 
 

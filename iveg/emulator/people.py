@@ -25,7 +25,7 @@ _ARRIVED_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class WalkStop:
     """A place that a person goes to and how long the work there takes (s)."""
 
     x: float
@@ -34,7 +34,7 @@ class Stop:
     most_s: float = 0.0
 
 
-class Person:
+class SimulatedPerson:
     """One person and the round that he or she walks.
 
     Args:
@@ -42,7 +42,7 @@ class Person:
         rng: How long each stop really takes.
     """
 
-    def __init__(self, round_: Sequence[Stop], rng: np.random.Generator) -> None:
+    def __init__(self, round_: Sequence[WalkStop], rng: np.random.Generator) -> None:
         self._round = tuple(round_)
         self._rng = rng
         self._next = 0

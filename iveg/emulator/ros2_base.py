@@ -16,7 +16,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
-from iveg.emulator.world import REST, Rig, World
+from iveg.emulator.world import REST, Rig, SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.rig import Network
@@ -97,7 +97,7 @@ class Ros2Base:
     def __init__(
         self,
         rig: Rig,
-        world: World,
+        world: SimulatedWorld,
         network: Network,
         config: RobotConfig,
         rate_hz: float,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.people import Stop
+from iveg.emulator.people import WalkStop
 from iveg.emulator.routes import Station
 from iveg.emulator.scripts import Incident, RobotScript, Scenario
 
@@ -81,36 +81,36 @@ _OPPOSITE = RobotScript(
 # --- people of the testbed --------------------------------------------------------
 
 _PICKER_IN_3 = (
-    Stop(11.5, 9.0, 8.0, 14.0),
-    Stop(11.5, 9.8, 6.0, 12.0),
-    Stop(11.5, 10.6, 6.0, 12.0),
-    Stop(11.5, 8.2, 6.0, 12.0),
+    WalkStop(11.5, 9.0, 8.0, 14.0),
+    WalkStop(11.5, 9.8, 6.0, 12.0),
+    WalkStop(11.5, 10.6, 6.0, 12.0),
+    WalkStop(11.5, 8.2, 6.0, 12.0),
 )
 _PICKER_IN_5 = (
-    Stop(19.2, 6.0, 4.0, 10.0),
-    Stop(19.2, 9.0, 4.0, 10.0),
-    Stop(19.2, 13.0, 4.0, 10.0),
-    Stop(19.2, 10.0, 4.0, 10.0),
+    WalkStop(19.2, 6.0, 4.0, 10.0),
+    WalkStop(19.2, 9.0, 4.0, 10.0),
+    WalkStop(19.2, 13.0, 4.0, 10.0),
+    WalkStop(19.2, 10.0, 4.0, 10.0),
 )
 _WALKER_IN_2 = (
-    Stop(4.7, 2.8, 2.0, 5.0),
-    Stop(4.7, 8.0, 3.0, 8.0),
-    Stop(4.7, 15.0, 3.0, 8.0),
-    Stop(4.7, 17.0, 1.0, 3.0),
-    Stop(4.7, 11.0, 3.0, 8.0),
+    WalkStop(4.7, 2.8, 2.0, 5.0),
+    WalkStop(4.7, 8.0, 3.0, 8.0),
+    WalkStop(4.7, 15.0, 3.0, 8.0),
+    WalkStop(4.7, 17.0, 1.0, 3.0),
+    WalkStop(4.7, 11.0, 3.0, 8.0),
 )
 _CARRIER = (
-    Stop(10.6, 18.9, 8.0, 12.0),
-    Stop(8.7, 17.2),
-    Stop(8.7, 3.0),
-    Stop(10.6, 1.2, 5.0, 8.0),
-    Stop(8.7, 3.0),
-    Stop(8.7, 17.2),
+    WalkStop(10.6, 18.9, 8.0, 12.0),
+    WalkStop(8.7, 17.2),
+    WalkStop(8.7, 3.0),
+    WalkStop(10.6, 1.2, 5.0, 8.0),
+    WalkStop(8.7, 3.0),
+    WalkStop(8.7, 17.2),
 )
 _FOUR_PEOPLE = (_PICKER_IN_3, _WALKER_IN_2, _PICKER_IN_5, _CARRIER)
-_STANDER = (Stop(10.0, 10.0, 60.0, 60.0),)
-_AT_THE_END = (Stop(11.9, 17.2, 60.0, 60.0),)
-_CROSSER = (Stop(8.6, 10.0, 1.0, 3.0), Stop(11.4, 10.0, 1.0, 3.0))
+_STANDER = (WalkStop(10.0, 10.0, 60.0, 60.0),)
+_AT_THE_END = (WalkStop(11.9, 17.2, 60.0, 60.0),)
+_CROSSER = (WalkStop(8.6, 10.0, 1.0, 3.0), WalkStop(11.4, 10.0, 1.0, 3.0))
 
 # --- the field test of the paper --------------------------------------------------
 
@@ -131,7 +131,7 @@ _FACES_AWAY = RobotScript(
 )
 """Looks west, drives a little, then comes back east in reverse, past the aisle whose
 grower it never looks at."""
-_GROWER_IN_6 = (Stop(24.3, 25.5, 60.0, 60.0),)
+_GROWER_IN_6 = (WalkStop(24.3, 25.5, 60.0, 60.0),)
 
 _SCENARIOS = (
     Scenario(
@@ -175,7 +175,7 @@ _SCENARIOS = (
         "A person and AGII in one frame of AGI.",
         "One look holds both; the person is an alert, AGII is known for a peer.",
         {"AGI": _OPPOSITE, "AGII": _HAUL_ON},
-        ((Stop(15.1, 10.5, 10.0, 20.0), Stop(15.1, 11.5, 10.0, 20.0)),),
+        ((WalkStop(15.1, 10.5, 10.0, 20.0), WalkStop(15.1, 11.5, 10.0, 20.0)),),
     ),
     Scenario(
         "occluded",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from iveg.domain.geometry import Pose2D
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.people import Stop
+from iveg.emulator.people import WalkStop
 from iveg.emulator.routes import Route, Station, route_of
 
 TESTBED = "mvsim-20x20"
@@ -67,7 +67,7 @@ class Scenario:
     about: str
     outcome: str
     robots: Mapping[str, RobotScript]
-    people: tuple[tuple[Stop, ...], ...] = ()
+    people: tuple[tuple[WalkStop, ...], ...] = ()
     incidents: tuple[Incident, ...] = ()
     detector: str | None = None
     greenhouse: str = TESTBED

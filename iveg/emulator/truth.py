@@ -7,10 +7,10 @@ from typing import TextIO
 import orjson
 
 from iveg.emulator.camera import Target
-from iveg.emulator.world import Rig, World
+from iveg.emulator.world import Rig, SimulatedWorld
 
 
-def in_view(rig: Rig, world: World) -> Iterator[tuple[Target, float]]:
+def in_view(rig: Rig, world: SimulatedWorld) -> Iterator[tuple[Target, float]]:
     """Targets of which a part (0 to 1) is in view of a robot's camera, and it."""
     for target in world.targets_for(rig.robot_id):
         part = rig.part_seen(target, world)
@@ -29,7 +29,7 @@ class TruthLog:
     def __init__(self, file: Path) -> None:
         self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
 
-    def looked(self, rig: Rig, world: World, at: float) -> None:
+    def looked(self, rig: Rig, world: SimulatedWorld, at: float) -> None:
         """A robot has just looked (``at`` Unix s, by its own clock)."""
         visible = []
         for target, part in in_view(rig, world):

@@ -37,7 +37,7 @@ from iveg.emulator.kinematics import Odometer, Vehicle
 from iveg.emulator.layout import Layout
 from iveg.emulator.lidar import LaserModel, sweep
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.people import Person
+from iveg.emulator.people import SimulatedPerson
 from iveg.emulator.scripts import RobotScript
 
 Camera = Literal["boxes", "grounding"]
@@ -104,7 +104,7 @@ class Rig:
         """Seen from above."""
         return self.vehicle.body(self.robot_id)
 
-    def wish(self, now: float, around: "World") -> Twist2D:
+    def wish(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """What navigation asks for; ``now`` in seconds into the run."""
         discs = [person.disc for person in around.people]
         for body in around.bodies_but(self.robot_id):
@@ -117,7 +117,7 @@ class Rig:
         """Pose as believed, speeds as measured."""
         return Odometry(self.robot_id, Origin(), self._believed, self.vehicle.twist)
 
-    def scan(self, around: "World") -> LaserScan:
+    def scan(self, around: "SimulatedWorld") -> LaserScan:
         """One turn of the laser."""
         sensor = self.vehicle.pose.compose(self.profile.laser)
         people = [person.disc for person in around.people]
@@ -133,7 +133,7 @@ class Rig:
             sweep(sensor, _LASER, around.scenery, people, others, self._rng),
         )
 
-    def look(self, now: float, around: "World") -> DetectionFrame:
+    def look(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
         """One frame of camera and detector; empty when nothing is seen."""
         pose = self.vehicle.pose
         targets = around.targets_for(self.robot_id)
@@ -146,7 +146,7 @@ class Rig:
             found = (*found, ghost)
         return DetectionFrame(self.robot_id, Origin(), found, self._detector.lost)
 
-    def part_seen(self, target: Target, around: "World") -> float:
+    def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
         """How much of a target its camera has in view, whatever the detector says."""
         camera = self.vehicle.pose.compose(self.profile.camera)
         return self._detector.part_seen(camera, target.body, around.scenery)
@@ -158,7 +158,7 @@ class Rig:
         return Navigation(self.robot_id, Origin(), task, path[-1], path)
 
 
-class World:
+class SimulatedWorld:
     """Scenery, robots and people.
 
     Args:
@@ -191,7 +191,7 @@ class World:
             )
         }
         self.people = [
-            Person(round_, rng)
+            SimulatedPerson(round_, rng)
             for round_, rng in zip(
                 layout.people, generators[len(layout.robots) :], strict=True
             )

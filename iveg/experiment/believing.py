@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from iveg.domain.costmap import Costmap
-from iveg.experiment.scoring import Picture, Seen
+from iveg.experiment.scoring import Picture, SeenObject
 
 Held = Literal["nobody", "told", "own"]
 Belief = Callable[[float, float], Held]
@@ -72,7 +72,7 @@ def injections(
     }
 
 
-def _hidden(truth: Sequence[Picture], at: float, robot_id: str) -> list[Seen]:
+def _hidden(truth: Sequence[Picture], at: float, robot_id: str) -> list[SeenObject]:
     """People whom others have in view at a moment, and this robot's camera has not."""
     near = [one for one in truth if abs(one.at - at) < _SAME_MOMENT_S]
     own = {s.key for one in near if one.robot_id == robot_id for s in one.seen}

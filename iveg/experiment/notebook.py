@@ -17,7 +17,7 @@ from typing import Any
 from iveg.domain.errors import DataFileError
 from iveg.experiment.files import claim, read_json, write_json
 from iveg.experiment.outcome import Outcome, result_of
-from iveg.experiment.plan import Plan, Step
+from iveg.experiment.plan import Plan, PlannedRun
 from iveg.experiment.report import write_report
 
 
@@ -33,7 +33,7 @@ class Notebook:
         self._plan = plan
         claim(directory, plan)
 
-    def steps_left(self) -> list[Step]:
+    def steps_left(self) -> list[PlannedRun]:
         """Those that no earlier start has finished."""
         known = {(one["family"], one["number"]) for one in self._outcomes()}
         return [s for s in self._plan.steps() if (s.family, s.number) not in known]
@@ -43,11 +43,11 @@ class Notebook:
         """How many runs are finished."""
         return len(self._outcomes())
 
-    def is_last(self, step: Step) -> bool:
+    def is_last(self, step: PlannedRun) -> bool:
         """Whether nothing comes after it."""
         return step == [*self._plan.steps()][-1]
 
-    def keep(self, step: Step, outcome: Outcome) -> None:
+    def keep(self, step: PlannedRun, outcome: Outcome) -> None:
         """A run is finished."""
         write_json(self._file(step), outcome)
 
@@ -78,5 +78,5 @@ class Notebook:
                 found.append(read_json(self._file(step)))
         return found
 
-    def _file(self, step: Step) -> Path:
+    def _file(self, step: PlannedRun) -> Path:
         return self.directory / f"{step.name}.json"

@@ -14,7 +14,7 @@ from websockets.exceptions import WebSocketException
 
 from iveg.domain.stamps import parse_stamp
 from iveg.experiment.believing import Belief, belief_in
-from iveg.experiment.scoring import Picture, Seen
+from iveg.experiment.scoring import Picture, SeenObject
 from iveg.experiment.slices import Slice, slice_between
 
 _MAP_EVERY_S = 1.0
@@ -138,7 +138,7 @@ def picture_of(told: Mapping[str, Any]) -> Picture | None:
     if at is None:
         return None
     seen = tuple(
-        Seen(
+        SeenObject(
             str(place),
             one["class_id"],
             one["position"]["x"],

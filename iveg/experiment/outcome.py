@@ -11,14 +11,14 @@ from typing import Any
 import orjson
 
 from iveg import __version__
-from iveg.domain.latency.account import Spread
+from iveg.domain.latency.account import LatencySummary
 from iveg.domain.latency.hops import DATA, HOPS
 from iveg.experiment.believing import injections
 from iveg.experiment.observer import Watched, slowdowns_of
 from iveg.experiment.paper_tables import CLASSES
-from iveg.experiment.plan import Plan, Step
+from iveg.experiment.plan import Plan, PlannedRun
 from iveg.experiment.rehearsal import Rehearsed
-from iveg.experiment.scoring import Picture, Seen, Tally, paired, score, tally
+from iveg.experiment.scoring import Picture, SeenObject, Tally, paired, score, tally
 from iveg.experiment.slices import Slice, spreads
 from iveg.experiment.statistics import thinned
 
@@ -57,7 +57,7 @@ def stack_of(
     }
 
 
-def outcome_of(step: Step, counted: Outcome, stack: Outcome) -> Outcome:
+def outcome_of(step: PlannedRun, counted: Outcome, stack: Outcome) -> Outcome:
     """One run as it is kept."""
     return {**asdict(step), "counted": counted, "stack": stack}
 
@@ -153,7 +153,7 @@ def _rows(slices: Sequence[Slice]) -> list[dict[str, Any]]:
     ]
 
 
-def _told(of: Spread) -> dict[str, Any]:
+def _told(of: LatencySummary) -> dict[str, Any]:
     def ms(seconds: float | None) -> float | None:
         return None if seconds is None else round(1000.0 * seconds, 2)
 
@@ -188,7 +188,7 @@ def read_truth(file: Path) -> list[Picture]:
         except orjson.JSONDecodeError:
             continue
         seen = tuple(
-            Seen(one["key"], one["class"], one["x"], one["y"])
+            SeenObject(one["key"], one["class"], one["x"], one["y"])
             for one in told["visible"]
         )
         pictures.append(Picture(told["robot"], told["at"], seen))

@@ -22,7 +22,7 @@ P95_BELOW_MS: Final[Mapping[Place, float]] = {"simulation": 202.0, "field": 320.
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PaperScore:
     """One row: counts, then precision and recall in per cent, then AP@0.5."""
 
     tp: int
@@ -33,21 +33,21 @@ class Printed:
     ap: float | None
 
 
-PRINTED: Final[Mapping[Place, Mapping[str, Printed]]] = {
+PRINTED: Final[Mapping[Place, Mapping[str, PaperScore]]] = {
     "simulation": {
-        "farmer": Printed(42, 3, 1, 93.33, 97.67, 0.94),
-        "AGI": Printed(18, 2, 2, 88.89, 92.52, 0.92),
-        "AGII": Printed(28, 4, 3, 87.50, 87.56, 0.88),
+        "farmer": PaperScore(42, 3, 1, 93.33, 97.67, 0.94),
+        "AGI": PaperScore(18, 2, 2, 88.89, 92.52, 0.92),
+        "AGII": PaperScore(28, 4, 3, 87.50, 87.56, 0.88),
     },
     "field": {
-        "farmer": Printed(36, 6, 3, 85.71, 92.31, 0.94),
-        "AGI": Printed(34, 8, 5, 80.95, 87.18, 0.88),
-        "AGII": Printed(28, 12, 8, 70.00, 77.78, 0.88),
+        "farmer": PaperScore(36, 6, 3, 85.71, 92.31, 0.94),
+        "AGI": PaperScore(34, 8, 5, 80.95, 87.18, 0.88),
+        "AGII": PaperScore(28, 12, 8, 70.00, 77.78, 0.88),
     },
 }
-GLOBAL: Final[Mapping[Place, Printed]] = {
-    "simulation": Printed(88, 7, 6, 90.05, 92.70, None),
-    "field": Printed(98, 26, 16, 79.03, 85.96, None),
+GLOBAL: Final[Mapping[Place, PaperScore]] = {
+    "simulation": PaperScore(88, 7, 6, 90.05, 92.70, None),
+    "field": PaperScore(98, 26, 16, 79.03, 85.96, None),
 }
 """Its row "Total (global)"."""
 MEANS: Final[Mapping[Place, tuple[float, float, float]]] = {
@@ -78,7 +78,7 @@ def disagreements() -> Iterator[Disagreement]:
         yield from _rates(place, "total", GLOBAL[place])
 
 
-def _rates(place: Place, name: str, row: Printed) -> Iterator[Disagreement]:
+def _rates(place: Place, name: str, row: PaperScore) -> Iterator[Disagreement]:
     told = (
         ("precision %", row.precision, row.tp + row.fp),
         ("recall %", row.recall, row.tp + row.fn),
@@ -89,7 +89,7 @@ def _rates(place: Place, name: str, row: Printed) -> Iterator[Disagreement]:
             yield Disagreement(place, name, what, printed, follows)
 
 
-def _totals(place: Place, rows: list[Printed]) -> Iterator[Disagreement]:
+def _totals(place: Place, rows: list[PaperScore]) -> Iterator[Disagreement]:
     total, means = GLOBAL[place], MEANS[place]
     told = (
         ("total", "TP", total.tp, sum(row.tp for row in rows)),

@@ -16,7 +16,7 @@ SEED: Final = 2026
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PlannedRun:
     """One run of one scenario.
 
     Attributes:
@@ -55,12 +55,12 @@ class Plan:
     profile: str = "field"
     counted_s: float = 60.0
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Iterator[PlannedRun]:
         """In their order; every family's first runs come before any second."""
         for number in range(1, self.runs + 1):
             for place, family in enumerate(self.families):
                 seed = self.seed + 100 * place + number
-                yield Step(family, number, self.seconds, seed, self.counted_s)
+                yield PlannedRun(family, number, self.seconds, seed, self.counted_s)
 
 
 PLANS: Final[dict[Size, Plan]] = {

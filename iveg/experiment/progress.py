@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, Literal, TextIO
 
 from iveg.experiment.files import PROGRESS, write_json
-from iveg.experiment.plan import Step
+from iveg.experiment.plan import PlannedRun
 
 Phase = Literal["counting", "running"]
 State = Literal["running", "done", "broken"]
@@ -22,7 +22,7 @@ _WIDTH: Final = 20
 _SAID: Final = {"counting": "virtual clock", "running": "real time"}
 
 
-def expected_s(step: Step) -> float:
+def expected_s(step: PlannedRun) -> float:
     """About how long a run takes."""
     return step.seconds + _STARTS_S + _COUNTED_SHARE * step.counted_s
 
@@ -37,7 +37,7 @@ class Progress:
     """
 
     def __init__(
-        self, directory: Path, steps: Iterable[Step], before: int, out: TextIO
+        self, directory: Path, steps: Iterable[PlannedRun], before: int, out: TextIO
     ) -> None:
         self._directory = directory
         self._expected = {step.name: expected_s(step) for step in steps}
@@ -51,7 +51,7 @@ class Progress:
             left = round(self.left_s(0.0))
             print(f"{len(self._expected)} runs to go, about {left} s", file=out)
 
-    def begin(self, step: Step, phase: Phase, now: float) -> None:
+    def begin(self, step: PlannedRun, phase: Phase, now: float) -> None:
         """A run, or its second half, begins (``now`` monotonic, s)."""
         since = now
         if self._now is not None and self._now[0] == step.name:
@@ -61,7 +61,7 @@ class Progress:
             print(f"{step.name}: {_SAID[phase]}", file=self._out, flush=True)
         self.tick(now)
 
-    def end(self, step: Step, now: float) -> None:
+    def end(self, step: PlannedRun, now: float) -> None:
         """A run is done; how long it took says how long the others will take."""
         expected = self._expected.pop(step.name)
         if self._now is not None:

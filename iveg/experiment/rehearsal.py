@@ -14,7 +14,7 @@ from typing import Literal
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.costmap import Costmap
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
@@ -24,10 +24,10 @@ from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import Layout, lay_out
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.truth import in_view
-from iveg.emulator.world import Rig, World
+from iveg.emulator.world import Rig, SimulatedWorld
 from iveg.experiment.believing import Belief, belief_of
-from iveg.experiment.plan import ROBOTS, Step
-from iveg.experiment.scoring import Pair, Picture, Seen
+from iveg.experiment.plan import ROBOTS, PlannedRun
+from iveg.experiment.scoring import Pair, Picture, SeenObject
 from iveg.experiment.stage import STEP_S, Stage, heard
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, Ports, build
@@ -117,7 +117,9 @@ class Rehearsal:
         watched: The robot whose costmap is looked into.
     """
 
-    def __init__(self, step: Step, profile: str, rule: Rule, watched: str) -> None:
+    def __init__(
+        self, step: PlannedRun, profile: str, rule: DetectionRule, watched: str
+    ) -> None:
         scenario = scenario_named(step.family)
         greenhouse = load_greenhouse(scenario.greenhouse)
         layout = lay_out(scenario, ROBOTS, greenhouse)
@@ -140,7 +142,7 @@ class Rehearsal:
             scan_every=_SCAN_EVERY,
         )
 
-    def _wire(self, greenhouse: Greenhouse, rule: Rule) -> None:
+    def _wire(self, greenhouse: Greenhouse, rule: DetectionRule) -> None:
         ids = count(1)
         outside = self._outside
         ports = Ports(
@@ -190,7 +192,7 @@ class Rehearsal:
     def _looked(self, rig: Rig) -> None:
         """What is in view at the very moment of the picture."""
         seen = (
-            Seen(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
+            SeenObject(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
             for one, _ in in_view(rig, self._world)
         )
         self._detections.append(Picture(rig.robot_id, self._now.mono, tuple(seen)))
@@ -202,7 +204,7 @@ class Rehearsal:
             frame = self._views.frame(real.robot_id, self._now)
             items = [] if frame is None else frame.items
             seen = (
-                Seen(
+                SeenObject(
                     str(place),
                     one.class_id,
                     one.position.x,
@@ -233,5 +235,9 @@ class Rehearsal:
         )
 
 
-def _world_of(greenhouse: Greenhouse, layout: Layout, profile: str, seed: int) -> World:
-    return World(greenhouse, layout, DETECTORS[layout.detector or profile], seed)
+def _world_of(
+    greenhouse: Greenhouse, layout: Layout, profile: str, seed: int
+) -> SimulatedWorld:
+    return SimulatedWorld(
+        greenhouse, layout, DETECTORS[layout.detector or profile], seed
+    )

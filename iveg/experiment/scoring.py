@@ -21,7 +21,7 @@ _LOOK_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class SeenObject:
     """A target in view, or a detection of one, by its centre in ``map`` (m).
 
     Attributes:
@@ -42,7 +42,7 @@ class Picture:
 
     robot_id: str
     at: float
-    seen: tuple[Seen, ...]
+    seen: tuple[SeenObject, ...]
 
 
 Pair = tuple[Picture, Picture]
@@ -145,11 +145,11 @@ def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
 
 
 def match(
-    real: Sequence[Seen], told: Sequence[Seen]
-) -> tuple[dict[str, float], list[Seen]]:
+    real: Sequence[SeenObject], told: Sequence[SeenObject]
+) -> tuple[dict[str, float], list[SeenObject]]:
     """Each target's own detection, the surest first, and what belongs to none."""
     matched: dict[str, float] = {}
-    wrong: list[Seen] = []
+    wrong: list[SeenObject] = []
     for one in sorted(told, key=lambda seen: -seen.confidence):
         free = [
             target
@@ -164,7 +164,7 @@ def match(
     return matched, wrong
 
 
-def overlap(real: Seen, told: Seen) -> float:
+def overlap(real: SeenObject, told: SeenObject) -> float:
     """Intersection over union of two squares of the target's size at these centres."""
     size = SIZE_M.get(real.class_id, _ROBOT_SIZE_M)
     dx, dy = abs(real.x - told.x), abs(real.y - told.y)

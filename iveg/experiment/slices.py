@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.latency.account import Cell, Spread, spread_of
+from iveg.domain.latency.account import Cell, LatencySummary, spread_of
 from iveg.domain.latency.hops import DATA, HOPS
 from iveg.domain.latency.sketch import NOTHING, Sketch, from_bins, merged
 from iveg.experiment.statistics import Interval
@@ -72,7 +72,7 @@ def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
     return {cell: merged(sketches_of(slices, cell)) for cell in cells}
 
 
-def spreads(slices: Sequence[Slice]) -> dict[Cell, Spread]:
+def spreads(slices: Sequence[Slice]) -> dict[Cell, LatencySummary]:
     """The numbers of all slices together."""
     return {cell: spread_of(sketch) for cell, sketch in whole(slices).items()}
 

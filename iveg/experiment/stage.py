@@ -17,7 +17,7 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import REST, Rig, World
+from iveg.emulator.world import REST, Rig, SimulatedWorld
 from iveg.ngsi import codec
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
@@ -85,7 +85,7 @@ class StagedRobot:
         )
         self._perform(self._machine.release_locally(now.mono), now)
 
-    def step(self, number: int, world: World, now: Instant) -> None:
+    def step(self, number: int, world: SimulatedWorld, now: Instant) -> None:
         """Navigate, drive, sense."""
         into_run = number * STEP_S
         free = self._machine.may_drive
@@ -152,7 +152,7 @@ class Stage:
 
     def __init__(
         self,
-        world: World,
+        world: SimulatedWorld,
         incidents: Iterable[Incident],
         ingest: Ingest,
         loop: RuleLoop,

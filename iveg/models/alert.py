@@ -85,7 +85,7 @@ def _told(member: Json) -> list[Told]:
 
 
 class Alert(Model):
-    """A alert to people: all occurrences of one kind and subject as one."""
+    """An alert to people: all occurrences of one kind and subject as one."""
 
     alert_id: str
     priority: alert_book.Priority

@@ -11,7 +11,7 @@ from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
-from iveg.domain.stop.latency import Spread
+from iveg.domain.stop.latency import StopLatency
 from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.models.base import Model, Slots, rounded, stamp
@@ -239,7 +239,7 @@ class LatencySpread(Model):
     max_ms: float | None
 
     @classmethod
-    def of(cls, of: Spread) -> "LatencySpread":
+    def of(cls, of: StopLatency) -> "LatencySpread":
         """Rounded to a tenth of a millisecond."""
         return cls(
             count=of.count,

@@ -23,7 +23,7 @@ class Rule(Model):
     since: str | None
 
     @classmethod
-    def of(cls, rule: detection_rule.Rule) -> "Rule":
+    def of(cls, rule: detection_rule.DetectionRule) -> "Rule":
         """One version."""
         return cls(
             id=rule.id,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
@@ -18,7 +18,7 @@ from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.ports import CommandPort, Fleet, Journal
+from iveg.pipeline.ports import CommandPort, FleetPort, StopJournal
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 
@@ -41,9 +41,9 @@ class Ports:
         fiware_is_cut: Whether orders get nowhere there; None asks the health monitor.
     """
 
-    fleet: Fleet
+    fleet: FleetPort
     transports: Mapping[Transport, CommandPort]
-    journal: Journal
+    journal: StopJournal
     sink: RecordSink
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
@@ -62,7 +62,7 @@ class Choices:
         boot: Random, new at each start; identity of our feedback.
     """
 
-    rule: Rule = field(default_factory=Rule)
+    rule: DetectionRule = field(default_factory=DetectionRule)
     drills: Drills | None = None
     boot: str = "iveg-boot"
 

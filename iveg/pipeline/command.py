@@ -26,6 +26,7 @@ from iveg.domain.stop import (
     Changed,
     Closed,
     Command,
+    DesiredRecord,
     Effect,
     OffTable,
     Press,
@@ -33,14 +34,13 @@ from iveg.domain.stop import (
     SendStop,
     SetDesiredState,
     StopMachine,
-    Wanted,
 )
 from iveg.domain.stop import conditions as stop_conditions
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import Transport
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import Clock, CommandPort, Fleet, Ids, Journal
+from iveg.pipeline.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
 from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.sending import IsCut, Sender
@@ -80,8 +80,8 @@ class Commander:
         self,
         robots: Iterable[str],
         ports: Mapping[Transport, CommandPort],
-        fleet: Fleet,
-        journal: Journal,
+        fleet: FleetPort,
+        journal: StopJournal,
         event_log: EventLog,
         hub: Hub,
         new_id: Ids,
@@ -253,7 +253,7 @@ class Commander:
         for machine in self.machines.values():
             self._perform(machine, machine.tick(now, self._new_id()), now)
 
-    def restore(self, wanted: Mapping[str, Wanted], now: Instant) -> None:
+    def restore(self, wanted: Mapping[str, DesiredRecord], now: Instant) -> None:
         """After a restart: stop every robot again that was to stand."""
         for robot_id, one in wanted.items():
             machine = self.machines.get(robot_id)

@@ -4,11 +4,11 @@ A sighting is logged at its start and recorded once in two seconds, so that a pe
 stands before a camera for an hour does not fill the log.
 """
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
-from iveg.domain.order import Verdict
+from iveg.domain.order import OrderVerdict
 from iveg.domain.rule.overload import Overload
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.world import World
@@ -59,7 +59,11 @@ class DetectionTracking:
         return len(self._told)
 
     def take(
-        self, frame: DetectionFrame, received: Received, verdict: Verdict, rule: Rule
+        self,
+        frame: DetectionFrame,
+        received: Received,
+        verdict: OrderVerdict,
+        rule: DetectionRule,
     ) -> None:
         """Take one frame; a late one may still protect somebody, Orion's answer not.
 
@@ -92,7 +96,7 @@ class DetectionTracking:
         return received.at.mono - seen_at.mono
 
     def _look(
-        self, frame: DetectionFrame, received: Received, rule: Rule
+        self, frame: DetectionFrame, received: Received, rule: DetectionRule
     ) -> list[Placed]:
         seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())

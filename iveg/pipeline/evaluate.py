@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
@@ -27,7 +27,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.records import AlertRecord, DecisionRecord
-from iveg.domain.rule.speed_limits import Change, Crossing, SpeedLimits
+from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.world import World
 from iveg.pipeline import topics
@@ -39,7 +39,7 @@ from iveg.pipeline.feedback import FeedbackPublisher
 from iveg.pipeline.first_reports import FirstReports
 from iveg.pipeline.kinds import LowValues, kind
 from iveg.pipeline.log_messages import evidence_of, speed_line
-from iveg.pipeline.ports import Fleet, Ids
+from iveg.pipeline.ports import FleetPort, Ids
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.staleness import Staleness
 
@@ -61,8 +61,8 @@ class Evaluator:
         self,
         world: World,
         greenhouse: Greenhouse,
-        rule: Rule,
-        fleet: Fleet,
+        rule: DetectionRule,
+        fleet: FleetPort,
         event_log: EventLog,
         hub: Hub,
         new_id: Ids,
@@ -237,7 +237,7 @@ class Evaluator:
         if slower or (self._untold and self._feedback_publisher.may_publish(now)):
             self.tell(now)
 
-    def _crossed(self, change: Change, now: Instant) -> None:
+    def _crossed(self, change: LimitChange, now: Instant) -> None:
         crossing = change.crossing
         if change.began:
             if not crossing.in_sight:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 
 from iveg.domain.decisions import Decision, Link, Place
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.observations import Instant
 from iveg.domain.records import AlertRecord, DecisionRecord
@@ -82,7 +82,7 @@ def cleared_behind(record: AlertRecord, found: float) -> AlertRecord:
     return replace(record, cleared_at=found, members=[*record.members[:-1], *last])
 
 
-def _parameters(rule: Rule, zone: Zone) -> dict[str, object]:
+def _parameters(rule: DetectionRule, zone: Zone) -> dict[str, object]:
     return {
         "threshold": rule.threshold_of(zone.reason),
         "radius_m": rule.radius_m,

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
-from iveg.pipeline.ports import Fleet
+from iveg.pipeline.ports import FleetPort
 
 USED_HZ, BURST = 30.0, 8.0
 """What robots can use of feedback, and how many may come at once (1/s, 1)."""
@@ -34,7 +34,7 @@ class FeedbackPublisher:
         world: World,
         people: People,
         other: Mapping[str, Instant],
-        fleet: Fleet,
+        fleet: FleetPort,
         stamp: Callable[[float], str],
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
@@ -59,7 +59,7 @@ class FeedbackPublisher:
         return min(BURST, self._left + USED_HZ * since)
 
     def tell(
-        self, speed_limits: Mapping[str, SpeedLimit], rule: Rule, now: Instant
+        self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
     ) -> None:
         """Send every robot what the fleet must know."""
         self.published_at = now.mono
@@ -106,7 +106,7 @@ class FeedbackPublisher:
             self._backlog(now),
         )
 
-    def _alerts(self, rule: Rule, now: Instant) -> Iterable[FeedbackAlert]:
+    def _alerts(self, rule: DetectionRule, now: Instant) -> Iterable[FeedbackAlert]:
         for person in self._people.known.values():
             for sighting, radius in person.rings(rule, now):
                 # What a recording saw long ago must not slow a robot of today.

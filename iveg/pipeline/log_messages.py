@@ -18,7 +18,7 @@ from iveg.domain.world import World
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class SlowdownCauses:
     """The detection behind a slow-down, and its distance from the robot (m).
 
     Attributes:
@@ -44,7 +44,7 @@ def evidence_of(
     people: People,
     world: World,
     greenhouse: Greenhouse,
-) -> Evidence | None:
+) -> SlowdownCauses | None:
     """Facts behind the reason that a robot reports; None when iVeg has none.
 
     A robot judges alerts by its own pose, too, and may be ahead of our decision; it
@@ -74,7 +74,7 @@ def _without_decision(
     people: People,
     world: World,
     greenhouse: Greenhouse,
-) -> Evidence | None:
+) -> SlowdownCauses | None:
     for person in people.known.values():
         if report.decision_id == person.decision_id:
             return _of_person(person, robot, greenhouse)
@@ -82,12 +82,12 @@ def _without_decision(
     return None if peer is None else _of_peer(peer, robot, greenhouse)
 
 
-def _of_crossing(crossing: Crossing) -> Evidence:
+def _of_crossing(crossing: Crossing) -> SlowdownCauses:
     zone, look = crossing.zone, crossing.zone.sighting
     confidence = None if look is None else look.confidence
     unseen = None if look is None else look.age_s(crossing.entered)
     grown = unseen is not None and unseen > LIMITS.growth_grace_s
-    return Evidence(
+    return SlowdownCauses(
         zone.cause,
         zone.reason,
         zone.observer,
@@ -102,11 +102,11 @@ def _of_crossing(crossing: Crossing) -> Evidence:
 
 def _of_person(
     person: Person, robot: RobotState, greenhouse: Greenhouse
-) -> Evidence | None:
+) -> SlowdownCauses | None:
     if robot.odometry is None:
         return None
     pose, look = robot.odometry.pose, person.newest
-    return Evidence(
+    return SlowdownCauses(
         person.person_id,
         person.class_,
         look.observer,
@@ -119,11 +119,11 @@ def _of_person(
 
 def _of_peer(
     peer: RobotState, robot: RobotState, greenhouse: Greenhouse
-) -> Evidence | None:
+) -> SlowdownCauses | None:
     if robot.odometry is None or peer.odometry is None:
         return None
     pose, other = robot.odometry.pose, peer.odometry.pose
-    return Evidence(
+    return SlowdownCauses(
         peer.robot_id,
         "robot",
         peer.robot_id,
@@ -132,7 +132,7 @@ def _of_peer(
     )
 
 
-def speed_line(report: SafetyReport, evidence: Evidence | None) -> LogEvent:
+def speed_line(report: SafetyReport, evidence: SlowdownCauses | None) -> LogEvent:
     """A robot applies another factor than before, and why."""
     slots: dict[str, Slot] = {
         "robot": report.robot_id,

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Literal, Protocol
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.messages import Contacts, Delivery, Message
 from iveg.domain.observations import Instant
@@ -39,7 +39,7 @@ class CommandPort(Protocol):
         """
 
 
-class Fleet(Protocol):
+class FleetPort(Protocol):
     """The fleet's topics on MQTT: feedback and desired states."""
 
     def tell(self, feedback: Feedback) -> None:
@@ -55,7 +55,7 @@ class Fleet(Protocol):
         """
 
 
-class Journal(Protocol):
+class StopJournal(Protocol):
     """Append-only file that outlives a crash and a lost database."""
 
     async def wanted(
@@ -86,7 +86,7 @@ class Journal(Protocol):
 class RuleStore(Protocol):
     """Every version of the rule that ever was in force."""
 
-    async def append(self, rule: Rule) -> None:
+    async def append(self, rule: DetectionRule) -> None:
         """Write a new version down; returns when it is on disk. Raises HopError."""
 
 

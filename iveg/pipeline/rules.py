@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Protocol
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import OutdatedError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
@@ -16,7 +16,7 @@ from iveg.pipeline.ports import RuleStore
 class Judge(Protocol):
     """The part that applies the rule: the assessor."""
 
-    rule: Rule
+    rule: DetectionRule
 
 
 class Rules:
@@ -27,7 +27,11 @@ class Rules:
     """
 
     def __init__(
-        self, judge: Judge, store: RuleStore, event_log: EventLog, past: Iterable[Rule]
+        self,
+        judge: Judge,
+        store: RuleStore,
+        event_log: EventLog,
+        past: Iterable[DetectionRule],
     ) -> None:
         self._judge = judge
         self._store = store
@@ -36,13 +40,13 @@ class Rules:
         self.versions = [*past] or [judge.rule]
 
     @property
-    def current(self) -> Rule:
+    def current(self) -> DetectionRule:
         """The version in force."""
         return self._judge.rule
 
     async def change(
-        self, wanted: Rule, by: str, at: Instant, seen: int | None = None
-    ) -> Rule:
+        self, wanted: DetectionRule, by: str, at: Instant, seen: int | None = None
+    ) -> DetectionRule:
         """Put new parameters in force under the next version.
 
         Args:
@@ -73,7 +77,7 @@ class Rules:
         return rule
 
 
-def _line(before: Rule, rule: Rule) -> LogEvent:
+def _line(before: DetectionRule, rule: DetectionRule) -> LogEvent:
     slots: dict[str, Slot] = {
         "by": rule.author,
         "version": rule.version,

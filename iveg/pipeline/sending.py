@@ -20,7 +20,7 @@ from iveg.domain.stop import (
 )
 from iveg.domain.transports import TransportId
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import Clock, CommandPort, Fleet, Journal
+from iveg.pipeline.ports import Clock, CommandPort, FleetPort, StopJournal
 
 _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
@@ -43,8 +43,8 @@ class Sender:
     def __init__(
         self,
         ports: Mapping[TransportId, CommandPort],
-        fleet: Fleet,
-        journal: Journal,
+        fleet: FleetPort,
+        journal: StopJournal,
         event_log: EventLog,
         clock: Clock,
         came_back: CameBack,

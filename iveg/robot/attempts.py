@@ -14,7 +14,7 @@ ATTEMPTS_KEPT = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class AttemptVerdict:
     """What became of an order.
 
     Attributes:
@@ -32,13 +32,13 @@ class Attempts:
     """The verdicts on the last 64 attempts."""
 
     def __init__(self) -> None:
-        self._verdicts: dict[str, Verdict] = {}
+        self._verdicts: dict[str, AttemptVerdict] = {}
 
-    def recall(self, attempt: str | None) -> Verdict | None:
+    def recall(self, attempt: str | None) -> AttemptVerdict | None:
         """The verdict on an order that came before; None where it is the first."""
         return None if attempt is None else self._verdicts.get(attempt)
 
-    def note(self, attempt: str | None, verdict: Verdict) -> None:
+    def note(self, attempt: str | None, verdict: AttemptVerdict) -> None:
         """Remember a verdict; an order without an attempt cannot be remembered."""
         if attempt is None:
             return

@@ -50,7 +50,7 @@ def lowest(caps: Iterable[Cap]) -> Cap:
 
 
 @dataclass(frozen=True, slots=True)
-class Applied:
+class AppliedCap:
     """The cap that is in force, and the one that waits to replace it.
 
     Attributes:
@@ -61,15 +61,15 @@ class Applied:
     waiting: Cap | None = None
     since: float = 0.0
 
-    def settle(self, raw: Cap, now: float) -> "Applied":
+    def settle(self, raw: Cap, now: float) -> "AppliedCap":
         """Take the raw cap of this moment: down at once, up after 1.0 s."""
         if raw is self.cap and self.waiting is None:
             return self
         if raw.factor <= self.cap.factor:
-            return Applied(raw)
+            return AppliedCap(raw)
         if self.waiting is None:
-            return Applied(self.cap, raw, now)
+            return AppliedCap(self.cap, raw, now)
         waiting = lowest((self.waiting, raw))
         if now - self.since < LIMITS.release_after_s:
-            return Applied(self.cap, waiting, self.since)
-        return Applied(waiting).settle(raw, now)
+            return AppliedCap(self.cap, waiting, self.since)
+        return AppliedCap(waiting).settle(raw, now)

@@ -5,14 +5,14 @@ what is in it was measured after that feedback left iVeg (docs/interfaces/mqtt.m
 """
 
 from iveg.domain.observations import FeedbackRef, Origin
-from iveg.domain.order import Order
+from iveg.domain.order import StreamOrder
 
 
 class Echo:
     """Keeps the newest feedback, of whatever topic: iVeg counts them all as one."""
 
     def __init__(self) -> None:
-        self._order = Order()
+        self._order = StreamOrder()
         self.heard: FeedbackRef | None = None
         """None before the first."""
 

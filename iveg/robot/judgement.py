@@ -11,7 +11,7 @@ from typing import Literal
 from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
-from iveg.robot.caps import FREE, Applied, Cap, lowest
+from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 
@@ -62,7 +62,7 @@ class Judgement:
         self._limits = limits
         self._peer_feedback = PeerFeedback(robot_id)
         self._motion: Motion | None = None
-        self._applied = Applied(Cap(0.0, "watchdog"))
+        self._applied = AppliedCap(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
         self.local = FREE
         """What the robot's own software asks for, whatever iVeg says."""

@@ -22,7 +22,7 @@ from those."""
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class LaneMessage:
     """Bytes for one topic, at QoS 1."""
 
     topic: str
@@ -45,9 +45,9 @@ class SafetyLane:
         self._keep = keep
         self._publish = publish
         self._to_keep: HoldSet | None = None
-        self._answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
-        self._kept_answers: deque[Message] = deque(maxlen=_MAX_ANSWERS)
-        self._reports: dict[str, Message] = {}
+        self._answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
+        self._kept_answers: deque[LaneMessage] = deque(maxlen=_MAX_ANSWERS)
+        self._reports: dict[str, LaneMessage] = {}
         self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
         self._room = asyncio.Semaphore(_UNDER_WAY)
         self._disk_fails = False
@@ -59,12 +59,12 @@ class SafetyLane:
         self._to_keep = holds
         self._keep_wake.set()
 
-    def answer(self, message: Message) -> None:
+    def answer(self, message: LaneMessage) -> None:
         """Send after the set that it speaks of is on disk; the oldest gives way."""
         self._answers.append(message)
         self._keep_wake.set()
 
-    def report(self, message: Message) -> None:
+    def report(self, message: LaneMessage) -> None:
         """Send when there is time; a newer one of its topic takes its place."""
         self._reports[message.topic] = message
         self._send_wake.set()
@@ -107,12 +107,12 @@ class SafetyLane:
                     # Tasks begin in this order, and each is on its way at once.
                     sending.create_task(self._send(self._next()))
 
-    def _next(self) -> Message:
+    def _next(self) -> LaneMessage:
         if self._kept_answers:
             return self._kept_answers.popleft()
         return self._reports.pop(next(iter(self._reports)))
 
-    async def _send(self, message: Message) -> None:
+    async def _send(self, message: LaneMessage) -> None:
         try:
             await self._publish(message.topic, message.payload)
         except HopError:

@@ -16,14 +16,14 @@ _FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses reports that hold any of th
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class StopOrder:
     """Halt and hold; ``id`` None when the sender gave no usable name."""
 
     id: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Release:
+class ReleaseOrder:
     """Lift exactly these holds.
 
     Attributes:
@@ -37,8 +37,8 @@ class Release:
 
 
 @dataclass(frozen=True, slots=True)
-class Resume:
-    """Drive again after a release; ``attempt`` as in ``Release``."""
+class ResumeOrder:
+    """Drive again after a release; ``attempt`` as in ``ReleaseOrder``."""
 
     challenge: str
     attempt: str | None = None
@@ -51,7 +51,7 @@ class Unusable:
     why: str
 
 
-Order = Stop | Release | Resume | Unusable
+Order = StopOrder | ReleaseOrder | ResumeOrder | Unusable
 
 
 def read_order(payload: bytes) -> Order:
@@ -59,10 +59,12 @@ def read_order(payload: bytes) -> Order:
     try:
         message = load_json(payload)
     except UnreadableError:
-        return Stop() if _STOP.encode() in payload.lower() else Unusable("unreadable")
+        return (
+            StopOrder() if _STOP.encode() in payload.lower() else Unusable("unreadable")
+        )
     # A key that JSON dropped because it came twice still counts: look at the bytes.
     if b'"stop"' in payload.lower() or _speaks_of_stop(message):
-        return Stop(_stop_id(message))
+        return StopOrder(_stop_id(message))
     return _release_or_resume(message)
 
 
@@ -129,14 +131,14 @@ def _release(asked: dict[str, object]) -> Order:
     named = tuple(one for one in ids if isinstance(one, str) and one)
     if len(named) != len(ids):
         return Unusable("malformed")
-    return Release(named, challenge, _usable_id(asked.get("attempt")))
+    return ReleaseOrder(named, challenge, _usable_id(asked.get("attempt")))
 
 
 def _resume(asked: dict[str, object]) -> Order:
     challenge = asked["ch"]
     if not isinstance(challenge, str) or not challenge or not _has_good_name(asked):
         return Unusable("malformed")
-    return Resume(challenge, _usable_id(asked.get("attempt")))
+    return ResumeOrder(challenge, _usable_id(asked.get("attempt")))
 
 
 def _has_good_name(asked: dict[str, object]) -> bool:

@@ -35,7 +35,7 @@ _LONGEST_STEP_S = 0.5
 
 
 @dataclass(slots=True)
-class Rates:
+class UplinkRates:
     """Says which message is a measure; every other is for iVeg alone.
 
     All moments are monotonic (s).

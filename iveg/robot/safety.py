@@ -23,13 +23,19 @@ from typing import Literal
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
-from iveg.robot.attempts import Attempts, Verdict
+from iveg.robot.attempts import Attempts, AttemptVerdict
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Answer, AnswerCode, Drive, Effect, Persist, Report
 from iveg.robot.gate import Gate
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import DEFAULT_LIMITS, Judgement, Limits
-from iveg.robot.orders import Release, Resume, Stop, read_desired_state, read_order
+from iveg.robot.orders import (
+    ReleaseOrder,
+    ResumeOrder,
+    StopOrder,
+    read_desired_state,
+    read_order,
+)
 
 State = Literal["HELD", "BRAKING", "STANDING", "READY", "RUNNING"]
 
@@ -152,9 +158,9 @@ class SafetyMachine:
         """Something came on ``/{apikey}/{robot}/cmd``."""
         self._judge(now)
         order = read_order(payload)
-        if isinstance(order, Stop):
+        if isinstance(order, StopOrder):
             answer = self._stop(order.id, now)
-        elif isinstance(order, Release | Resume):
+        elif isinstance(order, ReleaseOrder | ResumeOrder):
             answer = self._attempt(order, now)
         else:
             answer = self._answer(None, "REFUSED", order.why)
@@ -215,11 +221,11 @@ class SafetyMachine:
                 return hold
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
-    def _attempt(self, order: Release | Resume, now: float) -> CommandAnswer:
+    def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
         """The first copy of an order is judged; every other is answered alike."""
         verdict = self._attempts.recall(order.attempt)
         if verdict is None:
-            if isinstance(order, Release):
+            if isinstance(order, ReleaseOrder):
                 verdict = self._release(order, now)
             else:
                 verdict = self._resume(order, now)
@@ -228,19 +234,19 @@ class SafetyMachine:
             verdict.answered, verdict.code, verdict.why, attempt=order.attempt
         )
 
-    def _release(self, order: Release, now: float) -> Verdict:
+    def _release(self, order: ReleaseOrder, now: float) -> AttemptVerdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
             # The same release again: nothing left to lift, answered alike.
-            return Verdict(first, "RELEASED")
+            return AttemptVerdict(first, "RELEASED")
         why = self._why_not_release(order, now)
         if why is not None:
             return self._refuse(first, order.challenge, why, now)
         self._holds = self._holds.lift(self._holds.remote & frozenset(order.ids))
         self._renew_challenge(now)
-        return Verdict(first, "RELEASED")
+        return AttemptVerdict(first, "RELEASED")
 
-    def _why_not_release(self, order: Release, now: float) -> str | None:
+    def _why_not_release(self, order: ReleaseOrder, now: float) -> str | None:
         """The code that a release is refused with; None when it is perfect."""
         remote = self._holds.remote
         if not remote:
@@ -251,18 +257,18 @@ class SafetyMachine:
             return "challenge"
         return None if self._judgement.stands(now) else "not_standing"
 
-    def _resume(self, order: Resume, now: float) -> Verdict:
+    def _resume(self, order: ResumeOrder, now: float) -> AttemptVerdict:
         if self._resumed and order.challenge == self._resumed_by:
-            return Verdict(None, "RESUMED")
+            return AttemptVerdict(None, "RESUMED")
         why = self._why_not_resume(order)
         if why is not None:
             return self._refuse(None, order.challenge, why, now)
         self._let_go()
         self._resumed_by = order.challenge
         self._renew_challenge(now)
-        return Verdict(None, "RESUMED")
+        return AttemptVerdict(None, "RESUMED")
 
-    def _why_not_resume(self, order: Resume) -> str | None:
+    def _why_not_resume(self, order: ResumeOrder) -> str | None:
         if self._holds.holds:
             return "held"
         if self._resumed:
@@ -271,11 +277,11 @@ class SafetyMachine:
 
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
-    ) -> Verdict:
+    ) -> AttemptVerdict:
         """Refuse; a copy that comes later, when all would be right, finds it spent."""
         if challenge == self._challenge:
             self._renew_challenge(now)
-        return Verdict(answered, "REFUSED", why)
+        return AttemptVerdict(answered, "REFUSED", why)
 
     def _answer(
         self,

@@ -28,8 +28,8 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS
 from iveg.robot.echo import Echo
-from iveg.robot.lane import Message
-from iveg.robot.rates import Rates
+from iveg.robot.lane import LaneMessage
+from iveg.robot.rates import UplinkRates
 from iveg.robot.single import SinglePayload
 
 Sensed = Odometry | LaserScan | DetectionFrame | Navigation | Battery | Unplaced
@@ -90,7 +90,7 @@ class Uplink:
         self._next: Counter[str] = Counter({"_safety": first_report - 1})
         self._looked: tuple[tuple[str, int], ...] = ()
         self._stamp = math.nan, ""
-        self.rates = Rates()
+        self.rates = UplinkRates()
         self.sent: Counter[str] = Counter()
         """Measures made, by device suffix; the single payload's is empty."""
         self.spared: Counter[str] = Counter()
@@ -120,25 +120,25 @@ class Uplink:
 
     def report(
         self, report: SafetyReport, at: Instant, *, is_measure: bool = True
-    ) -> tuple[int, list[Message]]:
+    ) -> tuple[int, list[LaneMessage]]:
         """The ``seq`` of a safety report and its messages, the direct one first.
 
         Both are the same bytes: whichever comes first counts.
         """
         origin = self._origin("_safety", at)
         payload = codec.write_safety(replace(report, origin=origin))
-        messages = [Message(names.direct_topic(self._id, "_safety"), payload)]
+        messages = [LaneMessage(names.direct_topic(self._id, "_safety"), payload)]
         if is_measure:
             self.sent["_safety"] += 1
-            messages.append(Message(self._topic("_safety"), payload))
+            messages.append(LaneMessage(self._topic("_safety"), payload))
         return origin.seq or 0, messages
 
-    def answer(self, answer: CommandAnswer, at: Instant) -> Message:
+    def answer(self, answer: CommandAnswer, at: Instant) -> LaneMessage:
         """The message of an answer on ``cmdexe``."""
         origin = self._origin(_ANSWERS, at)
         self.sent[_ANSWERS] += 1
         topic = names.answer_topic(self._apikey, self._id)
-        return Message(topic, codec.write_answer(replace(answer, origin=origin)))
+        return LaneMessage(topic, codec.write_answer(replace(answer, origin=origin)))
 
     def _send_single(
         self, single: SinglePayload, observation: Sensed, at: Instant

@@ -17,7 +17,7 @@ from iveg.domain.observations import LaserScan, Odometry
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import World
+from iveg.emulator.world import SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")
 _SETTING = "IVEG_TEST_RECORDINGS"
@@ -38,7 +38,7 @@ def emulated_logs(folder: Path, seconds: float = 20.0) -> tuple[Path, ...]:
     """What each robot of the demo records of its first seconds, a file for each."""
     greenhouse = load_greenhouse("mvsim-20x20")
     layout = lay_out(scenario_named("demo"), ROBOTS, greenhouse)
-    world = World(greenhouse, layout, DETECTORS["perfect"], seed=1)
+    world = SimulatedWorld(greenhouse, layout, DETECTORS["perfect"], seed=1)
     lines: dict[str, list[str]] = {robot_id: [] for robot_id in ROBOTS}
     for now in _drive(world, seconds):
         for robot_id, rig in world.rigs.items():
@@ -50,7 +50,7 @@ def emulated_logs(folder: Path, seconds: float = 20.0) -> tuple[Path, ...]:
     return files
 
 
-def _drive(world: World, seconds: float) -> Iterator[float]:
+def _drive(world: SimulatedWorld, seconds: float) -> Iterator[float]:
     """Everybody moves; pauses for the recorder two and a half times a second."""
     for step in range(round(seconds / _STEP_S)):
         now = step * _STEP_S

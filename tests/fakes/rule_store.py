@@ -1,6 +1,6 @@
 """A store of rule versions in memory, whose disk may be full."""
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 
 
@@ -8,10 +8,10 @@ class FakeRuleStore:
     """Keeps what is written; ``full`` refuses."""
 
     def __init__(self) -> None:
-        self.written: list[Rule] = []
+        self.written: list[DetectionRule] = []
         self.full = False
 
-    async def append(self, rule: Rule) -> None:
+    async def append(self, rule: DetectionRule) -> None:
         if self.full:
             raise HopError("disk", "no space left")
         self.written.append(rule)

@@ -55,7 +55,7 @@ class Cloud:
     )
     answers: list[CommandAnswer] = field(default_factory=list)
     devices: set[str] = field(default_factory=set)
-    problems: list[codec.Problem] = field(default_factory=list)
+    problems: list[codec.UnreadPart] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.link = MqttLink(self.address, "cloud")

@@ -25,12 +25,12 @@ from iveg.domain.observations import (
 )
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.emulated_robot import FleetSettings
-from iveg.emulator.fleet import Fleet, run_emulator
+from iveg.emulator.fleet import SimulatedFleet, run_emulator
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import World
+from iveg.emulator.world import SimulatedWorld
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 
 TESTBED = load_greenhouse("mvsim-20x20")
@@ -393,7 +393,7 @@ async def test_an_incident_of_a_scenario_happens_when_it_is_due(
     address: BrokerAddress, cloud: Cloud, tmp_path: Path
 ) -> None:
     layout = lay_out(scenario_named("demo"), FLEET, TESTBED)
-    world = World(TESTBED, layout, DETECTORS["perfect"], seed=1)
+    world = SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1)
     settings = FleetSettings(
         address, "iveg", "per-topic", 1.0, 3.0, tmp_path, held=False, rate_hz=30.0
     )
@@ -401,7 +401,7 @@ async def test_an_incident_of_a_scenario_happens_when_it_is_due(
         Incident(1.0, FaultOrder(robot="AGII", mute=True)),
         Incident(0.1, FaultOrder(robot="AGV", mute=True)),
     )
-    fleet = Fleet(world, settings, radio_seed=1)
+    fleet = SimulatedFleet(world, settings, radio_seed=1)
 
     def silent_for(scans: int) -> bool:
         said = cloud.heard["AGII"]

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import FULL_SPEED
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
@@ -208,7 +208,7 @@ class Rig:
         """Whether the robot may drive at full speed; the fleet's eyes are open."""
         self.robot.detections_at = self.at().mono
         found, _ = self.speed_limits.evaluate(
-            self.world, self.people, Rule(), self.at(), "d"
+            self.world, self.people, DetectionRule(), self.at(), "d"
         )
         return found["AGI"].speed_factor >= FULL_SPEED
 

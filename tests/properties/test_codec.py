@@ -112,7 +112,7 @@ alerts = st.builds(
 def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
     reading = codec.read_measure("AGI_odom", codec.write_odometry(value))
 
-    assert reading == codec.Reading((value,))
+    assert reading == codec.ReadResult((value,))
 
 
 @given(
@@ -121,7 +121,7 @@ def test_odometry_comes_back_as_it_went(value: Odometry) -> None:
 def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
     written = codec.write_detections(value)
 
-    assert codec.read_measure("AGI_yolox_bounding_boxes", written) == codec.Reading(
+    assert codec.read_measure("AGI_yolox_bounding_boxes", written) == codec.ReadResult(
         (value,)
     )
 
@@ -144,9 +144,9 @@ def test_detections_come_back_as_they_went(value: DetectionFrame) -> None:
     )
 )
 def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
-    assert codec.read_measure("AGI_safety", codec.write_safety(value)) == codec.Reading(
-        (value,)
-    )
+    assert codec.read_measure(
+        "AGI_safety", codec.write_safety(value)
+    ) == codec.ReadResult((value,))
 
 
 @given(
@@ -162,7 +162,7 @@ def test_safety_reports_come_back_as_they_went(value: SafetyReport) -> None:
 def test_navigation_comes_back_as_it_went(value: Navigation) -> None:
     assert codec.read_measure(
         "AGI_nav", codec.write_navigation(value)
-    ) == codec.Reading((value,))
+    ) == codec.ReadResult((value,))
 
 
 @given(
@@ -180,7 +180,7 @@ def test_navigation_comes_back_as_it_went(value: Navigation) -> None:
     )
 )
 def test_answers_come_back_as_they_went(value: CommandAnswer) -> None:
-    assert codec.read_answer("AGI", codec.write_answer(value)) == codec.Reading(
+    assert codec.read_answer("AGI", codec.write_answer(value)) == codec.ReadResult(
         (value,)
     )
 
@@ -217,7 +217,7 @@ def test_climate_comes_back_as_it_went(
     attributes = orjson.loads(codec.write_climate(value, "t"))
 
     entity = {"id": names.CLIMATE_ID, "type": names.CLIMATE_TYPE, **attributes}
-    assert codec.read_entity(entity) == codec.Reading((value,))
+    assert codec.read_entity(entity) == codec.ReadResult((value,))
 
 
 @given(origins)
@@ -225,7 +225,7 @@ def test_the_heartbeat_comes_back_as_it_went(origin: Origin) -> None:
     attributes = orjson.loads(codec.write_heartbeat(origin))
 
     entity = {"id": names.HEARTBEAT_ID, "type": names.HEARTBEAT_TYPE, **attributes}
-    assert codec.read_entity(entity) == codec.Reading((HeartbeatProbe(origin),))
+    assert codec.read_entity(entity) == codec.ReadResult((HeartbeatProbe(origin),))
 
 
 @given(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.rule import zones
-from iveg.domain.rule.speed_limits import Change
+from iveg.domain.rule.speed_limits import LimitChange
 from tests.unit.domain.scene import Scene, person
 
 FLEET = tuple(f"R{number}" for number in range(6))
@@ -25,7 +25,7 @@ STEPS = st.lists(
 """Pause (s), who moves and looks, to where, and whom it sees (half metres)."""
 
 
-def named(changes: Iterable[Change]) -> list[tuple[object, ...]]:
+def named(changes: Iterable[LimitChange]) -> list[tuple[object, ...]]:
     return [
         (
             one.began,

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.observations import Odometry
-from iveg.domain.order import Order
+from iveg.domain.order import StreamOrder
 from iveg.domain.world import World
 from tests.builders import odometry, origin, received
 
@@ -41,7 +41,7 @@ def test_each_message_is_new_late_or_a_duplicate_and_counted_as_one(
 
 @given(st.lists(st.tuples(st.integers(0, 50), stamps), min_size=1, max_size=60))
 def test_no_stamp_ever_orders_anything(arrived: list[tuple[int, float]]) -> None:
-    told, silent = Order(), Order()
+    told, silent = StreamOrder(), StreamOrder()
     for seq, stamp_s in arrived:
         stamped = origin(seq)
         off = type(stamped)(stamped.boot, seq, "whenever", stamp_s)

@@ -18,7 +18,7 @@ from iveg.emulator.ros2_base import TIMEOUT_S, Base
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Drive as Told
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, REST
-from iveg.robot.ros2.config import Drive
+from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist
@@ -66,7 +66,10 @@ class Gate:
 
     def __post_init__(self) -> None:
         self.topics = DriveTopics(
-            Drive(stamped_in=True, stamped_out=True), "/in", "base_link", InputFaults()
+            DriveConfig(stamped_in=True, stamped_out=True),
+            "/in",
+            "base_link",
+            InputFaults(),
         )
         self.seen = 0
 

@@ -26,18 +26,18 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.domain.order import Order
+from iveg.domain.order import StreamOrder
 from iveg.domain.stop import (
     Changed,
     Closed,
     Command,
+    DesiredRecord,
     Effect,
     OffTable,
     SendOnce,
     SendStop,
     SetDesiredState,
     StopMachine,
-    Wanted,
 )
 from iveg.domain.transports import TransportId
 from iveg.ngsi import codec
@@ -116,7 +116,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         self.ids = itertools.count(1)
         self.level: tuple[str, ...] = ()
         self.journal = False
-        self.disk = Wanted("ana")
+        self.disk = DesiredRecord("ana")
         self.named: set[str] = set()
         self.strange = False
         self.asking = False
@@ -140,7 +140,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         """A new iVeg: nothing is known but the journal."""
         self.iveg = StopMachine("AGI")
         self.history.clear()
-        self.order, self.asked, self.sent_once = Order(), 0, 0
+        self.order, self.asked, self.sent_once = StreamOrder(), 0, 0
         self.samples: list[tuple[float, SafetyReport, TransportId]] = []
         self.moved_at = self.last_send = self.heard_at = float("-inf")
         self.releasing_since: float | None = None

@@ -16,7 +16,7 @@ import pytest
 from iveg.domain.errors import CommandRefusedError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord, Record
-from iveg.domain.stop import Wanted
+from iveg.domain.stop import DesiredRecord
 from tests.fakes.journal import FakeJournal
 from tests.unit.pipeline.desk import Desk, settle
 
@@ -34,7 +34,7 @@ class Disk:
 
     commands: dict[str, CommandRecord] = field(default_factory=dict)
     events: dict[CommandEventRecord, None] = field(default_factory=dict)
-    wanted: dict[str, Wanted] = field(default_factory=dict)
+    wanted: dict[str, DesiredRecord] = field(default_factory=dict)
 
     def take(self, records: list[Record], journal: FakeJournal) -> None:
         for record in records:
@@ -46,7 +46,7 @@ class Disk:
         for robot_id, desired, hold_id, by in journal.lines:
             self.wanted.pop(robot_id, None)
             if desired == "stopped":
-                self.wanted[robot_id] = Wanted(by, hold_id)
+                self.wanted[robot_id] = DesiredRecord(by, hold_id)
         for robot_id, _, named, challenge in journal.named_lines:
             if robot_id in self.wanted:
                 self.wanted[robot_id] = replace(

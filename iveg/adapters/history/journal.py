@@ -27,7 +27,7 @@ _RESERVE_BYTES = 10 * 2**20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
 
-class Journal:
+class SpillFile:
     """An append-only file; safe to use from several threads.
 
     Args:

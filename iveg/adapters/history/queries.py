@@ -23,7 +23,7 @@ from iveg.adapters.history.tables import (
     decisions,
     latency,
 )
-from iveg.domain.day import Pose, Seen
+from iveg.domain.day import DaySighting, Pose
 from iveg.domain.errors import HopError
 from iveg.domain.records import (
     AlertRecord,
@@ -227,7 +227,7 @@ class Queries:
 
     async def day_series(
         self, since: float, until: float
-    ) -> tuple[tuple[Pose, ...], tuple[Seen, ...]]:
+    ) -> tuple[tuple[Pose, ...], tuple[DaySighting, ...]]:
         """Where robots and people were in each second of a range."""
         poses = await self._ask(lambda c: series.poses_of(c, since, until))
         return poses, await self._ask(lambda c: series.people_seen(c, since, until))

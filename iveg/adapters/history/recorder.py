@@ -20,7 +20,7 @@ from typing import Literal
 
 from iveg.adapters import clock
 from iveg.adapters.history.engine import sqlite_file
-from iveg.adapters.history.journal import Journal
+from iveg.adapters.history.journal import SpillFile
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
@@ -69,7 +69,7 @@ class Recorder:
         read_clock: Callable[[], Instant] = clock.now,
     ) -> None:
         self._store = Store(database_url)
-        self._journal = Journal(journal)
+        self._journal = SpillFile(journal)
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")

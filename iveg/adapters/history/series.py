@@ -20,7 +20,7 @@ from sqlalchemy import (
 
 from iveg.adapters.history.lists import record_of
 from iveg.adapters.history.tables import climate, commands, detections, odometry
-from iveg.domain.day import Pose, Seen
+from iveg.domain.day import DaySighting, Pose
 from iveg.domain.records import ByTransport, CommandRecord
 
 _Point = tuple[Any, ...]
@@ -163,7 +163,9 @@ def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, 
     return tuple(Pose(*row) for row in connection.execute(wanted))
 
 
-def people_seen(connection: Connection, since: float, until: float) -> tuple[Seen, ...]:
+def people_seen(
+    connection: Connection, since: float, until: float
+) -> tuple[DaySighting, ...]:
     """Where people were seen for sure in each second of ``since <= at < until``."""
     c = detections.c
     second = _whole(connection, c.at)
@@ -174,7 +176,7 @@ def people_seen(connection: Connection, since: float, until: float) -> tuple[See
         .group_by(c.robot_id, c.person_id, second)
         .order_by(second)
     )
-    return tuple(Seen(*row) for row in connection.execute(wanted))
+    return tuple(DaySighting(*row) for row in connection.execute(wanted))
 
 
 def confidence_counts(

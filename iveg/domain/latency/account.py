@@ -15,7 +15,7 @@ Cell = tuple[Data, Hop]
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class LatencySummary:
     """One hop of one kind of data (s); None where nothing was measured."""
 
     count: int
@@ -44,11 +44,11 @@ def merge(parts: Mapping[Cell, list[Sketch]]) -> dict[Cell, Sketch]:
     return {cell: merged(sketches) for cell, sketches in parts.items()}
 
 
-def spread_of(sketch: Sketch) -> Spread:
+def spread_of(sketch: Sketch) -> LatencySummary:
     """Its numbers."""
     if not sketch.count:
-        return Spread(0, None, None, None, None, None, None)
-    return Spread(
+        return LatencySummary(0, None, None, None, None, None, None)
+    return LatencySummary(
         sketch.count,
         sketch.mean,
         sketch.quantile(0.50),

@@ -12,7 +12,7 @@ from statistics import median
 from typing import Final, Literal
 
 from iveg.domain.latency.hops import Hop
-from iveg.domain.latency.order import Order
+from iveg.domain.latency.order import SequenceLoss
 from iveg.domain.latency.stream import Stream
 
 BEHIND_S: Final = 1.0
@@ -116,7 +116,7 @@ def _behind_agent(stream: Stream, now: float) -> float | None:
 
 def _disorder(stream: Stream) -> Iterable[Remark]:
     about = {"robot": stream.robot_id, "data": stream.data}
-    hops: tuple[tuple[Hop, Order], ...] = (
+    hops: tuple[tuple[Hop, SequenceLoss], ...] = (
         ("uplink", stream.up),
         ("fiware", stream.fiware),
     )

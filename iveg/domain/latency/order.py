@@ -23,7 +23,7 @@ class Lately:
         return self.missing / max(1, self.passed + self.missing)
 
 
-class Order:
+class SequenceLoss:
     """Counts messages by their numbers.
 
     Attributes:

@@ -14,7 +14,7 @@ Place = Literal["simulation", "field"]
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PaperLatency:
     """One row, all in ms."""
 
     uplink_mean: float
@@ -25,15 +25,15 @@ class Printed:
     total_p95: float
 
 
-PAPER: Final[dict[Place, dict[Data, Printed]]] = {
+PAPER: Final[dict[Place, dict[Data, PaperLatency]]] = {
     "simulation": {
-        "odometry": Printed(3.8, 11.2, 98.4, 182.3, 102.2, 193.5),
-        "detections": Printed(4.1, 12.5, 101.2, 188.7, 105.3, 201.2),
-        "lidar": Printed(4.3, 13.1, 96.1, 155.4, 100.4, 168.5),
+        "odometry": PaperLatency(3.8, 11.2, 98.4, 182.3, 102.2, 193.5),
+        "detections": PaperLatency(4.1, 12.5, 101.2, 188.7, 105.3, 201.2),
+        "lidar": PaperLatency(4.3, 13.1, 96.1, 155.4, 100.4, 168.5),
     },
     "field": {
-        "odometry": Printed(16.9, 103.9, 121.3, 212.6, 138.2, 316.5),
-        "detections": Printed(16.2, 101.0, 119.2, 214.9, 135.4, 315.8),
-        "lidar": Printed(17.4, 97.2, 117.0, 168.6, 134.4, 265.8),
+        "odometry": PaperLatency(16.9, 103.9, 121.3, 212.6, 138.2, 316.5),
+        "detections": PaperLatency(16.2, 101.0, 119.2, 214.9, 135.4, 315.8),
+        "lidar": PaperLatency(17.4, 97.2, 117.0, 168.6, 134.4, 265.8),
     },
 }

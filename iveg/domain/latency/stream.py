@@ -13,7 +13,7 @@ from typing import Final
 
 from iveg.domain.latency.hops import HOPS, Data, Exclusion, Hop
 from iveg.domain.latency.offset import ClockOffset
-from iveg.domain.latency.order import Order
+from iveg.domain.latency.order import SequenceLoss
 from iveg.domain.latency.series import Series
 from iveg.domain.latency.trace import Tracer
 from iveg.domain.observations import Instant, Origin
@@ -26,7 +26,7 @@ _RATE_S: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Rates:
+class StreamRates:
     """Messages a second over the last five.
 
     Attributes:
@@ -56,7 +56,7 @@ class Stream:
         self.robot_id, self.data, self.clock = robot_id, data, clock
         self.hops: dict[Hop, Series] = {hop: Series() for hop in HOPS}
         self.excluded: Counter[tuple[Hop, Exclusion]] = Counter()
-        self.up, self.fiware = Order(), Order()
+        self.up, self.fiware = SequenceLoss(), SequenceLoss()
         self.tracer = Tracer()
         self.is_throttled = False
         self.orion_first = 0
@@ -157,13 +157,13 @@ class Stream:
         self.fiware.second()
 
     @property
-    def rates(self) -> Rates:
+    def rates(self) -> StreamRates:
         """The rates that really arrive."""
         if len(self._past) < 2:
-            return Rates(0.0, 0.0, 0.0)
+            return StreamRates(0.0, 0.0, 0.0)
         (h0, a0, o0), (h1, a1, o1) = self._past[0], self._past[-1]
         for_s = len(self._past) - 1
-        return Rates((h1 - h0) / for_s, (a1 - a0) / for_s, (o1 - o0) / for_s)
+        return StreamRates((h1 - h0) / for_s, (a1 - a0) / for_s, (o1 - o0) / for_s)
 
     # --- the ring ---------------------------------------------------------------------
 

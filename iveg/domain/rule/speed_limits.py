@@ -10,7 +10,7 @@ at half speed.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import CLEAR, HALF_SPEED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
@@ -56,7 +56,7 @@ class Crossing:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class LimitChange:
     """A crossing that began or ended."""
 
     crossing: Crossing
@@ -81,13 +81,13 @@ class SpeedLimits:
         self,
         world: World,
         people: People,
-        rule: Rule,
+        rule: DetectionRule,
         now: Instant,
         new_id: str,
-    ) -> tuple[dict[str, SpeedLimit], list[Change]]:
+    ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
         near = zones_near(world, people, rule, now, self._open)
-        changes: list[Change] = []
+        changes: list[LimitChange] = []
         for robot in world.robots.values():
             zones = list(near(robot))
             if zones or self._open.get(robot.robot_id):
@@ -103,7 +103,7 @@ class SpeedLimits:
 
     def _cross(
         self, robot: RobotState, zones: Iterable[Zone], now: Instant, new_id: str
-    ) -> Iterator[Change]:
+    ) -> Iterator[LimitChange]:
         mine = self._open.setdefault(robot.robot_id, {})
         nearest = _nearest(robot, zones, mine)
         for number, (cause, (depth, distance, zone)) in enumerate(nearest.items()):
@@ -114,7 +114,7 @@ class SpeedLimits:
                 name = f"{new_id}-{number}"
                 crossing = self._enter(robot, zone, distance, now, name)
                 mine[cause] = crossing
-                yield Change(crossing, began=True)
+                yield LimitChange(crossing, began=True)
         yield from _leave(mine, nearest, now)
 
     def _enter(
@@ -205,7 +205,7 @@ def _nearest(
 
 def _leave(
     mine: dict[str, Crossing], near: Mapping[str, object], now: Instant
-) -> Iterator[Change]:
+) -> Iterator[LimitChange]:
     for cause, crossing in list(mine.items()):
         if cause not in near and crossing.outside_since is None:
             crossing = replace(crossing, outside_since=now.mono)
@@ -213,7 +213,7 @@ def _leave(
         since = crossing.outside_since
         if since is not None and now.mono - since >= LIMITS.release_after_s:
             del mine[cause]
-            yield Change(crossing, began=False)
+            yield LimitChange(crossing, began=False)
 
 
 def _still(crossing: Crossing, depth: float, distance: float, now: Instant) -> Crossing:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS, ring_radius
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
@@ -50,14 +50,18 @@ class Zone:
     alert_id: str | None = None
 
 
-def zones_of(world: World, people: People, rule: Rule, now: Instant) -> Iterator[Zone]:
+def zones_of(
+    world: World, people: People, rule: DetectionRule, now: Instant
+) -> Iterator[Zone]:
     """Every circle that slows robots now."""
     for person in people.known.values():
         yield from _zones_of(person, world, rule, now)
     yield from _peers(world, rule, now)
 
 
-def _zones_of(person: Person, world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
+def _zones_of(
+    person: Person, world: World, rule: DetectionRule, now: Instant
+) -> Iterator[Zone]:
     for sighting, radius in person.rings(rule, now):
         yield Zone(
             person.class_,
@@ -72,7 +76,7 @@ def _zones_of(person: Person, world: World, rule: Rule, now: Instant) -> Iterato
         )
 
 
-def _peers(world: World, rule: Rule, now: Instant) -> Iterator[Zone]:
+def _peers(world: World, rule: DetectionRule, now: Instant) -> Iterator[Zone]:
     for peer, age in _moving(world, now):
         yield _circle_of(peer, rule.radius_at(age))
 
@@ -104,7 +108,7 @@ Near = Callable[[RobotState], Iterable[Zone]]
 def zones_near(
     world: World,
     people: People,
-    rule: Rule,
+    rule: DetectionRule,
     now: Instant,
     inside: Mapping[str, Mapping[str, Any]],
 ) -> Near:
@@ -167,7 +171,7 @@ class _Placed:
 
 
 def _people_near(
-    placed: _Placed, people: People, rule: Rule, now: Instant
+    placed: _Placed, people: People, rule: DetectionRule, now: Instant
 ) -> dict[str, set[str]]:
     """Robot → the people whom it may be near."""
     spots = people.spots
@@ -185,7 +189,7 @@ def _people_near(
 def _peers_near(
     placed: _Placed,
     world: World,
-    rule: Rule,
+    rule: DetectionRule,
     now: Instant,
     inside: Mapping[str, Mapping[str, Any]],
 ) -> dict[str, list[Zone]]:

@@ -21,7 +21,7 @@ from iveg.domain.stop.effects import (
 )
 from iveg.domain.stop.machine import STEPS, Step, StopMachine
 from iveg.domain.stop.sends import FIWARE_PAUSE_S, STANDING_RESEND_S
-from iveg.domain.stop.wanted import Wanted
+from iveg.domain.stop.wanted import DesiredRecord
 
 __all__ = [
     "FIWARE_PAUSE_S",
@@ -31,6 +31,7 @@ __all__ = [
     "Closed",
     "Command",
     "CommandState",
+    "DesiredRecord",
     "Effect",
     "Event",
     "Key",
@@ -43,6 +44,5 @@ __all__ = [
     "Step",
     "StopMachine",
     "Times",
-    "Wanted",
     "believe",
 ]

@@ -6,7 +6,7 @@ from math import ceil
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class StopLatency:
     """Times of one step (ms); None where nothing was measured.
 
     Attributes:
@@ -21,12 +21,12 @@ class Spread:
     longest: float | None
 
 
-def spread(values: Iterable[float | None]) -> Spread:
+def spread(values: Iterable[float | None]) -> StopLatency:
     """Summarise what was measured; what never came is left out and not counted."""
     known = sorted(value for value in values if value is not None)
     if not known:
-        return Spread(0, None, None, None)
-    return Spread(
+        return StopLatency(0, None, None, None)
+    return StopLatency(
         len(known), nearest_rank(known, 0.50), nearest_rank(known, 0.95), known[-1]
     )
 

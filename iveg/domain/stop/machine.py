@@ -43,7 +43,7 @@ from iveg.domain.stop.effects import (
 from iveg.domain.stop.evidence import Evidence, stands
 from iveg.domain.stop.sends import Progress, Sends
 from iveg.domain.stop.standstill import Standstill
-from iveg.domain.stop.wanted import Wanted
+from iveg.domain.stop.wanted import DesiredRecord
 from iveg.domain.transports import TRANSPORTS, Transport, TransportId
 
 _UNKNOWN = Origin()
@@ -122,7 +122,7 @@ class StopMachine(Evidence):
         self.stop = replace(self.stop, requesters=(*self.stop.requesters, by))
         return [*effects, self._changed("requested", self.stop, f"joined by {by}")]
 
-    def restore(self, wanted: Wanted, at: Instant, new_id: str) -> list[Effect]:
+    def restore(self, wanted: DesiredRecord, at: Instant, new_id: str) -> list[Effect]:
         """STOP once more what an earlier run had stopped.
 
         A hold that no release ever named cannot have been lifted, so asserting it again

@@ -41,7 +41,7 @@ class Moment:
 
 
 @dataclass(slots=True)
-class Topic:
+class TopicOrder:
     """The count of one topic, and whether its moments and stamps rise with it.
 
     A stamp that falls makes one message incomparable, since clocks are set; a moment
@@ -87,7 +87,7 @@ class Standstill:
         self._moving_samples = 0
         self._moved: Moment | None = None
         self._moved_at = float("-inf")
-        self._reports, self._odometry = Topic(), Topic()
+        self._reports, self._odometry = TopicOrder(), TopicOrder()
 
     def forget(self) -> None:
         """What was measured does not count any more."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class DesiredRecord:
     """A robot that was to stand.
 
     Attributes:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from iveg.domain.detection_rule import Class, Rule
+from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
@@ -17,7 +17,7 @@ from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.tracking.point_index import PointIndex
 from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
-from iveg.domain.tracking.tracker import Seen, Tracker
+from iveg.domain.tracking.tracker import PlacedDetection, Tracker
 from iveg.domain.world import World
 
 _SUSPECT_M = 1.0
@@ -93,7 +93,7 @@ class People:
         self,
         frame: DetectionFrame,
         world: World,
-        rule: Rule,
+        rule: DetectionRule,
         at: Instant,
         new_id: str,
     ) -> list[Placed]:
@@ -156,7 +156,7 @@ class People:
         before = set(self.known)
         tracks = self._tracker.take(
             [
-                Seen(
+                PlacedDetection(
                     out[index].class_ or "person",
                     _sighting(out[index], observer, at),
                     f"{new_id}-{index}",
@@ -191,7 +191,10 @@ class People:
 
 
 def _place(
-    detection: Detection, frame: DetectionFrame, observer: RobotState, rule: Rule
+    detection: Detection,
+    frame: DetectionFrame,
+    observer: RobotState,
+    rule: DetectionRule,
 ) -> Placed | None:
     x, y, z = detection.box.centre
     if detection.frame_id == "base_link":

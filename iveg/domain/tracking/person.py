@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from iveg.domain.detection_rule import Class, Rule
+from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 
@@ -88,7 +88,9 @@ class Person:
             )
         )
 
-    def rings(self, rule: Rule, now: Instant) -> Iterable[tuple[Sighting, float]]:
+    def rings(
+        self, rule: DetectionRule, now: Instant
+    ) -> Iterable[tuple[Sighting, float]]:
         """Every circle that protects this person, with its radius now (m)."""
         for sighting in self.sightings:
             age = sighting.age_s(now)

@@ -34,7 +34,7 @@ MARK_M = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class PlacedDetection:
     """One confident detection of a picture.
 
     Attributes:
@@ -60,7 +60,7 @@ class Tracker:
     _tracks: int = 0
     _together: dict[str, set[str]] = field(default_factory=dict)
 
-    def take(self, picture: Sequence[Seen], at: Instant) -> list[str | None]:
+    def take(self, picture: Sequence[PlacedDetection], at: Instant) -> list[str | None]:
         """Take one detection frame of one robot in.
 
         Returns:
@@ -96,7 +96,7 @@ class Tracker:
     # --- chains -------------------------------------------------------------------
 
     def _continue_chains(
-        self, picture: Sequence[Seen], at: Instant
+        self, picture: Sequence[PlacedDetection], at: Instant
     ) -> list[tuple[str, Sighting] | None]:
         """For each detection the earlier sighting that it replaces, and its track."""
         out: list[tuple[str, Sighting] | None] = [None] * len(picture)
@@ -139,7 +139,7 @@ class Tracker:
 
     def _choose_tracks(
         self,
-        picture: Sequence[Seen],
+        picture: Sequence[PlacedDetection],
         chains: Sequence[tuple[str, Sighting] | None],
         at: Instant,
     ) -> list[str | None]:
@@ -158,7 +158,7 @@ class Tracker:
 
     def _assign_tracks(
         self,
-        picture: Sequence[Seen],
+        picture: Sequence[PlacedDetection],
         tracks: list[str | None],
         at: Instant,
         *,
@@ -183,7 +183,7 @@ class Tracker:
 
     def _put(
         self,
-        one: Seen,
+        one: PlacedDetection,
         old: tuple[str, Sighting] | None,
         track: str | None,
         at: Instant,
@@ -207,7 +207,7 @@ class Tracker:
         )
         return track
 
-    def _begin(self, one: Seen, at: Instant) -> str | None:
+    def _begin(self, one: PlacedDetection, at: Instant) -> str | None:
         if not self._has_room(at):
             return None
         self._drop_mark(one, at)
@@ -233,7 +233,7 @@ class Tracker:
                 return True
         return False
 
-    def _drop_mark(self, one: Seen, at: Instant) -> None:
+    def _drop_mark(self, one: PlacedDetection, at: Instant) -> None:
         """Drop the nearest last-seen mark within reach of a new person, its owner."""
         marks = [
             (_distance(person.newest, one.sighting), person.person_id)
@@ -307,13 +307,15 @@ def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:
     return track
 
 
-def _is_alike(person: Person, one: Seen) -> bool:
+def _is_alike(person: Person, one: PlacedDetection) -> bool:
     """Whether they can be one: of a class, and of the same map."""
     frame = person.newest.recording
     return person.class_ == one.class_ and frame == one.sighting.recording
 
 
-def _chain_cost(one: Seen, person: Person, look: Sighting, at: Instant) -> float:
+def _chain_cost(
+    one: PlacedDetection, person: Person, look: Sighting, at: Instant
+) -> float:
     """Distance to the same observer's earlier look (m); inf where it is another's."""
     if not _is_alike(person, one) or bool(look.reach_m) != bool(one.sighting.reach_m):
         return math.inf
@@ -323,7 +325,7 @@ def _chain_cost(one: Seen, person: Person, look: Sighting, at: Instant) -> float
     return distance if distance <= _gate(look, at) else math.inf
 
 
-def _live_cost(one: Seen, person: Person, at: Instant) -> float:
+def _live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
     """Distance to the nearest fresh look of anybody (m); inf beyond its gate.
 
     Where two robots see one person with noise, a detection that lies far from the one
@@ -343,7 +345,7 @@ def _live_cost(one: Seen, person: Person, at: Instant) -> float:
     )
 
 
-def _lost_cost(one: Seen, person: Person, at: Instant) -> float:
+def _lost_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
     """Distance to the last look (m); inf beyond what is likely."""
     last = person.newest
     if not _is_alike(person, one) or one.sighting.reach_m or last.reach_m:

@@ -31,14 +31,14 @@ from iveg.ngsi.codec.reports import (
     write_sensed,
     write_unplaced,
 )
-from iveg.ngsi.codec.untrusted import MAX_DEPTH, Problem, Reading, load_json
+from iveg.ngsi.codec.untrusted import MAX_DEPTH, ReadResult, UnreadPart, load_json
 
 __all__ = [
     "MAX_DEPTH",
     "FeedbackWriter",
     "IsPast",
-    "Problem",
-    "Reading",
+    "ReadResult",
+    "UnreadPart",
     "format_stamp",
     "load_json",
     "parse_stamp",

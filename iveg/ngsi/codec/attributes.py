@@ -28,7 +28,7 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.fields import read_holds, read_origin
-from iveg.ngsi.codec.untrusted import Reading, first_complaint, merge, unread
+from iveg.ngsi.codec.untrusted import ReadResult, first_complaint, merge, unread
 from iveg.ngsi.sensors import SENSORS, Sensor
 
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ IsPast = Callable[[str, type[Observation], str, int], bool]
 
 def read_attributes(
     robot_id: str, attributes: Mapping[str, Any], is_past: IsPast | None = None
-) -> Reading:
+) -> ReadResult:
     """Read every attribute of a robot that the contract knows; skip the others.
 
     Args:
@@ -61,7 +61,7 @@ def read_attributes(
         if old is None:
             readings.append(read_one(robot_id, reader, attributes, name))
         else:
-            readings.append(Reading((old,)))
+            readings.append(ReadResult((old,)))
     return merge(readings)
 
 
@@ -89,10 +89,10 @@ def _overtaken(
 
 def read_one(
     source: str, reader: _Reader, attributes: Mapping[str, Any], name: str = ""
-) -> Reading:
+) -> ReadResult:
     """What one reader makes of an entity, or why it cannot."""
     try:
-        return Reading((reader(source, attributes),))
+        return ReadResult((reader(source, attributes),))
     except ValidationError as error:
         return unread(source, f"bad_{name or 'entity'}", first_complaint(error))
     except UnreadableError as error:

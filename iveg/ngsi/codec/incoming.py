@@ -19,12 +19,18 @@ from iveg.ngsi.codec.attributes import (
     read_attributes,
     read_one,
 )
-from iveg.ngsi.codec.untrusted import Reading, first_complaint, load_json, merge, unread
+from iveg.ngsi.codec.untrusted import (
+    ReadResult,
+    first_complaint,
+    load_json,
+    merge,
+    unread,
+)
 
 
 def read_notification(
     body: bytes, is_past: IsPast | None = None
-) -> tuple[str, Reading]:
+) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
@@ -46,7 +52,7 @@ def read_notification(
     )
 
 
-def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> Reading:
+def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
     if not isinstance(entity_id, str) or not isinstance(entity_type, str):
@@ -79,7 +85,7 @@ def _attribute_value(attribute: Any) -> Any:
 
 def read_measure(
     device_id: str, payload: bytes, is_past: IsPast | None = None
-) -> Reading:
+) -> ReadResult:
     """Read what a robot's device published on its ``attrs`` topic."""
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
@@ -93,7 +99,7 @@ def read_measure(
     return read_attributes(robot_id, attributes, is_past)
 
 
-def read_answer(robot_id: str, payload: bytes) -> Reading:
+def read_answer(robot_id: str, payload: bytes) -> ReadResult:
     """Read a robot's answer on its ``cmdexe`` topic."""
     try:
         value = load_json(payload)

@@ -16,7 +16,7 @@ _CONTAINERS = frozenset({dict, list})
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class UnreadPart:
     """Something that could not be read.
 
     Attributes:
@@ -31,11 +31,11 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ReadResult:
     """What a message held: what could be read and what could not."""
 
     observations: tuple[Observation, ...] = ()
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[UnreadPart, ...] = ()
 
 
 def load_json(body: bytes | str) -> Any:
@@ -72,19 +72,19 @@ def _deeper_than(value: Any, limit: int) -> bool:
     return any(_deeper_than(part, limit - 1) for part in value)
 
 
-def unread(source: str, reason: str, detail: str = "") -> Reading:
+def unread(source: str, reason: str, detail: str = "") -> ReadResult:
     """A reading that is one problem."""
-    return Reading(problems=(Problem(source, reason, detail),))
+    return ReadResult(problems=(UnreadPart(source, reason, detail),))
 
 
-def merge(readings: Iterable[Reading]) -> Reading:
+def merge(readings: Iterable[ReadResult]) -> ReadResult:
     """Several readings as one, in order."""
     observations: list[Observation] = []
-    problems: list[Problem] = []
+    problems: list[UnreadPart] = []
     for reading in readings:
         observations.extend(reading.observations)
         problems.extend(reading.problems)
-    return Reading(tuple(observations), tuple(problems))
+    return ReadResult(tuple(observations), tuple(problems))
 
 
 def first_complaint(error: ValidationError) -> str:

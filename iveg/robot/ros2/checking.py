@@ -39,7 +39,7 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class CheckRow:
     """One line of the table."""
 
     topic: str
@@ -51,10 +51,10 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class CheckVerdict:
     """What was found; nothing ``missing`` means that the robot may join."""
 
-    rows: tuple[Row, ...]
+    rows: tuple[CheckRow, ...]
     chain: str
     missing: tuple[str, ...]
 
@@ -68,7 +68,7 @@ def judge(
     seconds: float,
     stamp: float,
     broker: str | None,
-) -> Verdict:
+) -> CheckVerdict:
     """Everything that a few seconds of listening tell.
 
     Args:
@@ -95,7 +95,7 @@ def judge(
     chain, broken = _chain(config, heard, transforms, stamp)
     missing += broken if others else []
     missing += _drive(config, others) if others else []
-    return Verdict(tuple(rows), chain, tuple(missing))
+    return CheckVerdict(tuple(rows), chain, tuple(missing))
 
 
 def _row(
@@ -106,7 +106,7 @@ def _row(
     others: Sequence[Known],
     heard: Mapping[str, Heard],
     seconds: float,
-) -> tuple[Row, list[str]]:
+) -> tuple[CheckRow, list[str]]:
     writers = [one for one in others if one.topic == name and one.writes]
     fitting = [one for one in writers if one.type == message.ROS]
     one = heard.get(topic, Heard())
@@ -125,7 +125,7 @@ def _row(
         remark = "slow"
         missing.append(f"{name} has a publisher and comes {rate:.1f} times a second.")
     kind = writers[0].type if writers else message.ROS
-    return Row(name, kind, len(writers), rate, one.age_s, remark), missing
+    return CheckRow(name, kind, len(writers), rate, one.age_s, remark), missing
 
 
 def _complaints(
@@ -201,7 +201,7 @@ def _drive(config: RobotConfig, others: Iterable[Known]) -> list[str]:
     return found
 
 
-def lines(verdict: Verdict) -> list[str]:
+def lines(verdict: CheckVerdict) -> list[str]:
     """The verdict as a person reads it."""
     table = [("topic", "type", "writers", "Hz", "age", "")]
     for row in verdict.rows:

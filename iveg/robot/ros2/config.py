@@ -73,7 +73,7 @@ class Frames:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class DriveConfig:
     """The gate's drive.
 
     Attributes:
@@ -128,7 +128,7 @@ class RobotConfig:
     peers: tuple[str, ...] = ()
     topics: Topics = Topics()
     frames: Frames = Frames()
-    drive: Drive = Drive()
+    drive: DriveConfig = DriveConfig()
     tf_max_age_s: float = 0.5
     class_list: str = ""
     p_min: float = 0.8
@@ -179,7 +179,7 @@ def _read(page: "_Page", raw: Mapping[str, Any]) -> RobotConfig:
         peers=ros.get("peers", (), _peers),
         topics=Topics(**_texts(page, raw, "topics", Topics, _topic)),
         frames=Frames(**_texts(page, raw, "frames", Frames, _frame)),
-        drive=Drive(
+        drive=DriveConfig(
             drive.get("stamped_in", False, _flag),
             drive.get("stamped_out", False, _flag),
             drive.maybe("max_speed", 0.05, 5.0),

@@ -7,7 +7,7 @@ the robot may be: that is the safety node's gate, and this module writes its wor
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Twist2D
 from iveg.robot.gate import REST
-from iveg.robot.ros2.config import Drive
+from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.ros2 import cdr
@@ -31,7 +31,7 @@ class DriveTopics:
     """
 
     def __init__(
-        self, drive: Drive, topic: str, base_link: str, input_faults: InputFaults
+        self, drive: DriveConfig, topic: str, base_link: str, input_faults: InputFaults
     ) -> None:
         self._drive = drive
         self._topic = topic

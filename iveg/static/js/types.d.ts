@@ -10,7 +10,7 @@ export type Acting = {
   in_sight: boolean;
 };
 
-/** A alert to people: all occurrences of one kind and subject as one. */
+/** An alert to people: all occurrences of one kind and subject as one. */
 export type Alert = {
   alert_id: string;
   priority: "P1" | "P2" | "P3";

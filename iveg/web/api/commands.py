@@ -24,7 +24,7 @@ Releasing = Annotated[Principal, Depends(require("release"))]
 HoldId = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class Release(BaseModel):
+class ReleaseRequest(BaseModel):
     """The holds that the person saw."""
 
     model_config = ConfigDict(strict=True, extra="ignore")
@@ -77,7 +77,7 @@ def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
         status_code=202,
         response_model=Pressed,
     )
-    async def release(robot_id: str, body: Release, who: Releasing) -> Response:
+    async def release(robot_id: str, body: ReleaseRequest, who: Releasing) -> Response:
         """Lift exactly the holds that the person saw; 409 when they have changed."""
         command = await commander.release(robot_id, body.holds, who.name, clock())
         return Json(Pressed.of(command), 202)

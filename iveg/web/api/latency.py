@@ -12,10 +12,10 @@ from fastapi import APIRouter, Depends, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from iveg.domain.latency.account import Cell, Spread, collect, merge, spread_of
+from iveg.domain.latency.account import Cell, LatencySummary, collect, merge, spread_of
 from iveg.domain.latency.hops import DATA, HOPS, WINDOW_S, Data, Hop, Window
 from iveg.domain.latency.offset import ClockOffset
-from iveg.domain.latency.order import Order
+from iveg.domain.latency.order import SequenceLoss
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
@@ -164,7 +164,7 @@ def _trace(of: tuple[str, Data], newest: Trace) -> HopTrace:
 
 def _row(
     data: Data,
-    spreads: Mapping[Cell, Spread],
+    spreads: Mapping[Cell, LatencySummary],
     sampled: list[Hop],
     sketches: Mapping[Cell, Sketch] | None,
 ) -> HopRow:
@@ -196,7 +196,7 @@ def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
     }
 
 
-def _spread(of: Spread) -> HopSpread:
+def _spread(of: LatencySummary) -> HopSpread:
     return HopSpread(
         count=of.count,
         mean_ms=_ms(of.mean),
@@ -238,7 +238,7 @@ def _stream(of: Stream) -> HopStream:
     )
 
 
-def _order(of: Order) -> HopOrder:
+def _order(of: SequenceLoss) -> HopOrder:
     return HopOrder(
         passed=of.passed,
         missing=of.missing,

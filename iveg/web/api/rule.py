@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 from starlette.responses import Response
 
-from iveg.domain.detection_rule import Class, Rule
+from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.models.base import Listing
@@ -56,9 +56,9 @@ class RuleChange(BaseModel):
             raise ValueError("names must not be empty; person and robot are themselves")
         return {**cleaned, **own}
 
-    def applied_to(self, rule: Rule) -> Rule:
+    def applied_to(self, rule: DetectionRule) -> DetectionRule:
         """The rule with these parameters."""
-        return Rule(
+        return DetectionRule(
             rule.id,
             rule.version,
             _new(self.confidence_threshold, rule.threshold),

@@ -155,7 +155,9 @@ def router(
                 watcher = tasks.create_task(
                     _watch_session(websocket, principal), name="live-session"
                 )
-                ear = Ear(websocket, subscriber, clock, stop, principal, feed)
+                ear = ClientMessages(
+                    websocket, subscriber, clock, stop, principal, feed
+                )
                 tasks.create_task(ear.listen((sender, watcher)), name="live-listen")
         except* (WebSocketDisconnect, ConnectionError) as gone:
             _log.debug("browser gone: %s", gone)
@@ -260,7 +262,7 @@ def _may_still(websocket: WebSocket, principal: Principal, action: Action) -> bo
     return current is not None and current.may(action)
 
 
-class Ear:
+class ClientMessages:
     """Messages from one browser: pings, presses, painted frames.
 
     Answers go out with all else, so that a press is read at once also where the way

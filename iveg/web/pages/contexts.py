@@ -8,7 +8,7 @@ attribute).  Live values never come this way; they arrive on ``/live``.
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.models.day import Day
 from iveg.web.pages.openapi import ApiDoc
 
@@ -178,7 +178,7 @@ class AboutPage:
 
     template: ClassVar[str] = "about.html"
     frame: Frame
-    rule: Rule
+    rule: DetectionRule
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ Traces name what they show in ``meta``; the page gives them words and colours.
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from iveg.domain.latency.account import Cell, Spread
+from iveg.domain.latency.account import Cell, LatencySummary
 from iveg.domain.latency.hops import DATA, Hop
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.trace import Trace
@@ -18,7 +18,7 @@ _Trace = Mapping[str, object]
 _MOST_POINTS = 200
 
 
-def bars_figure(spreads: Mapping[Cell, Spread]) -> bytes:
+def bars_figure(spreads: Mapping[Cell, LatencySummary]) -> bytes:
     """Mean of each hop (ms), stacked by kind of data, with a whisker to its P95."""
     traces = [trace for hop in STEPS for trace in _bars(spreads, hop)]
     return figure_of(traces, ("data", "ms"), {"barmode": "stack"})
@@ -78,7 +78,7 @@ def steps_of(trace: Trace | None) -> list[HopStep]:
     ]
 
 
-def _bars(spreads: Mapping[Cell, Spread], hop: Hop) -> Iterator[_Trace]:
+def _bars(spreads: Mapping[Cell, LatencySummary], hop: Hop) -> Iterator[_Trace]:
     found = {data: spreads[data, hop] for data in DATA}
     measured = {data: one for data, one in found.items() if one.mean is not None}
     if not measured:

@@ -17,7 +17,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
 from iveg.domain import limits
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
@@ -138,7 +138,7 @@ def router(
     reader: Callable[..., Any],
     anyone: Callable[..., Any],
     document: Callable[[], ApiDoc],
-    rule: Callable[[], Rule],
+    rule: Callable[[], DetectionRule],
 ) -> APIRouter:
     """The routes of all pages.
 

@@ -29,7 +29,7 @@ from iveg.domain.errors import NotAllowedError
 from iveg.domain.observations import Instant
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
-from iveg.web.security.rate_limits import Attempts
+from iveg.web.security.rate_limits import FailedAttempts
 from iveg.web.security.roles import MAY, NOBODY, Action, Principal, Role
 from iveg.web.security.sessions import Sessions, SessionStore
 
@@ -77,7 +77,7 @@ class Authenticator:
         self._sign_in_token = sign_in_token
         self._api_token = api_token
         self._clock = clock
-        self._attempts = Attempts()
+        self._attempts = FailedAttempts()
         self.sessions = Sessions(clock, store)
         self.refused = 0
         """Sign-ins with a wrong token."""

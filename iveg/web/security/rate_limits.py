@@ -31,7 +31,7 @@ _SILENT_S = 3.0
 """Pages ping every second; one silent for longer hangs on a dead line."""
 
 
-class Attempts:
+class FailedAttempts:
     """Wrong sign-ins by address: five a minute, then one a minute.
 
     Never a lock-out: tries during the wait do not make it longer, and a successful

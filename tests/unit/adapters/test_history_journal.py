@@ -6,7 +6,7 @@ from pathlib import Path
 import orjson
 import pytest
 
-from iveg.adapters.history.journal import Journal
+from iveg.adapters.history.journal import SpillFile
 from iveg.domain.errors import HopError
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
@@ -32,7 +32,7 @@ def rows(*records: Record) -> list[Waiting]:
     return [Waiting(record, number, 5.0) for number, record in enumerate(records, 1)]
 
 
-class JournalOnFullDisk(Journal):
+class JournalOnFullDisk(SpillFile):
     """There is room for half a line only, until the reserve is gone."""
 
     def __init__(self, file: Path, reserve: Path) -> None:
@@ -50,11 +50,11 @@ class JournalOnFullDisk(Journal):
 
 
 @pytest.fixture
-def journal(tmp_path: Path) -> Journal:
-    return Journal(tmp_path / "journal", reserve_bytes=4096)
+def journal(tmp_path: Path) -> SpillFile:
+    return SpillFile(tmp_path / "journal", reserve_bytes=4096)
 
 
-def test_what_was_written_down_is_read_back(journal: Journal) -> None:
+def test_what_was_written_down_is_read_back(journal: SpillFile) -> None:
     journal.append(rows(*EVERYTHING))
 
     found, end = journal.read(0, 100)
@@ -64,7 +64,7 @@ def test_what_was_written_down_is_read_back(journal: Journal) -> None:
     assert end == journal.size
 
 
-def test_a_journal_is_read_in_pieces(journal: Journal) -> None:
+def test_a_journal_is_read_in_pieces(journal: SpillFile) -> None:
     journal.append(rows(*EVERYTHING))
 
     first, middle = journal.read(0, 3)
@@ -74,13 +74,13 @@ def test_a_journal_is_read_in_pieces(journal: Journal) -> None:
     assert end == journal.size
 
 
-def test_a_journal_that_never_was_is_empty(journal: Journal) -> None:
+def test_a_journal_that_never_was_is_empty(journal: SpillFile) -> None:
     assert journal.size == 0
     assert journal.read(0, 10) == ([], 0)
 
 
 def test_a_line_torn_by_a_power_cut_is_counted_and_the_others_count(
-    journal: Journal, tmp_path: Path
+    journal: SpillFile, tmp_path: Path
 ) -> None:
     journal.append(rows(command_record(), log_record()))
     os.truncate(tmp_path / "journal", journal.size - 10)
@@ -92,7 +92,7 @@ def test_a_line_torn_by_a_power_cut_is_counted_and_the_others_count(
     assert end == journal.size
 
 
-def test_what_was_appended_meanwhile_is_not_cleared(journal: Journal) -> None:
+def test_what_was_appended_meanwhile_is_not_cleared(journal: SpillFile) -> None:
     journal.append(rows(command_record()))
     _, end = journal.read(0, 10)
     journal.append(rows(log_record()))
@@ -103,7 +103,7 @@ def test_what_was_appended_meanwhile_is_not_cleared(journal: Journal) -> None:
 
 
 def test_a_record_that_is_no_text_is_left_out_and_its_neighbours_kept(
-    journal: Journal,
+    journal: SpillFile,
 ) -> None:
     journal.append(rows(log_record(key="\ud800"), command_record()))
 
@@ -112,7 +112,7 @@ def test_a_record_that_is_no_text_is_left_out_and_its_neighbours_kept(
     assert [row.record for row in found] == [command_record()]
 
 
-def test_a_full_disk_is_told_and_leaves_no_half_line(journal: Journal) -> None:
+def test_a_full_disk_is_told_and_leaves_no_half_line(journal: SpillFile) -> None:
     journal.append(rows(command_record()))
     size = journal.size
 
@@ -125,7 +125,7 @@ def test_a_full_disk_is_told_and_leaves_no_half_line(journal: Journal) -> None:
 
 
 def test_the_reserve_is_really_taken_from_the_disk(
-    journal: Journal, tmp_path: Path
+    journal: SpillFile, tmp_path: Path
 ) -> None:
     journal.keep_reserve()
 
@@ -145,7 +145,9 @@ def test_a_full_disk_gets_the_reserve_back(tmp_path: Path) -> None:
     assert reserve.exists()
 
 
-def test_no_room_for_the_reserve_is_no_error(journal: Journal, tmp_path: Path) -> None:
+def test_no_room_for_the_reserve_is_no_error(
+    journal: SpillFile, tmp_path: Path
+) -> None:
     with files_no_longer_than(100):
         journal.keep_reserve()
 
@@ -153,7 +155,7 @@ def test_no_room_for_the_reserve_is_no_error(journal: Journal, tmp_path: Path) -
 
 
 def test_a_line_of_the_version_before_is_read_back_with_its_json(
-    journal: Journal, tmp_path: Path
+    journal: SpillFile, tmp_path: Path
 ) -> None:
     record = asdict(decision_record(links=[])) | {
         "links": '[{"link": "detection", "at": 1.0}]',
@@ -169,7 +171,7 @@ def test_a_line_of_the_version_before_is_read_back_with_its_json(
 
 
 def test_an_order_of_the_version_before_is_read_back_with_its_times(
-    journal: Journal, tmp_path: Path
+    journal: SpillFile, tmp_path: Path
 ) -> None:
     record = asdict(command_record()) | {
         "sent_direct_at": 1.5,

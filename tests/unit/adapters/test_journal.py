@@ -10,7 +10,7 @@ import orjson
 import pytest
 
 from iveg.adapters.journal import FileJournal
-from iveg.domain.stop import Wanted
+from iveg.domain.stop import DesiredRecord
 from tests.builders import START
 
 
@@ -31,7 +31,7 @@ async def test_what_was_wanted_last_is_wanted_after_a_restart(tmp_path: Path) ->
     )
     journal.close()
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
 
 
 async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
@@ -62,7 +62,7 @@ async def test_what_a_release_has_named_is_known_and_still_wanted(
     journal.close()
 
     assert FileJournal(path).read() == {
-        "AGI": Wanted("iveg", "01C", ("01A", "01B"), ("01A", "01B"), "c1")
+        "AGI": DesiredRecord("iveg", "01C", ("01A", "01B"), ("01A", "01B"), "c1")
     }
 
 
@@ -76,7 +76,9 @@ async def test_a_release_that_came_true_is_over_but_its_names_stay_known(
     await journal.wanted("AGI", "stopped", "01B", "ben", START)
     journal.close()
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ben", "01B", named=("01A",))}
+    assert FileJournal(path).read() == {
+        "AGI": DesiredRecord("ben", "01B", named=("01A",))
+    }
 
 
 async def test_of_the_names_the_last_sixty_four_are_kept(tmp_path: Path) -> None:
@@ -100,7 +102,7 @@ def test_a_hold_that_an_earlier_version_wrote_down_may_have_been_named(
         b' "by": "ana"}\n'
     )
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ana", None)}
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", None)}
 
 
 def test_without_a_file_nothing_is_wanted(tmp_path: Path) -> None:
@@ -118,8 +120,8 @@ async def test_a_line_that_a_crash_cut_short_hurts_no_other(
     (await write(path, ("AGII", "stopped"))).close()
 
     assert FileJournal(path).read() == {
-        "AGI": Wanted("ana", "01A"),
-        "AGII": Wanted("ana", "01A"),
+        "AGI": DesiredRecord("ana", "01A"),
+        "AGII": DesiredRecord("ana", "01A"),
     }
     assert "line 3: not readable, skipped" in caplog.text
 
@@ -145,7 +147,7 @@ async def test_a_line_that_says_nothing_releases_nothing(
     with path.open("ab") as file:
         file.write(line + b"\n")
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
 
 
 async def test_lines_of_many_at_once_are_whole(tmp_path: Path) -> None:
@@ -222,7 +224,9 @@ async def test_names_of_releases_survive_that_the_journal_is_compacted(
     await later.wanted("AGI", "stopped", "01B", "ben", START)
     later.close()
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ben", "01B", named=("01A",))}
+    assert FileJournal(path).read() == {
+        "AGI": DesiredRecord("ben", "01B", named=("01A",))
+    }
 
 
 async def test_a_journal_of_a_newer_iveg_is_believed_and_left_as_it_is(
@@ -233,6 +237,6 @@ async def test_a_journal_of_a_newer_iveg_is_believed_and_left_as_it_is(
     newer = path.read_bytes().replace(b'"version":1', b'"version":9', 1)
     path.write_bytes(newer)
 
-    assert FileJournal(path).read() == {"AGI": Wanted("ana", "01A")}
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
     assert path.read_bytes() == newer
     assert "stop-journal 9" in caplog.text

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.rules import FileRules
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from tests.builders import START
 
-FIRST = Rule()
-CHANGED = Rule(
+FIRST = DetectionRule()
+CHANGED = DetectionRule(
     version=2,
     threshold=0.7,
     class_thresholds={"robot": 0.9},

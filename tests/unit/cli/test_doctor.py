@@ -3,9 +3,9 @@ from dataclasses import replace
 import pytest
 
 from iveg.cli.diagnosis import (
+    DiagnosisRow,
     Finding,
     Lag,
-    Row,
     Stack,
     exit_code,
     judge,
@@ -32,7 +32,7 @@ def found(**input_faults: str | None) -> dict[Check, Finding]:
     return {check: Finding(check, 0.012, named.get(check)) for check in Check}
 
 
-def row(check: Check, findings: dict[Check, Finding]) -> Row:
+def row(check: Check, findings: dict[Check, Finding]) -> DiagnosisRow:
     return next(one for one in judge(findings, STACK) if one.check == check)
 
 

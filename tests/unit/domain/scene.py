@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
@@ -13,7 +13,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
 )
-from iveg.domain.rule.speed_limits import Change, SpeedLimits
+from iveg.domain.rule.speed_limits import LimitChange, SpeedLimits
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.tracking.person import Person
 from iveg.domain.tracking.sight import AllClear
@@ -47,10 +47,10 @@ class Scene:
 
     robots: tuple[str, ...] = ("AGI", "AGII")
     greenhouse: Greenhouse = FIELD
-    rule: Rule = field(default_factory=Rule)
+    rule: DetectionRule = field(default_factory=DetectionRule)
     now: float = 0.0
     replay: str | None = None
-    changes: list[Change] = field(default_factory=list)
+    changes: list[LimitChange] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.world = World(fleet_of(*self.robots))

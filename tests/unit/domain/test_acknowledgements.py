@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.acknowledgements import ECHO_S, WINDOW_S, acknowledgements_of
 from iveg.domain.decisions import Decision
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.rule.zones import Zone
 from tests.builders import START, at
@@ -39,7 +39,7 @@ def asked(
     )
     one = Decision(
         crossing,
-        Rule(),
+        DetectionRule(),
         noticed=None if looked is None else at(entered - looked).mono,
         answered=None if ahead is None else at(entered - ahead).mono,
     )

@@ -3,8 +3,8 @@
 import pytest
 
 from iveg.domain.day import (
+    DaySighting,
     Pose,
-    Seen,
     closest_passes,
     due_drills,
     slowed_minutes,
@@ -58,7 +58,7 @@ def test_a_slow_down_that_goes_on_counts_until_now() -> None:
 
 def test_the_closest_passes_are_of_moving_robots_and_not_one_pass_told_thrice() -> None:
     poses = [pose(10), pose(11, x=1.5), pose(200, x=4.0), pose(400, speed=0.0)]
-    seen = [Seen(second, 2.0, 2.0, "AGII") for second in (10, 11, 200, 400)]
+    seen = [DaySighting(second, 2.0, 2.0, "AGII") for second in (10, 11, 200, 400)]
 
     found = closest_passes(poses, seen, GREENHOUSE)
 

@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.alerts.conditions import of_decision, of_robot
 from iveg.domain.decisions import Decision, Decisions
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import FeedbackRef, SafetyReport
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
@@ -52,7 +52,7 @@ def crossing(
 
 
 def decision(**parts: object) -> Decision:
-    return Decision(crossing(**parts), Rule())  # type: ignore[arg-type]
+    return Decision(crossing(**parts), DetectionRule())  # type: ignore[arg-type]
 
 
 def slow() -> SafetyReport:
@@ -276,7 +276,7 @@ def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
     book.put(opened)
     for number in range(5):
         named = replace(crossing(), decision_id=f"ended-{number}")
-        book.put(Decision(named, Rule()).closed(at(number)))
+        book.put(Decision(named, DetectionRule()).closed(at(number)))
 
     assert book.get("open") is opened
     assert book.get("ended-0") is None

@@ -2,9 +2,9 @@
 
 import pytest
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 
-RULE = Rule()
+RULE = DetectionRule()
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def test_a_faint_unmapped_class_is_faint() -> None:
 
 
 def test_a_class_may_have_a_threshold_of_its_own() -> None:
-    rule = Rule(class_thresholds={"person": 0.6})
+    rule = DetectionRule(class_thresholds={"person": 0.6})
 
     assert rule.judge("farmer", 0.6).kind == "alert"
     assert rule.judge("robot", 0.6).kind == "faint"
@@ -75,4 +75,4 @@ def test_a_fresh_ring_is_exactly_the_papers() -> None:
 
 
 def test_growth_never_makes_a_ring_smaller_than_it_was_set() -> None:
-    assert Rule(radius_m=7.0).radius_at(5.0) == 7.0
+    assert DetectionRule(radius_m=7.0).radius_at(5.0) == 7.0

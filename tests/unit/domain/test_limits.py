@@ -7,8 +7,8 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from iveg.domain.detection_rule import Rule
-from iveg.domain.limits import LIMITS, Row, ring_radius, rows
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.limits import LIMITS, LimitRow, ring_radius, rows
 from iveg.robot.judgement import Limits
 from iveg.settings import Settings
 from tests.processes import ROOT
@@ -19,7 +19,7 @@ RINGS = json.loads((ROOT / "tests/data/rings.json").read_text())
 
 @pytest.mark.parametrize("case", RINGS, ids=lambda one: f"{one}")
 def test_the_ring_law_gives_the_shared_cases(case: dict[str, float]) -> None:
-    rule = Rule(radius_m=case["radius_m"])
+    rule = DetectionRule(radius_m=case["radius_m"])
 
     assert rule.radius_at(case["age_s"]) == pytest.approx(case["ring_m"], abs=1e-6)
 
@@ -38,7 +38,7 @@ def test_nobody_can_change_a_limit() -> None:
 
 
 @pytest.mark.parametrize("row", [*rows()], ids=lambda row: row.name)
-def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Row) -> None:
+def test_every_limit_has_a_unit_a_source_and_a_meaning(row: LimitRow) -> None:
     assert row.unit
     assert row.source
     assert row.says
@@ -48,13 +48,13 @@ def test_every_limit_has_a_unit_a_source_and_a_meaning(row: Row) -> None:
 def test_rule_robot_and_settings_begin_with_the_limits() -> None:
     settings, robot = Settings(), Limits()
 
-    assert settings.safety_radius_m == Rule().radius_m == LIMITS.ring_default_m
+    assert settings.safety_radius_m == DetectionRule().radius_m == LIMITS.ring_default_m
     assert settings.feedback_stand_s == robot.stand_s == LIMITS.feedback_stand_s
     assert settings.feedback_slow_s == robot.slow_s == LIMITS.feedback_slow_s
 
 
 @pytest.mark.parametrize("row", [*rows()], ids=lambda row: row.name)
-def test_the_safety_page_prints_the_limit(row: Row) -> None:
+def test_the_safety_page_prints_the_limit(row: LimitRow) -> None:
     page = (ROOT / "docs/safety.md").read_text()
 
     line = f"| `{row.name}` | {row.value:g} {row.unit} | {row.says} | {row.source} |"

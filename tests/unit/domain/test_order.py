@@ -3,20 +3,20 @@
 import pytest
 
 from iveg.domain.observations import Origin
-from iveg.domain.order import Order
+from iveg.domain.order import StreamOrder
 from tests.builders import START, origin
 
 YEARS_S = 5 * 365 * 86400.0
 
 
 def test_the_next_message_is_new() -> None:
-    order = Order()
+    order = StreamOrder()
 
     assert [order.judge(origin(seq)) for seq in (1, 2, 9)] == ["new"] * 3
 
 
 def test_an_older_message_is_late() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(5))
 
     assert order.judge(origin(4)) == "late"
@@ -24,7 +24,7 @@ def test_an_older_message_is_late() -> None:
 
 
 def test_the_same_message_again_is_a_duplicate() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(5))
     order.judge(origin(6))
 
@@ -32,7 +32,7 @@ def test_the_same_message_again_is_a_duplicate() -> None:
 
 
 def test_the_newest_is_never_new_twice_however_many_late_ones_came_between() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1000))
     for seq in range(200):
         order.judge(origin(seq))
@@ -41,14 +41,14 @@ def test_the_newest_is_never_new_twice_however_many_late_ones_came_between() -> 
 
 
 def test_a_new_boot_counts_though_its_number_is_lower() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1000, boot="a"))
 
     assert order.judge(origin(1, boot="b")) == "new"
 
 
 def test_a_boot_that_was_seen_before_the_present_one_is_late() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1000, boot="a"))
     order.judge(origin(1, boot="b"))
 
@@ -57,7 +57,7 @@ def test_a_boot_that_was_seen_before_the_present_one_is_late() -> None:
 
 
 def test_a_straggler_of_an_unseen_boot_does_not_silence_the_living_one() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1, boot="living"))
     order.judge(origin(900, boot="straggler"))
 
@@ -67,7 +67,7 @@ def test_a_straggler_of_an_unseen_boot_does_not_silence_the_living_one() -> None
 
 
 def test_an_old_boot_that_repeats_itself_does_not_come_back() -> None:
-    order = Order()
+    order = StreamOrder()
     for seq in range(10):
         order.judge(origin(seq, boot="old"))
     order.judge(origin(1, boot="new"))
@@ -77,7 +77,7 @@ def test_an_old_boot_that_repeats_itself_does_not_come_back() -> None:
 
 
 def test_an_old_boot_does_not_come_back_while_the_present_one_speaks() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1, boot="old"))
     for seq in range(50):
         order.judge(origin(seq, boot="new"))
@@ -87,7 +87,7 @@ def test_an_old_boot_does_not_come_back_while_the_present_one_speaks() -> None:
 
 
 def test_boots_that_are_long_gone_are_forgotten() -> None:
-    order = Order()
+    order = StreamOrder()
     for number in range(100):
         order.judge(origin(1, boot=f"boot-{number}"))
 
@@ -96,7 +96,7 @@ def test_boots_that_are_long_gone_are_forgotten() -> None:
 
 @pytest.mark.parametrize("nameless", [Origin(), Origin("a"), Origin(None, 3)])
 def test_a_message_without_identity_is_new_by_arrival(nameless: Origin) -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(7))
 
     assert [order.judge(nameless) for _ in range(2)] == ["new"] * 2
@@ -104,7 +104,7 @@ def test_a_message_without_identity_is_new_by_arrival(nameless: Origin) -> None:
 
 
 def test_a_stamp_years_off_orders_nothing() -> None:
-    order = Order()
+    order = StreamOrder()
     order.judge(origin(1, wall=START.wall + YEARS_S))
 
     assert order.judge(origin(2, wall=START.wall)) == "new"

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import pytest
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.people import People
 from tests.builders import detection
 from tests.unit.domain.scene import Scene, person
 
-ON = Rule(possible_people=True)
+ON = DetectionRule(possible_people=True)
 
 
 def looked(scene: Scene, *chances: float, every_s: float = 0.1, x: float = 5.0) -> None:

@@ -5,11 +5,11 @@ from itertools import permutations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
 from iveg.domain.tracking.person import Sighting
-from iveg.domain.tracking.tracker import Seen, Tracker
+from iveg.domain.tracking.tracker import PlacedDetection, Tracker
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -179,7 +179,7 @@ def rings_of(tracker: Tracker, now: Instant) -> set[tuple[str, float, float, flo
     return {
         (look.observer, look.x, look.y, radius)
         for one in tracker.known.values()
-        for look, radius in one.rings(Rule(), now)
+        for look, radius in one.rings(DetectionRule(), now)
     }
 
 
@@ -195,7 +195,7 @@ def test_the_union_of_rings_is_the_same_with_and_without_merging(
         for tracker in (merging, never):
             tracker.take(
                 [
-                    Seen(
+                    PlacedDetection(
                         "person",
                         Sighting(observer, x, y, 0.9, now, "farmer", 0.9),
                         f"d{number}",

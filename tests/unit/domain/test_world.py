@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.fleet import RobotDescription
 from iveg.domain.geometry import Pose2D
@@ -180,7 +180,7 @@ def test_a_robot_that_moves_is_a_hazard_though_nobody_knows_how_old_its_pose_is(
     world = world_that_told(0.0)
     world.apply(received(odometry("AGII", 1.0, origin=echoing(1, heard=None))))
 
-    found = zones_of(world, People(), Rule(), at(0.5))
+    found = zones_of(world, People(), DetectionRule(), at(0.5))
 
     assert [zone.cause for zone in found] == ["AGII"]
 

@@ -12,8 +12,8 @@ from iveg.embedded.notifier import (
     REFUSED,
     TIMED_OUT,
     Delivery,
-    Lane,
-    Target,
+    DeliveryLane,
+    NotificationTarget,
     exchange,
 )
 
@@ -51,7 +51,7 @@ class Outcomes:
 @asynccontextmanager
 async def receiver(
     talk: Callable[[asyncio.StreamReader, asyncio.StreamWriter, int], Awaitable[None]],
-) -> AsyncIterator[Target]:
+) -> AsyncIterator[NotificationTarget]:
     """A server that does with its nth connection whatever ``talk`` says."""
     count = 0
     tasks: set[asyncio.Task[None]] = set()
@@ -71,7 +71,7 @@ async def receiver(
 
     server = await asyncio.start_server(connected, "127.0.0.1", 0)
     try:
-        yield Target("127.0.0.1", server.sockets[0].getsockname()[1])
+        yield NotificationTarget("127.0.0.1", server.sockets[0].getsockname()[1])
     finally:
         server.close()
         for task in tasks:
@@ -94,7 +94,7 @@ async def test_deliveries_arrive_in_order_over_one_connection() -> None:
 
     outcomes = Outcomes()
     async with http_server(handle, "127.0.0.1", 0) as port:
-        lane = Lane(Target("127.0.0.1", port))
+        lane = DeliveryLane(NotificationTarget("127.0.0.1", port))
         bodies = [str(number).encode() for number in range(200)]
         for body in bodies:
             lane.send(outcomes.of(body))
@@ -120,7 +120,7 @@ async def test_a_receiver_that_keeps_connections_is_sent_ahead() -> None:
 
     outcomes = Outcomes()
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         for number in range(5):
             lane.send(outcomes.of(b"%d" % number))
         assert [status for _, (status, _) in await outcomes.number(5)] == [204] * 5
@@ -137,7 +137,7 @@ async def test_a_receiver_that_closes_each_time_is_served_all_the_same() -> None
 
     outcomes = Outcomes()
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         for number in range(3):
             lane.send(outcomes.of(b"%d" % number))
         known = await outcomes.number(3)
@@ -165,7 +165,7 @@ async def test_what_a_closing_receiver_never_looked_at_goes_out_once_more() -> N
 
     outcomes = Outcomes()
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         for number in range(3):
             lane.send(outcomes.of(b"%d" % number))
         known = await outcomes.number(3)
@@ -182,7 +182,7 @@ async def test_a_new_receiver_that_hangs_up_is_a_failure() -> None:
 
     outcomes = Outcomes()
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         lane.send(outcomes.of(b"0"))
         assert await outcomes.number(1) == [(b"0", (0, CLOSED))]
         lane.close()
@@ -199,7 +199,7 @@ async def test_a_silent_receiver_times_out_and_the_next_delivery_goes_on() -> No
 
     outcomes = Outcomes()
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         lane.send(outcomes.of(b"0", timeout_s=0.05))
         lane.send(outcomes.of(b"1"))
         known = await outcomes.number(2)
@@ -210,7 +210,7 @@ async def test_a_silent_receiver_times_out_and_the_next_delivery_goes_on() -> No
 
 async def test_a_receiver_that_is_away_is_refused_at_once() -> None:
     outcomes = Outcomes()
-    lane = Lane(Target("127.0.0.1", 1))
+    lane = DeliveryLane(NotificationTarget("127.0.0.1", 1))
     lane.send(outcomes.of(b"0"))
     lane.send(outcomes.of(b"1"))
     assert [what for _, what in await outcomes.number(2)] == [(0, REFUSED)] * 2
@@ -228,7 +228,7 @@ async def test_beyond_its_bound_a_lane_drops_the_oldest(
     outcomes = Outcomes()
     bound = notifier._MAX_QUEUED
     async with receiver(talk) as target:
-        lane = Lane(target)
+        lane = DeliveryLane(target)
         for number in range(bound + 2):
             lane.send(outcomes.of(b"%d" % number))
         lane.close()
@@ -242,10 +242,12 @@ async def test_one_exchange_gives_status_and_body() -> None:
         return Response(200, request.body)
 
     async with http_server(handle, "127.0.0.1", 0) as port:
-        target = Target("127.0.0.1", port)
+        target = NotificationTarget("127.0.0.1", port)
         assert await exchange(target, post(b"abc"), 1.0) == (200, b"abc")
 
 
 def test_a_target_is_read_from_an_address() -> None:
-    assert Target.from_url("http://a:81/x") == Target("a", 81)
-    assert Target.from_url("https://b/x") == Target("b", 443, tls=True)
+    assert NotificationTarget.from_url("http://a:81/x") == NotificationTarget("a", 81)
+    assert NotificationTarget.from_url("https://b/x") == NotificationTarget(
+        "b", 443, tls=True
+    )

@@ -9,9 +9,9 @@ from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Post
 from iveg.emulator.depth import (
     DepthCamera,
+    DepthView,
     Foliage,
     Upright,
-    View,
     person_shape,
     robot_shape,
     take,
@@ -68,12 +68,12 @@ def view(
     scenery: Scenery = OPEN,
     foliage: Foliage | None = None,
     seed: int = 1,
-) -> View:
+) -> DepthView:
     rng = np.random.default_rng(seed)
     return take(camera, sensor, targets, scenery, foliage, rng)
 
 
-def segment(picture: View, number: int = 1, class_id: str = "farmer") -> Segment:
+def segment(picture: DepthView, number: int = 1, class_id: str = "farmer") -> Segment:
     seen = picture.segment(number, class_id, 0.9)
     assert seen is not None
     return seen

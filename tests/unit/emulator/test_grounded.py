@@ -21,7 +21,7 @@ from iveg.emulator.greenhouse import Body, Disc, Scenery
 from iveg.emulator.grounded import GroundedCamera
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import World
+from iveg.emulator.world import SimulatedWorld
 from tests.builders import AGI
 
 GREENHOUSE = Greenhouse(
@@ -103,7 +103,7 @@ def test_both_cameras_find_the_same_people_in_nearly_the_same_places() -> None:
     greenhouse = load_greenhouse("mvsim-20x20")
     layout = lay_out(scenario_named("demo"), ("AGI", "AGII"), greenhouse)
     drawn, grounded = (
-        World(greenhouse, layout, DETECTORS["perfect"], 1, kind)
+        SimulatedWorld(greenhouse, layout, DETECTORS["perfect"], 1, kind)
         for kind in ("boxes", "grounding")
     )
     pairs = 0

@@ -5,8 +5,8 @@ import pytest
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.emulator.orders import (
     FaultOrder,
+    OrderPlace,
     PersonOrder,
-    Place,
     read_order,
     read_translations,
 )
@@ -20,7 +20,7 @@ def test_an_order_names_a_robot_and_what_is_wrong() -> None:
     order = read_order(body)
 
     assert order == FaultOrder(
-        robot="AGI", drop_percent=10.0, false_person=Place(x=1.0, y=2.5)
+        robot="AGI", drop_percent=10.0, false_person=OrderPlace(x=1.0, y=2.5)
     )
 
 
@@ -75,7 +75,7 @@ def test_words_of_a_command_line_are_the_same_orders() -> None:
 
     assert read_translations(words, FLEET) == [
         FaultOrder(robot="AGII", freeze_odometry="repeat"),
-        FaultOrder(robot="AGI", false_person=Place(x=1.0, y=2.0)),
+        FaultOrder(robot="AGI", false_person=OrderPlace(x=1.0, y=2.0)),
         FaultOrder(robot="AGI", drop_percent=10.0),
         FaultOrder(robot="AGII", drop_percent=10.0),
     ]

@@ -5,18 +5,18 @@ import numpy as np
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.greenhouse import Body, Scenery
-from iveg.emulator.people import RADIUS_M, WALKING_SPEED, Person, Stop
+from iveg.emulator.people import RADIUS_M, WALKING_SPEED, SimulatedPerson, WalkStop
 
 DT = 0.05
 OPEN = Scenery.of(Greenhouse("yard", Rectangle(-10.0, -10.0, 20.0, 10.0)))
 
 
-def person(*stops: Stop, seed: int = 1) -> Person:
-    return Person(stops, np.random.default_rng(seed))
+def person(*stops: WalkStop, seed: int = 1) -> SimulatedPerson:
+    return SimulatedPerson(stops, np.random.default_rng(seed))
 
 
 def test_a_person_walks_at_walking_pace_and_arrives() -> None:
-    walker = person(Stop(0.0, 0.0), Stop(7.0, 0.0, 60.0, 60.0))
+    walker = person(WalkStop(0.0, 0.0), WalkStop(7.0, 0.0, 60.0, 60.0))
 
     walker.step(DT, [], OPEN)
     walker.step(DT, [], OPEN)
@@ -29,7 +29,7 @@ def test_a_person_walks_at_walking_pace_and_arrives() -> None:
 
 
 def test_a_person_stays_at_a_stop_and_then_goes_on() -> None:
-    worker = person(Stop(0.0, 0.0, 2.0, 2.0), Stop(5.0, 0.0, 60.0, 60.0))
+    worker = person(WalkStop(0.0, 0.0, 2.0, 2.0), WalkStop(5.0, 0.0, 60.0, 60.0))
 
     places = []
     for _ in range(80):
@@ -41,7 +41,7 @@ def test_a_person_stays_at_a_stop_and_then_goes_on() -> None:
 
 
 def test_the_same_seed_walks_the_same_way() -> None:
-    round_ = (Stop(0.0, 0.0, 0.0, 3.0), Stop(5.0, 0.0, 0.0, 3.0))
+    round_ = (WalkStop(0.0, 0.0, 0.0, 3.0), WalkStop(5.0, 0.0, 0.0, 3.0))
     one, other = person(*round_, seed=7), person(*round_, seed=7)
 
     for _ in range(300):
@@ -52,7 +52,7 @@ def test_the_same_seed_walks_the_same_way() -> None:
 
 
 def test_a_person_walks_round_a_robot_that_stands_in_the_way() -> None:
-    walker = person(Stop(0.0, 0.0), Stop(8.0, 0.0, 60.0, 60.0))
+    walker = person(WalkStop(0.0, 0.0), WalkStop(8.0, 0.0, 60.0, 60.0))
     robot = Body("AGI", Pose2D(4.0, 0.0, 0.0), 1.0, 0.6)
 
     gaps = []
@@ -65,7 +65,7 @@ def test_a_person_walks_round_a_robot_that_stands_in_the_way() -> None:
 
 
 def test_a_person_steps_aside_for_a_robot_that_comes_near() -> None:
-    worker = person(Stop(0.0, 0.0, 600.0, 600.0))
+    worker = person(WalkStop(0.0, 0.0, 600.0, 600.0))
     robot = Body("AGI", Pose2D(0.0, 0.6, 0.0), 1.0, 0.6)
 
     for _ in range(40):
@@ -77,7 +77,7 @@ def test_a_person_steps_aside_for_a_robot_that_comes_near() -> None:
 def test_a_person_never_walks_into_crop() -> None:
     row = Rectangle(2.0, -5.0, 3.0, 5.0)
     yard = Scenery.of(Greenhouse("yard", Rectangle(-9.0, -9.0, 9.0, 9.0), rows=(row,)))
-    walker = person(Stop(0.0, 0.0), Stop(6.0, 1.0, 9.0, 9.0))
+    walker = person(WalkStop(0.0, 0.0), WalkStop(6.0, 1.0, 9.0, 9.0))
 
     for _ in range(200):
         walker.step(DT, [], yard)
@@ -85,7 +85,7 @@ def test_a_person_never_walks_into_crop() -> None:
 
 
 def test_a_person_who_was_placed_stays_when_held() -> None:
-    walker = person(Stop(0.0, 0.0), Stop(7.0, 0.0))
+    walker = person(WalkStop(0.0, 0.0), WalkStop(7.0, 0.0))
 
     walker.place(3.0, 3.0, hold=True)
     walker.step(DT, [], OPEN)

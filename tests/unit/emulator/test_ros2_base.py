@@ -15,7 +15,7 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.ros2_base import TIMEOUT_S, Base, Ros2Base
 from iveg.emulator.ros2_base import Navigation as Nav
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import REST, World
+from iveg.emulator.world import REST, SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs
 from iveg.robot.uplink import Sensed
@@ -66,7 +66,7 @@ class Emulated:
     def __init__(self) -> None:
         greenhouse = load_greenhouse("mvsim-20x20")
         layout = lay_out(scenario_named("demo"), ["AGI", "AGII"], greenhouse)
-        self.world = World(greenhouse, layout, DETECTORS["perfect"], 1)
+        self.world = SimulatedWorld(greenhouse, layout, DETECTORS["perfect"], 1)
         self.rig = self.world.rigs["AGII"]
         self.network = FakeNetwork()
         self.config = RobotConfig(namespace="/agii")

@@ -8,7 +8,7 @@ from iveg.emulator.camera import Counts, DetectorModel
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import World
+from iveg.emulator.world import SimulatedWorld
 from iveg.experiment.outcome import read_truth
 
 BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0, 1)})
@@ -17,7 +17,7 @@ BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0
 def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> None:
     greenhouse = load_greenhouse(scenario_named("together").greenhouse)
     layout = lay_out(scenario_named("together"), ("AGI", "AGII"), greenhouse)
-    world = World(greenhouse, layout, BLIND, seed=1)
+    world = SimulatedWorld(greenhouse, layout, BLIND, seed=1)
     rig = world.rigs["AGI"]
 
     with closing(TruthLog(tmp_path / "truth.jsonl")) as log:

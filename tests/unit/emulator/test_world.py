@@ -11,7 +11,7 @@ from iveg.emulator.camera import DETECTORS, PERSON
 from iveg.emulator.layout import lay_out
 from iveg.emulator.people import RADIUS_M
 from iveg.emulator.scenarios import SCENARIOS, scenario_named
-from iveg.emulator.world import World, climate_at
+from iveg.emulator.world import SimulatedWorld, climate_at
 from tests.touching import bodies_touch, touches
 
 FLEET = ("AGI", "AGII")
@@ -26,12 +26,12 @@ def world_of(
     *,
     seed: int = 1,
     detector: str = "perfect",
-) -> World:
+) -> SimulatedWorld:
     layout = lay_out(scenario_named(scenario), robots, greenhouse)
-    return World(greenhouse, layout, DETECTORS[detector], seed)
+    return SimulatedWorld(greenhouse, layout, DETECTORS[detector], seed)
 
 
-def run(world: World, seconds: float, dt: float = 0.1) -> Iterator[float]:
+def run(world: SimulatedWorld, seconds: float, dt: float = 0.1) -> Iterator[float]:
     """Drive everybody as they wish; yields the time after every step."""
     for step in range(round(seconds / dt)):
         now = step * dt
@@ -43,7 +43,7 @@ def run(world: World, seconds: float, dt: float = 0.1) -> Iterator[float]:
         yield now
 
 
-def nearest_person(world: World, robot_id: str) -> float:
+def nearest_person(world: SimulatedWorld, robot_id: str) -> float:
     pose = world.rigs[robot_id].vehicle.pose
     return min(pose.distance_to(person.x, person.y) for person in world.people)
 

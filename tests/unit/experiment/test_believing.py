@@ -8,12 +8,12 @@ import pytest
 from iveg.domain.costmap import Costmap, Grid
 from iveg.experiment.believing import Belief, belief_in, belief_of, injections
 from iveg.experiment.observer import picture_of, slowdowns_of
-from iveg.experiment.scoring import Picture, Seen
+from iveg.experiment.scoring import Picture, SeenObject
 
-FARMER = Seen("person-0", "farmer", 1.0, 1.0)
+FARMER = SeenObject("person-0", "farmer", 1.0, 1.0)
 
 
-def look(robot_id: str, *seen: Seen, at: float = 0.0) -> Picture:
+def look(robot_id: str, *seen: SeenObject, at: float = 0.0) -> Picture:
     return Picture(robot_id, at, seen)
 
 
@@ -83,7 +83,7 @@ def test_a_picture_is_read_as_live_tells_it() -> None:
     picture = picture_of(told)
 
     assert picture is not None
-    assert picture.seen == (Seen("0", "farmer", 1.0, 2.0, 0.9),)
+    assert picture.seen == (SeenObject("0", "farmer", 1.0, 2.0, 0.9),)
     assert picture_of({**told, "stamp": None}) is None
 
 

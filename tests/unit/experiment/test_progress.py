@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from iveg.experiment.files import read_json
-from iveg.experiment.plan import Step
+from iveg.experiment.plan import PlannedRun
 from iveg.experiment.progress import Progress, expected_s
 
-STEPS = [Step("peers", n, 20.0, n) for n in (1, 2)]
+STEPS = [PlannedRun("peers", n, 20.0, n) for n in (1, 2)]
 
 
 class Terminal(io.StringIO):

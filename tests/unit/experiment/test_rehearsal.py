@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.experiment.outcome import counted_of
-from iveg.experiment.plan import ROBOTS, Step
+from iveg.experiment.plan import ROBOTS, PlannedRun
 from iveg.experiment.rehearsal import Rehearsal
 
-RULE = Rule()
+RULE = DetectionRule()
 
 
 async def counted(
@@ -16,7 +16,7 @@ async def counted(
     profile: str = "field",
     seconds: float = 5.0,
 ) -> Any:
-    rehearsal = Rehearsal(Step(family, 1, 6.0, seed), profile, RULE, "AGII")
+    rehearsal = Rehearsal(PlannedRun(family, 1, 6.0, seed), profile, RULE, "AGII")
     return counted_of(await rehearsal.play(seconds), "AGII")
 
 

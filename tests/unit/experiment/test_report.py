@@ -12,7 +12,7 @@ from iveg.experiment.compare import write_comparison
 from iveg.experiment.files import directory_of, read_json, write_json
 from iveg.experiment.notebook import Notebook
 from iveg.experiment.outcome import outcome_of, read_truth, result_of
-from iveg.experiment.plan import FAMILIES, PLANS, Step
+from iveg.experiment.plan import FAMILIES, PLANS, PlannedRun
 from iveg.experiment.progress import expected_s
 from iveg.experiment.report import write_report
 from iveg.experiment.scoring import Tally
@@ -58,7 +58,7 @@ def result(
     """An experiment of one run."""
     of = (found + missed, found + ghosts)
     farmer = Tally((confidence,) * found, missed, (0.6,) * ghosts, *of)
-    step = Step("together", 1, 6.0, 7)
+    step = PlannedRun("together", 1, 6.0, 7)
     stack = half(farmer, [piece(one) for one in took_ms])
     outcome = outcome_of(step, half(farmer), stack)
     return result_of(PLANS["minimal"], [outcome], CHOSEN, why)
@@ -197,7 +197,7 @@ def test_quick_stays_under_three_minutes_and_full_has_enough_messages() -> None:
 # --- what broke off goes on -----------------------------------------------------------
 
 
-def finished(step: Step) -> Any:
+def finished(step: PlannedRun) -> Any:
     farmer = Tally((0.9,), 0, (), 1, 1)
     return outcome_of(step, half(farmer), half(farmer, []))
 

@@ -7,7 +7,7 @@ import pytest
 from iveg.experiment.scoring import (
     Picture,
     Score,
-    Seen,
+    SeenObject,
     overlap,
     paired,
     score,
@@ -17,11 +17,11 @@ from iveg.experiment.scoring import (
 HZ = 10
 
 
-def person(x: float = 5.0, confidence: float = 0.9, key: str = "p") -> Seen:
-    return Seen(key, "farmer", x, 0.0, confidence)
+def person(x: float = 5.0, confidence: float = 0.9, key: str = "p") -> SeenObject:
+    return SeenObject(key, "farmer", x, 0.0, confidence)
 
 
-def pictures(seconds: int, *seen: Seen, robot_id: str = "AGI") -> list[Picture]:
+def pictures(seconds: int, *seen: SeenObject, robot_id: str = "AGI") -> list[Picture]:
     """Ten a second, all with the same in them."""
     return [
         Picture(robot_id, 1000.0 + n / HZ, tuple(seen)) for n in range(HZ * seconds)

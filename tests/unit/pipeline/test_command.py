@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.errors import CommandRefusedError, UnknownRobotError
 from iveg.domain.observations import Hold
 from iveg.domain.records import CommandEventRecord, CommandRecord
-from iveg.domain.stop import STEPS, Command, StopMachine, Wanted
+from iveg.domain.stop import STEPS, Command, DesiredRecord, StopMachine
 from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import safety_report
 from tests.fakes.records import command_record
@@ -497,7 +497,7 @@ async def test_the_history_says_that_a_released_stop_is_over() -> None:
 async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> None:
     desk = Desk()
 
-    desk.commander.restore({"AGI": Wanted("ana", "01HELD")}, desk.clock())
+    desk.commander.restore({"AGI": DesiredRecord("ana", "01HELD")}, desk.clock())
     await settle()
 
     machine = desk.commander.machine("AGI")
@@ -511,10 +511,13 @@ async def test_a_restart_asserts_a_hold_again_that_no_release_ever_named() -> No
 
 @pytest.mark.parametrize(
     "wanted",
-    [Wanted("ana"), Wanted("ana", "01HELD", named=("01HELD",), asked=("01HELD",))],
+    [
+        DesiredRecord("ana"),
+        DesiredRecord("ana", "01HELD", named=("01HELD",), asked=("01HELD",)),
+    ],
 )
 async def test_a_restart_never_asserts_a_hold_that_a_release_may_have_named(
-    wanted: Wanted,
+    wanted: DesiredRecord,
 ) -> None:
     desk = Desk()
 
@@ -531,7 +534,7 @@ async def test_a_restart_among_three_holds_that_were_named_waits_for_the_robot()
 ):
     desk = Desk()
     three = ("01A", "01B", "01C")
-    wanted = Wanted("ana", "01C", three, three, "0123456789abcdef")
+    wanted = DesiredRecord("ana", "01C", three, three, "0123456789abcdef")
 
     desk.commander.restore({"AGI": wanted}, desk.clock())
     await desk.wait(0.9)
@@ -545,7 +548,7 @@ async def test_a_restart_among_three_holds_that_were_named_waits_for_the_robot()
 async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
     desk = Desk()
 
-    desk.commander.restore({"AGX": Wanted("ana")}, desk.clock())
+    desk.commander.restore({"AGX": DesiredRecord("ana")}, desk.clock())
     await settle()
 
     assert desk.fleet.stops == []
@@ -553,7 +556,7 @@ async def test_a_restart_forgets_robots_that_left_the_fleet() -> None:
 
 async def test_what_a_crash_left_open_is_closed_and_says_what_became_of_it() -> None:
     desk = Desk()
-    desk.commander.restore({"AGI": Wanted("ana")}, desk.clock())
+    desk.commander.restore({"AGI": DesiredRecord("ana")}, desk.clock())
     await settle()
     before = len(desk.sink.records)
     left = (
@@ -700,7 +703,7 @@ async def test_delivered_is_told_with_the_time_it_took() -> None:
 async def test_old_commands_make_room() -> None:
     desk = Desk()
     for _ in range(250):
-        desk.commander.restore({"AGII": Wanted("ana")}, desk.clock())
+        desk.commander.restore({"AGII": DesiredRecord("ana")}, desk.clock())
         desk.report("AGII", released=(desk.commander.machine("AGII").hold_id or "",))
 
     assert len(desk.commander.commands) <= 200

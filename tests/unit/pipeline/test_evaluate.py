@@ -2,7 +2,7 @@
 
 import pytest
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Hold, Origin
@@ -461,7 +461,7 @@ def test_a_person_beyond_the_walls_slows_who_saw_them_and_is_told_as_doubtful() 
 
 def test_a_possible_person_is_told_as_such_where_the_rule_counts_them() -> None:
     desk = watched(Desk())
-    desk.evaluator.rule = Rule(possible_people=True)
+    desk.evaluator.rule = DetectionRule(possible_people=True)
     # Faint looks at one spot are told once; the possible one is another line.
     for _ in range(3):
         desk.clock.now += 0.1

@@ -1,6 +1,6 @@
 """The lowest cap counts: down at once, up late."""
 
-from iveg.robot.caps import FREE, Applied, Cap, lowest, quantised
+from iveg.robot.caps import FREE, AppliedCap, Cap, lowest, quantised
 
 HALF = Cap(0.5, "person", "p1")
 ZERO = Cap(0.0, "watchdog")
@@ -29,26 +29,26 @@ def test_factors_go_down_to_the_next_step() -> None:
 
 
 def test_a_lower_cap_counts_at_once() -> None:
-    assert Applied(FREE).settle(HALF, 5.0).cap == HALF
+    assert AppliedCap(FREE).settle(HALF, 5.0).cap == HALF
 
 
 def test_a_higher_cap_waits_a_second() -> None:
-    applied = Applied(HALF).settle(FREE, 5.0).settle(FREE, 5.95)
+    applied = AppliedCap(HALF).settle(FREE, 5.0).settle(FREE, 5.95)
     assert applied.cap == HALF
     assert applied.settle(FREE, 6.0).cap == FREE
 
 
 def test_one_relapse_starts_the_second_anew() -> None:
-    applied = Applied(HALF).settle(FREE, 5.0).settle(HALF, 5.9).settle(FREE, 6.0)
+    applied = AppliedCap(HALF).settle(FREE, 5.0).settle(HALF, 5.9).settle(FREE, 6.0)
     assert applied.settle(FREE, 6.9).cap == HALF
     assert applied.settle(FREE, 7.0).cap == FREE
 
 
 def test_what_came_lower_while_waiting_is_what_it_rises_to() -> None:
-    applied = Applied(ZERO).settle(FREE, 5.0).settle(HALF, 5.5).settle(FREE, 6.0)
+    applied = AppliedCap(ZERO).settle(FREE, 5.0).settle(HALF, 5.5).settle(FREE, 6.0)
     assert applied.cap == HALF
     assert applied.settle(FREE, 7.0).cap == FREE
 
 
 def test_the_same_factor_with_another_reason_is_told_at_once() -> None:
-    assert Applied(HALF).settle(Cap(0.5, "stale"), 5.0).cap.reason == "stale"
+    assert AppliedCap(HALF).settle(Cap(0.5, "stale"), 5.0).cap.reason == "stale"

@@ -11,7 +11,7 @@ import pytest
 from iveg.domain.errors import HopError
 from iveg.domain.observations import Hold
 from iveg.robot.holds import HoldSet
-from iveg.robot.lane import Message, SafetyLane
+from iveg.robot.lane import LaneMessage, SafetyLane
 
 FIRST = HoldSet((Hold("01A", "iveg", "remote"),))
 SECOND = HoldSet((Hold("01B", "iveg", "remote"),))
@@ -64,8 +64,8 @@ class World:
         await until(lambda: len(self.seen) >= count)
 
 
-def message(text: str) -> Message:
-    return Message("t", text.encode())
+def message(text: str) -> LaneMessage:
+    return LaneMessage("t", text.encode())
 
 
 async def test_an_answer_waits_for_the_disk() -> None:

@@ -8,14 +8,14 @@ import pytest
 
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.probe import ProbeLag
-from iveg.robot.rates import LEVELS, PATIENCE_S, Rates
+from iveg.robot.rates import LEVELS, PATIENCE_S, UplinkRates
 
 KINDS = ("_lidar2D", "_yolox_bounding_boxes", "_odom")
 TICK_S = 1 / 30
 
 
 def told_for(
-    rates: Rates, backlog_s: float | None, seconds: float, now: float
+    rates: UplinkRates, backlog_s: float | None, seconds: float, now: float
 ) -> float:
     """Feedback at 5 Hz that says so; the time after it."""
     for _ in range(round(seconds * 5)):
@@ -24,7 +24,7 @@ def told_for(
     return now
 
 
-def measures(rates: Rates, suffix: str, seconds: float = 10.0) -> list[float]:
+def measures(rates: UplinkRates, suffix: str, seconds: float = 10.0) -> list[float]:
     """When a sensor of 30 Hz has a measure for the agent."""
     ticks = (tick * TICK_S for tick in range(round(seconds / TICK_S)))
     return [now for now in ticks if rates.is_measure(suffix, now)]
@@ -32,7 +32,7 @@ def measures(rates: Rates, suffix: str, seconds: float = 10.0) -> list[float]:
 
 @pytest.mark.parametrize("suffix", [*KINDS, "_nav", ""])
 def test_without_a_backlog_every_message_is_a_measure(suffix: str) -> None:
-    assert len(measures(Rates(), suffix)) == 300
+    assert len(measures(UplinkRates(), suffix)) == 300
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_scans_give_way_first_then_looks_then_poses(
     level: float, rates_hz: tuple[float, ...]
 ) -> None:
     for suffix, wanted in zip(KINDS, rates_hz, strict=True):
-        sent = len(measures(Rates(level=level), suffix)) / 10.0
+        sent = len(measures(UplinkRates(level=level), suffix)) / 10.0
         assert wanted <= sent <= 1.15 * wanted
 
 
@@ -58,7 +58,7 @@ def test_scans_give_way_first_then_looks_then_poses(
 def test_no_level_and_no_backlog_goes_below_a_floor(
     suffix: str, longest_s: float
 ) -> None:
-    rates = Rates()
+    rates = UplinkRates()
     told_for(rates, 60.0, 600.0, 0.0)
     sent = measures(rates, suffix)
     assert (
@@ -69,30 +69,30 @@ def test_no_level_and_no_backlog_goes_below_a_floor(
 
 @pytest.mark.parametrize("suffix", ["_nav", "_safety", ""])
 def test_intent_reports_and_the_single_payload_are_never_fewer(suffix: str) -> None:
-    assert len(measures(Rates(level=LEVELS), suffix)) == 300
+    assert len(measures(UplinkRates(level=LEVELS), suffix)) == 300
 
 
 def test_news_is_a_measure_at_any_level() -> None:
-    rates = Rates(level=LEVELS)
+    rates = UplinkRates(level=LEVELS)
     measures(rates, "_yolox_bounding_boxes", 1.0)
     assert rates.is_measure("_yolox_bounding_boxes", 1.0, news=True)
     assert rates.is_measure("_yolox_bounding_boxes", 1.001, news=True)
 
 
 def test_a_sensor_slower_than_its_floor_is_left_alone() -> None:
-    rates = Rates(level=LEVELS)
+    rates = UplinkRates(level=LEVELS)
     assert all(rates.is_measure("_odom", now) for now in range(100))
 
 
 @pytest.mark.parametrize("backlog_s", [None, 0.0, 0.49])
 def test_no_news_and_good_news_lower_nothing(backlog_s: float | None) -> None:
-    rates = Rates()
+    rates = UplinkRates()
     told_for(rates, backlog_s, 60.0, 0.0)
     assert rates.level == 0.0
 
 
 def test_silence_of_iveg_changes_nothing() -> None:
-    rates = Rates()
+    rates = UplinkRates()
     now = told_for(rates, 5.0, 2.0, 0.0)
     level = rates.level
     rates.told(5.0, now + 3600.0)
@@ -100,7 +100,7 @@ def test_silence_of_iveg_changes_nothing() -> None:
 
 
 def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:
-    rates = Rates()
+    rates = UplinkRates()
     now = told_for(rates, 5.0, 4.0, 0.0)
     assert rates.level == LEVELS
     now = told_for(rates, 0.1, PATIENCE_S - 1.0, now)
@@ -112,13 +112,13 @@ def test_a_backlog_is_answered_within_seconds_and_forgiven_slowly() -> None:
 
 
 def test_a_level_between_well_and_behind_stays() -> None:
-    rates = Rates(level=1.5)
+    rates = UplinkRates(level=1.5)
     told_for(rates, 0.4, 600.0, 0.0)
     assert rates.level == 1.5
 
 
 def test_each_time_that_it_was_too_early_it_waits_longer() -> None:
-    rates, now, waits = Rates(), 0.0, []
+    rates, now, waits = UplinkRates(), 0.0, []
     for _ in range(4):
         now = told_for(rates, 5.0, 4.0, now)
         began = now
@@ -136,7 +136,9 @@ class Stack:
     """An agent that takes so many measures a second in order, and iVeg's own probe."""
 
     per_s: float
-    rates: list[Rates] = field(default_factory=lambda: [Rates(), Rates()])
+    rates: list[UplinkRates] = field(
+        default_factory=lambda: [UplinkRates(), UplinkRates()]
+    )
     now: float = 0.0
     queue: deque[Origin | None] = field(default_factory=deque)
     probe: ProbeLag = field(default_factory=ProbeLag)

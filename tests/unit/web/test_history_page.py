@@ -16,7 +16,7 @@ from starlette.websockets import WebSocketDisconnect
 import iveg
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.records import Record
 from iveg.pipeline.record import Waiting
 from iveg.web import problems
@@ -72,7 +72,7 @@ class Server:
                 reader=lambda: Principal("ana", "operator"),
                 anyone=lambda: None,
                 document=lambda: describe_api(app),
-                rule=Rule,
+                rule=DetectionRule,
             )
         )
         app.add_api_route("/healthz", lambda: "ok")

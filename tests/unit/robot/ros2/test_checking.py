@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from iveg.robot.ros2.checking import Heard, Verdict, judge, lines
-from iveg.robot.ros2.config import Drive, RobotConfig
+from iveg.robot.ros2.checking import CheckVerdict, Heard, judge, lines
+from iveg.robot.ros2.config import DriveConfig, RobotConfig
 from iveg.robot.ros2.transforms import TransformBuffer
 from iveg.ros2 import messages as m
 from iveg.ros2.names import DEFAULT, SENSOR_DATA, TF, TF_STATIC, Qos
@@ -64,7 +64,7 @@ def verdict(
     said: dict[str, Heard] | None = None,
     buffer: TransformBuffer | None = None,
     broker: str | None = None,
-) -> Verdict:
+) -> CheckVerdict:
     endpoints = [one for name, one in WHOLE.items() if name != without]
     return judge(
         config or RobotConfig(),
@@ -135,18 +135,20 @@ def test_a_robot_that_has_everything_misses_nothing() -> None:
             "TF: no map → odom.",
         ),
         (
-            verdict(config=RobotConfig(drive=Drive(stamped_out=True))),
+            verdict(config=RobotConfig(drive=DriveConfig(stamped_out=True))),
             "/cmd_vel is geometry_msgs/msg/Twist there: drive.stamped_out.",
         ),
         (
-            verdict(config=RobotConfig(drive=Drive(stamped_in=True))),
+            verdict(config=RobotConfig(drive=DriveConfig(stamped_in=True))),
             "/cmd_vel_nav is geometry_msgs/msg/Twist there: drive.stamped_in.",
         ),
         (verdict(broker="No MQTT broker answers."), "No MQTT broker answers."),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_missing_is_said_in_one_sentence(found: Verdict, sentence: str) -> None:
+def test_what_is_missing_is_said_in_one_sentence(
+    found: CheckVerdict, sentence: str
+) -> None:
     assert list(found.missing) == [sentence]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from iveg.domain.geometry import Twist2D
 from iveg.robot.gate import REST
-from iveg.robot.ros2.config import Drive
+from iveg.robot.ros2.config import DriveConfig
 from iveg.robot.ros2.drive import DriveTopics
 from iveg.robot.ros2.input_faults import InputFaults, speed_of
 from iveg.ros2 import cdr
@@ -18,7 +18,7 @@ AHEAD = m.Twist(m.Vector3(0.5, 0.1, 0.2), m.Vector3(0.3, 0.4, -0.2))
 
 def topics(**drive: bool) -> tuple[DriveTopics, InputFaults]:
     input_faults = InputFaults()
-    found = DriveTopics(Drive(**drive), "/cmd_vel_nav", "base_link", input_faults)
+    found = DriveTopics(DriveConfig(**drive), "/cmd_vel_nav", "base_link", input_faults)
     return found, input_faults
 
 

@@ -9,7 +9,7 @@ import pytest
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.domain.records import CommandRecord
-from iveg.domain.stop.latency import Spread, spread
+from iveg.domain.stop.latency import StopLatency, spread
 from iveg.web.api import stop_records
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
@@ -101,5 +101,5 @@ async def test_a_command_of_an_earlier_run_is_found_in_the_history(
 def test_a_spread_is_of_what_was_measured() -> None:
     values = [float(number) for number in range(1, 101)]
 
-    assert spread([*values, None]) == Spread(100, 50.0, 95.0, 100.0)
-    assert spread([None]) == Spread(0, None, None, None)
+    assert spread([*values, None]) == StopLatency(100, 50.0, 95.0, 100.0)
+    assert spread([None]) == StopLatency(0, None, None, None)

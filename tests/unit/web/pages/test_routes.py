@@ -10,7 +10,7 @@ from fastapi import FastAPI
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
-from iveg.domain.detection_rule import Rule
+from iveg.domain.detection_rule import DetectionRule
 from iveg.web.pages.contexts import LivePage, Site
 from iveg.web.pages.openapi import (
     AnswerDoc,
@@ -107,7 +107,7 @@ async def browser(authenticator: FakeAuthenticator) -> AsyncIterator[httpx.Async
             reader=authenticator.reader,
             anyone=require("open"),
             document=lambda: API,
-            rule=lambda: replace(Rule(), threshold=0.75, radius_m=2.5),
+            rule=lambda: replace(DetectionRule(), threshold=0.75, radius_m=2.5),
         )
     )
     install(app, pages.problem)

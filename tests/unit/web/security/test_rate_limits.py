@@ -12,7 +12,7 @@ from iveg.web.security.rate_limits import (
     PAINTED_PER_S,
     SOCKETS,
     TOO_MANY_SOCKETS,
-    Attempts,
+    FailedAttempts,
     SocketLimits,
 )
 from iveg.web.security.roles import Principal
@@ -25,7 +25,7 @@ PING, STOP = '{"type": "ping", "t": 1}', '{"type": "stop", "robot_id": "AGI"}'
 
 
 def test_five_wrong_links_are_free_and_the_next_waits_a_minute() -> None:
-    attempts = Attempts()
+    attempts = FailedAttempts()
     for second in range(5):
         assert attempts.wait_s("10.0.0.1", second) == 0.0
         attempts.failed("10.0.0.1", second)
@@ -35,7 +35,7 @@ def test_five_wrong_links_are_free_and_the_next_waits_a_minute() -> None:
 
 
 def test_one_address_does_not_make_another_wait() -> None:
-    attempts = Attempts()
+    attempts = FailedAttempts()
     for _ in range(5):
         attempts.failed("10.0.0.1", 0.0)
 
@@ -43,7 +43,7 @@ def test_one_address_does_not_make_another_wait() -> None:
 
 
 def test_whoever_gets_in_begins_anew() -> None:
-    attempts = Attempts()
+    attempts = FailedAttempts()
     for _ in range(5):
         attempts.failed("10.0.0.1", 0.0)
     attempts.succeeded("10.0.0.1")
@@ -52,7 +52,7 @@ def test_whoever_gets_in_begins_anew() -> None:
 
 
 def test_addresses_are_bounded() -> None:
-    attempts = Attempts()
+    attempts = FailedAttempts()
     for number in range(5000):
         attempts.failed(f"10.0.{number}", 0.0)
 
