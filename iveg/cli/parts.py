@@ -22,7 +22,8 @@ from iveg.adapters.history.engine import sqlite_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
-from iveg.app import Dss, broker_of, create_app
+from iveg.app import Dss, broker_of
+from iveg.asgi import create_app
 from iveg.cli.memory import settle_memory
 from iveg.cli.running import LOOPBACK, run_until_told, tell_link, tell_ready
 from iveg.domain.errors import DataFileError, HopError

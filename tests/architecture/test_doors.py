@@ -6,7 +6,8 @@ import pytest
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
-from iveg.app import Dss, create_app
+from iveg.app import Dss
+from iveg.asgi import create_app
 from iveg.settings import Settings
 from iveg.web.security.authentication import Action, declared_action, undeclared
 from tests.architecture import documents

@@ -10,7 +10,8 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app import Dss, create_app
+from iveg.app import Dss
+from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings
 from tests.builders import odometry
