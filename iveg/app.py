@@ -116,6 +116,7 @@ class Dss:
             lambda *told: self.ingest.reject(*told),
             settings.direct_read,
             lambda *identity: self.ingest.is_past(*identity),
+            lambda *told: self.latency.watch.passed_over(*told),
         )
         self.link = MqttLink(
             broker_of(settings),
@@ -124,6 +125,7 @@ class Dss:
             self._direct.read,
             self._broker_back,
             self._broker_lost,
+            self._direct.pass_over,
         )
         self.orion = OrionClient(
             settings.orion_url, settings.fiware_service, settings.fiware_servicepath

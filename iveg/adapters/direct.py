@@ -32,6 +32,8 @@ _SUFFIXES: dict[type[Observation], str] = {
     **{sensor.of: sensor.suffix for sensor in SENSORS},
 }
 
+PassedOver = Callable[[str, type[Observation], int], None]
+
 
 class DirectReader:
     """Turns messages of robots into observations of the ``direct`` transport.
@@ -40,6 +42,8 @@ class DirectReader:
         offer: Where observations go; ``reject`` where the unreadable is counted.
         scope: What is read; ``safety`` leaves poses, scans and intent to FIWARE.
         is_past: Tells by its identity what FIWARE has already brought.
+        passed_over: Told of a robot's messages of one kind that reached the broker and
+            were not read, because a newer one was there.
     """
 
     def __init__(
@@ -51,28 +55,38 @@ class DirectReader:
         reject: Callable[[str, str, str], None],
         scope: Scope = "all",
         is_past: codec.IsPast | None = None,
+        passed_over: PassedOver = lambda _robot, _kind, _count: None,
     ) -> None:
         self._clock = clock
         self._offer = offer
         self._reject = reject
         self._is_past = is_past
+        self._passed_over = passed_over
         kinds = read_directly(scope)
         self._kinds = tuple(kinds)
         self._devices: dict[str, str] = {}
+        self._sources: dict[str, tuple[str, type[Observation]]] = {}
         self._dense: set[str] = set()
         self._answers: dict[str, str] = {}
         self._subscriptions: dict[str, int] = {}
         for robot_id in robots:
             for kind, qos in kinds.items():
                 if kind in _SUFFIXES:
-                    self._listen(apikey, robot_id, _SUFFIXES[kind], qos)
+                    self._listen(apikey, robot_id, _SUFFIXES[kind], qos, kind)
             if kinds:
                 self._listen(apikey, robot_id, "", 1)
                 answers = names.answer_topic(apikey, robot_id)
                 self._answers[answers] = robot_id
                 self._subscriptions[answers] = 1
 
-    def _listen(self, apikey: str, robot_id: str, suffix: str, qos: int) -> None:
+    def _listen(
+        self,
+        apikey: str,
+        robot_id: str,
+        suffix: str,
+        qos: int,
+        kind: type[Observation] | None = None,
+    ) -> None:
         device = robot_id + suffix
         topics = [names.measure_topic(apikey, device)]
         if suffix in names.DIRECT_SUFFIXES:
@@ -80,11 +94,18 @@ class DirectReader:
             self._dense.add(topics[-1])
         for topic in topics:
             self._devices[topic] = device
+            if kind is not None:
+                self._sources[topic] = robot_id, kind
             self._subscriptions[topic] = qos
 
     def subscriptions(self) -> dict[str, int]:
         """Topics and their QoS."""
         return self._subscriptions
+
+    def pass_over(self, topic: str, count: int) -> None:
+        """So many messages of a topic came and were overtaken before they were read."""
+        if topic in self._sources:
+            self._passed_over(*self._sources[topic], count)
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""

@@ -64,6 +64,8 @@ class MqttLink:
         on_message: Called in the loop with topic and payload; must not block.
         on_connect: Called after every (re)connect, subscriptions in place.
         on_loss: Called once when a connection is lost.
+        on_passed_over: Called with a topic and how many of its messages were not
+            handed over because newer ones had come with them; before the newest.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class MqttLink:
         on_message: Callable[[str, bytes], None] | None = None,
         on_connect: Callable[[], None] | None = None,
         on_loss: Callable[[], None] | None = None,
+        on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
     ) -> None:
         self._address = address
         self._name = name
@@ -81,6 +84,7 @@ class MqttLink:
         self._on_message = on_message
         self._on_connect = on_connect
         self._on_loss = on_loss
+        self._on_passed_over = on_passed_over
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._wake = asyncio.Event()
@@ -154,9 +158,13 @@ class MqttLink:
             finally:
                 sender.cancel()
 
-    def _hand_telemetry(self, messages: Mapping[str, bytes]) -> None:
+    def _hand_telemetry(
+        self, messages: Mapping[str, bytes], passed_over: Mapping[str, int]
+    ) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""
         try:
+            for topic, count in passed_over.items():
+                self._on_passed_over(topic, count)
             self._hand(messages)
         except Exception as error:
             self._mistake = error

@@ -7,6 +7,7 @@ sends: messages on the wire grow old, and robots' answers to a STOP behind them.
 
 import socket
 import ssl
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,7 +20,8 @@ _LONGEST_LENGTH = 4
 _TELEMETRY, _RETAINED = 0x30, 0x01
 """PUBLISH at QoS 0."""
 
-Take = Callable[[Mapping[str, bytes]], None]
+Take = Callable[[Mapping[str, bytes], Mapping[str, int]], None]
+"""Payloads by topic, and how many older ones of a topic were passed over."""
 
 
 class GreedyClient(aiomqtt.Client):
@@ -87,16 +89,18 @@ class ReadAhead:
         if not came:
             return False
         self._may_take = False
-        telemetry, others, self._begun = sort_packets(self._begun + came)
+        telemetry, passed_over, others, self._begun = sort_packets(self._begun + came)
         self._held = memoryview(others)
         if telemetry:
-            self._take(telemetry)
+            self._take(telemetry, passed_over)
         if not others:
             raise BlockingIOError
         return True
 
 
-def sort_packets(read: bytes) -> tuple[dict[str, bytes], bytes, bytes]:
+def sort_packets(
+    read: bytes,
+) -> tuple[dict[str, bytes], Counter[str], bytes, bytes]:
     """Tell telemetry from other packets.
 
     A reader that falls behind must not read ever older news: of a topic's telemetry
@@ -104,21 +108,24 @@ def sort_packets(read: bytes) -> tuple[dict[str, bytes], bytes, bytes]:
     reports) is all among the others, in order.
 
     Returns:
-        Payloads by topic, the other packets, and what was read of one that is not
-        whole yet.
+        Payloads by topic, how many older ones of each were passed over, the other
+        packets, and what was read of one that is not whole yet.
     """
     telemetry: dict[str, bytes] = {}
+    passed_over: Counter[str] = Counter()
     others: list[bytes] = []
     place = 0
     while (found := _packet_at(read, place)) is not None:
         body, end = found
         name = body + 2 + int.from_bytes(read[body : body + 2], "big")
         if read[place] & ~_RETAINED == _TELEMETRY and name <= end:
-            telemetry[read[body + 2 : name].decode(errors="replace")] = read[name:end]
+            topic = read[body + 2 : name].decode(errors="replace")
+            passed_over[topic] += topic in telemetry
+            telemetry[topic] = read[name:end]
         else:
             others.append(read[place:end])
         place = end
-    return telemetry, b"".join(others), read[place:]
+    return telemetry, +passed_over, b"".join(others), read[place:]
 
 
 def _packet_at(read: bytes, place: int) -> tuple[int, int] | None:

@@ -21,11 +21,11 @@ class LatencyMonitor:
     """Hands messages to the watch, and its findings to history and log."""
 
     def __init__(
-        self, watch: LatencyWatch, sink: RecordSink, minutes: EventLog
+        self, watch: LatencyWatch, sink: RecordSink, event_log: EventLog
     ) -> None:
         self.watch = watch
         self._sink = sink
-        self._event_log = minutes
+        self._event_log = event_log
         self._told: dict[str, float] = {}
 
     def decided(self, taken: Iterable[Received], now: Instant) -> None:

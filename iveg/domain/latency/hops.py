@@ -7,7 +7,7 @@ from iveg.domain.observations import (
     LaserScan,
     Observation,
     Odometry,
-    Overtaken,
+    kind_of,
 )
 
 Hop = Literal["uplink", "fiware", "robot_orion", "iveg", "screen"]
@@ -54,7 +54,9 @@ _DATA: Final[dict[type, Data]] = {
 
 def data_of(observation: Observation) -> Data | None:
     """The row of the table that an observation belongs to; None for no row."""
-    data = _DATA.get(type(observation))
-    if data is None and isinstance(observation, Overtaken):
-        return _DATA[observation.kind]
-    return data
+    return data_of_kind(kind_of(observation))
+
+
+def data_of_kind(kind: type[Observation]) -> Data | None:
+    """The same by the observation's type."""
+    return _DATA.get(kind)

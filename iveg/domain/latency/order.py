@@ -30,11 +30,13 @@ class SequenceLoss:
         newest: Highest number so far; None before the first of a boot.
         missing: Numbers that never came; ``reordered`` that came after a later one;
             ``repeated`` that came twice.
+        unread: Came since the newest was taken, and were not looked into.
     """
 
     def __init__(self) -> None:
         self.newest: int | None = None
         self.passed = self.missing = self.reordered = self.repeated = 0
+        self.unread = 0
         self._past: deque[tuple[int, int, int]] = deque(maxlen=_RECENT_S + 1)
 
     def restart(self) -> None:
@@ -45,7 +47,10 @@ class SequenceLoss:
         """Count a message of a sender that leaves no number out."""
         newest = self.newest
         skipped = 0 if newest is None else seq - newest - 1
-        self.arrived(seq, skipped if 0 < skipped < _LEAP else 0)
+        missing = max(0, skipped - self.unread) if 0 < skipped < _LEAP else 0
+        self.passed += self.unread
+        self.unread = 0
+        self.arrived(seq, missing)
 
     def arrived(self, seq: int, missing: int = 0) -> None:
         """A message, and how many that should have come before it did not."""

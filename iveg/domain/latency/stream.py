@@ -94,6 +94,11 @@ class Stream:
         self._put(place, seq, at.mono, took, _AGENT if agent else _DENSE)
         self.tracer.heard(seq, origin.stamp, took, at.mono)
 
+    def passed_over(self, count: int) -> None:
+        """So many were at the broker, and newer ones with them: none is lost."""
+        self._heard += count
+        self.up.unread += count
+
     def notified(
         self, origin: Origin, at: Instant, composed_at: float | None, *, thinned: bool
     ) -> None:

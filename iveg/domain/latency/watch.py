@@ -9,12 +9,20 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 from iveg.domain.latency.behind import Overloads
-from iveg.domain.latency.hops import DATA, LONGEST_S, Data, Exclusion, Hop, data_of
+from iveg.domain.latency.hops import (
+    DATA,
+    LONGEST_S,
+    Data,
+    Exclusion,
+    Hop,
+    data_of,
+    data_of_kind,
+)
 from iveg.domain.latency.offset import ClockOffset
 from iveg.domain.latency.series import SLICE_S, Series
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
-from iveg.domain.observations import FeedbackRef, Instant, Received
+from iveg.domain.observations import FeedbackRef, Instant, Observation, Received
 from iveg.domain.transports import FIWARE
 
 _SECOND_S: Final = 1.0
@@ -74,6 +82,13 @@ class LatencyWatch:
             stream.heard(origin, received.at, composed_at, agent=received.sparse)
         else:
             stream.notified(origin, received.at, composed_at, thinned=received.thinned)
+
+    def passed_over(self, robot_id: str, kind: type[Observation], count: int) -> None:
+        """So many reached the broker and were not read: newer ones came with them."""
+        data = data_of_kind(kind)
+        stream = None if data is None else self._streams.get((robot_id, data))
+        if stream is not None:
+            stream.passed_over(count)
 
     def decided(self, taken: Iterable[Received], now: Instant) -> None:
         """These became part of the state, and the fleet has been judged with them."""

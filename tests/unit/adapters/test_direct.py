@@ -7,6 +7,7 @@ from iveg.adapters.direct import DirectReader
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    Observation,
     Odometry,
     Received,
     SafetyReport,
@@ -27,6 +28,7 @@ class Bench:
     def __init__(self, scope: Scope = "all") -> None:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
+        self.passed_over: list[tuple[str, type[Observation], int]] = []
         self.reader = DirectReader(
             "iveg",
             ["AGI"],
@@ -34,6 +36,7 @@ class Bench:
             self.offered.append,
             lambda *problem: self.rejected.append(problem),
             scope,
+            passed_over=lambda *told: self.passed_over.append(told),
         )
 
 
@@ -89,6 +92,15 @@ def test_poses_come_straight_from_either_topic(topic: str) -> None:
 
     (read,) = bench.offered
     assert (type(read.observation), read.road) == (Odometry, "mqtt")
+
+
+def test_what_was_overtaken_unread_is_told_by_robot_and_kind() -> None:
+    bench = Bench()
+
+    bench.reader.pass_over("/AGI/iveg/odom", 2)
+    bench.reader.pass_over("/iveg/AGI/cmdexe", 2)
+
+    assert bench.passed_over == [("AGI", Odometry, 2)]
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,10 @@ import pytest
 
 from iveg.domain.latency.hops import DATA, HOPS, Hop
 from iveg.domain.latency.sketch import sketch_of
-from iveg.domain.observations import Origin
+from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.observations import Odometry, Origin
 from iveg.domain.transports import DIRECT, FIWARE
+from tests.builders import odometry, origin, received
 from tests.unit.domain.chain import Chain, jittered, still
 
 CALM: dict[Hop, float] = {
@@ -283,6 +285,17 @@ def test_loss_is_named_at_its_hop_within_three_seconds(fault: str, key: str) -> 
     said = chain.said()
     assert set(said) == {key}
     assert said[key]["share"] == pytest.approx(0.2, abs=0.08)
+
+
+def test_what_newer_ones_overtook_before_it_was_read_is_not_lost() -> None:
+    watch = LatencyWatch(["AGI"])
+    watch.arrived(received(odometry(origin=origin(0)), transport=DIRECT.id))
+
+    watch.passed_over("AGI", Odometry, 3)
+    watch.arrived(received(odometry(origin=origin(5)), transport=DIRECT.id))
+
+    (stream,) = (one for one in watch.streams if one.data == "odometry")
+    assert (stream.up.passed, stream.up.missing) == (5, 1)
 
 
 def test_disorder_is_named_at_its_hop() -> None:
