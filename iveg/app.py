@@ -45,7 +45,7 @@ from iveg.models.snapshot import Server, Snapshot, User
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
 from iveg.pipeline.build import Choices, Ports, build
-from iveg.pipeline.coverage import Watch
+from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.messenger import Messenger
@@ -206,7 +206,7 @@ class Dss:
         )
         self.provisioner.throttle.allowed = settings.orion_throttle
         self.mapper = Mapper(world, self.evaluator.greenhouse.bounds)
-        self.watch = Watch(world, self.evaluator.greenhouse)
+        self.coverage = CoverageMonitor(world, self.evaluator.greenhouse)
         self.views = Views(
             self.evaluator,
             self.commander,
@@ -252,7 +252,7 @@ class Dss:
             tasks.create_task(self.link.run(), name="mqtt")
             tasks.create_task(self.loop.run(), name="rule-loop")
             tasks.create_task(self.mapper.run(clock.now), name="costmap")
-            tasks.create_task(self.watch.run(clock.now), name="coverage")
+            tasks.create_task(self.coverage.run(clock.now), name="coverage")
             tasks.create_task(self.provisioner.run(), name="provisioner")
             tasks.create_task(self.recorder.run(), name="recorder")
             tasks.create_task(self.messenger.run(), name="messages")

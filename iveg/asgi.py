@@ -75,7 +75,7 @@ def create_app(dss: Dss) -> FastAPI:
     )
     app.include_router(robots.router(dss.views, clock.now))
     app.include_router(costmap.router(dss.mapper, dss.evaluator, clock.now))
-    app.include_router(coverage.router(dss.watch, clock.now))
+    app.include_router(coverage.router(dss.coverage, clock.now))
     days = day.Days(dss.queries, dss.evaluator.greenhouse, settings.drill_days)
     app.include_router(day.router(days, drawn, clock.now))
     app.include_router(commands.router(dss.commander, clock.now))

@@ -15,7 +15,7 @@ from iveg.pipeline.ports import Clock
 TICK_S = 0.5
 
 
-class Watch:
+class CoverageMonitor:
     """When each cell of the aisles was last in view.
 
     Attributes:

@@ -10,11 +10,11 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.places import Coverage, LaneCoverage
-from iveg.pipeline.coverage import Watch
+from iveg.pipeline.coverage import CoverageMonitor
 from iveg.web.security.authentication import require
 
 
-def router(watch: Watch, clock: Callable[[], Instant]) -> APIRouter:
+def router(monitor: CoverageMonitor, clock: Callable[[], Instant]) -> APIRouter:
     """Routes of the camera coverage."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]
@@ -28,21 +28,21 @@ def router(watch: Watch, clock: Callable[[], Instant]) -> APIRouter:
         greenhouse has no aisles.
         """
         now = clock()
-        share = watch.coverage.share(now)
+        share = monitor.coverage.share(now)
         told = Coverage(
             at=format_stamp(now.wall),
-            cameras=watch.cameras(now),
+            cameras=monitor.cameras(now),
             within_s=RECENT_S,
             share=None if share is None else round(share, 4),
-            lanes=_lanes(watch, now),
+            lanes=_lanes(monitor, now),
         )
         return Response(write_json(told), media_type="application/json")
 
     return routes
 
 
-def _lanes(watch: Watch, now: Instant) -> list[LaneCoverage]:
-    pairs = zip(watch.coverage.lanes, watch.coverage.ages(now), strict=True)
+def _lanes(monitor: CoverageMonitor, now: Instant) -> list[LaneCoverage]:
+    pairs = zip(monitor.coverage.lanes, monitor.coverage.ages(now), strict=True)
     return [
         LaneCoverage(
             label=one.lane.label,
