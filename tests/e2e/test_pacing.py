@@ -55,7 +55,8 @@ WATCH = """() => {
   };
 }"""
 
-ALL_PAINTED = """robots => {
+ALL_PAINTED = """([robots, frames]) => {
+  if (window.seen.frames <= frames) return false;
   const painted = Object.entries(window.seen.count);
   return painted.filter(([key, n]) => key.endsWith('odom') && n > 2).length === robots;
 }"""
@@ -89,7 +90,9 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
         ]
         pages[0].wait_for_timeout(1000 * SECONDS)
         for page in pages:
-            page.wait_for_function(ALL_PAINTED, arg=len(ROBOTS), timeout=60_000)
+            page.wait_for_function(
+                ALL_PAINTED, arg=[len(ROBOTS), FRAMES], timeout=60_000
+            )
         seen = [evaluate(page, "() => window.seen") for page in pages]
         for page in pages:
             page.context.close()
