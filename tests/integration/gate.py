@@ -65,6 +65,12 @@ class Gate:
     async def _be(self, mood: Mood) -> None:
         self._mood = mood
         if self._server is not None:
+            # Who is at the threshold comes in first: CPython 3.11 loses the socket of
+            # a connection whose server is closed between its accept and its start.
+            for door in self._server.sockets:
+                self._loop.remove_reader(door.fileno())
+            await asyncio.sleep(0.0)
+            await asyncio.sleep(0.0)
             self._server.close()
             self._server = None
         inside = list(self._inside)
