@@ -51,6 +51,14 @@ test("a ring that the server drew wider than six metres is not made smaller", ()
   near(readPerson({ ...wide, receivedAtMs: 0 }, 500).ringM, 7);
 });
 
+test("somebody whose place was seen to be empty has no ring that grows", () => {
+  const checked = person({ stage: "remembered", age_s: 3, radius_m: null });
+
+  const scene = readPerson({ ...checked, receivedAtMs: 0 }, 5000);
+
+  equal([scene.stage, scene.ringM], ["last_seen", 0]);
+});
+
 test("a stop that nobody confirmed widens with the last known speed", () => {
   const stop = command({
     state: "UNCONFIRMED",

@@ -145,7 +145,9 @@ function unsureDistance(robot, store, nowMs) {
  */
 export function readPerson(person, nowMs) {
   const ageS = ageOf(person, nowMs);
-  const stage = stageAt(person.stage, ageS);
+  // Somebody whose place was seen to be empty has no ring, however short a time ago.
+  const isFree = person.radius_m === null;
+  const stage = isFree ? "last_seen" : stageAt(person.stage, ageS);
   return {
     id: person.person_id,
     peer: person.class === "robot",
@@ -153,7 +155,7 @@ export function readPerson(person, nowMs) {
     x: person.position.x,
     y: person.position.y,
     ageS,
-    ringM: ringNow(person, stage, ageS),
+    ringM: isFree ? 0 : ringNow(person, stage, ageS),
     confidence: person.confidence,
     observers: person.observers,
     acting: person.acting,
