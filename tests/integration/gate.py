@@ -69,14 +69,14 @@ class Gate:
             # a connection whose server is closed between its accept and its start.
             for door in self._server.sockets:
                 self._loop.remove_reader(door.fileno())
-            await asyncio.sleep(0.0)
-            await asyncio.sleep(0.0)
+            await _a_few_turns()
             self._server.close()
             self._server = None
         inside = list(self._inside)
         for task in inside:
             task.cancel()
         await asyncio.gather(*inside, return_exceptions=True)
+        await _a_few_turns()
         if mood != "shut":
             self._server = await asyncio.start_server(
                 self._enter, "127.0.0.1", self.port
@@ -102,6 +102,8 @@ class Gate:
     async def _serve(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
+        if self._mood == "shut":
+            return
         if self._mood == "hanging":
             await asyncio.Event().wait()
         elif self._mood in _ANSWERS:
@@ -128,6 +130,12 @@ class Gate:
                 way.cancel()
             await asyncio.gather(*ways, return_exceptions=True)
             back.close()
+
+
+async def _a_few_turns() -> None:
+    """Let what has begun in the loop go on: a start, an end, the word of it."""
+    for _ in range(4):
+        await asyncio.sleep(0.0)
 
 
 async def _copy(
