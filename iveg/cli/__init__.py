@@ -110,7 +110,7 @@ def _parser() -> argparse.ArgumentParser:
     serve = commands.add_parser("serve", help="the DSS and its page")
     serve.add_argument("--demo", action="store_true", help=argparse.SUPPRESS)
     fiware = commands.add_parser("fiware", help="MQTT broker, Orion and IoT Agent")
-    emulator = commands.add_parser("emulator", help="robots that are not there")
+    emulator = commands.add_parser("emulator", help="simulated robots")
     emulator.add_argument("--scenario", default="demo", metavar="NAME")
     emulator.add_argument(
         "--robots", type=_positive, metavar="N", help="how many (default: the fleet)"

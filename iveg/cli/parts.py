@@ -143,7 +143,7 @@ async def fiware(settings: Settings) -> None:
 
 
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:
-    """Robots, people and air that are not there."""
+    """Simulated robots, people and air."""
     from iveg.emulator.fleet import run_emulator
     from iveg.emulator.orders import read_translations
 

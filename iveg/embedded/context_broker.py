@@ -109,7 +109,7 @@ class ContextBroker:
         *,
         forced: bool = False,
     ) -> None:
-        """Change attributes; make those that are not there."""
+        """Change attributes; create missing ones."""
         if changes:
             touched = apply(entity, changes, scope.now, forced=forced)
             self._tell(scope, entity, touched, "entityChange")

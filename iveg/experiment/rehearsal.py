@@ -64,9 +64,9 @@ class Rehearsed:
 
 
 class _Outside:
-    """The doors of a pipeline in which nobody presses anything.
+    """The ports of a pipeline in which nobody presses anything.
 
-    Implements ``pipeline.ports.Fleet``, ``Journal`` and ``RecordSink``.
+    Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
     """
 
     def __init__(self) -> None:
@@ -111,7 +111,7 @@ class _Outside:
 
 
 class Rehearsal:
-    """One scenario between its doors.
+    """One scenario in a pipeline of its own.
 
     Args:
         watched: The robot whose costmap is looked into.

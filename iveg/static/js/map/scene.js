@@ -145,9 +145,7 @@ function unsureDistance(robot, store, nowMs) {
  */
 export function readPerson(person, nowMs) {
   const ageS = ageOf(person, nowMs);
-  // Somebody whose place was seen to be empty has no ring, however short a time ago.
-  const isFree = person.radius_m === null;
-  const stage = isFree ? "last_seen" : stageAt(person.stage, ageS);
+  const stage = stageAt(person, ageS);
   return {
     id: person.person_id,
     peer: person.class === "robot",
@@ -155,7 +153,7 @@ export function readPerson(person, nowMs) {
     x: person.position.x,
     y: person.position.y,
     ageS,
-    ringM: isFree ? 0 : ringNow(person, stage, ageS),
+    ringM: ringNow(person, stage, ageS),
     confidence: person.confidence,
     observers: person.observers,
     acting: person.acting,
@@ -191,7 +189,8 @@ export function marked(people) {
  * @param {number} ageS
  */
 function ringNow(person, stage, ageS) {
-  const radiusM = person.radius_m ?? 0;
+  const radiusM = person.radius_m;
+  if (radiusM === null) return 0;
   if (stage === "seen") return radiusM;
   return ringRadius(radiusM, ageS, person.age_s ?? 0);
 }
@@ -199,11 +198,14 @@ function ringNow(person, stage, ageS) {
 /**
  * A person never gets fresher here than the server said, only older.
  *
- * @param {Person["stage"]} stage
+ * Without a ring (the place was seen to be empty) nobody is remembered there.
+ *
+ * @param {Person} person
  * @param {number} ageS
  * @returns {ScenePerson["stage"]}
  */
-function stageAt(stage, ageS) {
+function stageAt({ stage, radius_m }, ageS) {
+  if (radius_m === null) return "last_seen";
   if (stage === "gone" || stage === "last_seen") return "last_seen";
   if (ageS > LIMITS.ring_lasts_s) return "last_seen";
   return stage === "seen" && ageS <= LIMITS.seen_s ? "seen" : "remembered";
