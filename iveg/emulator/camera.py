@@ -1,10 +1,9 @@
-"""Camera and detector: who is in view, and what a detector of the paper's makes of it.
+"""Emulated camera and detector: targets in view, and what the paper's detector reports.
 
-Unless ``grounded`` places what is found, nothing is rendered.  A target in the field of
+Nothing is rendered unless ``grounded`` locates the targets.  A target in the field of
 view, in range and not hidden by crop or crates opens an *encounter* of 0.5 to 2 s;
-whether it is missed, how sure the detector is and whether a false box comes with it is
-drawn once for the encounter, so that mistakes last as long as real ones and do not
-flicker away between two frames.
+a miss, the confidence and a possible false box are drawn once per encounter, so that
+errors last as long as real ones and do not flicker between two frames.
 
 Source of the rates: the seed paper's field table (true positives, false positives,
 false negatives per class).  Assumed: the spread of confidence, the length of an
@@ -29,12 +28,12 @@ _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
 _GHOST_NEAR_M, _GHOST_FAR_M = 2.0, 6.0
 _HIDDEN_LOSS = 0.15
-"""Confidence that a target loses when nearly all of it is hidden."""
+"""Loss of confidence for a target that is almost fully hidden."""
 
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """What the paper counted for one class."""
+    """Counts of one class in the paper's field table."""
 
     true_positives: int
     false_positives: int
@@ -42,17 +41,17 @@ class Counts:
 
     @property
     def encounters(self) -> int:
-        """How often there was something to see."""
+        """Number of encounters with a target of the class."""
         return self.true_positives + self.false_negatives
 
     @property
     def miss_rate(self) -> float:
-        """Chance that an encounter is missed."""
+        """Probability that an encounter is missed."""
         return self.false_negatives / self.encounters
 
     @property
     def ghost_rate(self) -> float:
-        """Chance that an encounter brings a false box of the class."""
+        """Probability that an encounter brings a false box of the class."""
         return self.false_positives / self.encounters
 
 
@@ -66,14 +65,14 @@ _FAULTLESS = Counts(1, 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class DetectorModel:
-    """How good a detector is.
+    """Error model of a detector.
 
     Attributes:
         confidence: Mean over encounters (0 to 1); ``spread`` its deviation.
         flicker: Deviation from frame to frame.
         ghost_confidence: How much less sure false boxes are.
         position: Deviation of a box for an encounter (m); ``jitter`` per frame (m).
-        counts: By class; one that is not named is seen like ``AGI``.
+        counts: By class; other classes have the counts of ``AGI``.
     """
 
     confidence: float
@@ -99,10 +98,10 @@ DETECTORS: Mapping[str, DetectorModel] = {
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Something that a detector may see.
+    """An object that a detector may detect.
 
     Attributes:
-        key: Tells it apart from others.
+        key: Unique id.
         class_id: As the paper's detector names it.
         body: Its outline; a person's is a square.
     """
@@ -114,20 +113,20 @@ class Target:
 
 
 def person_target(number: int, person: Disc) -> Target:
-    """A person as a detector sees one."""
+    """A person as a target."""
     pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
     body = Body(f"person-{number}", pose, size, size)
     return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
 
 
 def robot_target(body: Body) -> Target:
-    """A robot as a detector sees one: the class is its name, as in the paper."""
+    """A robot as a target: the class is its id, as in the paper."""
     return Target(body.robot_id, body.robot_id, body, ROBOT_HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)
 class _Ghost:
-    """A false box at a place in ``map``."""
+    """A false box at a position in ``map``."""
 
     class_id: str
     x: float
@@ -137,7 +136,7 @@ class _Ghost:
 
 @dataclass(frozen=True, slots=True)
 class _Encounter:
-    """What was drawn for one target."""
+    """Random draws for one target, valid for one encounter."""
 
     until: float
     missed: bool
@@ -148,7 +147,7 @@ class _Encounter:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A target that the network has found, and how sure it is (0 to 1)."""
+    """A detected target and its confidence (0 to 1)."""
 
     target: Target
     probability: float
@@ -158,20 +157,20 @@ Place = Callable[
     [Pose2D, Sequence[Found], Sequence[Target], Scenery],
     tuple[tuple[Detection, ...], int],
 ]
-"""Places what was found: boxes, and how many are there without a place."""
+"""Locates detected targets: boxes, and the number of targets without a position."""
 
 
 class Detector:
-    """One robot's camera and the network behind it.
+    """Camera of one robot with its detector.
 
     Args:
         profile: Where the camera sits and what it sees.
         model: How good the network is.
-        rng: Where its mistakes come from.
-        place: Makes boxes of what was found; None draws them about the truth.
+        rng: Random source of its errors.
+        place: Locates detected targets; None draws boxes about the truth.
 
     Attributes:
-        lost: How many of the last look are there without a place.
+        lost: Targets of the last frame without a position.
     """
 
     def __init__(
@@ -197,7 +196,7 @@ class Detector:
             now: Seconds into the run.
             pose: The robot's true pose in ``map``.
             targets: People and the other robots.
-            scenery: What hides them.
+            scenery: Occluding objects.
 
         Returns:
             Boxes in ``base_link``.
@@ -226,7 +225,7 @@ class Detector:
     # --- what is in view ----------------------------------------------------------
 
     def part_seen(self, camera: Pose2D, body: Body, scenery: Scenery) -> float:
-        """How much of a target ``camera`` has in view: 0, 1/3, 2/3 or 1."""
+        """Visible share of a target from ``camera``: 0, 1/3, 2/3 or 1."""
         x, y = body.pose.x, body.pose.y
         distance = camera.distance_to(x, y)
         if not _NEAREST_M < distance <= self._profile.camera_range:
@@ -239,7 +238,7 @@ class Detector:
         places = ((x + k * side_x, y + k * side_y) for k in (-0.9, 0.0, 0.9))
         return sum(not scenery.hides(camera.x, camera.y, *p) for p in places) / 3
 
-    # --- what the network makes of it ---------------------------------------------
+    # --- detections ---------------------------------------------------------------
 
     def _encounter(
         self, now: float, camera: Pose2D, target: Target, visible: bool
@@ -307,7 +306,7 @@ class Detector:
 def upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
-    """A box of a person's size at a place in ``map``, told in ``base_link``."""
+    """A box of a person's size at a position in ``map``, given in ``base_link``."""
     ahead, left = _into(pose, x, y)
     half = 0.25
     box = Box3D(

@@ -1,12 +1,12 @@
-"""The picture of a depth camera: people, robots, crop and leaves, and what hides what.
+"""Pictures of a depth camera: people, robots, crop and leaves with their occlusion.
 
 Everything is upright on a flat floor - a footprint from one height to another - so a
 pixel's ray meets it where its column meets the footprint and its row the heights: two
 small problems instead of 307,200.  Depth runs along the optical axis (m).
 
 Sources: Intel's D400 tuning paper (disparity error 0.08 pixels, baseline 50 mm) and
-Point Grey's Bumblebee2 sheet (120 mm) for noise; sizes of leaves are assumed.  What it
-leaves out: arms and legs, lens distortion, shadows of the second eye, flying pixels.
+Point Grey's Bumblebee2 sheet (120 mm) for noise; sizes of leaves are assumed.  Left
+out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
 """
 
 import math
@@ -35,13 +35,13 @@ _NOISE_PATCH = 8
 
 @dataclass(frozen=True, slots=True)
 class DepthCamera:
-    """A depth camera on a robot, looking level.
+    """Depth camera on a robot, looking level.
 
     Attributes:
         lens: Of the picture that the depth is registered to.
         height: Above the floor (m).
-        most: Farther is not measured (m).
-        baseline: Between the two eyes (m).
+        most: Largest measured depth (m).
+        baseline: Between the two imagers (m).
         disparity_error: Standard deviation (pixels); depth errs by z² · e / (f · b).
         dropouts: Share of pixels that are not measured, 0 to 1.
     """
@@ -62,13 +62,13 @@ class DepthCamera:
 
 @dataclass(frozen=True, slots=True)
 class Foliage:
-    """Leaves about a target's outline that the mask network takes for the target.
+    """Leaves about a target's outline that the mask network assigns to the target.
 
     Attributes:
         leaves: How many.
         least_radius: (m); ``most_radius`` (m).
         least_gap: How far behind or before the target they hang (m); ``most_gap`` (m).
-        before: Share that hangs before the target, 0 to 1; these hide a part of it.
+        before: Share that hangs in front of the target and hides a part of it, 0 to 1.
     """
 
     leaves: int = 30
@@ -90,12 +90,12 @@ class Upright:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
-    """What a camera sees.
+    """A rendered picture.
 
     Attributes:
-        depth: What it measures.
+        depth: As measured (m).
         instances: Shape (height, width); 0 scenery, n the n-th target from 1.
-        leaked: The same of leaves that the mask network takes for the n-th target.
+        leaked: Likewise, leaves that the mask network assigns to the n-th target.
     """
 
     depth: DepthPicture
@@ -103,7 +103,7 @@ class DepthView:
     leaked: NDArray[np.int16]
 
     def segment(self, number: int, class_id: str, probability: float) -> Segment | None:
-        """What detector and mask network make of target ``number``; None if unseen."""
+        """Output of detector and mask network for target ``number``; None if unseen."""
         mask: Mask = (self.instances == number) | (self.leaked == number)
         if not (self.instances == number).any():
             return None
@@ -143,15 +143,15 @@ def take(
     foliage: Foliage | None,
     rng: np.random.Generator,
 ) -> DepthView:
-    """One picture.
+    """Render one picture.
 
     Args:
         camera: Its data sheet.
         sensor: Its pose in ``map``.
-        targets: Who is there; the first is number 1 of ``DepthView.instances``.
-        scenery: What stands still.
+        targets: Visible objects; the first is number 1 of ``DepthView.instances``.
+        scenery: Static objects.
         foliage: Leaves about every target; None where nothing grows.
-        rng: Where leaves and noise come from.
+        rng: Random source of leaves and noise.
     """
     rays = _Rays.of(camera, sensor)
     depth = _background(rays, sensor, scenery)
@@ -168,7 +168,7 @@ def take(
     return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
 
 
-# --- rays -----------------------------------------------------------------------------
+# --- rays -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +196,7 @@ class _Rays:
 
 
 Span = tuple[Floats, Floats]
-"""Where rays enter and leave (m); they miss where they leave before they enter."""
+"""Where rays enter and leave (m); a ray that leaves before it enters misses."""
 
 
 def _background(rays: _Rays, sensor: Pose2D, scenery: Scenery) -> Floats:
@@ -218,7 +218,7 @@ def _background(rays: _Rays, sensor: Pose2D, scenery: Scenery) -> Floats:
 
 
 def _paint(rays: _Rays, sensor: Pose2D, thing: Upright, depth: Floats) -> Mask:
-    """Shorten ``depth`` where a thing stands before it; tells where it does."""
+    """Shorten ``depth`` where an object stands in front; returns where it does."""
     enter, leave = _footprint_span(rays.across, sensor, thing.footprint)
     columns = np.flatnonzero((enter <= leave) & (leave > 0.0))
     seen = np.zeros(depth.shape, np.bool_)
@@ -278,7 +278,7 @@ def _slab(slope: Floats, low: float, high: float) -> Span:
     return np.minimum(one, other), np.maximum(one, other)
 
 
-# --- leaves ---------------------------------------------------------------------------
+# --- leaves -----------------------------------------------------------------------
 
 
 def _hang(
@@ -320,7 +320,7 @@ def _disc(shape: tuple[int, ...], row: int, column: int, radius: float) -> Mask:
     return disc
 
 
-# --- what is measured -----------------------------------------------------------------
+# --- what is measured -------------------------------------------------------------
 
 
 def _measure(

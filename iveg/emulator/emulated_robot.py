@@ -1,6 +1,6 @@
-"""One emulated robot: its rig under its own safety node, and the faults it may have.
+"""One emulated robot: its rig under its own safety node, and its possible faults.
 
-It has three slots a period: drive and odometry, laser, camera.
+A period has three slots: drive and odometry, laser, camera.
 """
 
 import asyncio
@@ -32,19 +32,19 @@ LINK_FIELDS = {
     "jitter_ms",
     "mute",
 }
-"""Fields of a fault order that its radio obeys."""
+"""Fields of a fault order that apply to its radio."""
 
 
 @dataclass(frozen=True, slots=True)
 class FleetSettings:
-    """What all robots of a run share.
+    """Settings shared by all robots of a run.
 
     Attributes:
         slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
-        state_directory: Where hold files live.
-        held: Nobody releases the boot hold at the robots.
+        state_directory: Directory of the hold files.
+        held: The boot hold is not released at the robots.
         rate_hz: Of odometry, laser and camera each.
-        truth: Where it is written down what was really in view.
+        truth: Log of the targets really in view.
     """
 
     address: BrokerAddress
@@ -59,13 +59,13 @@ class FleetSettings:
 
 
 class EmulatedRobot:
-    """One rig, its safety node, and the order in which they are asked.
+    """One rig and its safety node, called in their slots.
 
     Args:
-        relay: Its way to the broker where that may be bad; None leads straight there.
+        relay: Faulty link to the broker; None connects directly.
 
     Attributes:
-        started: Set when orders are obeyed.
+        started: Set when fault orders are accepted.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class EmulatedRobot:
     def _drive(self, dt: float) -> None:
         now, node = self._now(), self._node
         if self._node_task is not None:
-            # While wishes do not count navigation asks for rest: the gate wants to see
+            # While twists have no effect navigation requests zero: the gate requires
             # that before it lets the robot move again.
             wish = self._rig.wish(now, self._world)
             self._wish = wish if node.may_drive else REST
@@ -165,19 +165,19 @@ class EmulatedRobot:
             self._settings.truth.looked(self._rig, self._world, at)
 
     def _obey_gate(self, command: Twist2D) -> None:
-        """The base takes what the gate lets through; a deaf one only when to halt."""
+        """Apply the gate's command; with the fault ``deaf`` only a halt."""
         ignores = self._is_deaf and command != REST
         self._rig.drive(self._wish if ignores else command)
 
     def _read_clock(self) -> Instant:
-        """The robot's own clocks, of which the one on the wall may be wrong."""
+        """The robot's own clocks; the wall clock may be wrong."""
         now = clock.now()
         return Instant(now.mono, now.wall + self._clock_offset_s)
 
     # --- faults -------------------------------------------------------------------
 
     def obey(self, order: FaultOrder) -> None:
-        """Do what a fault order says, in the order of its fields."""
+        """Execute a fault order in the order of its fields."""
         node = self._node
         if order.deaf is not None:
             self._is_deaf = order.deaf
@@ -201,7 +201,7 @@ class EmulatedRobot:
             self._is_odometry_frozen = order.freeze_odometry in (True, "silent")
 
     def _disturb(self, order: FaultOrder) -> None:
-        """The radio's part; without a relay there is no order that names it."""
+        """Set the radio's faults; without a relay no order names it."""
         if self._relay is None:
             return
         radio = self._relay.radio
@@ -223,7 +223,7 @@ class EmulatedRobot:
 
 
 def battery_after(driven_s: float) -> Battery:
-    """A battery that drains while it drives and is swapped before it is low."""
+    """A battery that drains while driving and is swapped before it is low."""
     usable = _BATTERY_FULL - _BATTERY_SWAPPED
     level = _BATTERY_FULL - (driven_s / _BATTERY_LASTS_S) % usable
     return Battery("", Origin(), round(level, 3), charging=False, voltage=25.6)

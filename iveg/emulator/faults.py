@@ -1,8 +1,8 @@
-"""A door on loopback through which tests break things: small HTTP, JSON orders.
+"""HTTP endpoint on loopback through which tests inject faults, with JSON orders.
 
 ``POST /`` with a ``FaultOrder`` or a ``PersonOrder``; 204 when done, 400 when it cannot
 be read, with a sentence that names the field, 409 when it cannot be done.  Not for
-production: it opens on 127.0.0.1 alone, and only when asked for.
+production: it listens on 127.0.0.1 alone, and only on request.
 """
 
 import asyncio
@@ -19,17 +19,17 @@ Obey = Callable[[Order], str | None]
 
 
 async def open_faults(port: int, obey: Obey) -> tuple[asyncio.Server, int]:
-    """Open the door; orders are taken from now on, until the server is closed.
+    """Open the endpoint; orders are accepted until the server is closed.
 
     Args:
         port: 0 takes a free one.
-        obey: Does what an order says; returns why it cannot.
+        obey: Executes an order; returns the reason if it cannot.
 
     Returns:
         The server and its port.
 
     Raises:
-        SettingsError: somebody listens there already.
+        SettingsError: the port is in use.
     """
 
     async def visit(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -41,7 +41,7 @@ async def open_faults(port: int, obey: Obey) -> tuple[asyncio.Server, int]:
             writer.write(f"{head}Connection: close\r\n\r\n".encode() + body)
             await writer.drain()
         except (ConnectionError, TimeoutError, asyncio.IncompleteReadError):
-            pass  # a visitor who left is no concern of the robots
+            pass  # a closed connection does not concern the robots
         finally:
             writer.close()
 

@@ -1,7 +1,7 @@
 """Runs a scenario in real time: each robot's rig under its own safety node, over MQTT.
 
-The slots of the robots are staggered, so that neither this process nor the broker sees
-bursts.  A slot that comes too late is skipped, never made up for.
+The slots of the robots are staggered, so that neither this process nor the broker gets
+bursts.  A late slot is skipped, never repeated.
 """
 
 import asyncio
@@ -71,30 +71,30 @@ async def run_emulator(
         robots: Their ids.
         address: The broker.
         apikey: First part of the measure topics.
-        greenhouse: Where they drive.
-        scenario: Which run; ``iveg.emulator.scenarios`` has them.
+        greenhouse: Greenhouse they drive in.
+        scenario: Name of a scenario of ``iveg.emulator.scenarios``.
         seed: The same seed gives the same people and the same noise.
         profile: Of the detector: ``field``, ``simulation`` or ``perfect``.
         uplink: One message a topic, or Algorithm 1's single payload.
         slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
         stand_s: See above.
         state_directory: Where the robots keep their hold files; made if missing.
-        held: The robots stay held until somebody releases them.
+        held: The robots stay held until a release.
         rate_hz: Of odometry, laser and camera each.
-        faults: What is wrong from the start.
+        faults: Faults from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
-        on_fault_port: Told which port it became.
-        network: DDS: the robots speak ROS 2 there, and ``iveg robot`` rides on them.
-        ros2: What each one's topics are called; below ``/`` and its id in small letters
-            where nothing is said.
-        description: What each robot is; None: iVeg's own.
-        camera: Where boxes come from: drawn about the truth, or by grounding.
-        truth: Where it is written down what was really in view.
+        on_fault_port: Called with the port in use.
+        network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``.
+        ros2: Topic names of each robot; by default below ``/`` and its id in lower
+            case.
+        description: Fleet description; None: the built-in one.
+        camera: Source of the boxes: drawn about the truth, or by grounding.
+        truth: Log of the targets really in view.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the
             greenhouse.
-        SettingsError: somebody listens on the fault port already.
+        SettingsError: the fault port is in use.
     """
     if profile not in DETECTORS:
         known = ", ".join(DETECTORS)
@@ -144,12 +144,12 @@ def _base(
 
 
 class SimulatedFleet:
-    """The robots and people of a run, kept going in time.
+    """Robots and people of a run, advanced in real time.
 
     Args:
-        radio_seed: Of the chance in the robots' radios, which then obey orders; None
-            leads the robots straight to the broker.
-        bases: Makes robots that speak ROS 2 and carry no software of iVeg's.
+        radio_seed: Seed of the robots' radios, which then accept fault orders; None
+            connects the robots directly to the broker.
+        bases: Makes ROS 2 robots without iVeg's software.
     """
 
     def __init__(
@@ -219,10 +219,10 @@ class SimulatedFleet:
             await asyncio.sleep(incident.every_s)
 
     def obey(self, order: Order) -> str | None:
-        """Do what a fault order says.
+        """Execute a fault order.
 
         Returns:
-            None, or why it cannot be done.
+            None, or the reason why it cannot be done.
         """
         if isinstance(order, FaultOrder):
             robot = self._robots.get(order.robot)
@@ -241,7 +241,7 @@ class SimulatedFleet:
 def _relay(
     settings: FleetSettings, robot_id: str, place: int, seed: int | None
 ) -> Relay | None:
-    """A robot's way to the broker; chance of its own, apart from the world's."""
+    """A robot's faulty link to the broker, with random numbers of its own."""
     if seed is None:
         return None
     devices = (f"{robot_id}_odom", robot_id)

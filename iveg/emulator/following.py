@@ -1,4 +1,4 @@
-"""Navigation: along a route by pure pursuit, halting at stations, waiting for others.
+"""Navigation: pure pursuit along a route, halts at stations, waiting for others.
 
 Source: pure pursuit (Coulter, CMU-RI-TR-92-01).  A robot that cannot turn on the spot
 drives an open route forwards and backwards.
@@ -17,13 +17,13 @@ from iveg.emulator.routes import SPACING_M, Route, Station
 
 _LOOK_AHEAD_M = 0.7
 _WINDOW = 12
-"""Points that a robot may pass between two ticks, and what it looks for itself in."""
+"""Points of the route that are searched for the robot's position at each tick."""
 _ON_THE_SPOT = 0.9
-"""A differential robot turns on the spot when the route points this far aside (rad)."""
+"""Angle to the route from which a differential robot turns on the spot (rad)."""
 _COMFORT = 0.4
-"""Deceleration that navigation plans with (m/s²)."""
+"""Deceleration that navigation plans (m/s²)."""
 CLEARANCE_M = 0.6
-"""Free way in front of the nose below which a robot waits."""
+"""Free distance ahead of the robot's front below which it waits (m)."""
 _SIDE_M = 0.15
 _HORIZON = 35
 
@@ -53,22 +53,22 @@ class Follower:
 
     @property
     def at_station(self) -> bool:
-        """Whether the robot halts on purpose."""
+        """Whether the robot halts at a station."""
         return self._leaves_at is not None
 
     def path(self, length_m: float = 12.0) -> tuple[tuple[float, float], ...]:
-        """The way ahead, a point a metre."""
+        """The path ahead, one point per metre."""
         count = round(length_m / SPACING_M)
         ahead = self._route.ahead(self._index, count, self._direction)
         return tuple((float(x), float(y)) for x, y in ahead[::10])
 
     def wish(self, pose: Pose2D, now: float, discs: Sequence[Disc]) -> Twist2D:
-        """The twist that navigation wants.
+        """The twist that navigation requests.
 
         Args:
-            pose: Where the robot is.
+            pose: Pose of the robot.
             now: Seconds into the run.
-            discs: People and parts of other robots, as local sensors know them.
+            discs: People and parts of other robots, as local sensors detect them.
         """
         self._locate(pose)
         if self._halts(now):
@@ -111,7 +111,7 @@ class Follower:
         return last - self._index if self._direction > 0 else self._index
 
     def _way_to_halt(self) -> float:
-        """To the next station or end within the horizon (m)."""
+        """Distance to the next station or end within the horizon (m)."""
         count = len(self._route.points)
         for step in range(_HORIZON):
             index = self._index + step * self._direction
@@ -121,7 +121,7 @@ class Follower:
         return math.inf
 
     def _room(self, ahead: Floats, discs: Sequence[Disc]) -> float:
-        """Free way in front of the nose (m)."""
+        """Free distance ahead of the robot's front (m)."""
         if not discs:
             return math.inf
         half = self._profile.width / 2 + _SIDE_M

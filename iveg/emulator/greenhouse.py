@@ -1,7 +1,7 @@
-"""The greenhouse as arrays: what blocks a ray, and what a robot must not touch.
+"""Greenhouse geometry as arrays: obstacles for rays and for robots.
 
-The domain's ``Greenhouse`` names things; this module only knows rectangles and discs,
-in ``map`` (m), laid out for NumPy.
+The domain's ``Greenhouse`` names objects; this module only has rectangles and discs, in
+``map`` (m), laid out for NumPy.
 """
 
 import math
@@ -41,7 +41,7 @@ class Body:
         return np.array([self.pose.transform(*corner) for corner in around])
 
     def discs(self) -> tuple[Disc, ...]:
-        """Three discs along the body that cover it but for its corners."""
+        """Three discs along the body that cover all but its corners."""
         reach = self.length / 2 - self.width / 2
         places = (self.pose.transform(along, 0.0) for along in (-reach, 0.0, reach))
         return tuple(Disc(x, y, self.width / 2) for x, y in places)
@@ -67,13 +67,13 @@ class Body:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scenery:
-    """Everything that stands still.
+    """All static objects.
 
     Attributes:
         bounds: The outer wall.
         rectangles: Shape (n, 4): xmin, ymin, xmax, ymax of crop, crates, trolleys.
         posts: Shape (m, 3): x, y, radius.
-        screens: What hides people and robots from a camera: crop, crates, trolleys.
+        screens: Objects that occlude cameras: crop, crates, trolleys.
     """
 
     bounds: Rectangle
@@ -83,7 +83,7 @@ class Scenery:
 
     @classmethod
     def of(cls, greenhouse: Greenhouse) -> "Scenery":
-        """Lay a greenhouse out."""
+        """Arrays of a greenhouse."""
         screens = greenhouse.rows + tuple(thing.area for thing in greenhouse.obstacles)
         sides = [(area.xmin, area.ymin, area.xmax, area.ymax) for area in screens]
         posts = [(post.x, post.y, post.radius) for post in greenhouse.posts]
@@ -95,10 +95,10 @@ class Scenery:
         )
 
     def hides(self, ax: float, ay: float, bx: float, by: float) -> bool:
-        """Whether something stands between two points."""
+        """Whether an object occludes the line between two points."""
         return any(area.crosses(ax, ay, bx, by) for area in self.screens)
 
     def free(self, x: float, y: float, radius: float) -> bool:
-        """Whether a disc fits at a place."""
+        """Whether a disc fits at a position."""
         inside = self.bounds.contains(x, y, -radius)
         return inside and not any(s.contains(x, y, radius) for s in self.screens)

@@ -1,8 +1,8 @@
-"""Boxes the long way round: a mask and a depth picture, and the grounding of a robot.
+"""Boxes by grounding: from a rendered mask and depth picture, with a robot's own code.
 
-What the network finds, and how sure it is, is drawn as ever (``camera``); where it is
-comes out of the picture, by the very code that rides on a robot (``robot/grounding``).
-Only the part of the picture about a target is taken: the rest is looked at by nobody.
+Detection and confidence are drawn as without grounding (``camera``); the position comes
+from the picture, by the code that runs on a robot (``robot/grounding``).  Only the part
+of the picture about a target is rendered: the rest is not needed.
 """
 
 import math
@@ -28,20 +28,20 @@ from iveg.robot.grounding.cloud import Pinhole
 from iveg.robot.grounding.locate import Grounding, Mount, look
 
 _WIDTH, _HEIGHT = 320, 240
-"""As a D435 sends depth; a quarter of its pixels, and enough of them at 8 m."""
+"""A quarter of the pixels of a D435, which is enough at 8 m."""
 _BESIDE_M = 0.2
-"""So far beside a target its leaves and its fringe may hang."""
+"""Margin about a target for its leaves and fringe (m)."""
 _NEAREST_M = 0.3
 _SETTINGS = Grounding(p_min=0.0, hidden={PERSON: 0.36})
-"""A robot tells faint ones, too: what iVeg does with them is iVeg's to say."""
+"""A robot reports uncertain detections as well; the threshold is iVeg's."""
 
 
 class GroundedCamera:
-    """One robot's depth camera and the software that places what it shows.
+    """One robot's depth camera and the software that locates targets in its pictures.
 
     Args:
         profile: Where the camera sits and what it sees.
-        rng: Where noise and leaves come from.
+        rng: Random source of noise and leaves.
     """
 
     def __init__(self, profile: RobotProfile, rng: np.random.Generator) -> None:
@@ -57,16 +57,16 @@ class GroundedCamera:
         targets: Sequence[Target],
         scenery: Scenery,
     ) -> tuple[tuple[Detection, ...], int]:
-        """Place what was found.
+        """Locate detected targets.
 
         Args:
             pose: The robot's true pose in ``map``.
-            found: Of these, in the order that they are told in.
-            targets: All that may hide one another.
-            scenery: What hides them, too.
+            found: Detected targets, in the order of the report.
+            targets: All objects that may occlude one another.
+            scenery: Static occluding objects.
 
         Returns:
-            Boxes in ``base_link``, and how many are there without a place.
+            Boxes in ``base_link``, and the number of targets without a position.
         """
         placed: list[Detection] = []
         lost = 0
@@ -103,7 +103,7 @@ def _shape(target: Target) -> tuple[Upright, ...]:
 
 
 def _about(camera: DepthCamera, sensor: Pose2D, target: Target) -> Pinhole | None:
-    """The part of the lens in which a target can be; None where it is out of view."""
+    """Part of the lens that can contain a target; None where it is out of view."""
     lens, body = camera.lens, target.body
     dx, dy = body.pose.x - sensor.x, body.pose.y - sensor.y
     c, s = math.cos(sensor.yaw), math.sin(sensor.yaw)
@@ -123,6 +123,6 @@ def _about(camera: DepthCamera, sensor: Pose2D, target: Target) -> Pinhole | Non
 
 
 def _within(low: float, high: float, size: int) -> tuple[int, int] | None:
-    """Whole pixels from ``low`` to ``high`` of a picture; None where there is none."""
+    """Whole pixels of a picture from ``low`` to ``high``; None if there are none."""
     first, last = max(0, math.floor(low)), min(size, math.ceil(high) + 1)
     return (first, last) if first < last else None

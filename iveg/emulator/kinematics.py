@@ -1,7 +1,7 @@
-"""How robots move and what they believe: drives with limits, odometry with noise.
+"""Robot motion: drives with limits, and odometry with noise.
 
-Source: the seed paper (AGI turns on the spot, AGII has a turning radius of 2 m).
-What it leaves out: slip, load, slopes.
+Source: the seed paper (AGI turns on the spot, AGII has a turning radius of 2 m).  Left
+out: slip, load, slopes.
 """
 
 import math
@@ -14,14 +14,14 @@ from iveg.domain.geometry import Pose2D, Twist2D, wrap_angle
 from iveg.emulator.greenhouse import Body
 
 _TURN_ACCELERATION = 1.5
-"""How fast a differential drive takes up a turn (rad/s²); assumed."""
+"""Angular acceleration of a differential drive (rad/s²); assumed."""
 
 _STEERING_RATE = 0.6
-"""How fast an Ackermann drive changes its curvature (1/m per s); assumed."""
+"""Change of curvature of an Ackermann drive (1/m per s); assumed."""
 
 
 class Vehicle:
-    """A body that follows drive commands within the limits of its profile."""
+    """A vehicle that executes drive commands within the limits of its profile."""
 
     def __init__(self, profile: RobotProfile, pose: Pose2D) -> None:
         self.profile = profile
@@ -30,7 +30,7 @@ class Vehicle:
         self._curvature = 0.0
 
     def step(self, command: Twist2D, dt: float) -> None:
-        """Drive for ``dt`` (s) as commanded, or as near as the limits allow."""
+        """Drive for ``dt`` (s) as commanded, within the limits."""
         speed = self._speed(command.linear_x, dt)
         if self.profile.drive == "ackermann":
             turn = speed * self._steer(command, dt)
@@ -55,7 +55,7 @@ class Vehicle:
         return _towards(now, wanted, limit * dt)
 
     def _steer(self, command: Twist2D, dt: float) -> float:
-        # Wheels cannot be turned by a command without speed: they stay as they are.
+        # A command without speed defines no steering angle: it stays as it is.
         if abs(command.linear_x) > 1e-3:
             wanted = command.angular_z / command.linear_x
             wanted = clip(wanted, 1.0 / self.profile.turning_radius)
@@ -63,12 +63,12 @@ class Vehicle:
         return self._curvature
 
     def body(self, robot_id: str) -> Body:
-        """The vehicle seen from above."""
+        """Footprint of the vehicle."""
         return Body(robot_id, self.pose, self.profile.length, self.profile.width)
 
 
 def clip(value: float, limit: float) -> float:
-    """The value, brought into ±``limit``."""
+    """The value clipped to ±``limit``."""
     return min(max(value, -limit), limit)
 
 
@@ -78,17 +78,17 @@ def _towards(value: float, target: float, step: float) -> float:
 
 @dataclass(slots=True)
 class Odometer:
-    """What the robot believes: the truth with an error that does not run away.
+    """Odometry: the true pose with a bounded error.
 
     Each metre adds an error of about 2 % along and 1 % across, each radian turned one
-    of 3 %, and each forgets the errors before it, as the localizer behind
-    ``base_pose_ground_truth`` does; an error is therefore bounded, and a robot that
-    stands reports the same pose for ever.
+    of 3 %, and earlier errors decay, as with the localizer behind
+    ``base_pose_ground_truth``; the error is therefore bounded, and a robot at rest
+    reports a constant pose.
 
     Attributes:
         along: Standard deviation, part of the way driven; ``across`` likewise.
         turning: Standard deviation, part of the angle turned.
-        memory_m: Way (m) after which an error is forgotten; ``memory_rad`` likewise.
+        memory_m: Distance (m) over which an error decays; ``memory_rad`` likewise.
     """
 
     rng: np.random.Generator
@@ -100,18 +100,18 @@ class Odometer:
     _error: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def measure(self, truth: Pose2D, twist: Twist2D, dt: float) -> Pose2D:
-        """The pose as reported after moving with ``twist`` for ``dt`` (s)."""
+        """The reported pose after moving with ``twist`` for ``dt`` (s)."""
         way, angle = abs(twist.linear_x) * dt, abs(twist.angular_z) * dt
         self._walk(0, self.along, way, self.memory_m)
         self._walk(1, self.across, way, self.memory_m)
         self._walk(2, self.turning, angle, self.memory_rad)
-        # Driving along a row shows a localizer its heading, too.
+        # Driving along a row also corrects the heading of a localizer.
         self._error[2] *= math.exp(-way / self.memory_m)
         x, y = truth.transform(self._error[0], self._error[1])
         return Pose2D(x, y, wrap_angle(truth.yaw + self._error[2]))
 
     def _walk(self, which: int, part: float, moved: float, memory: float) -> None:
-        # Ornstein-Uhlenbeck over the way, not over time; its deviation is
+        # Ornstein-Uhlenbeck over the distance, not over time; its deviation is
         # part × memory, e.g. 2 % of 2 m = 4 cm.
         keep = math.exp(-moved / memory)
         spread = part * memory * math.sqrt(1.0 - keep * keep)

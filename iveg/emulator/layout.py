@@ -26,7 +26,7 @@ _MOST_ON_THE_RING = 20
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A scenario laid out for one fleet in one greenhouse."""
+    """A scenario fitted to one fleet in one greenhouse."""
 
     robots: Mapping[str, RobotScript]
     profiles: Mapping[str, RobotProfile]
@@ -44,14 +44,14 @@ def lay_out(
     """Fit a scenario to a fleet and a greenhouse.
 
     Args:
-        scenario: What happens.
-        robots: Who drives.
-        greenhouse: Where.
-        fleet: What each robot is; None: iVeg's own.
+        scenario: The scenario.
+        robots: Ids of the robots.
+        greenhouse: The greenhouse.
+        fleet: Fleet description; None: the built-in one.
 
     Raises:
-        DataFileError: the greenhouse has no room for so many robots, or is not what
-            the scenario is about.
+        DataFileError: the greenhouse has no room for so many robots, or does not fit
+            the scenario.
     """
     extra = scenario.incidents, scenario.detector
     profiles = {robot_id: _body(robot_id, fleet or built_in()) for robot_id in robots}
@@ -77,13 +77,13 @@ def lay_out(
 
 
 def _body(robot_id: str, fleet: FleetDescription) -> RobotProfile:
-    """What to build; of a robot that nobody described one like AGI."""
+    """Profile of a robot; one without a description is like AGI."""
     one = fleet.of_robot(robot_id)
     return one.profile if one.is_described else built_in().of_robot("AGI").profile
 
 
 def _on_the_ring(robots: Sequence[str]) -> dict[str, RobotScript]:
-    """All on one round, one way, evenly spaced: nobody meets anybody."""
+    """All robots on one closed route, in one direction, evenly spaced."""
     if len(robots) > _MOST_ON_THE_RING:
         reason = f"has room for {_MOST_ON_THE_RING} robots, not for {len(robots)}."
         raise DataFileError(TESTBED, "", reason)
@@ -98,7 +98,7 @@ def _on_the_ring(robots: Sequence[str]) -> dict[str, RobotScript]:
 
 
 def _in_a_field(robots: Sequence[str]) -> dict[str, RobotScript]:
-    """Each on a square of its own."""
+    """One square for each robot."""
     scripts = {}
     for place, robot_id in enumerate(robots):
         x = place * _FIELD_PITCH_M
@@ -127,9 +127,9 @@ def _around_the_field(robots: Sequence[str]) -> tuple[tuple[WalkStop, ...], ...]
 def _lanes_for(
     robots: Mapping[str, RobotProfile], greenhouse: Greenhouse
 ) -> list[Lane]:
-    """A lane each: the one its start lies in, else the longest that is left.
+    """One lane for each robot: the one of its start, else the longest free one.
 
-    Who needs most room to turn chooses first.
+    Robots with the largest turning radius choose first.
     """
     lanes = sorted(greenhouse.lanes, key=lambda lane: -_long(lane.area))
     if len(robots) > len(lanes):
@@ -171,7 +171,7 @@ def _up_and_down(area: Rectangle, greenhouse: Greenhouse) -> RobotScript:
 def _free_stretch(
     ends: tuple[tuple[float, float], ...], greenhouse: Greenhouse
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The longest part of a line that keeps off crates, trolleys and posts."""
+    """The longest part of a line without crates, trolleys and posts."""
     line = route_of(ends, 0.0, False).points
     best, run = (0, 0), 0
     for index, (x, y) in enumerate(line):

@@ -2,7 +2,7 @@
 
 Ray casting by the slab method for rectangles and by the quadratic for discs, all rays
 of a sweep in a few NumPy calls (``benchmarks/lidar_cost.py`` says what it costs).
-What it leaves out: intensity, motion during the sweep, leaves that let a ray through.
+Left out: intensity, motion during the sweep, leaves that let a ray through.
 """
 
 import math
@@ -21,7 +21,7 @@ _LEAST_SLOPE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LaserModel:
-    """The sensor's data sheet.
+    """Data sheet of the sensor.
 
     Attributes:
         beams: Rays in a full turn.
@@ -36,7 +36,7 @@ class LaserModel:
 
     @property
     def angle_increment(self) -> float:
-        """Between neighbouring rays (rad); the first looks backwards, at -π."""
+        """Between neighbouring rays (rad); the first points backwards, at -π."""
         return math.tau / self.beams
 
 
@@ -53,10 +53,10 @@ def sweep(
     Args:
         sensor: Its pose in ``map``.
         model: Its data sheet.
-        scenery: What stands still.
-        people: What walks.
+        scenery: Static objects.
+        people: People.
         others: The other robots.
-        rng: Where the noise comes from.
+        rng: Random source of the noise.
 
     Returns:
         Shape (beams,), float32 (m); ``inf`` where nothing is within ``range_max``.
@@ -83,7 +83,7 @@ def _slopes(directions: Floats) -> Floats:
 
 
 def _wall(sensor: Pose2D, directions: Floats, scenery: Scenery) -> Floats:
-    """Where each ray leaves the outer wall."""
+    """Distance of the outer wall on each ray."""
     bounds, slopes = scenery.bounds, _slopes(directions)
     x = np.where(slopes[0] > 0, bounds.xmax - sensor.x, bounds.xmin - sensor.x)
     y = np.where(slopes[1] > 0, bounds.ymax - sensor.y, bounds.ymin - sensor.y)
@@ -108,7 +108,7 @@ def _boxes(sensor: Pose2D, directions: Floats, boxes: Floats) -> Floats:
 
 
 def _body(sensor: Pose2D, directions: Floats, body: Body) -> Floats:
-    """The same against a turned box: rays are turned into its frame."""
+    """The same for a rotated box: rays are transformed into its frame."""
     c, s = math.cos(body.pose.yaw), math.sin(body.pose.yaw)
     dx, dy = sensor.x - body.pose.x, sensor.y - body.pose.y
     inner = Pose2D(c * dx + s * dy, c * dy - s * dx, 0.0)
@@ -118,7 +118,7 @@ def _body(sensor: Pose2D, directions: Floats, body: Body) -> Floats:
 
 
 def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:
-    """Shorten ``ranges`` by discs, shape (n, 3), looking only at rays that can hit."""
+    """Shorten ``ranges`` by discs, shape (n, 3), for rays that can hit only."""
     dx, dy = discs[:, 0] - sensor.x, discs[:, 1] - sensor.y
     distance = np.hypot(dx, dy)
     matters = (distance > discs[:, 2]) & (distance < model.range_max + discs[:, 2])

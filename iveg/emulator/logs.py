@@ -33,7 +33,7 @@ _log = logging.getLogger(__name__)
 _FORBIDDEN = re.compile(r"[<>\"'=;()]")
 _LONGEST_LINE = 1 << 20
 _HALF_SIZE_M, _HEIGHT_M = 0.25, 1.75
-"""A log knows the place of a detection; it is sent as a box of a person's size."""
+"""A log has the position of a detection; it is sent as a box of a person's size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Entry:
 
 
 class LogReader:
-    """Reads one recording, as often as asked; complains about each bad line once.
+    """Reader of one recording, repeatable; each bad line is reported once.
 
     Args:
         file: ``.jsonl`` or ``.jsonl.gz``.
@@ -66,7 +66,7 @@ class LogReader:
         """All entries from the start, in the order of the file.
 
         Raises:
-            DataFileError: the file ends within its compression, or went away.
+            DataFileError: the compressed file is truncated, or was removed.
         """
         try:
             with self._open() as lines:
@@ -178,7 +178,7 @@ def _scan(line: _ScanLine) -> LaserScan:
 
 
 def _detection(line: _DetectionLine) -> Detection:
-    # Orion refuses a whole update for one of these characters.
+    # Orion refuses a whole update because of one of these characters.
     if _FORBIDDEN.search(line.class_):
         raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
     half = _HALF_SIZE_M

@@ -1,4 +1,4 @@
-"""What may go wrong on purpose, as orders: the words of fault port and command line."""
+"""Fault orders: the vocabulary of the fault port and the command line."""
 
 import json
 from collections.abc import Sequence
@@ -20,30 +20,30 @@ class _Order(BaseModel):
 
 
 class OrderPlace(_Order):
-    """A point in ``map`` (m)."""
+    """A position in ``map`` (m)."""
 
     x: Metres
     y: Metres
 
 
 class FaultOrder(_Order):
-    """What goes wrong with one robot; a field that is absent changes nothing.
+    """Faults of one robot; an absent field changes nothing.
 
     Attributes:
-        mute: Publishes nothing; ``deaf``: drives as it likes whatever iVeg says.
-        freeze_odometry: ``silent`` (or true): its odometry falls silent; ``repeat``:
-            the last message of it, stamp and count included, is sent again and again.
+        mute: Publishes nothing; ``deaf``: ignores iVeg's speed limits.
+        freeze_odometry: ``silent`` (or true): odometry stops; ``repeat``: its last
+            message, stamp and count included, is sent repeatedly.
         clock_offset_s: Its wall clock is this far ahead (s).
-        drop_percent: Of its telemetry, lost on the way.
-        duplicate_percent: Of its telemetry, delivered twice.
-        reorder_percent: Of its telemetry, overtaken by the next of the same topic.
-        delay_ms: How long all that it publishes takes longer.
-        jitter_ms: What is added to the delay at random, from none to all of it.
-        local_hold: Somebody presses its red button, or it bumps.
-        release_locally: The crew lifts those, and its boot hold.
-        kill: Its software dies; ``revive`` starts it anew, held.
-        false_person: Its camera sees a person there; null ends that.
-        hide_people: Its camera sees no person.
+        drop_percent: Share of its telemetry that is lost.
+        duplicate_percent: Share of its telemetry that is delivered twice.
+        reorder_percent: Share of its telemetry delivered after the next of the topic.
+        delay_ms: Delay of everything that it publishes.
+        jitter_ms: Random addition to the delay, from 0 to this.
+        local_hold: Its red button or bumper is pressed.
+        release_locally: The crew lifts local holds and the boot hold.
+        kill: Its software ends; ``revive`` starts it again, held.
+        false_person: Its camera detects a person there; null ends that.
+        hide_people: Its camera detects no person.
     """
 
     robot: str
@@ -65,7 +65,7 @@ class FaultOrder(_Order):
 
 
 class PersonOrder(_Order):
-    """Puts one person somewhere; with ``hold`` to stay there.
+    """Moves one person to a position; with ``hold`` the person stays there.
 
     Attributes:
         person: Counted from 0.
@@ -82,10 +82,10 @@ Order = FaultOrder | PersonOrder
 
 
 def read_order(body: bytes) -> Order:
-    """One order as JSON.
+    """Parse one order from JSON.
 
     Raises:
-        UnreadableError: it is none; one sentence names the field.
+        UnreadableError: not an order; one sentence names the field.
     """
     try:
         value = json.loads(body)
@@ -97,14 +97,14 @@ def read_order(body: bytes) -> Order:
 
 
 def read_translations(words: Sequence[str], robots: Sequence[str]) -> list[FaultOrder]:
-    """The orders of a command line: ``field=value``, or ``robot:field=value`` for one.
+    """Parse the orders of a command line: ``field=value``, or ``robot:field=value``.
 
     Args:
-        words: As typed, such as ``drop_percent=10`` or ``AGI:deaf=true``.
-        robots: Who is meant where no robot is named.
+        words: Arguments such as ``drop_percent=10`` or ``AGI:deaf=true``.
+        robots: Robots of an order that names none.
 
     Raises:
-        DataFileError: a word is no order; says which and why.
+        DataFileError: an argument is not an order; names it with the reason.
     """
     orders: list[FaultOrder] = []
     for word in words:
@@ -127,7 +127,7 @@ def read_translations(words: Sequence[str], robots: Sequence[str]) -> list[Fault
 
 
 def _value(text: str) -> object:
-    """JSON where it is JSON, text elsewhere: nobody types quotation marks."""
+    """Parse as JSON if possible, else as text, since quotation marks are not typed."""
     try:
         return json.loads(text)
     except ValueError:
@@ -144,9 +144,9 @@ def _validated(kind: type[Order], value: dict[str, object]) -> Order:
 
 
 def _sentence(complaints: Sequence[tuple[tuple[int | str, ...], str]]) -> str:
-    """The first field that is wrong, and how."""
+    """The first invalid field with its reason."""
     place, said = complaints[0]
-    # A field that allows several types complains once for each of them.
+    # A field that allows several types has one error for each of them.
     same = [why for where, why in complaints if where[0] == place[0]]
     if len(same) > 1:
         return f"{place[0]}: {'; or '.join(same)}"

@@ -1,4 +1,4 @@
-"""Doing something once a period, for ever."""
+"""Periodic calls."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -8,14 +8,13 @@ from iveg.adapters import clock
 SLOTS = 3
 """A robot's period has one each for drive and odometry, laser, camera."""
 LONGEST_STEP_S = 0.1
-"""A machine that slept must not let a robot leap."""
+"""Longest time step (s), so that a suspended machine moves no robot by a jump."""
 
 
 async def every(period: float, work: Callable[[float], None]) -> None:
     """Call ``work`` with the time since its last call, once a period (s), for ever.
 
-    A call that comes more than a period late moves the ones after it: nothing is made
-    up for.
+    A call more than a period late moves the later ones: missed calls are not repeated.
     """
     last = due = clock.now().mono
     while True:
@@ -27,7 +26,7 @@ async def every(period: float, work: Callable[[float], None]) -> None:
 
 
 async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> None:
-    """Call each of ``work`` once a period (s), evenly apart, for ever."""
+    """Call each of ``work`` once a period (s), evenly spaced, for ever."""
     turn = 0
 
     def slot(dt: float) -> None:

@@ -1,9 +1,8 @@
-"""People who walk the aisles, work at the rows, and give way to robots.
+"""Simulated people who walk the aisles, work at the rows, and give way to robots.
 
-They go from place to place at walking pace, stay a while at each, and start over.
-One who comes near a robot slides along it, as a person would step aside, so that no
-robot and no person ever wait for each other without end.  What is left out: talking,
-surprise, running.
+A person walks from stop to stop, stays a while at each, and starts over.  Near a robot
+the person moves sideways along it, so that a robot and a person never block each other
+for ever.  Left out: talking, surprise, running.
 """
 
 import math
@@ -15,18 +14,18 @@ import numpy as np
 from iveg.emulator.greenhouse import Body, Disc, Scenery
 
 WALKING_SPEED = 1.4
-"""(m/s), as the seed paper's people walk; ISO 13855 plans with 1.6."""
+"""(m/s), as in the seed paper; ISO 13855 assumes 1.6."""
 
 RADIUS_M = 0.25
 _KEEPS_OFF_M = 0.45
-"""Between a person's edge and a robot; nearer, the person steps aside."""
+"""Distance between a person and a robot below which the person steps aside (m)."""
 _STEP_ASIDE_SPEED = 0.8
 _ARRIVED_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class WalkStop:
-    """A place that a person goes to and how long the work there takes (s)."""
+    """A place to walk to, and the time spent there (s)."""
 
     x: float
     y: float
@@ -35,11 +34,11 @@ class WalkStop:
 
 
 class SimulatedPerson:
-    """One person and the round that he or she walks.
+    """One person with a round of stops.
 
     Args:
-        round_: Places in order; after the last comes the first.
-        rng: How long each stop really takes.
+        round_: Stops in order; the first follows the last.
+        rng: Random source of the time at each stop.
     """
 
     def __init__(self, round_: Sequence[WalkStop], rng: np.random.Generator) -> None:
@@ -52,11 +51,11 @@ class SimulatedPerson:
 
     @property
     def disc(self) -> Disc:
-        """The person seen from above."""
+        """Footprint of the person."""
         return Disc(self.x, self.y, RADIUS_M)
 
     def place(self, x: float, y: float, *, hold: bool) -> None:
-        """Put the person somewhere; with ``hold`` to stay there."""
+        """Move the person to a position; with ``hold`` the person stays there."""
         self.x, self.y, self._held = x, y, hold
 
     def step(self, dt: float, robots: Sequence[Body], scenery: Scenery) -> None:
@@ -103,14 +102,14 @@ class SimulatedPerson:
     def _slide(
         self, move_x: float, move_y: float, out_x: float, out_y: float
     ) -> tuple[float, float]:
-        """The same step along the robot's side; head-on, to the left of the robot."""
+        """The same step sideways along the robot; head-on, to the robot's left."""
         along = move_y * out_x - move_x * out_y
         way = math.hypot(move_x, move_y)
         turn = math.copysign(way, along) if abs(along) > 0.05 * way else way
         return -out_y * turn, out_x * turn
 
     def _move(self, dx: float, dy: float, scenery: Scenery) -> None:
-        """Go there, or along what stands in the way; one who is inside may leave."""
+        """Move by this step, or along an obstacle; a person inside one may leave it."""
         inside = not scenery.free(self.x, self.y, RADIUS_M)
         for step_x, step_y in ((dx, dy), (dx, 0.0), (0.0, dy)):
             if inside or scenery.free(self.x + step_x, self.y + step_y, RADIUS_M):

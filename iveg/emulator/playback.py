@@ -1,4 +1,4 @@
-"""A recording at a moment of its own time: pure, and played at any pace."""
+"""A recording at a moment of its own time, independent of the pace it is played at."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -8,24 +8,24 @@ from iveg.domain.observations import Detection, LaserScan, Odometry
 from iveg.emulator.logs import Entry
 
 _READ_AHEAD = 256
-"""Lines looked ahead for the next pose; beyond, the robot is shown where it was."""
+"""Entries searched for the next pose; beyond, the last pose is kept."""
 
 _SEEN_FOR_S = 0.4
-"""How long (s of the recording) a recorded picture counts, unless another follows."""
+"""How long (s of the recording) a detection frame counts, unless another follows."""
 _ONE_PICTURE_S = 0.02
-"""Detections so close together are of one picture; 30 a second are usual at most."""
+"""Detections within this time (s) are one frame; frames come 30 times a second."""
 
 
 class Playback:
-    """Where a recording stands.
+    """Position in a recording.
 
     Args:
-        open_: Gives the entries from the start; at least one is odometry.
+        open_: Returns the entries from the start; at least one is odometry.
         loop: Starts over at the end.
 
     Attributes:
         ended: Whether the last entry was played; never with ``loop``.
-        has_detector: Whether a detection was met: then no detection means nobody.
+        has_detector: Whether a detection was read: then none means an empty frame.
     """
 
     def __init__(self, open_: Callable[[], Iterator[Entry]], *, loop: bool) -> None:
@@ -50,7 +50,7 @@ class Playback:
         self._last = self._poses_ahead[0]
 
     def advance(self, seconds: float) -> None:
-        """Let ``seconds`` of the recording pass."""
+        """Advance by ``seconds`` of the recording."""
         self._at += seconds
         while self._ahead and self._ahead[0].at <= self._at:
             self._take(self._ahead.popleft())
@@ -81,16 +81,16 @@ class Playback:
                 self._see(detection, entry.at)
 
     def _see(self, detection: Detection, at: float) -> None:
-        """The newest picture takes the place of the one before: who walks is one."""
+        """The newest frame replaces the one before: a walking person counts once."""
         if not self._picture or abs(at - self._taken_at) > _ONE_PICTURE_S:
             self._picture, self._taken_at = (), at
         self._picture = (*self._picture, detection)
 
-    # --- what the robot senses at this moment -------------------------------------
+    # --- sensor values at this moment ---------------------------------------------
 
     @property
     def motion(self) -> tuple[Pose2D, Twist2D]:
-        """Pose and speeds, interpolated between two recorded ones."""
+        """Pose and speeds, interpolated between two recorded poses."""
         at, last = self._last
         if not self._poses_ahead or self._poses_ahead[0][0] <= at:
             return last.pose, last.twist
@@ -106,10 +106,10 @@ class Playback:
 
     @property
     def scan(self) -> LaserScan | None:
-        """The newest sweep; the same object until there is another."""
+        """The newest scan; the same object until the next."""
         return self._scan
 
     @property
     def detections(self) -> tuple[Detection, ...]:
-        """What the newest picture shows; nothing when that is too long ago."""
+        """Detections of the newest frame; none when it is too old."""
         return self._picture

@@ -1,7 +1,8 @@
-"""A bad radio: what a robot publishes is lost, late, doubled or out of order.
+"""Faulty radio link: a robot's messages are lost, delayed, duplicated or reordered.
 
-Pure but for its seed.  Loss, doubles and disorder befall telemetry (QoS 0) alone, since
-TCP and QoS 1 deliver all else once and in order; delay befalls all that is published.
+Deterministic for a seed.  Loss, duplicates and reordering affect telemetry (QoS 0)
+alone, since TCP and QoS 1 deliver all other messages once and in order; delay affects
+all messages.
 """
 
 from collections import Counter
@@ -12,15 +13,15 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class LinkFaults:
-    """How bad it is; percentages of telemetry, one drawn apart from the other.
+    """Faults of a link; percentages of telemetry, drawn independently.
 
     Attributes:
         drop_percent: Lost.
         duplicate_percent: Delivered twice.
         reorder_percent: Delivered after the next of the same topic.
-        delay_ms: Added to all; ``jitter_ms`` at most more, order kept.
-        repeats_odometry: In place of odometry its last message goes out again.
-        mute: Nothing that the robot publishes arrives; it learns nothing of that.
+        delay_ms: Added to all; up to ``jitter_ms`` more, in order.
+        repeats_odometry: Odometry is replaced by its last message.
+        mute: Nothing that the robot publishes arrives, without an error.
     """
 
     drop_percent: float = 0.0
@@ -37,10 +38,10 @@ class Packet:
     """One MQTT packet.
 
     Attributes:
-        topic: Where it is published to; None for a packet of another kind.
+        topic: Topic of a PUBLISH; None for a packet of another type.
         qos: 0 to 2.
-        raw: All its bytes.
-        receipt: What a broker answers to one of QoS 1 (PUBACK); else empty.
+        raw: The whole packet.
+        receipt: Acknowledgement for QoS 1 (PUBACK); else empty.
     """
 
     topic: str | None
@@ -50,20 +51,20 @@ class Packet:
 
     @property
     def is_telemetry(self) -> bool:
-        """Whether it may get lost."""
+        """Whether it may be lost."""
         return self.topic is not None and self.qos == 0
 
 
 class Radio:
-    """Decides what becomes of each packet that a robot sends.
+    """Decides the fate of each packet that a robot sends.
 
     Args:
         odometry: Topics that carry odometry.
-        rng: Where chance comes from; a message of telemetry draws thrice.
+        rng: Random source, drawn three times for each telemetry message.
 
     Attributes:
-        faults: How bad the radio is now.
-        counters: What was dropped, duplicated, reordered, repeated, muted.
+        faults: Faults at present.
+        counters: Packets dropped, duplicated, reordered, repeated, muted.
     """
 
     def __init__(self, odometry: frozenset[str], rng: np.random.Generator) -> None:
@@ -76,7 +77,7 @@ class Radio:
         self._newest_due = 0.0
 
     def pass_on(self, packet: Packet, now: float) -> list[tuple[float, bytes]]:
-        """What goes out for a packet, and when (same clock as ``now``, s)."""
+        """Packets to send for a packet, and when (same clock as ``now``, s)."""
         if packet.topic is None:
             return [(now, packet.raw)]
         if self.faults.mute:
@@ -88,7 +89,7 @@ class Radio:
         return [(self._due(now), one.raw) for one in out]
 
     def _repeated(self, packet: Packet, topic: str) -> Packet:
-        """The packet; of frozen odometry the last one that went through unfrozen."""
+        """The packet; for frozen odometry the last one that passed before the fault."""
         if topic not in self._odometry:
             return packet
         if self.faults.repeats_odometry and topic in self._last:
@@ -119,6 +120,6 @@ class Radio:
         late_ms = faults.delay_ms
         if faults.jitter_ms > 0.0:
             late_ms += self._rng.uniform(0.0, faults.jitter_ms)
-        # One connection keeps its order; disorder is a fault of its own.
+        # One connection keeps its order; reordering is a separate fault.
         self._newest_due = max(self._newest_due, now + late_ms / 1000.0)
         return self._newest_due

@@ -1,4 +1,4 @@
-"""Recordings of any kind as entries in time: logs of JSON lines, bags of ROS."""
+"""Recordings of any format as entries in time: logs of JSON lines, ROS bags."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,7 +21,7 @@ class Recording(Protocol):
         """All entries from the start; at least one is odometry.
 
         Raises:
-            DataFileError: the recording breaks off.
+            DataFileError: the recording is truncated.
         """
 
 
@@ -33,18 +33,18 @@ def open_recording(
     bag_time: bool = False,
     pose: Pose2D | None = None,
 ) -> Recording:
-    """Open a recording by its name.
+    """Open a recording by its file name.
 
     Args:
         path: ``.jsonl``, ``.jsonl.gz``, ``.db3``, ``.mcap``, ``.bag``, or a directory.
-        mount: Where the laser of a bag sits in ``base_link``; logs say it themselves.
-        topics: Which of a bag are read.
-        bag_time: A bag plays by when it was recorded, not by the stamps of its sensors.
-        pose: Where a recording without odometry stands, such as a fixed camera's.
+        mount: Pose of a bag's laser in ``base_link``; logs contain it.
+        topics: Topics of a bag that are read.
+        bag_time: A bag is timed by its recording times, not by sensor stamps.
+        pose: Fixed pose of a recording without odometry, such as a camera's.
 
     Raises:
-        DataFileError: it is of no known kind, cannot be read, or neither holds odometry
-            nor was said where it stands.
+        DataFileError: unknown format, unreadable file, or neither odometry nor a fixed
+            pose.
     """
     recording = _opened(path, mount, topics, bag_time=bag_time, fixed=pose is not None)
     if any(isinstance(one.observation, Odometry) for one in recording.entries()):
@@ -76,11 +76,11 @@ def _opened(
 
 
 class FixedRecording:
-    """A recording of something that never moves: its pose comes before all else.
+    """A recording of a static sensor: its pose precedes all other entries.
 
     Args:
         recording: Without odometry, and not empty.
-        pose: Where it stands in the frame of the recording.
+        pose: Its pose in the frame of the recording.
     """
 
     def __init__(self, recording: Recording, pose: Pose2D) -> None:
@@ -97,10 +97,10 @@ class FixedRecording:
 
 
 class BagRecording:
-    """A bag whose messages come by the stamps of their sensors, or by bag time.
+    """A bag whose messages are ordered by sensor stamps, or by bag time.
 
-    Stamps count unless the first message has none: a bag without them, or one that is
-    asked to, plays by bag time throughout, since the two clocks may differ by years.
+    Stamps count unless the first message has none: without stamps, or on request, a bag
+    uses bag time throughout, since the two clocks may differ by years.
     """
 
     def __init__(self, bag: Bag, *, bag_time: bool) -> None:
@@ -110,7 +110,7 @@ class BagRecording:
         self._start = 0.0 if first is None else self._time_of(first)
 
     def entries(self) -> Iterator[Entry]:
-        """All entries from the start; one whose stamp is absurd is left out."""
+        """All entries from the start; entries with absurd stamps are omitted."""
         for message in self._bag.messages():
             at = self._time_of(message) - self._start
             if abs(at) <= _LONGEST_S:

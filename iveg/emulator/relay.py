@@ -1,7 +1,7 @@
-"""The way from a robot to the broker through its bad radio: a relay on loopback.
+"""Relay on loopback that applies a faulty radio between a robot and the broker.
 
-The robot's own software connects here and knows nothing of it, so that what is tested
-is what rides on a real robot.  What the broker says comes back untouched.
+The robot's own software connects here without knowing, so that the tests run the
+software of a real robot.  Messages of the broker pass unchanged.
 """
 
 import asyncio
@@ -20,14 +20,14 @@ _CHUNK = 65536
 
 
 class Relay:
-    """Listens for one robot; use it with ``async with``.
+    """Relay for one robot; use it with ``async with``.
 
     Args:
-        broker: Where the robot means to go.
-        radio: What becomes of its packets.
+        broker: Address of the broker.
+        radio: Decides the fate of its packets.
 
     Attributes:
-        address: Where the robot connects instead, once the relay is open.
+        address: Address for the robot, once the relay is open.
     """
 
     def __init__(self, broker: BrokerAddress, radio: Radio) -> None:
@@ -62,11 +62,11 @@ class Relay:
         assert task is not None  # noqa: S101 - a coroutine that runs is in a task
         self._visits.add(task)
         try:
-            # A broker that is away, or goes: the robot sees its connection closed.
+            # The broker is unreachable or closes: the robot's connection is closed.
             with contextlib.suppress(OSError, asyncio.IncompleteReadError):
                 await self._connect(reader, writer)
         except asyncio.CancelledError:
-            pass  # the relay closes; nobody waits for this task's word
+            pass  # the relay closes; nobody awaits this task's result
         finally:
             self._visits.discard(task)
             writer.close()
@@ -90,7 +90,7 @@ class Relay:
         down: asyncio.StreamReader,
         up: asyncio.StreamWriter,
     ) -> None:
-        """Both ways until one end closes."""
+        """Forward both directions until one end closes."""
         waiting: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue(_MOST_WAITING)
         ways = [
             asyncio.create_task(way, name=f"relay-{name}")
@@ -149,7 +149,7 @@ async def _send_when_due(
 
 
 async def read_packet(reader: asyncio.StreamReader) -> Packet:
-    """One packet of MQTT 3.1.1: kind and flags, length of 1 to 4 bytes, the rest.
+    """Read one packet of MQTT 3.1.1: type and flags, length of 1 to 4 bytes, the rest.
 
     Raises:
         asyncio.IncompleteReadError: the sender has closed.

@@ -1,10 +1,10 @@
-"""Plays recorded runs as robots: the log moves, the safety node decides how fast.
+"""Replays recorded runs as robots: the safety node decides the speed of the playback.
 
-The node's drive output is the pace of the log: full speed plays it as recorded, a
-limit of 0.5 at half the pace, a hold not at all, and the replayed robot then reports
-that it stands.  Poses between two recorded ones are interpolated, because a safety node
-wants odometry more often than logs have it.  While the log pauses, the newest scan and
-detections are told again, as a robot that stands goes on seeing what it saw.
+The node's drive output is the pace of the log: full speed plays it as recorded, a limit
+of 0.5 at half the pace, a hold pauses it, and the replayed robot then reports a
+standstill.  Poses between two recorded ones are interpolated, because a safety node
+requires odometry more often than logs have it.  While the log pauses, the newest scan
+and detections are repeated, as the sensors of a robot at rest do.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
 TASK = "replay"
-"""What a replayed robot calls its task; iVeg knows it by the mark of its messages."""
+"""Task of a replayed robot; iVeg recognises replays by the mark of their messages."""
 
 _REST = Twist2D(0.0, 0.0)
 _PERIOD_S = 0.05
@@ -46,7 +46,7 @@ _FASTEST = 100.0
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """What all replayed robots of a run share; see ``run_replay``."""
+    """Settings shared by all replayed robots of a run; see ``run_replay``."""
 
     address: BrokerAddress
     apikey: str
@@ -84,18 +84,18 @@ async def run_replay(
         robots: Their ids, in the order of the files.
         address: The broker.
         apikey: First part of the measure topics.
-        speed: 2 plays twice as fast as recorded.
+        speed: Pace; 2 is twice as fast as recorded.
         loop: Starts over at the end.
         uplink: One message a topic, or Algorithm 1's single payload.
         slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
         stand_s: See above.
         state_directory: Where the robots keep their hold files; made if missing.
-        topics: Which of a ROS bag are read; see ``open_recording``.
-        bag_time: Bags play by when they were recorded; see ``open_recording``.
-        fleet: What each robot is; None: nobody described them.
-        frame: The map that all recordings are in; None: each is in one of its own, and
-            nobody in it slows another robot.
-        poses: By robot, where a recording without odometry stands.
+        topics: Topics of a ROS bag; see ``open_recording``.
+        bag_time: Bags use recording times; see ``open_recording``.
+        fleet: Fleet description; None: no description.
+        frame: Map frame of all recordings; None: each has a frame of its own, and its
+            detections slow no other robot.
+        poses: By robot, the fixed pose of a recording without odometry.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
@@ -150,7 +150,7 @@ def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
 
 
 def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
-    """The complaint about a file among what ended the tasks."""
+    """The error about a file among those that ended the tasks."""
     found = group.subgroup(DataFileError)
     while found is not None:
         first = found.exceptions[0]
@@ -198,7 +198,7 @@ class ReplayedRobot:
         )
 
     async def run(self) -> None:
-        """Play until cancelled; ``ended`` says when the recording is over."""
+        """Play until cancelled; ``ended`` is set when the recording is over."""
         self._node.release_locally()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._node.run(), name=f"node-{self.robot_id}")
@@ -221,7 +221,7 @@ class ReplayedRobot:
         self._tell(clock.now().mono)
 
     def _slowed(self, command: float, dt: float) -> float:
-        """The pace, 0 to 1: it falls no faster than the robot's brake allows."""
+        """The pace, 0 to 1: it falls no faster than the robot's brakes allow."""
         wanted = max(0.0, command / self._profile.max_speed)
         braking = self._profile.braking / self._profile.max_speed
         return max(wanted, self._pace - braking * dt)

@@ -1,8 +1,8 @@
-"""An emulated robot that speaks ROS 2: topics out, ``cmd_vel`` obeyed, nothing else.
+"""An emulated ROS 2 base: publishes its topics and executes ``cmd_vel``.
 
-What a base and Nav2 are on a real robot: no safety node and no MQTT; ``iveg robot``
-stands between it and iVeg.  A base to which nothing is said for half a second halts by
-itself, whatever it was told last.
+It stands for the base and Nav2 of a real robot, without safety node and MQTT; ``iveg
+robot`` connects it to iVeg. A base without a command for half a second halts by itself,
+whatever the last command was.
 """
 
 import asyncio
@@ -26,17 +26,17 @@ from iveg.ros2.schema import Message
 
 _log = logging.getLogger(__name__)
 TIMEOUT_S = 0.5
-"""A base to which nothing is said for so long halts."""
+"""A base without a command for this long halts (s)."""
 _SECOND = 1.0
 _LASER = "laser"
 _GIVES_UP_S, _RESTS_S = 1.0, 0.8
 
 
 class Navigation:
-    """Nav2 as far as a gate meets it: wishes, gives up when nothing moves, tries again.
+    """Nav2 as a gate meets it: requests twists, gives up without progress, tries again.
 
-    A gate that was resumed lets nothing through before it was asked for rest; a real
-    navigation that makes no progress cancels and asks for just that.
+    After a resume the gate stays closed until zero was requested; a real navigation
+    without progress cancels its goal and requests zero.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class Navigation:
         self._rests_until = -math.inf
 
     def wish(self, wish: Twist2D, driven: Twist2D, now: float) -> Twist2D:
-        """What is asked for now, when the base was last told ``driven``."""
+        """The twist requested now; ``driven`` was the last command of the base."""
         if now < self._rests_until:
             return REST
         if wish == REST or driven != REST:
@@ -58,17 +58,17 @@ class Navigation:
 
 
 class Base:
-    """The drive's own watchdog: the newest command, for as long as it counts."""
+    """The drive's own watchdog: the newest command while it is valid."""
 
     def __init__(self) -> None:
         self._command, self._at = REST, -math.inf
 
     def told(self, command: Twist2D, now: float) -> None:
-        """A command came."""
+        """Take a command."""
         self._command, self._at = command, now
 
     def command(self, now: float) -> Twist2D:
-        """What the wheels do; rest when nothing came for half a second."""
+        """Command for the wheels; zero when none came for half a second."""
         return self._command if now - self._at <= TIMEOUT_S else REST
 
 
@@ -85,13 +85,13 @@ class Ros2Base:
 
     Args:
         rig: The machine.
-        world: Where it drives.
+        world: World it drives in.
         network: DDS.
-        config: What its topics and frames are called.
+        config: Names of its topics and frames.
         rate_hz: Of odometry, laser and camera each.
 
     Attributes:
-        started: Set when orders are obeyed.
+        started: Set when fault orders are accepted.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class Ros2Base:
             await in_slots(1.0 / self._rate_hz, slots)
 
     def obey(self, order: FaultOrder) -> None:
-        """Do what a fault order says of sensors; the rest is its software's."""
+        """Execute the sensor faults of an order; the others concern its software."""
         if order.freeze_odometry is not None:
             self._is_odometry_frozen = bool(order.freeze_odometry)
         self._rig.blind(order)
@@ -227,7 +227,7 @@ class Ros2Base:
 
 
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
-    """A pose of ``map`` in a frame that is at ``outer`` there."""
+    """A pose of ``map`` in a frame whose pose in ``map`` is ``outer``."""
     c, s = math.cos(outer.yaw), math.sin(outer.yaw)
     dx, dy = pose.x - outer.x, pose.y - outer.y
     return Pose2D(c * dx + s * dy, c * dy - s * dx, pose.yaw - outer.yaw)

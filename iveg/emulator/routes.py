@@ -1,4 +1,4 @@
-"""Ways to drive: lines with rounded corners, and the places to halt on them."""
+"""Routes: lines with rounded corners, and stations to halt at."""
 
 import math
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ SPACING_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A place on the route where a robot halts for a while.
+    """A point of the route where a robot halts for a while.
 
     Attributes:
-        dwell_s: How long it halts.
-        period_s: With a timetable it goes on at the next ``offset_s`` + n × period.
+        dwell_s: Duration of the halt.
+        period_s: With a timetable it leaves at the next ``offset_s`` + n × period.
     """
 
     x: float
@@ -29,7 +29,7 @@ class Station:
     offset_s: float = 0.0
 
     def departure(self, arrival: float) -> float:
-        """When a robot that came at ``arrival`` (s into the run) goes on."""
+        """Time of departure after an arrival (both s into the run)."""
         ready = arrival + self.dwell_s
         if self.period_s == 0.0:
             return ready
@@ -39,7 +39,7 @@ class Station:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Route:
-    """A way to drive: points ``SPACING_M`` apart, shape (n, 2), in ``map`` (m).
+    """A route: points ``SPACING_M`` apart, shape (n, 2), in ``map`` (m).
 
     Attributes:
         closed: Whether the last point leads to the first.
@@ -49,12 +49,12 @@ class Route:
     closed: bool
 
     def index_of(self, x: float, y: float) -> int:
-        """The point nearest to a place."""
+        """The point nearest to a position."""
         away = np.hypot(self.points[:, 0] - x, self.points[:, 1] - y)
         return int(away.argmin())
 
     def pose_at(self, index: int) -> Pose2D:
-        """Where a robot stands that is on point ``index`` and looks along the route."""
+        """Pose of a robot on point ``index`` that looks along the route."""
         (ax, ay), (bx, by) = self.ahead(index, 2)
         return Pose2D(float(ax), float(ay), math.atan2(by - ay, bx - ax))
 

@@ -1,4 +1,4 @@
-"""Named runs as data: who drives where, who walks where, what goes wrong, what follows.
+"""Named runs as data: routes of robots, rounds of people, faults, expected outcome.
 
 All but ``nlos-field`` are written for the testbed of the paper (``mvsim-20x20``):
 corridors lie at x = 2, 6, 10, 14, 18 m, crop between them at x = 4, 8, 12, 16 m from
@@ -22,7 +22,7 @@ _NORTH, _SOUTH, _WEST = math.pi / 2, -math.pi / 2, math.pi
 
 _SCOUT_CORNERS = ((10.0, 2.2), (10.0, 17.8), (6.0, 17.8), (6.0, 2.2))
 _LOOK_OUT = Station(10.0, 4.0, dwell_s=1.0, period_s=80.0, offset_s=10.0)
-"""AGI waits at the mouth of corridor 3, in view of the worker there, while AGII passes
+"""AGI waits at the entry of corridor 3, in view of the worker there, while AGII passes
 the same worker on the other side of the crop."""
 
 _SCOUT = RobotScript(
@@ -224,10 +224,10 @@ SCENARIOS: Mapping[str, Scenario] = {scenario.name: scenario for scenario in _SC
 
 
 def scenario_named(name: str) -> Scenario:
-    """The scenario of that name.
+    """The scenario of a name.
 
     Raises:
-        DataFileError: there is none; lists those that exist.
+        DataFileError: unknown name; lists the known ones.
     """
     if name not in SCENARIOS:
         known = ", ".join(SCENARIOS)

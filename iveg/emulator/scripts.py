@@ -1,4 +1,4 @@
-"""What a scenario is made of: scripts of robots, rounds of people, incidents."""
+"""Parts of a scenario: scripts of robots, rounds of people, incidents."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ TESTBED = "mvsim-20x20"
 
 @dataclass(frozen=True, slots=True)
 class RobotScript:
-    """Where one robot starts and drives.
+    """Start and route of one robot.
 
     Attributes:
         corners: Of its route, rounded with ``radius`` (m).
-        closed: A round; otherwise there and back.
+        closed: A closed route; otherwise back and forth.
         cruise: (m/s).
-        task: Its intent in a word.
+        task: Its reported task.
     """
 
     start: Pose2D
@@ -32,17 +32,17 @@ class RobotScript:
     stations: tuple[Station, ...] = ()
 
     def route(self) -> Route:
-        """The way as points."""
+        """The route as points."""
         return route_of(self.corners, self.radius, self.closed)
 
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """Something that goes wrong on purpose.
+    """A fault injected during a run.
 
     Attributes:
         at_s: Seconds into the run; again every ``every_s`` where that is not 0.
-        order: What.
+        order: The fault.
     """
 
     at_s: float
@@ -55,11 +55,11 @@ class Scenario:
     """One named run.
 
     Attributes:
-        about: What it shows, in one sentence.
-        outcome: What must be seen of it in iVeg; held by a test of the whole stack.
-        robots: Scripts by robot id; a fleet with others drives ``many``'s round.
-        people: The round of each person.
-        detector: Takes the place of the profile that was asked for.
+        about: Purpose in one sentence.
+        outcome: Expected outcome in iVeg; checked by a test of the whole stack.
+        robots: Scripts by robot id; a fleet with other ids uses the route of ``many``.
+        people: Stops of each person.
+        detector: Replaces the requested detector profile.
         greenhouse: The greenhouse that it is written for.
     """
 

@@ -1,4 +1,4 @@
-"""What was really in view of each camera, for whoever scores a detector."""
+"""Ground truth for the evaluation of detectors: targets in view of each camera."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,7 @@ from iveg.emulator.world import Rig, SimulatedWorld
 
 
 def in_view(rig: Rig, world: SimulatedWorld) -> Iterator[tuple[Target, float]]:
-    """Targets of which a part (0 to 1) is in view of a robot's camera, and it."""
+    """Targets in view of a robot's camera, with the visible share (0 to 1)."""
     for target in world.targets_for(rig.robot_id):
         part = rig.part_seen(target, world)
         if part > 0.0:
@@ -19,18 +19,18 @@ def in_view(rig: Rig, world: SimulatedWorld) -> Iterator[tuple[Target, float]]:
 
 
 class TruthLog:
-    """A line of JSON a picture.
+    """Ground truth as one line of JSON per picture.
 
     ``{"robot", "at": Unix s, "visible": [{"key", "class", "x", "y", "part"}]}``: all
-    targets of which a part (0 to 1) is in view, by their true place in ``map`` (m),
-    whatever the detector makes of them.
+    targets of which a part (0 to 1) is in view, by their true position in ``map`` (m),
+    whatever the detector reports.
     """
 
     def __init__(self, file: Path) -> None:
         self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
 
     def looked(self, rig: Rig, world: SimulatedWorld, at: float) -> None:
-        """A robot has just looked (``at`` Unix s, by its own clock)."""
+        """Record a robot's view at its picture (``at`` Unix s, by its own clock)."""
         visible = []
         for target, part in in_view(rig, world):
             pose = target.body.pose
@@ -47,5 +47,5 @@ class TruthLog:
         self._file.write(orjson.dumps(told).decode() + "\n")
 
     def close(self) -> None:
-        """Nothing more comes."""
+        """Close the file."""
         self._file.close()

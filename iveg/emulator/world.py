@@ -1,7 +1,7 @@
-"""The greenhouse with everybody in it: who is where, and what each robot senses there.
+"""The simulated world: robots, people and climate, and each robot's sensor values.
 
-Pure but for its seeds: time is an argument, so an hour is a loop of steps.
-``fleet.py`` runs the same world in real time and speaks MQTT for its robots.
+Deterministic for a seed: time is an argument, so an hour is a loop of steps.
+``fleet.py`` runs the same world in real time over MQTT.
 """
 
 import math
@@ -47,12 +47,12 @@ _FALSE_PERSON_CONFIDENCE = 0.95
 
 
 class Rig:
-    """The hardware of one robot and its navigation; the safety node sits between.
+    """Hardware and navigation of one robot; the safety node sits in between.
 
     Attributes:
-        command: What the drive was told last.
-        false_person: Fault: a place in ``map`` where the camera sees a person.
-        hides_people: Fault: the camera sees no person.
+        command: Last command of the drive.
+        false_person: Fault: a position in ``map`` where the camera detects a person.
+        hides_people: Fault: the camera detects no person.
     """
 
     def __init__(
@@ -83,17 +83,17 @@ class Rig:
         )
 
     def drive(self, command: Twist2D) -> None:
-        """Take a command; it holds until the next."""
+        """Set the command of the drive; it holds until the next."""
         self.command = command
 
     def move(self, dt: float) -> None:
-        """Let ``dt`` seconds pass on wheels."""
+        """Move the wheels for ``dt`` seconds."""
         self.vehicle.step(self.command, dt)
         truth, twist = self.vehicle.pose, self.vehicle.twist
         self._believed = self._odometer.measure(truth, twist, dt)
 
     def blind(self, order: FaultOrder) -> None:
-        """Do what a fault order says of what the camera sees."""
+        """Set the camera faults of an order."""
         if order.hide_people is not None:
             self.hides_people = order.hide_people
         if "false_person" in order.model_fields_set:
@@ -101,11 +101,11 @@ class Rig:
             self.false_person = None if place is None else (place.x, place.y)
 
     def body(self) -> Body:
-        """Seen from above."""
+        """Footprint of the robot."""
         return self.vehicle.body(self.robot_id)
 
     def wish(self, now: float, around: "SimulatedWorld") -> Twist2D:
-        """What navigation asks for; ``now`` in seconds into the run."""
+        """Twist that navigation requests; ``now`` in seconds into the run."""
         discs = [person.disc for person in around.people]
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())
@@ -114,7 +114,7 @@ class Rig:
     # --- sensors ------------------------------------------------------------------
 
     def odometry(self) -> Odometry:
-        """Pose as believed, speeds as measured."""
+        """Estimated pose, measured speeds."""
         return Odometry(self.robot_id, Origin(), self._believed, self.vehicle.twist)
 
     def scan(self, around: "SimulatedWorld") -> LaserScan:
@@ -147,7 +147,7 @@ class Rig:
         return DetectionFrame(self.robot_id, Origin(), found, self._detector.lost)
 
     def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
-        """How much of a target its camera has in view, whatever the detector says."""
+        """Visible share of a target from its camera, whatever the detector reports."""
         camera = self.vehicle.pose.compose(self.profile.camera)
         return self._detector.part_seen(camera, target.body, around.scenery)
 
@@ -162,11 +162,11 @@ class SimulatedWorld:
     """Scenery, robots and people.
 
     Args:
-        greenhouse: Where.
-        layout: Who, and on which ways.
-        detector: How good the robots' detectors are.
+        greenhouse: The greenhouse.
+        layout: Robots and people with their routes.
+        detector: Error model of the robots' detectors.
         seed: The same seed gives the same people and the same noise.
-        camera: Where boxes come from: drawn about the truth, or by grounding.
+        camera: Source of the boxes: drawn about the truth, or by grounding.
     """
 
     def __init__(
@@ -198,25 +198,25 @@ class SimulatedWorld:
         ]
 
     def walk(self, dt: float) -> None:
-        """Let ``dt`` seconds pass for the people."""
+        """Move the people for ``dt`` seconds."""
         bodies = self.bodies()
         for person in self.people:
             person.step(dt, bodies, self.scenery)
 
     def bodies(self) -> list[Body]:
-        """All robots seen from above."""
+        """Footprints of all robots."""
         return [rig.body() for rig in self.rigs.values()]
 
     def bodies_but(self, robot_id: str) -> list[Body]:
-        """The other robots, as one of them meets them."""
+        """The other robots, as obstacles for one of them."""
         return [body for body in self.bodies() if body.robot_id != robot_id]
 
     def discs(self) -> list[Disc]:
-        """All people seen from above."""
+        """Footprints of all people."""
         return [person.disc for person in self.people]
 
     def targets_for(self, robot_id: str) -> list[Target]:
-        """What a robot's camera may see."""
+        """Possible targets of a robot's camera."""
         people = [person_target(n, disc) for n, disc in enumerate(self.discs())]
         return people + [robot_target(body) for body in self.bodies_but(robot_id)]
 
@@ -225,7 +225,7 @@ _DAY_S = 86_400.0
 
 
 def climate_at(wall: float) -> Climate:
-    """The air at a time of day (Unix s): warm and dry at 14 h UTC, damp at night.
+    """Climate at a time of day (Unix s): warm and dry at 14 h UTC, humid at night.
 
     Typical of a Mediterranean greenhouse in spring; CO₂ falls while the crop works.
     """

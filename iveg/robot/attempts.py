@@ -1,9 +1,9 @@
-"""What this robot has said to each release and resume, so that a copy changes nothing.
+"""Verdicts of a robot on release and resume orders, so that copies change nothing.
 
-An order comes once on each transport and may come again.  Whichever copy is first is
-judged; every other is answered alike, also when the robot has changed meanwhile: what
-was refused stays refused.  What is forgotten, by number or by a reboot, cannot act
-either: its challenge is spent (docs/safety.md).
+An order arrives once on each transport and may be repeated.  The first copy is judged;
+every later copy gets the same answer, even when the robot's state has changed: a
+refused order stays refused. An attempt that is no longer remembered, because of its age
+or a reboot, cannot act either: its challenge is spent (docs/safety.md).
 """
 
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ ATTEMPTS_KEPT = 64
 
 @dataclass(frozen=True, slots=True)
 class AttemptVerdict:
-    """What became of an order.
+    """Result of an order.
 
     Attributes:
-        answered: The hold that the answer names.
+        answered: Hold that the answer names.
         code: ``RELEASED``, ``RESUMED`` or ``REFUSED``.
         why: The code of a refusal.
     """
@@ -29,13 +29,13 @@ class AttemptVerdict:
 
 
 class Attempts:
-    """The verdicts on the last 64 attempts."""
+    """Verdicts on the last 64 attempts."""
 
     def __init__(self) -> None:
         self._verdicts: dict[str, AttemptVerdict] = {}
 
     def recall(self, attempt: str | None) -> AttemptVerdict | None:
-        """The verdict on an order that came before; None where it is the first."""
+        """Verdict on an order that came before; None for the first copy."""
         return None if attempt is None else self._verdicts.get(attempt)
 
     def note(self, attempt: str | None, verdict: AttemptVerdict) -> None:

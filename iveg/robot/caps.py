@@ -1,8 +1,8 @@
-"""What a robot may drive at most: the lowest of its caps, lowered at once, raised late.
+"""Speed caps of a robot: the lowest applies, at once when lower, delayed when higher.
 
-Factors are 0, 0.5 or 1 and never multiplied (docs/safety.md): two zones that overlap
-still halve.  A raw cap that goes down counts immediately; one that goes up must stay up
-for a second first, and what came lower in that second counts.
+Factors are 0, 0.5 or 1 and are never multiplied (docs/safety.md): two overlapping zones
+still halve the speed.  A raw cap that falls applies immediately; one that rises must
+stay up for one second first, and a lower cap within that second counts.
 """
 
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ from iveg.domain.feedback import FULL_SPEED, HALF_SPEED
 from iveg.domain.limits import LIMITS
 
 _REASONS = ("clear", "stale", "watchdog", "robot", "person")
-"""What a report may give as reason for a cap; at equal factors the last one is told."""
+"""Reasons of a cap in a report; at equal factors the later one is reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,29 +32,29 @@ FREE = Cap(FULL_SPEED, "clear")
 
 
 def quantised(factor: float) -> float:
-    """The allowed factor that is not above a given one."""
+    """Largest allowed factor that is not above the given one."""
     if factor >= FULL_SPEED:
         return FULL_SPEED
     return HALF_SPEED if factor >= HALF_SPEED else 0.0
 
 
 def known_reason(reason: str) -> str:
-    """A reason that a report may carry; an unheard-of one is told as ``stale``."""
+    """Reason that a report may carry; an unknown one is reported as ``stale``."""
     return reason if reason in _REASONS and reason != "clear" else "stale"
 
 
 def lowest(caps: Iterable[Cap]) -> Cap:
-    """The cap that counts: the lowest factor, people before robots before silence."""
+    """The effective cap: lowest factor; if equal, people, then robots, then silence."""
     asked = [cap for cap in caps if cap is not FREE]
     return min((*asked, FREE), key=Cap._order) if asked else FREE
 
 
 @dataclass(frozen=True, slots=True)
 class AppliedCap:
-    """The cap that is in force, and the one that waits to replace it.
+    """The cap in force and a pending higher one.
 
     Attributes:
-        waiting: Lowest raw cap since ``since``, all above ``cap``; None: nothing waits.
+        waiting: Lowest raw cap since ``since``, all above ``cap``; None: no change.
     """
 
     cap: Cap
@@ -62,7 +62,7 @@ class AppliedCap:
     since: float = 0.0
 
     def settle(self, raw: Cap, now: float) -> "AppliedCap":
-        """Take the raw cap of this moment: down at once, up after 1.0 s."""
+        """Apply the present raw cap: a lower one at once, a higher one after 1.0 s."""
         if raw is self.cap and self.waiting is None:
             return self
         if raw.factor <= self.cap.factor:

@@ -1,7 +1,7 @@
-"""What this robot has heard of iVeg, told back so that iVeg can prove our age.
+"""Newest feedback that this robot received, sent back as proof of the message age.
 
-Every message of ours names the newest feedback that we had heard when we measured;
-what is in it was measured after that feedback left iVeg (docs/interfaces/mqtt.md).
+Every message names the newest feedback that the robot had received when it measured;
+its content was measured after that feedback left iVeg (docs/interfaces/mqtt.md).
 """
 
 from iveg.domain.observations import FeedbackRef, Origin
@@ -9,15 +9,15 @@ from iveg.domain.order import StreamOrder
 
 
 class Echo:
-    """Keeps the newest feedback, of whatever topic: iVeg counts them all as one."""
+    """Reference to the newest feedback, of any topic: iVeg counts all topics as one."""
 
     def __init__(self) -> None:
         self._order = StreamOrder()
         self.heard: FeedbackRef | None = None
-        """None before the first."""
+        """None before the first feedback."""
 
     def take(self, feedback: Origin) -> None:
-        """A feedback that could be read has come."""
+        """Store the reference of a feedback that could be read."""
         if feedback.boot is None or feedback.seq is None:
             return
         if self._order.judge(feedback) == "new":

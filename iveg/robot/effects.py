@@ -1,6 +1,7 @@
-"""What the safety machine wants done, as frozen values, in the order to do it.
+"""Effects that the safety machine requests, as frozen values in the order of execution.
 
-Zero command first, then the hold set to disk, then the answer, then the report.
+The zero command comes first, then the hold set on disk, then the answer, then the
+report.
 """
 
 from dataclasses import dataclass
@@ -15,28 +16,28 @@ AnswerCode = Literal["LATCHED", "RELEASED", "RESUMED", "REFUSED"]
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Tell the drive this, now."""
+    """Send this command to the drive at once."""
 
     twist: Twist2D
 
 
 @dataclass(frozen=True, slots=True)
 class Persist:
-    """Keep this hold set over a loss of power."""
+    """Store this hold set so that it survives a loss of power."""
 
     holds: HoldSet
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Answer a command on ``cmdexe``; the uplink fills the origin."""
+    """Answer a command on ``cmdexe``; the uplink fills in the origin."""
 
     answer: CommandAnswer
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Say what is applied; the uplink fills the origin and tells its ``seq`` back.
+    """Publish a safety report; the uplink fills in the origin and returns its ``seq``.
 
     Attributes:
         is_measure: Also for the IoT Agent, which gets changes and two a second.

@@ -1,7 +1,7 @@
-"""The last word before the drive: what upstream wishes, capped, ramped or zero.
+"""The gate before the drive: upstream commands, capped, ramped or replaced by zero.
 
-After a resume upstream must first ask for nothing for half a second, so that a wish
-which waited behind the hold cannot lurch the robot (neutral interlock, docs/safety.md).
+After a resume upstream must request zero for half a second, so that a command issued
+during the hold cannot jerk the robot (neutral interlock, docs/safety.md).
 """
 
 import math
@@ -17,7 +17,7 @@ _LONGEST_STEP_S = 0.1
 
 
 class Gate:
-    """Turns wishes into drive commands; times are monotonic seconds.
+    """Turns requested twists into drive commands; times are monotonic seconds.
 
     Forward, reverse and turning are all scaled by the factor, so the path keeps its
     shape; speed grows by 0.5 m/s² at most and falls at once.
@@ -37,20 +37,20 @@ class Gate:
 
     @property
     def neutral_needed(self) -> bool:
-        """Whether upstream must still ask for nothing before anything moves."""
+        """Whether upstream must still request zero before the robot may move."""
         return self._neutral_needed
 
     def wish(self, twist: Twist2D, now: float) -> None:
-        """Take upstream's newest wish; one that is no number is a wish to rest."""
+        """Take upstream's newest twist; one that is not finite counts as zero."""
         finite = math.isfinite(twist.linear_x) and math.isfinite(twist.angular_z)
         self._wish, self._wished_at = (twist if finite else REST), now
 
     def require_neutral(self) -> None:
-        """From here on upstream must first ask for nothing for 0.5 s."""
+        """Require zero from upstream for 0.5 s before the robot may move again."""
         self._neutral_needed, self._neutral_since = True, None
 
     def output(self, factor: float, may_drive: bool, now: float) -> Twist2D:
-        """What the drive is told now (m/s, rad/s).
+        """Command for the drive at this moment (m/s, rad/s).
 
         Args:
             factor: 0, 0.5 or 1.
@@ -92,7 +92,7 @@ class Gate:
 
 
 def _grown(last: float, aim: float, growth: float) -> float:
-    """The largest magnitude that may follow ``last``; a change of sign starts at 0."""
+    """Largest magnitude that may follow ``last``; a change of sign starts at 0."""
     return (abs(last) if last * aim > 0 else 0.0) + growth
 
 

@@ -1,7 +1,7 @@
-"""The holds of a robot on its disk: whole or not at all.
+"""The robot's hold set on disk, written atomically.
 
-Written aside, forced to the disk and renamed, so a loss of power leaves the old set or
-the new one.  A file that cannot be read is not an empty one.
+The file is written under another name, flushed and renamed, so a loss of power leaves
+the old set or the new one.  An unreadable file is not treated as an empty set.
 """
 
 from pathlib import Path
@@ -21,12 +21,12 @@ _NAMES = TypeAdapter(list[str])
 
 
 def read_holds(file: Path) -> HoldSet | None:
-    """The stored set, an empty one before the first start; None when unreadable."""
+    """The stored set; an empty one before the first start; None when unreadable."""
     try:
         stored = load_json(file.read_bytes())
         holds = _HOLDS.validate_python(stored["holds"])
         released = _NAMES.validate_python(stored["released"])
-        # A file of an older robot has none.
+        # Files of older versions lack the key.
         joined = _NAMES.validate_python(stored.get("joined", []))
     except FileNotFoundError:
         return HoldSet()
@@ -40,7 +40,7 @@ def read_holds(file: Path) -> HoldSet | None:
 
 
 def write_holds(file: Path, holds: HoldSet) -> None:
-    """Store the set; returns when a loss of power can no longer lose it.
+    """Store the set; on return it survives a loss of power.
 
     Raises:
         OSError: the disk refused; the file is as it was.

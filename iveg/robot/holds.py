@@ -1,7 +1,7 @@
-"""What keeps a robot from moving: a set of holds, and the holds that are no more.
+"""The set of holds that keeps a robot from moving, and the ids already released.
 
-A robot drives only with an empty set.  Every hold has a name; a release must name what
-it lifts, and a name that was released once never holds again (docs/safety.md).
+A robot drives only with an empty set. Every hold has an id; a release must name the ids
+that it lifts, and a released id never holds again (docs/safety.md).
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from iveg.domain.observations import Hold
 
 RELEASED_KEPT = 64
 MAX_HOLDS = 48
-"""Of the 64 that a report may carry; the rest is room for holds of the robot's own."""
+"""Of the 64 that a report may carry; the others are reserved for local holds."""
 
 _SURVIVES_REBOOT = frozenset({"iveg", "hw", "bumper"})
 
@@ -37,18 +37,18 @@ class HoldSet:
 
     @property
     def remote(self) -> frozenset[str]:
-        """Ids that a release from iVeg must name, all of them."""
+        """Ids that a release from iVeg must name completely."""
         return frozenset(hold.id for hold in self.holds if hold.ack == "remote")
 
     @property
     def link_alone(self) -> Hold | None:
-        """The ``link`` hold that may still clear itself; None when others came."""
+        """The ``link`` hold that may clear itself; None when there are other holds."""
         if len(self.holds) == 1 and self.holds[0].ack == "auto":
             return self.holds[0]
         return None
 
     def latch(self, hold: Hold) -> "HoldSet":
-        """One hold more; a ``link`` hold that is joined no longer clears itself."""
+        """Add a hold; a ``link`` hold beside others no longer clears itself."""
         earlier = tuple(
             replace(held, ack="remote") if held.ack == "auto" else held
             for held in self.holds
@@ -57,7 +57,7 @@ class HoldSet:
         return replace(self, holds=(*earlier, hold), joined=joined)._with_room()
 
     def _with_room(self) -> "HoldSet":
-        """No more holds than a report may carry: the oldest STOP joins the others."""
+        """Keep the set within the size of a report: the oldest STOP joins another."""
         ours = [hold for hold in self.holds if hold.source == "iveg"]
         if len(self.holds) <= MAX_HOLDS or len(ours) < 2:
             return self
@@ -68,9 +68,9 @@ class HoldSet:
         )
 
     def lift(self, ids: Iterable[str]) -> "HoldSet":
-        """Without the holds of these names; the names are remembered as released.
+        """The set without these holds; their ids are remembered as released.
 
-        What has joined goes with the last STOP of those that it has joined.
+        Joined STOPs are lifted together with the last STOP that they joined.
         """
         named = frozenset(ids)
         lifted = [hold.id for hold in self.holds if hold.id in named]
@@ -81,6 +81,6 @@ class HoldSet:
         return HoldSet(kept, released, self.joined if held else ())
 
     def after_reboot(self) -> "HoldSet":
-        """What a new start inherits: STOPs and local holds, not yesterday's boot."""
+        """The set that a new start inherits: STOPs and local holds, no boot hold."""
         kept = tuple(hold for hold in self.holds if hold.source in _SURVIVES_REBOOT)
         return replace(self, holds=kept)

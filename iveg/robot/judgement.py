@@ -1,7 +1,7 @@
-"""How fast a robot may drive at this moment, by all that it knows; holds apart.
+"""Speed limit of a robot at this moment from all that it knows, holds excepted.
 
-Own pose, iVeg's silence, and what others told: each is a cap, the lowest counts, and
-what is unknown is slow (docs/safety.md).
+Its own pose, iVeg's silence and the peers' feedback each give a cap; the lowest
+applies, and missing knowledge means slow (docs/safety.md).
 """
 
 import math
@@ -20,7 +20,7 @@ _REST = Twist2D(0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the machine must know of its robot.
+    """Constants of one robot for the safety machine.
 
     Attributes:
         max_speed: (m/s); ``max_turn`` (rad/s).
@@ -41,7 +41,7 @@ DEFAULT_LIMITS = Limits()
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Newest odometry; ``at`` monotonic (s); ``pose`` None: it has no place in map."""
+    """Newest odometry; ``at`` monotonic (s); ``pose`` None: not in ``map``."""
 
     pose: Pose2D | None
     twist: Twist2D
@@ -49,7 +49,7 @@ class Motion:
 
 
 class Judgement:
-    """Keeps what one robot knows and judges it; times are monotonic seconds.
+    """Knowledge of one robot and its evaluation; times are monotonic seconds.
 
     Args:
         robot_id: This robot.
@@ -65,27 +65,27 @@ class Judgement:
         self._applied = AppliedCap(Cap(0.0, "watchdog"))
         self.watchdog = Watchdog(boot_at, limits.slow_s)
         self.local = FREE
-        """What the robot's own software asks for, whatever iVeg says."""
+        """Cap requested by the robot's own software, independent of iVeg."""
 
     @property
     def cap(self) -> Cap:
-        """What is in force since ``settle``."""
+        """The cap in force since the last ``settle``."""
         return self._applied.cap
 
     @property
     def twist(self) -> Twist2D:
-        """The measured twist, however old; at rest before the first."""
+        """The measured twist, however old; zero before the first."""
         return _REST if self._motion is None else self._motion.twist
 
     def motion(self, now: float) -> Motion | None:
-        """Newest odometry; None when it is lost (0.5 s)."""
+        """Newest odometry; None when it is older than 0.5 s."""
         motion = self._motion
         if motion is None or now - motion.at > LIMITS.pose_stand_s:
             return None
         return motion
 
     def stands(self, now: float) -> bool:
-        """Whether the robot is measured to be at rest, and lately."""
+        """Whether fresh odometry shows the robot at rest."""
         motion = self.motion(now)
         if motion is None:
             return False
@@ -95,10 +95,10 @@ class Judgement:
         )
 
     def moved(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
-        """Take odometry; one that holds no number is none.
+        """Take odometry; one with a number that is not finite is ignored.
 
-        Without a pose it tells how fast the robot is, which a standstill needs, and
-        not where: then nothing can be judged near, and the cap is 0.
+        Odometry without a pose gives the speed, which confirms a standstill, but no
+        position: proximity cannot be judged, and the cap is 0.
         """
         place = () if pose is None else (pose.x, pose.y, pose.yaw)
         if all(map(math.isfinite, (*place, twist.linear_x, twist.angular_z))):
@@ -110,7 +110,7 @@ class Judgement:
             self.watchdog.heard(feedback.seen.get(self._id), now)
 
     def settle(self, now: float) -> None:
-        """Judge this moment."""
+        """Evaluate this moment."""
         self.watchdog.look(now)
         slowed = self.cap.reason in ("person", "robot")
         raw = lowest(
@@ -124,7 +124,7 @@ class Judgement:
         self._applied = self._applied.settle(raw, now)
 
     def must_stand(self, now: float) -> bool:
-        """Whether iVeg's silence holds the robot."""
+        """Whether iVeg's silence requires a hold."""
         silent = self.watchdog.silence(now) > self._limits.stand_s
         return silent and self._limits.on_link_loss == "stop"
 

@@ -1,7 +1,7 @@
-"""The lane of safety: disk before answer, answers in order, the newest reports.
+"""Outgoing safety messages: disk before answer, answers in order, newest report wins.
 
-Telemetry has its own slots in the MQTT link, so however much of it waits, it never
-delays or drops what goes through here.
+Telemetry has its own slots in the MQTT link, so no amount of pending telemetry delays
+or drops a safety message.
 """
 
 import asyncio
@@ -16,7 +16,7 @@ from iveg.robot.holds import HoldSet
 _log = logging.getLogger(__name__)
 _MAX_ANSWERS = 256
 _UNDER_WAY = 16
-"""Messages that the broker has yet to confirm.  One at a time would be one report a
+"""Messages without a confirmation of the broker.  One at a time would be one report a
 second over a radio that takes half a second each way, and no standstill is measured
 from those."""
 
@@ -52,25 +52,25 @@ class SafetyLane:
         self._room = asyncio.Semaphore(_UNDER_WAY)
         self._disk_fails = False
         self.unsent = 0
-        """Answers and reports that found no broker; the next report says the same."""
+        """Answers and reports lost without a broker; the next report has the state."""
 
     def persist(self, holds: HoldSet) -> None:
-        """Keep this set; it describes everything before, so the newest is enough."""
+        """Store this set; only the newest is pending, since it replaces all before."""
         self._to_keep = holds
         self._keep_wake.set()
 
     def answer(self, message: LaneMessage) -> None:
-        """Send after the set that it speaks of is on disk; the oldest gives way."""
+        """Send once the hold set that it refers to is on disk; drops the oldest."""
         self._answers.append(message)
         self._keep_wake.set()
 
     def report(self, message: LaneMessage) -> None:
-        """Send when there is time; a newer one of its topic takes its place."""
+        """Send when possible; a newer report of the same topic replaces it."""
         self._reports[message.topic] = message
         self._send_wake.set()
 
     async def keep_forever(self) -> None:
-        """Write sets and pass answers on until cancelled."""
+        """Write sets and release answers until cancelled."""
         while True:
             await self._keep_wake.wait()
             self._keep_wake.clear()

@@ -1,7 +1,7 @@
-"""One robot's safety software at work: performs what the safety machine decides.
+"""Safety software of one robot: executes the effects of the safety machine.
 
-The only publisher to the drive.  Effects are performed where they arise, zero first;
-disk and broker follow in their own lane and are never waited for.
+It is the only publisher to the drive.  Effects are executed where they arise, the zero
+command first; disk and broker have a queue of their own and are never waited for.
 """
 
 import asyncio
@@ -45,11 +45,11 @@ _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
 _SAID_WITHIN_S = 0.03
-"""Odometry, a wish and feedback that come together are one word to the drive."""
+"""Odometry, upstream twist and feedback that arrive together give one drive command."""
 
 
 class RobotNode:
-    """The software that rides on a robot.
+    """Safety node of one robot.
 
     Args:
         robot_id: This robot.
@@ -61,12 +61,12 @@ class RobotNode:
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this stops the robot (s).
         uplink: One message a topic, or Algorithm 1's single payload.
-        held: Nobody is at the robot while it starts: ``release_locally`` does nothing
+        held: No crew is at the robot at start: ``release_locally`` has no effect
             before ``run``.
         on_link_loss: What ``stand_s`` of silence does.
         replay: It plays a recording, which is in this map frame: its messages are
-            marked, and echo nothing, since what they say was measured long ago.
-        on_feedback: Told each feedback that could be read, and its topic's robot.
+            marked, and echo no feedback, since their content was measured long ago.
+        on_feedback: Called with the topic's robot and each feedback that could be read.
         read_clock: The robot's own clocks.
     """
 
@@ -138,41 +138,41 @@ class RobotNode:
             limits=limits,
         )
 
-    # --- what upstream may know ---------------------------------------------------
+    # --- state for upstream -------------------------------------------------------
 
     @property
     def state(self) -> State:
-        """Where the safety machine stands."""
+        """State of the safety machine."""
         return self._machine.state(self._read_clock().mono)
 
     @property
     def holds(self) -> tuple[Hold, ...]:
-        """What holds the robot."""
+        """Holds of the robot."""
         return self._machine.holds.holds
 
     @property
     def may_drive(self) -> bool:
-        """Whether wishes count; while False upstream should wish for rest.
+        """Whether upstream twists have effect; if not, upstream should request zero.
 
-        After a resume the robot moves only once upstream has wished for rest (or for
-        nothing at all) for 0.5 s.
+        After a resume the robot moves only once upstream has requested zero, or sent no
+        twist at all, for 0.5 s.
         """
         return self._machine.may_drive
 
     @property
     def speed_factor(self) -> float:
-        """The factor of the gate; holds apart."""
+        """Speed factor of the gate, holds excepted."""
         return self._machine.cap.factor
 
     @property
     def connected(self) -> bool:
-        """Whether the broker hears us."""
+        """Whether the broker is connected."""
         return self._link.connected
 
-    # --- what happens to the robot ------------------------------------------------
+    # --- inputs -------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Ride on the robot until cancelled; the drive is left at rest."""
+        """Run until cancelled; the drive is left at rest."""
         self._nobody_there = False
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -190,7 +190,7 @@ class RobotNode:
             self._drive(REST)
 
     def sense(self, *observations: Sensed) -> None:
-        """Take what the robot's own sensors say; origins are filled in here."""
+        """Take observations of the robot's own sensors; origins are filled in."""
         now = self._read_clock()
         for one in observations:
             if isinstance(one, Odometry):
@@ -203,31 +203,31 @@ class RobotNode:
                 self._uplink.send(one, own)
 
     def wish(self, twist: Twist2D) -> None:
-        """Take upstream navigation's ``cmd_vel``; forgotten after 0.5 s."""
+        """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
         self._perform(self._machine.wish(twist, self._read_clock().mono))
 
     def limit(self, factor: float, cause: str | None = None) -> None:
-        """Drive no faster than this from here on (0, 0.5 or 1), because of ``cause``.
+        """Limit the speed factor (0, 0.5 or 1) for the robot's own software.
 
-        Beside everything that iVeg asks for; never instead of it.
+        The limit applies in addition to iVeg's, never instead of it.
         """
         self._machine.limit(FREE if factor >= 1.0 else Cap(factor, "stale", cause))
 
     def tell_faults(self, faults: tuple[RobotFault, ...]) -> None:
-        """What the next reports say is wrong with the robot's own data."""
+        """Set the data faults that the next reports carry."""
         self._faults = faults
 
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
-        """The red button or the bumper at the robot was pressed."""
+        """Hold the robot because its red button or bumper was pressed."""
         self._perform(self._machine.local_hold(source, self._read_clock().mono))
 
     def release_locally(self) -> None:
-        """A crew at the robot lifts boot, button and bumper holds and resumes."""
+        """Lift boot, button and bumper holds and resume, for the crew at the robot."""
         if not self._nobody_there:
             self._perform(self._machine.release_locally(self._read_clock().mono))
 
     async def _tick_forever(self) -> None:
-        """Tick whenever the drive was told nothing for 40 ms."""
+        """Tick whenever the drive got no command for 40 ms."""
         self._loop = asyncio.get_running_loop()
         self._broken = self._loop.create_future()
         self._tick()
@@ -286,7 +286,7 @@ class RobotNode:
                     self._report(report, is_measure=is_measure)
 
     def _tell_drive(self, twist: Twist2D) -> None:
-        """Rest and news at once; what it was told a moment ago is not said twice."""
+        """Send zero and changes at once; do not repeat a command just sent."""
         now = self._read_clock().mono
         told, at = self._told
         if twist == told and twist != REST and now - at < _SAID_WITHIN_S:
@@ -312,5 +312,5 @@ class RobotNode:
             self._lane.report(message)
 
     def _own(self, now: Instant) -> Instant:
-        """The moment on the robot's own clocks: since its boot, and its wall clock."""
+        """This moment on the robot's own clocks: seconds since boot, and wall clock."""
         return Instant(now.mono - self._started, now.wall)

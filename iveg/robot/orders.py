@@ -1,7 +1,7 @@
-"""What a robot reads from its ``cmd`` topic: generous towards STOP, strict elsewhere.
+"""Orders from a robot's ``cmd`` topic: tolerant towards STOP, strict elsewhere.
 
-Whatever smells of a STOP is one; a release or resume must be exactly what the contract
-says, or it is refused with a reason (docs/safety.md).
+Any payload that mentions a STOP is one; a release or resume must match the contract
+exactly, or it is refused with a reason (docs/safety.md).
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from iveg.ngsi.codec import load_json
 
 _STOP = "stop"
 _MAX_NAMED = 128
-_FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses reports that hold any of these
+_FORBIDDEN = frozenset("<>\"'=;()")  # Orion refuses values with any of these
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class ReleaseOrder:
     """Lift exactly these holds.
 
     Attributes:
-        attempt: Names the order; its copies have the same.  None from the earlier
+        attempt: Id of the order, shared by its copies.  None from the earlier
             version.
     """
 
@@ -46,7 +46,7 @@ class ResumeOrder:
 
 @dataclass(frozen=True, slots=True)
 class Unusable:
-    """Neither; ``why`` is a short, stable code."""
+    """An order that cannot be used; ``why`` is a short, stable code."""
 
     why: str
 
@@ -62,7 +62,7 @@ def read_order(payload: bytes) -> Order:
         return (
             StopOrder() if _STOP.encode() in payload.lower() else Unusable("unreadable")
         )
-    # A key that JSON dropped because it came twice still counts: look at the bytes.
+    # JSON drops the first of two equal keys, so the bytes are searched as well.
     if b'"stop"' in payload.lower() or _speaks_of_stop(message):
         return StopOrder(_stop_id(message))
     return _release_or_resume(message)
@@ -72,7 +72,7 @@ def read_desired_state(payload: bytes) -> tuple[str, ...] | None:
     """Read ``/{robot}/iveg/desired``.
 
     Returns:
-        The STOPs that hold (none named: one without a name); None where nothing holds.
+        The STOPs that hold (empty: one without an id); None where nothing holds.
     """
     try:
         level = load_json(payload)
@@ -142,5 +142,5 @@ def _resume(asked: dict[str, object]) -> Order:
 
 
 def _has_good_name(asked: dict[str, object]) -> bool:
-    """Whether an order has no attempt at all or one that can be answered."""
+    """Whether an order has no attempt id at all or one that can be answered."""
     return "attempt" not in asked or _usable_id(asked["attempt"]) is not None

@@ -1,9 +1,9 @@
-"""What a robot knows from others: feedback of every peer topic, kept and aged.
+"""Feedback of every peer topic, kept with its age: the robot's view of others.
 
 Algorithm 3 of the paper, judged against the robot's own pose.  It differs in four
-ways: a person who is missing from a message ages out instead of vanishing, a ring grows
-while its topic is silent (docs/safety.md), a peer that is known to stand slows nobody,
-and an alert about the robot itself is ignored, or it would slow for ever.
+ways: a person missing from a message ages out instead of being dropped, a radius grows
+while its topic is silent (docs/safety.md), a peer known to stand slows nobody,
+and an alert about the robot itself is ignored, or it would slow down for ever.
 """
 
 from collections.abc import Iterator
@@ -32,11 +32,11 @@ _Key = tuple[str, str | None, str | None, int]
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """One alert as last told.
+    """One alert as last received.
 
     Attributes:
-        missing_since: First message of the topic that was without it; None: present.
-        myself: It describes this robot.
+        missing_since: Time of the topic's first message without it; None: present.
+        myself: The alert describes this robot.
     """
 
     alert: FeedbackAlert
@@ -47,7 +47,7 @@ class _Kept:
 
 @dataclass(frozen=True, slots=True)
 class _Peer:
-    """The observer of a topic, where iVeg believes it to be.
+    """The observer of a topic at the pose that iVeg reports.
 
     Attributes:
         stamp: As told; while it stays the same, the pose grows old.
@@ -60,7 +60,7 @@ class _Peer:
     at: float
 
     def cap(self, name: str, own: Pose2D, beyond: float, now: float) -> Cap:
-        """What the peer asks of a robot at ``own``."""
+        """Cap that the peer requires of a robot at ``own``."""
         age = now - self.at
         if age > LIMITS.ring_lasts_s or (self.stands and age <= LIMITS.silence_s):
             return FREE
@@ -71,7 +71,7 @@ class _Peer:
 
 @dataclass(slots=True)
 class _Topic:
-    """What one topic said last; ``boots`` are all it ever had, newest last."""
+    """Newest state of one topic; ``boots`` are all seen so far, newest last."""
 
     origin: Origin
     at: float
@@ -82,7 +82,7 @@ class _Topic:
 
 
 class PeerFeedback:
-    """Everything that feedback told one robot.
+    """All feedback that one robot received.
 
     Args:
         robot_id: Whose speed limits count.
@@ -95,10 +95,10 @@ class PeerFeedback:
     def take(
         self, topic: str, feedback: Feedback, own: Pose2D | None, now: float
     ) -> bool:
-        """Take a message of ``topic``; older ones than it already gave are dropped.
+        """Take a message of ``topic``; messages older than the newest are dropped.
 
         Returns:
-            Whether it counted.
+            Whether it was accepted.
         """
         memory = self._topics.get(topic)
         if memory is None:
@@ -114,11 +114,11 @@ class PeerFeedback:
         return True
 
     def caps(self, own: Pose2D | None, slowed: bool, now: float) -> Iterator[Cap]:
-        """Everything that asks this robot to be slow, at pose ``own`` in ``map``.
+        """All caps on this robot at pose ``own`` in ``map``.
 
         Args:
-            own: None while the robot does not know where it is.
-            slowed: The robot is slow for a person or peer: rings let go later.
+            own: None while the robot is not localised.
+            slowed: The robot is already slow for a person or peer: release is delayed.
             now: Monotonic (s).
         """
         beyond = LIMITS.release_beyond_m if slowed else 0.0
@@ -176,7 +176,7 @@ class PeerFeedback:
         own: Pose2D | None,
         before: _Kept | None,
     ) -> bool:
-        # What I see myself is never me.
+        # The robot's own detections never show itself.
         if alert.class_ != "robot" or alert.observer == self._me:
             return False
         if alert.class_id == self._me or _limited_free(topic.speed_limit, alert):
@@ -184,20 +184,20 @@ class PeerFeedback:
         if alert.position is None or own is None:
             return False
         near = own.distance_to(*alert.position[:2]) <= MYSELF_WITHIN_M
-        # I drive on; the spot where I was seen stays behind and is still about me.
+        # The robot moves on; the place where it was seen still belongs to it.
         same_spot = before is not None and before.alert.position == alert.position
         return near or (same_spot and before is not None and before.myself)
 
 
 def _alive(kept: _Kept, topic: _Topic, now: float) -> bool:
-    """Whether an alert still counts: told lately, and its topic has not moved on."""
+    """Whether an alert still counts: recent, and not superseded on its topic."""
     missing = kept.missing_since
     moved_on = missing is not None and topic.at - missing >= MOVED_ON_S
     return not moved_on and now - kept.at <= LIMITS.ring_lasts_s
 
 
 def _newer(origin: Origin, topic: _Topic) -> bool:
-    """Whether a message counts: a boot not met before, or further in the count."""
+    """Whether a message counts: of an unknown boot, or with a higher ``seq``."""
     if origin.boot != topic.origin.boot:
         if origin.boot in topic.boots:
             return False
@@ -209,7 +209,7 @@ def _newer(origin: Origin, topic: _Topic) -> bool:
 
 
 def _told(feedback: Feedback) -> dict[_Key, FeedbackAlert]:
-    """The people and robots of one message; the newest is usually in the list too."""
+    """People and robots of one message; the newest is usually in the list too."""
     alerts = list(feedback.alerts)
     if feedback.alert is not None and feedback.alert not in alerts:
         alerts.append(feedback.alert)
@@ -252,7 +252,7 @@ def _ring(alert: FeedbackAlert, silence: float) -> float:
 def _inside(
     alert: FeedbackAlert, observer: _Peer | None, own: Pose2D | None, ring: float
 ) -> bool:
-    """Whether I am in the ring; somebody of unknown place is where the observer is."""
+    """Whether ``own`` is inside the radius, about the observer if no place is known."""
     if alert.position is not None:
         place = alert.position[:2]
     elif observer is not None:

@@ -1,18 +1,18 @@
-"""How much of its telemetry a robot sends through the IoT Agent.
+"""Rates of telemetry that a robot sends through the IoT Agent.
 
-One agent carries about 150 measures a second; two robots at 30 Hz have 180.  iVeg tells
-how far Orion is behind, and a robot that hears of a backlog sends less, scans first::
+One agent carries about 150 measures a second; two robots at 30 Hz send 180.  iVeg
+reports Orion's backlog, and a robot that learns of one sends less, scans first::
 
     level  0 ───────────── 1 ───────────── 2 ───────────── 3
     scans  all ──> 1 Hz    1 Hz            1 Hz            1 Hz
-    looks  all             all ──> 3 Hz    3 Hz            3 Hz
+    camera all             all ──> 3 Hz    3 Hz            3 Hz
     poses  all             all             all ──> 5 Hz    5 Hz
 
-The level rises while the backlog lasts and sinks slowly once it is over; each time that
-was too early, it waits twice as long before it tries again.  Nothing that is told can
-raise a rate above the sensor's own or lower it below these floors.  Safety reports are
+The level rises while the backlog lasts and falls slowly afterwards; after each fall
+that was too early the next one waits twice as long.  No reported backlog can raise a
+rate above the sensor's own or lower it below these floors.  Safety reports are
 never fewer, nor are the single payloads of Algorithm 1, which hold all in one message.
-What is held back still goes straight to iVeg.
+Messages held back still go to iVeg directly.
 """
 
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ FLOOR_HZ: dict[str, float] = {
 LEVELS = float(len(FLOOR_HZ))
 
 BEHIND_S, WELL_S = 0.5, 0.25
-"""A backlog, and none; between the two the level stays."""
+"""Lag (s) that counts as a backlog, and as none; between the two the level stays."""
 FAR_BEHIND_S = 3.0
 RISE_PER_S, RISE_FAR_PER_S, SINK_PER_S = 0.5, 1.0, 0.02
 PATIENCE_S, LONGEST_PATIENCE_S = 10.0, 600.0
@@ -36,7 +36,7 @@ _LONGEST_STEP_S = 0.5
 
 @dataclass(slots=True)
 class UplinkRates:
-    """Says which message is a measure; every other is for iVeg alone.
+    """Decides which message is a measure; every other is sent to iVeg alone.
 
     All moments are monotonic (s).
 
@@ -52,7 +52,7 @@ class UplinkRates:
     _due: dict[str, float] = field(default_factory=dict)
 
     def told(self, backlog_s: float | None, now: float) -> None:
-        """Orion is this far behind; None where nobody knows, which changes nothing."""
+        """Take Orion's reported lag; None, when unknown, changes nothing."""
         before, self._told_at = self._told_at, now
         if backlog_s is None or before is None:
             return
@@ -81,17 +81,17 @@ class UplinkRates:
             self.level = max(0.0, self.level - SINK_PER_S * step)
 
     def is_measure(self, suffix: str, now: float, *, news: bool = False) -> bool:
-        """Whether a device's message is for the agent, too; news always is."""
+        """Whether a device's message also goes to the agent; changes always do."""
         interval = self._interval_s(suffix)
         due = self._due.get(suffix, now)
         if now < due and not news:
             return False
-        # What came late is made up for, so that the mean rate is kept; not more.
+        # A late message is compensated, so that the mean rate is kept, not exceeded.
         self._due[suffix] = max(due, now - interval) + interval
         return True
 
     def _interval_s(self, suffix: str) -> float:
-        """The least time between two measures of a device (s); 0: every one."""
+        """Least time between two measures of a device (s); 0: every message is one."""
         if self.level == 0.0:
             return 0.0
         for place, (device, floor_hz) in enumerate(FLOOR_HZ.items()):

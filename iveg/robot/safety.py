@@ -7,14 +7,14 @@ r"""The safety machine of one robot, pure: facts and times in, frozen effects ou
                         ^   \__ any stop / hw / bumper, in any state __        │
                         │                                             \       │ resume
                      BRAKING <────────────────────────────────── RUNNING <────┘
-    RUNNING: upstream at rest for 0.5 s first, then the ramp;  factor = min(caps)
+    RUNNING: upstream at zero for 0.5 s first, then the ramp;  factor = min(caps)
              feedback older than 1.0 s, or a person or peer near  -> cap 0.5
              feedback older than 3.0 s -> hold `link`, which clears itself when
              feedback was fresh for 2.0 s, three times a minute, if no other hold came
 
 The state is never stored: it follows from the holds, the measured speed and whether
-somebody resumed.  The paper's Algorithm 3 is in ``peer_feedback``; here silence is
-added, which the paper takes for permission and iVeg does not.
+a resume was accepted.  The paper's Algorithm 3 is in ``peer_feedback``; here silence is
+added, which the paper treats as permission and iVeg does not.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ REPORT_EVERY_S, REPORT_HELD_EVERY_S = 0.4, 0.075
 second is for iVeg alone: ten a second would be most of what one agent can carry."""
 
 _Applied = tuple[float, str, str | None, str | None, tuple[Hold, ...], str]
-"""What makes a report news; speeds and ages alone do not."""
+"""Fields whose change triggers a report; speeds and ages alone do not."""
 
 
 class SafetyMachine:
@@ -60,7 +60,7 @@ class SafetyMachine:
         now: Monotonic (s).
         stored: The hold set of the last run; None when it could not be read, which
             counts as a STOP whose name was lost.
-        fresh: Makes random texts that never repeat, for challenges and hold ids.
+        fresh: Returns a new random text, for challenges and hold ids.
         limits: Speeds and waiting times.
     """
 
@@ -90,10 +90,10 @@ class SafetyMachine:
             self._latch(self._nameless_stop(), now)
         self._latch(Hold(f"boot-{boot}", "boot", "remote"), now)
 
-    # --- what can be asked --------------------------------------------------------
+    # --- state --------------------------------------------------------------------
 
     def state(self, now: float) -> State:
-        """Where the robot stands in the drawing above."""
+        """State of the robot in the drawing above."""
         if not self._holds.holds:
             return "RUNNING" if self._resumed else "READY"
         if self._judgement.motion(now) is None:
@@ -102,17 +102,17 @@ class SafetyMachine:
 
     @property
     def holds(self) -> HoldSet:
-        """What holds the robot, and what did."""
+        """Current holds and those already released."""
         return self._holds
 
     @property
     def challenge(self) -> str:
-        """What a release or resume must echo."""
+        """Text that a release or resume must echo."""
         return self._challenge
 
     @property
     def may_drive(self) -> bool:
-        """Whether a wish would move the robot: nothing holds it, and it was neutral."""
+        """Whether a twist would move the robot: no holds, and neutral was seen."""
         return self._free and not self._gate.neutral_needed
 
     @property
@@ -120,42 +120,42 @@ class SafetyMachine:
         """The cap that the gate applies."""
         return self._judgement.cap
 
-    # --- what happens -------------------------------------------------------------
+    # --- inputs -------------------------------------------------------------------
 
     def tick(self, now: float) -> tuple[Effect, ...]:
-        """Time passed; call at least 20 times a second."""
+        """Advance time; call at least 20 times a second."""
         self._judge(now)
         return self._effects(now)
 
     def wish(self, twist: Twist2D, now: float) -> tuple[Effect, ...]:
-        """Upstream navigation asks for this twist."""
+        """Take the twist that upstream navigation requests."""
         self._gate.wish(twist, now)
         return self.tick(now)
 
     def odometry(
         self, pose: Pose2D | None, twist: Twist2D, now: float
     ) -> tuple[Effect, ...]:
-        """The robot's sensors measured where it is (None: not in map) and how fast."""
+        """Take measured pose (None: not in ``map``) and speed."""
         self._judgement.moved(pose, twist, now)
         return self.tick(now)
 
     def limit(self, cap: Cap) -> None:
-        """The robot's own software asks for at most this, until it says otherwise."""
+        """Set the cap of the robot's own software; it holds until the next call."""
         self._judgement.local = cap
 
     def feedback(
         self, topic: str, feedback: Feedback, now: float
     ) -> tuple[Effect, ...]:
-        """A message of ``/{topic}/mqtt_feedback`` came."""
+        """Take a message of ``/{topic}/mqtt_feedback``."""
         self._judgement.told(topic, feedback, now)
         return self.tick(now)
 
     def reported(self, seq: int, now: float) -> None:
-        """The safety report that was wanted has left as ``seq``."""
+        """Note that the requested safety report was sent as ``seq``."""
         self._judgement.watchdog.sent(seq, now)
 
     def command(self, payload: bytes, now: float) -> tuple[Effect, ...]:
-        """Something came on ``/{apikey}/{robot}/cmd``."""
+        """Take a message of ``/{apikey}/{robot}/cmd``."""
         self._judge(now)
         order = read_order(payload)
         if isinstance(order, StopOrder):
@@ -168,7 +168,7 @@ class SafetyMachine:
         return self._effects(now, answer)
 
     def desired(self, payload: bytes, now: float) -> tuple[Effect, ...]:
-        """The retained desired state came; ``run`` releases nothing."""
+        """Take the retained desired state; ``run`` releases nothing."""
         level = read_desired_state(payload)
         if level is not None:
             for hold_id in level or (None,):
@@ -178,13 +178,13 @@ class SafetyMachine:
     def local_hold(
         self, source: Literal["hw", "bumper"], now: float
     ) -> tuple[Effect, ...]:
-        """The red button or the bumper was pressed at the robot."""
+        """Hold the robot because its red button or bumper was pressed."""
         if all(hold.source != source for hold in self._holds.holds):
             self._latch(Hold(f"{source}-{self._fresh()}", source, "local"), now)
         return self.tick(now)
 
     def release_locally(self, now: float) -> tuple[Effect, ...]:
-        """A crew at the robot lifts what is theirs to lift, and resumes.
+        """Lift the local holds and resume, as the crew at the robot does.
 
         A STOP from iVeg stays, and with it the robot.
         """
@@ -207,7 +207,7 @@ class SafetyMachine:
         return self._answer(hold_id or hold.id, "LATCHED")
 
     def _held_as(self, hold_id: str | None) -> Hold:
-        """The hold that a STOP becomes, or the one that it is already."""
+        """The hold for a STOP: an existing one or a new one."""
         held = None if hold_id is None else self._holds.find(hold_id)
         if held is not None and held.ack == "remote":
             return held
@@ -222,7 +222,7 @@ class SafetyMachine:
         return Hold(f"local-{self._fresh()}", "iveg", "remote")
 
     def _attempt(self, order: ReleaseOrder | ResumeOrder, now: float) -> CommandAnswer:
-        """The first copy of an order is judged; every other is answered alike."""
+        """Judge the first copy of an order; give every other the same answer."""
         verdict = self._attempts.recall(order.attempt)
         if verdict is None:
             if isinstance(order, ReleaseOrder):
@@ -237,7 +237,7 @@ class SafetyMachine:
     def _release(self, order: ReleaseOrder, now: float) -> AttemptVerdict:
         first = order.ids[0]
         if set(order.ids) <= set(self._holds.released):
-            # The same release again: nothing left to lift, answered alike.
+            # The same release again: no hold is left to lift; the answer is the same.
             return AttemptVerdict(first, "RELEASED")
         why = self._why_not_release(order, now)
         if why is not None:
@@ -247,7 +247,7 @@ class SafetyMachine:
         return AttemptVerdict(first, "RELEASED")
 
     def _why_not_release(self, order: ReleaseOrder, now: float) -> str | None:
-        """The code that a release is refused with; None when it is perfect."""
+        """Code of the refusal of a release; None when it is valid."""
         remote = self._holds.remote
         if not remote:
             return "not_held"
@@ -278,7 +278,7 @@ class SafetyMachine:
     def _refuse(
         self, answered: str | None, challenge: str, why: str, now: float
     ) -> AttemptVerdict:
-        """Refuse; a copy that comes later, when all would be right, finds it spent."""
+        """Refuse an order; its challenge is spent, so a later copy cannot succeed."""
         if challenge == self._challenge:
             self._renew_challenge(now)
         return AttemptVerdict(answered, "REFUSED", why)
@@ -306,7 +306,7 @@ class SafetyMachine:
     # --- judgement ----------------------------------------------------------------
 
     def _judge(self, now: float) -> None:
-        """Bring caps, the ``link`` hold and the challenge up to this moment."""
+        """Evaluate caps, the ``link`` hold and the challenge at this moment."""
         self._judgement.settle(now)
         self._judge_link(now)
         waited = now - self._challenge_at
@@ -357,13 +357,13 @@ class SafetyMachine:
         if is_news or now - self._reported_at >= every:
             self._said, self._reported_at = applied, now
             is_measure = is_news or now - self._measured_at >= REPORT_EVERY_S
-            if is_measure:  # news and two a second are for the agent as well
+            if is_measure:  # changes, and two reports a second, also go to the agent
                 self._measured_at = now
             effects.append(Report(self._report(applied, now), is_measure))
         return tuple(effects)
 
     def _applied(self) -> _Applied:
-        """What is in force; a robot that waits for resume says 0, ``hold``, none."""
+        """Applied limit; a robot that waits for resume reports 0, ``hold``."""
         cap, holds, challenge = self.cap, self._holds.holds, self._challenge
         if self._free:
             return cap.factor, cap.reason, cap.cause, cap.decision_id, holds, challenge

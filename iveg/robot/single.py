@@ -1,8 +1,8 @@
-"""Algorithm 1's single payload, as the paper writes it: one message a robot and tick.
+"""Algorithm 1's single payload, as the paper writes it: one message per robot and tick.
 
-The payload has room for one detection, so those of one look take turns, surest first; a
-scan travels once; "looked, saw nothing", which the paper cannot say, is said with an
-empty ``bounding_boxes`` beside it.  ``pose`` and ``lidar_header`` carry the origin.
+The payload has room for one detection, so those of one frame take turns, the most
+probable first; a scan is sent once; an empty frame, which the paper cannot express, is
+an empty ``bounding_boxes`` beside it.  ``pose`` and ``lidar_header`` carry the origin.
 """
 
 import orjson
@@ -19,7 +19,7 @@ from iveg.ngsi.codec.fields import write_origin, write_ranges
 
 
 class SinglePayload:
-    """Collects what sensors say until odometry sends it.
+    """Collects observations until odometry triggers a message.
 
     Args:
         robot_id: This robot.
@@ -28,19 +28,19 @@ class SinglePayload:
     def __init__(self, robot_id: str) -> None:
         self._id = robot_id
         self.scan: LaserScan | None = None
-        """The sweep that has not travelled yet."""
+        """The sweep that has not been sent yet."""
         self._detections: list[Detection] = []
         self._saw_nothing = False
         self._unplaced = 0
 
     def look(self, frame: DetectionFrame) -> None:
-        """Take a look of the detector; it replaces what is left of the one before."""
+        """Take a detection frame; it replaces what is left of the one before."""
         self._detections = sorted(frame.detections, key=lambda one: one.probability)
         self._saw_nothing = not frame.detections and not frame.unreadable
         self._unplaced = frame.unreadable
 
     def write(self, odometry: Odometry) -> bytes:
-        """The bytes of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
+        """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
         origin = write_origin(odometry.origin)
         payload: dict[str, object] = {
             "pose": {

@@ -1,9 +1,10 @@
-"""Algorithm 1: what the robot's sensors say, on its way to iVeg.
+"""Algorithm 1: the robot's observations on their way to iVeg.
 
 Every observation gets its origin here (boot, count of its topic, the robot's clock) and
-becomes a measure.  Telemetry goes at QoS 0 and only the newest of a topic waits; what
-the broker could not take is not sent later, because by then it is no longer true.
-While Orion is behind, what the agent is spared goes straight to iVeg (``rates``).
+becomes a measure.  Telemetry goes at QoS 0 and only the newest of a topic is pending;
+a message that the broker could not take is not sent later, because it is outdated by
+then.  While Orion is behind, measures withheld from the agent go to iVeg directly
+(``rates``).
 """
 
 import math
@@ -48,7 +49,7 @@ _SAID = {
     kind: attrgetter(*(one.name for one in fields(kind) if one.name != "robot_id"))
     for kind in (*_SUFFIX, Unplaced)
 }
-"""What an observation says besides whose it is; its origin first."""
+"""Fields of an observation except the robot's id; the origin comes first."""
 
 
 class Uplink:
@@ -62,7 +63,7 @@ class Uplink:
         form: One message a topic, or Algorithm 1's single payload.
         first_report: ``seq`` of the first safety report; random, so that a number from
             an earlier boot is not taken for one of this.
-        echo: What was heard of iVeg; None proves no age, as recordings cannot.
+        echo: Newest feedback received; None for recordings, which prove no age.
         replay: The map frame of a recording, by which its messages are marked.
 
     Moments are the robot's own: monotonic seconds since its boot, and its wall clock.
@@ -94,10 +95,10 @@ class Uplink:
         self.sent: Counter[str] = Counter()
         """Measures made, by device suffix; the single payload's is empty."""
         self.spared: Counter[str] = Counter()
-        """What went straight to iVeg instead, likewise."""
+        """Messages sent to iVeg directly instead, by device suffix."""
 
     def send(self, observation: Sensed, at: Instant) -> None:
-        """Send what a sensor said at this moment."""
+        """Send an observation of this moment."""
         if self._single is not None and not isinstance(
             observation, Navigation | Battery | Unplaced
         ):
@@ -109,21 +110,21 @@ class Uplink:
         self._emit(suffix, _written(stamped), at.mono, news=news)
 
     def _stamped(self, observation: Sensed, origin: Origin) -> Sensed:
-        """What ``replace`` would give, at a third of its price."""
+        """Same result as ``dataclasses.replace`` at a third of its cost."""
         kind = type(observation)
         return kind(self._id, origin, *_SAID[kind](observation)[1:])
 
     def _is_news(self, frame: DetectionFrame) -> bool:
-        """Whether other things are seen than before, or with another confidence."""
+        """Whether the detected classes or their level of confidence changed."""
         before, self._looked = self._looked, _seen(frame)
         return self._looked != before
 
     def report(
         self, report: SafetyReport, at: Instant, *, is_measure: bool = True
     ) -> tuple[int, list[LaneMessage]]:
-        """The ``seq`` of a safety report and its messages, the direct one first.
+        """Build a safety report: its ``seq`` and its messages, the direct one first.
 
-        Both are the same bytes: whichever comes first counts.
+        Both have the same bytes: the first to arrive counts.
         """
         origin = self._origin("_safety", at)
         payload = codec.write_safety(replace(report, origin=origin))
@@ -163,7 +164,7 @@ class Uplink:
             self._offer(names.direct_topic(self._id, suffix), payload)
 
     def _stamp_of(self, wall: float) -> str:
-        """What is sensed together has one stamp, written once."""
+        """Text of a wall-clock time, written once for simultaneous observations."""
         if self._stamp[0] != wall:
             self._stamp = wall, codec.format_stamp(wall)
         return self._stamp[1]
@@ -187,7 +188,7 @@ class Uplink:
 
 
 def _seen(frame: DetectionFrame) -> tuple[tuple[str, int], ...]:
-    """What is in a look, and how sure the detector is: below 0.5, below 0.8, above."""
+    """Classes of a frame with their confidence: below 0.5, below 0.8, above."""
     return tuple(
         sorted(
             (one.class_id, (one.probability >= 0.5) + (one.probability >= 0.8))

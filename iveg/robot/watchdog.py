@@ -1,7 +1,7 @@
-"""How old iVeg's word is, judged by what iVeg says it has seen of us.
+"""Age of iVeg's feedback, judged by the reports that iVeg acknowledges.
 
-An old message that arrives again is not fresh: feedback is as old as the moment when we
-sent the report that it says it has seen (docs/interfaces/mqtt.md), not as its arrival.
+A delayed message is not fresh: feedback is as old as the report that it acknowledges,
+counted from its sending (docs/interfaces/mqtt.md), not as its own arrival.
 """
 
 from collections import OrderedDict, deque
@@ -12,7 +12,7 @@ _CLEARS, _CLEARS_WITHIN_S = 3, 60.0
 
 
 class Watchdog:
-    """Ages feedback; times are monotonic seconds.
+    """Age of feedback; times are monotonic seconds.
 
     Args:
         boot_at: When the robot started; silence counts from here.
@@ -29,15 +29,15 @@ class Watchdog:
         self._clears: deque[float] = deque(maxlen=_CLEARS)
 
     def sent(self, seq: int, now: float) -> None:
-        """Our safety report ``seq`` left."""
+        """Note that the safety report ``seq`` was sent."""
         self._sent[seq] = now
         if len(self._sent) > _REPORTS_KEPT:
             self._sent.popitem(last=False)
 
     def heard(self, seen: int | None, now: float) -> None:
-        """A feedback came; ``seen`` is the newest of our reports that it knows of.
+        """Take a feedback that acknowledges the robot's reports up to ``seen``.
 
-        A number that we never sent, or none, is no evidence of freshness.
+        A number that was never sent, or none, is no evidence of freshness.
         """
         self.look(now)
         evidence = None if seen is None else self._sent.get(seen)
@@ -51,17 +51,17 @@ class Watchdog:
             self._fresh_count += 1
 
     def look(self, now: float) -> None:
-        """Notice that time has passed: freshness that was interrupted starts anew."""
+        """Notice that time has passed: after an interruption freshness counts anew."""
         age = self.age(now)
         if age is None or age > self._slow_s:
             self._fresh_since = None
 
     def age(self, now: float) -> float | None:
-        """Age of the newest feedback (s); None when there never was any."""
+        """Age of the newest feedback (s); None before the first."""
         return None if self._evidence is None else max(0.0, now - self._evidence)
 
     def silence(self, now: float) -> float:
-        """Like ``age``, counted from the start of the robot while nothing came (s)."""
+        """Like ``age``; before the first feedback, time since the start (s)."""
         return now - (self._boot_at if self._evidence is None else self._evidence)
 
     def steady(self, now: float) -> bool:
@@ -74,10 +74,10 @@ class Watchdog:
         )
 
     def cleared(self, now: float) -> None:
-        """A ``link`` hold cleared itself."""
+        """Note that a ``link`` hold cleared itself."""
         self._clears.append(now)
 
     def may_clear(self, now: float) -> bool:
-        """Whether a new ``link`` hold may clear itself: thrice a minute, no more."""
+        """Whether a new ``link`` hold may clear itself: at most thrice a minute."""
         recent = [at for at in self._clears if now - at < _CLEARS_WITHIN_S]
         return len(recent) < _CLEARS

@@ -1,4 +1,4 @@
-"""Where the pixels are: a depth picture registered to the detector's, as a point cloud.
+"""Depth picture registered to the detector's picture, as a point cloud.
 
 Frame: the camera's optical one - z forward, x right, y down (REP-103's ``_optical``) -
 in metres.  Source: the seed paper, section "Spatial grounding": cloud index and depth
@@ -73,11 +73,10 @@ class DepthPicture:
     def continuous(self, index: Indices, most: float) -> NDArray[np.bool_]:
         """|p_z,k - p_z,k-1| ≤ τ_max: whether each depth agrees with its left neighbour.
 
-        The neighbour is the cloud's, in the mask or not, so the filter asks nothing of
-        what else is looked at.  Decided here, where the paper is silent: a pixel of the
-        first column has no neighbour (k-1 is the other side of the picture, a row up)
-        and is not accepted; nor is one that was not measured, or whose neighbour was
-        not.  The bound itself is accepted.
+        The neighbour is the cloud's, inside the mask or not.  The paper does not define
+        three cases: a pixel of the first column has no neighbour (k-1 is at the other
+        edge, a row up) and is not accepted, nor is a pixel without a measurement or
+        with an unmeasured neighbour; the bound itself is accepted.
 
         Args:
             index: pc_index, shape (n,).

@@ -1,4 +1,4 @@
-"""Mask and depth together: the 3D box, its centre, and its place in the work frame.
+"""From mask and depth to the 3D box, its centre and its position in the work frame.
 
 Source: the seed paper, section "Spatial grounding", from the 3D box to P_work, and the
 table of object parameters; Algorithm 1's ``SpatialGrounding``.  The printed box holds
@@ -30,7 +30,7 @@ from iveg.robot.grounding.mask import (
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """What detector and mask network say of one target.
+    """Output of detector and mask network for one target.
 
     Attributes:
         class_id: As the network names it.
@@ -51,10 +51,10 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Grounding:
-    """The numbers that the paper leaves open; the defaults are assumed.
+    """Parameters that the paper leaves open; the defaults are assumed.
 
     Attributes:
-        p_min: Least probability that is looked at, inclusive.
+        p_min: Least probability that is processed, inclusive.
         least_kernel: MINKERNEL (pixels); 9 is a cross of 3 × 3.
         most_kernel: MAXKERNEL, as share of the squared box width: a constant number of
             pixels that only trims a person at 1.5 m would eat one at 6 m.
@@ -113,7 +113,7 @@ class Grounded:
 
 @dataclass(frozen=True, slots=True)
 class Ungrounded:
-    """A target that has no place.
+    """A target whose position cannot be computed.
 
     Attributes:
         reason: ``unsure``: below p_min, by design; ``empty``: the mask holds nothing of
@@ -127,7 +127,7 @@ class Ungrounded:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where a camera sits in ``base_link``: looking level along its pose's x."""
+    """Mounting pose of a camera in ``base_link``; it looks level along x."""
 
     pose: Pose2D
     height: float
@@ -141,10 +141,10 @@ class Mount:
 def ground(
     segment: Segment, picture: DepthPicture, settings: Grounding = DEFAULT
 ) -> Grounded | Ungrounded:
-    """Place one target in the camera's optical frame.
+    """Locate one target in the camera's optical frame.
 
     Raises:
-        UnreadableError: A probability, position or mask that cannot be meant.
+        UnreadableError: A probability, position or mask out of range.
     """
     _examine(segment)
     if segment.probability < settings.p_min:

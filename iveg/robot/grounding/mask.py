@@ -1,4 +1,4 @@
-"""Which pixels are the target: the detector's bitset, freed of its leafy fringe.
+"""Pixels of a target: the detector's bitset without its fringe of leaves.
 
 Source: the seed paper, section "Spatial grounding": membership and bit position,
 kernel area, erosion by opening.  Its erosion formula is printed as::
@@ -27,7 +27,7 @@ Mask = NDArray[np.bool_]
 """Shape (h, w): rows downwards, columns to the right."""
 
 EDGE_LIMIT = 8192
-"""More pixels along an edge than any camera has."""
+"""Largest accepted edge of a picture (pixels)."""
 
 
 def belongs_to_mask(bits: bytes, width: int, x: int, y: int) -> bool:
@@ -47,7 +47,7 @@ def read_mask(bits: bytes, width: int, height: int) -> Mask:
         Shape (height, width).
 
     Raises:
-        UnreadableError: The size is none, or the bytes are not as many as it needs.
+        UnreadableError: The size is not positive, or differs from the number of bytes.
     """
     if not (0 < width <= EDGE_LIMIT and 0 < height <= EDGE_LIMIT):
         raise UnreadableError("bad_mask_size", f"{width} × {height} pixels")
@@ -61,7 +61,7 @@ def read_mask(bits: bytes, width: int, height: int) -> Mask:
 
 
 def write_mask(mask: Mask) -> bytes:
-    """The bitset of a mask; ``read_mask`` takes it back."""
+    """The bitset of a mask; the inverse of ``read_mask``."""
     return np.packbits(mask).tobytes()
 
 
@@ -90,7 +90,7 @@ def eroded(mask: Mask, size: int, iterations: int, rim: int = 0) -> Mask:
     """The mask without its fringe: a subset of the mask, empty only if that is.
 
     Args:
-        mask: What the detector gave; outside of it nothing belongs.
+        mask: As the detector gave it; pixels outside of it do not belong.
         size: Edge of the cross (pixels); the middle of an even one is right of and
             below its centre.
         iterations: T.  Fewer are done where one more would leave nothing: a target
