@@ -1,4 +1,4 @@
-"""The command line: words and settings to parts (docs/interfaces/cli.md)."""
+"""Command line: arguments and settings to parts (docs/interfaces/cli.md)."""
 
 import argparse
 import logging
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str]) -> int:
         level=logging.INFO if options.verbose else logging.WARNING,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
     )
-    # Their INFO lines are one a message; what matters they say as warnings.
+    # They log every message at INFO; important events are warnings.
     for noisy in ("amqtt", "transitions", "httpx", "alembic"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
     try:

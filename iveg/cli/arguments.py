@@ -1,4 +1,4 @@
-"""What is typed after ``iveg robot`` and ``iveg experiment``, and where ROS 2 is."""
+"""Arguments of ``iveg robot`` and ``iveg experiment``, and options for ROS 2."""
 
 import argparse
 from pathlib import Path
@@ -7,7 +7,7 @@ from pathlib import Path
 def add_robot_arguments(
     commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
 ) -> None:
-    """The words of ``iveg robot``."""
+    """Arguments of ``iveg robot``."""
     robot = commands.add_parser("robot", help="a ROS 2 robot joins")
     robot.add_argument("action", nargs="?", choices=("run", "check"), default="run")
     robot.add_argument("--id", required=True, metavar="ROBOT", help="as iVeg knows it")
@@ -30,7 +30,7 @@ def add_robot_arguments(
 
 
 def add_network_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where ROS 2 is."""
+    """Options for the ROS 2 network."""
     parser.add_argument("--ros-domain", type=int, metavar="N", help="0 to 232")
     parser.add_argument("--ros-interface", metavar="NAME", help="or its address")
     parser.add_argument(

@@ -1,7 +1,7 @@
-"""Everything on one machine: three processes, one address, one Ctrl-C.
+"""The whole system on one machine: three processes, one address, one Ctrl-C.
 
-The parts talk only through MQTT and HTTP, so each can be killed and started again by
-itself.  They watch their standard input: when this process is gone, so are they.
+The parts communicate only by MQTT and HTTP, so each can be killed and restarted by
+itself.  They watch their standard input, and end when this process has ended.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ _GRACE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class _Listener:
-    """One address that the demo opens, and the setting that moves it."""
+    """An address that the demo listens on, and the setting that changes it."""
 
     field: str
     variable: str
@@ -55,7 +55,7 @@ def demo(
         notify_token=settings.notify_token or secrets.token_hex(32),
         data_directory=str(directory),
     )
-    # Each demo is a new greenhouse: nothing of the last one's robots is still held.
+    # Each demo starts anew: no hold of the last demo's robots remains.
     with contextlib.suppress(FileNotFoundError):
         (directory / "commands.jsonl").unlink()
     child_environment = {
@@ -71,7 +71,7 @@ def demo(
 
 
 def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
-    """Robots that speak ROS 2 on loopback, and the software that rides on each."""
+    """ROS 2 robots on loopback, and an ``iveg robot`` for each."""
     place = ["--ros-domain", str(_free_domain()), "--ros-interface", "127.0.0.1"]
     place += ["--ros-peer", "127.0.0.1"]
     parts = [["emulator", "--dds", *place]]
@@ -83,7 +83,7 @@ def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
 
 
 def _free_domain() -> int:
-    """A DDS domain of which nobody on this machine has the first port.
+    """A DDS domain whose first port is free on this machine.
 
     Raises:
         SettingsError: there is none.
@@ -101,9 +101,9 @@ def _free_domain() -> int:
 def on_free_ports(
     settings: Settings, environment: Mapping[str, str], *, fiware: bool = True
 ) -> Settings:
-    """Defaults that are taken move to a free port; what somebody chose does not.
+    """Move defaults whose port is taken to a free port; chosen addresses stay.
 
-    Without ``fiware`` only the page's: a FIWARE that runs stays where it is.
+    Without ``fiware`` only the page moves: a running FIWARE stays where it is.
     """
     listeners = [_Listener("port", "IVEG_PORT", settings.host, settings.port)]
     places = (
@@ -174,9 +174,9 @@ async def _supervise(
 async def start_part(
     arguments: Sequence[str], environment: Mapping[str, str]
 ) -> asyncio.subprocess.Process:
-    """Start one part of iVeg as a program of its own."""
+    """Start one part of iVeg as a separate process."""
     # A session of its own: Ctrl-C reaches this process alone, which stops the parts
-    # in order, so that none complains about another that has already gone.
+    # in order, so that none logs the loss of another.
     return await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
@@ -191,10 +191,10 @@ async def start_part(
 
 
 async def wait_ready(name: str, process: asyncio.subprocess.Process) -> None:
-    """Wait until a part says that it is up.
+    """Wait until a part reports that it is ready.
 
     Raises:
-        SystemExit: it did not.
+        SystemExit: the part ended first.
     """
     assert process.stdout is not None  # noqa: S101 - it was asked for
     try:
@@ -207,13 +207,13 @@ async def wait_ready(name: str, process: asyncio.subprocess.Process) -> None:
 
 
 async def _watch(name: str, process: asyncio.subprocess.Process) -> None:
-    """Stay until a part ends; the others go on, as they would on a real site."""
+    """Wait until a part ends; the others continue, as on a real site."""
     code = await process.wait()
     print(f"iveg: {name} has ended (exit code {code}).", file=sys.stderr, flush=True)
 
 
 async def stop_parts(processes: list[asyncio.subprocess.Process]) -> None:
-    """End parts, one after the other; what hangs is killed."""
+    """End parts, one after the other; a part that hangs is killed."""
     for process in processes:
         if process.returncode is not None:
             continue

@@ -1,7 +1,7 @@
-"""What the findings of ``iveg doctor`` mean: rows, sentences, exit code; no I/O.
+"""Evaluation of the findings of ``iveg doctor``: rows, sentences, exit code; no I/O.
 
-A hop is tried only when those it stands on are well, so that one broken part is one
-failed row and not six.  The order is the order of the examination.
+A hop is tested only when the hops it depends on are well, so that one broken part is
+one failed row and not six.  The order is the order of the examination.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,18 +17,18 @@ State = Literal["ok", "failed", "not tried"]
 _ORION_WAITS_S = 4.0
 """Nearly the five seconds for which Orion waits for an agent."""
 LATE_S = 1.0
-"""A measure that takes longer is late, as it is for a running iVeg."""
+"""Age of a late measure (s), as in a running iVeg."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lag:
-    """How late measures reach Orion.
+    """Delay of measures on their way to Orion.
 
     Attributes:
         lag_s: Seconds.
-        growing: Whether it is known to become more.
-        at_least: Whether it may be any longer.
-        told_by: Who says so, as a clause; empty for the doctor's own measure.
+        growing: Whether it is known to grow.
+        at_least: Whether the true lag may be longer.
+        told_by: Source of the lag, as a clause; empty for the doctor's own measure.
     """
 
     lag_s: float
@@ -38,22 +38,22 @@ class Lag:
 
     @property
     def sentence(self) -> str:
-        """Such as "Measures reach Orion 23 s late, growing"."""
+        """A sentence such as "Measures reach Orion 23 s late, growing"."""
         said = lag_in_words(self.lag_s, growing=self.growing, at_least=self.at_least)
         return said[0].upper() + said[1:] + self.told_by
 
 
 @dataclass(frozen=True, slots=True)
 class Stack:
-    """The addresses that sentences name.
+    """Addresses for the sentences.
 
     Attributes:
         broker: Host and port of the MQTT broker.
-        user: Who we are there; empty for nobody.
-        listener: Where Orion was asked to post to.
+        user: User name at the broker; empty for anonymous.
+        listener: Address that Orion was asked to post to.
         topics: The probe device's topics, up to the last slash.
-        lag: How late measures are, where that is known to be the trouble.
-        waited_s: How long the doctor's measure was waited for (s).
+        lag: Delay of measures, where that is known to be the cause.
+        waited_s: Time that the doctor waited for its measure (s).
     """
 
     broker: str
@@ -70,12 +70,11 @@ class Stack:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One hop that was tried.
+    """Result of one tested hop.
 
     Attributes:
-        took_s: How long it took, or how long was waited (s).
-        trouble: None where it went well; what was said where it was refused; empty
-            where nothing came in time.
+        took_s: Duration, or time waited (s).
+        trouble: None for success; the reason of a refusal; empty for a time-out.
     """
 
     check: Check
@@ -84,13 +83,13 @@ class Finding:
 
     @property
     def well(self) -> bool:
-        """Whether the hop did its part."""
+        """Whether the hop works."""
         return self.trouble is None
 
 
 @dataclass(frozen=True, slots=True)
 class DiagnosisRow:
-    """One line of the table; ``sentence`` is empty where all is well."""
+    """One line of the table; ``sentence`` is empty for a hop that works."""
 
     check: Check
     state: State
@@ -102,19 +101,19 @@ Findings = Mapping[Check, Finding]
 
 
 def missing(check: Check, findings: Findings) -> tuple[Check, ...]:
-    """The hops that a hop stands on and that were not well."""
+    """The hops that a hop depends on and that do not work."""
     return tuple(
         need for need in NEEDS[check] if need not in findings or not findings[need].well
     )
 
 
 def judge(findings: Findings, stack: Stack) -> list[DiagnosisRow]:
-    """Every hop with its state and, where it failed, what to look at."""
+    """Every hop with its state and, where it failed, advice."""
     return [_row(check, findings, stack) for check in Check]
 
 
 def exit_code(rows: Sequence[DiagnosisRow]) -> int:
-    """0 where every hop is well, else 1."""
+    """0 if every hop works, else 1."""
     return int(any(row.state != "ok" for row in rows))
 
 
@@ -161,7 +160,7 @@ def _late(took_s: float) -> str:
 
 
 def _overloaded(check: Check, said: str, stack: Stack, lag: Lag) -> str:
-    """Before anything is said of addresses, tenants or databases."""
+    """Overload, reported before addresses, tenants or databases."""
     if check not in (Check.AGENT, Check.MEASURE):
         return f"The agent is behind ({said}); {lag_in_words(lag.lag_s)}."
     return (
@@ -271,7 +270,7 @@ def _command(said: str, stack: Stack, findings: Findings) -> str:
 
 
 def _took_long(findings: Findings) -> bool:
-    """Orion says 404 at once of an agent that is away, after 5 s of a silent one."""
+    """Orion answers 404 at once for an absent agent, after 5 s for a silent one."""
     finding = findings.get(Check.COMMAND)
     return finding is not None and finding.took_s > _ORION_WAITS_S
 

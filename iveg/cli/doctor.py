@@ -1,13 +1,13 @@
-"""``iveg doctor``: examines every hop of the chain by using it once.
+"""``iveg doctor``: tests every hop of the data path by using it once.
 
-A probe of its own is made, measured, commanded and removed again; no robot's device,
-entity or topic is touched, so it may run while robots drive.  It ends within twenty
-seconds, with what it has found by then::
+A probe device of its own is created, measured, commanded and removed again; no robot's
+device, entity or topic is touched, so it may run while robots drive.  It ends within
+twenty seconds, with the findings until then::
 
     broker, Orion, agent, database, page      all at once
-    what the running iVeg says of the lag     overload is known before anything is added
-    device → measure → notification → command → answer → straight command
-    the measure that has not come             waited for, while there is time
+    the lag that a running iVeg reports       overload is known before load is added
+    device → measure → notification → command → answer → direct command
+    a missing measure                         awaited, while there is time
     removal
 """
 
@@ -55,17 +55,17 @@ from iveg.settings import Settings
 
 PATIENCE_S, LIMIT_S = 5.0, 20.0
 _REMOVAL_S = 4.0
-"""Of the limit, what is kept for removing what was made."""
+"""Part of the limit that is reserved for the removal (s)."""
 _WAITS = 3
-"""A measure that has not come is waited for this many patiences in all."""
+"""Longest wait for a measure, in multiples of ``patience_s``."""
 _LOOK_EVERY_S = 0.05
 _FRESH_S = 10.0
-"""An older probe of the running iVeg's tells nothing of now."""
+"""Age from which the probe of a running iVeg is ignored (s)."""
 _ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - read, not bound
 
 
 def run_doctor(settings: Settings, data: Path) -> int:
-    """Examine, print the table, tidy up; returns the exit code."""
+    """Examine, print the table, remove the probe; returns the exit code."""
     examination = Examination(settings, data)
     run_until_told(examination.run())
     rows = judge(examination.findings, examination.stack)
@@ -76,17 +76,17 @@ def run_doctor(settings: Settings, data: Path) -> int:
 
 
 class Examination:
-    """One visit: every hop tried once, everything removed afterwards.
+    """One examination: every hop tested once, everything removed afterwards.
 
     Args:
-        settings: The addresses of the parts.
-        data: Where the history is unless the settings say otherwise.
-        patience_s: How long each hop may take (s).
-        limit_s: How long the visit may take, removal included (s).
+        settings: Addresses of the parts.
+        data: Directory of the history unless the settings name another.
+        patience_s: Time limit of each hop (s).
+        limit_s: Time limit of the examination, removal included (s).
 
     Attributes:
-        findings: What was found so far.
-        lag: How late measures are, where that is the trouble.
+        findings: Findings so far.
+        lag: Delay of measures, where that is the cause.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class Examination:
 
     @property
     def stack(self) -> Stack:
-        """What was examined, for sentences."""
+        """Addresses for the sentences."""
         address, settings = self._address, self._settings
         return Stack(
             broker=f"{address.host}:{address.port}",
@@ -137,11 +137,11 @@ class Examination:
 
     @property
     def left_behind(self) -> list[str]:
-        """What could not be removed, as sentences."""
+        """Parts of the probe that could not be removed, as sentences."""
         return self._probe.left_behind
 
     async def run(self) -> None:
-        """Try every hop; tidy up also when cancelled."""
+        """Test every hop; clean up also when cancelled."""
         async with AsyncExitStack() as stack:
             for client in (self._orion, self._agent, self._page):
                 stack.push_async_callback(client.close)
@@ -179,7 +179,7 @@ class Examination:
         trouble = None
         began = clock.now().mono
         try:
-            # Whoever waits twice, or for Orion that waits for the agent, is within.
+            # The limit allows for two waits, or for Orion's wait for the agent.
             async with asyncio.timeout(min(2 * self._patience_s, self._left_s)):
                 await step()
         except TimeoutError:
@@ -198,7 +198,7 @@ class Examination:
     # --- lag ----------------------------------------------------------------------
 
     async def _ask_iveg(self) -> Lag | None:
-        """What a running iVeg says of the lag, to those who have its token."""
+        """Lag that a running iVeg reports to holders of its token."""
         if not self._settings.api_token or missing(Check.PAGE, self.findings):
             return None
         with contextlib.suppress(HopError):
@@ -208,7 +208,7 @@ class Examination:
         return None
 
     async def _wait_for_the_measure(self) -> None:
-        """A measure that comes late tells how late; one that does not, at least how."""
+        """Wait for a late measure, which gives the lag or a lower bound of it."""
         finding = self.findings.get(Check.MEASURE)
         if finding is None or finding.trouble is None or not self._measured_at:
             return
@@ -228,7 +228,7 @@ class Examination:
             self.lag = Lag(took_s, at_least=True)
 
     async def _lag_of_the_heartbeat(self) -> Lag | None:
-        """By a running iVeg's own probe at Orion: when it left, when it came there."""
+        """Lag of a running iVeg's own probe, between sending and arrival at Orion."""
         with contextlib.suppress(HopError):
             left, came = await self._orion.read_probe_times()
             fresh = clock.now().wall - came < _FRESH_S
@@ -238,7 +238,7 @@ class Examination:
 
     @property
     def _agent_is_slow(self) -> bool:
-        """Whether it answered other questions late too."""
+        """Whether the agent also answered other requests late."""
         asked = (Check.AGENT, Check.DEVICE, Check.COMMAND)
         found = [self.findings[check] for check in asked if check in self.findings]
         return any(one.took_s > LATE_S for one in found)
@@ -267,7 +267,7 @@ class Examination:
         await self._seen("probe", mark, self._patience_s)
 
     async def _be_notified(self) -> None:
-        """Past the agent, so that only Orion and the way from it are on trial."""
+        """Be notified of a change made at Orion itself, without the agent."""
         ear = TopicListener()
 
         async def take(request: Request) -> Response:
@@ -279,7 +279,7 @@ class Examination:
             self._listening_at = f"http://{_in_url(host)}:{port}/"
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()
-            # What was done so far is preparation; the hop begins here.
+            # The steps so far are preparation; the hop begins here.
             self._began[Check.NOTIFICATION] = clock.now().mono
             await self._probe.change(mark)
             try:
@@ -323,15 +323,15 @@ class Examination:
         await self._connected.publish(topic, body, self._patience_s)
 
     async def _seen(self, attribute: str, mark: str, within_s: float) -> None:
-        """Until Orion has the mark in an attribute of the probe."""
+        """Wait until an attribute of the probe at Orion contains the mark."""
         async with asyncio.timeout(max(0.0, within_s)):
-            # Orion is asked: whether it calls is another hop's question.
+            # Orion is polled: notifications are tested by another hop.
             while not await self._probe.holds(attribute, mark):  # noqa: ASYNC110
                 await asyncio.sleep(_LOOK_EVERY_S)
 
 
 def _lag_told(health: Any) -> Lag | None:
-    """The lag in ``GET /api/v1/health``; None where all is well or nothing is told."""
+    """Lag in ``GET /api/v1/health``; None if healthy or not reported."""
     try:
         agent = next(one for one in health["hops"] if one["hop"] == Hop.AGENT)
         lag_s, growing = float(agent["lag_s"]), bool(agent["growing"])
@@ -342,13 +342,13 @@ def _lag_told(health: Any) -> Lag | None:
 
 
 def _notify_host(settings: Settings) -> str:
-    """The host that Orion is told to post to by an iVeg with these settings."""
+    """Host that an iVeg with these settings names to Orion for notifications."""
     url = settings.notify_url or notify_url_of(settings)
     return urlsplit(url).hostname or settings.host
 
 
 def _bind_to(host: str) -> str:
-    """Loopback stays loopback; any other name may be a container's or a router's."""
+    """Address to bind; any name but loopback may be a container's or a router's."""
     with contextlib.suppress(ValueError):
         address = ip_address(host)
         if address.is_loopback:

@@ -1,8 +1,8 @@
-"""``iveg experiment``: runs the paper's evaluation on real programs, and compares two.
+"""``iveg experiment``: runs the paper's evaluation on real programs; compares results.
 
-Each finished run is a file, so that what Ctrl-C or a crash broke off is taken up again
-by the same command.  All programs are of this experiment alone: it starts its own iVeg
-beside the FIWARE, on free ports, with a data directory of its own.
+Each finished run is a file, so that the same command continues after Ctrl-C or a crash.
+All programs belong to this experiment alone: it starts its own iVeg beside the FIWARE,
+on free ports, with a data directory of its own.
 """
 
 import argparse
@@ -74,10 +74,10 @@ def experiment(
 
 
 def with_fiware(settings: Settings, words: list[str]) -> Settings:
-    """What ``--fiware`` says: ``embedded``, ``settings``, or addresses.
+    """Settings for ``--fiware``: ``embedded``, ``settings``, or addresses.
 
     Raises:
-        SettingsError: Orion's or the IoT Agent's is missing, or one is no address.
+        SettingsError: Orion's or the IoT Agent's address is missing or invalid.
     """
     if words in (["embedded"], ["settings"]):
         return settings
@@ -109,11 +109,11 @@ def placed_in(directory: Path, settings: Settings) -> Settings:
 
 @dataclass
 class Lab:
-    """One experiment on its way.
+    """One running experiment.
 
     Attributes:
-        embedded: Whether FIWARE is started, too.
-        exit_code: 1 where it ended before its plan did.
+        embedded: Whether FIWARE is started as well.
+        exit_code: 1 if it ended before its plan was complete.
     """
 
     notebook: Notebook
@@ -124,7 +124,7 @@ class Lab:
     _running: dict[str, asyncio.subprocess.Process] = field(default_factory=dict)
 
     async def run(self, environment: Mapping[str, str]) -> None:
-        """Every step that is not done yet, then the report."""
+        """Run every step that is not done yet, then write the report."""
         surroundings = {**environment, **self.settings.to_environment()}
         steps = self.notebook.steps_left()
         directory = self.notebook.directory
@@ -147,7 +147,7 @@ class Lab:
 
     @contextlib.asynccontextmanager
     async def _stack(self, environment: Mapping[str, str]) -> AsyncIterator[None]:
-        # As in a demo no link is printed: nobody signs in here.
+        # As in a demo no link is printed: no person signs in here.
         serve = ["serve", "--demo"]
         parts = [["fiware"], serve] if self.embedded else [serve]
         try:
@@ -184,7 +184,7 @@ class Lab:
 
     @property
     def _rule(self) -> DetectionRule:
-        """As the iVeg that is started has it."""
+        """The rule of the iVeg that is started."""
         told = self.settings
         return DetectionRule(
             threshold=told.confidence_threshold, radius_m=told.safety_radius_m
@@ -193,7 +193,7 @@ class Lab:
     async def _real(
         self, step: PlannedRun, environment: Mapping[str, str], truth: Path
     ) -> Outcome:
-        """The same run by all programs, which may die."""
+        """The same run by all programs, any of which may end early."""
         words = ["emulator", "--scenario", step.family, "--seed", str(step.seed)]
         words += ["--profile", self.profile, "--truth", str(truth)]
         since = format_stamp(clock.now().wall)
@@ -202,14 +202,14 @@ class Lab:
         url, token = self._url, self.settings.api_token
         watched = await self._while_all_run(watch(url, token, step.seconds, WATCHED))
         completed = completed and await self._are_live()
-        # Nobody lets a stopped robot go here, so that is the last thing asked.
+        # Stopped robots are not released here, so STOP comes last.
         stops = await self._stop() if self.notebook.is_last(step) else []
         decisions = (await self._ask(f"decisions?since={since}&limit=500"))["items"]
         stack = stack_of(watched, read_truth(truth), decisions, WATCHED)
         return {**stack, "completed": completed and stack["completed"], "stops": stops}
 
     async def _while_all_run(self, work: Coroutine[Any, Any, T]) -> T:
-        """Raises HopError as soon as a program has ended."""
+        """Run ``work``; raises HopError as soon as a program has ended."""
         ends = {
             asyncio.create_task(part.wait()): name
             for name, part in self._running.items()
@@ -239,7 +239,7 @@ class Lab:
         return bool(robots) and all(one["link"] == "LIVE" for one in robots)
 
     async def _stop(self) -> Any:
-        """Stop the fleet, and how long that took each robot (ms)."""
+        """Stop the fleet; time until each robot stood (ms)."""
         await self._ask("fleet/stop", "POST")
         deadline = clock.now().mono + _STOPS_WITHIN_S
         while True:
@@ -254,7 +254,7 @@ class Lab:
         return f"http://{self.settings.host}:{self.settings.port}"
 
     async def _ask(self, path: str, method: str = "GET") -> Any:
-        """One answer of the API.
+        """One response of the API.
 
         Raises:
             HopError: iVeg did not answer.
@@ -269,7 +269,7 @@ class Lab:
             raise HopError("iveg", f"{path}: {error!r}") from error
 
     def _finish(self, why: str, progress: Progress) -> None:
-        # Who reads that it is over may open the report at once.
+        # A reader of the final state may open the report at once.
         report = self.notebook.finish(self._chosen(), why)
         progress.finish(why)
         self.exit_code = int(bool(why))
@@ -279,7 +279,7 @@ class Lab:
         print(f"report: {report}", flush=True)
 
     def _chosen(self) -> dict[str, Any]:
-        """What of the settings has a say in the numbers."""
+        """Settings that influence the numbers."""
         told = self.settings
         return {
             "fiware": "embedded" if self.embedded else "named",
@@ -292,10 +292,10 @@ class Lab:
 
 
 async def refuse_live_robots(settings: Settings) -> None:
-    """An experiment's robots bear the names of real ones.
+    """Refuse to start while a live robot is connected: the names are the same.
 
     Raises:
-        DataFileError: one of them was heard at that Orion a moment ago.
+        DataFileError: Orion had data of one of them a moment ago.
         HopError: Orion does not answer.
     """
     service = settings.fiware_service, settings.fiware_servicepath

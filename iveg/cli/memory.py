@@ -1,8 +1,8 @@
-"""How often a program that runs for months looks for memory that nobody uses.
+"""Garbage collection of a program that runs for months.
 
-A message makes a hundred short-lived values, none of them in a cycle.  Python looks
-through the youngest after each 700 of them, and now and then through everything that
-was ever imported, which takes tenths of a second in which no robot is heard.
+A message creates a hundred short-lived values, none of them in a cycle.  Python
+collects the youngest generation after each 700, and now and then all imported objects,
+which blocks the event loop for tenths of a second.
 """
 
 import gc
@@ -11,7 +11,7 @@ _YOUNG, _MIDDLE, _OLD = 20_000, 20, 50
 
 
 def settle_memory() -> None:
-    """Call when everything is imported and built: it stays and is looked at no more."""
+    """Exclude all present objects from collection; call it when everything is built."""
     gc.collect()
     gc.freeze()
     gc.set_threshold(_YOUNG, _MIDDLE, _OLD)

@@ -42,7 +42,7 @@ _WS_MAX_BYTES = 65536
 
 
 def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int:
-    """Run one part until it is told to end; returns the exit code."""
+    """Run one part until it is ended; returns the exit code."""
     match options.command:
         case "serve":
             data.mkdir(parents=True, exist_ok=True)
@@ -60,7 +60,7 @@ def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int
 
 
 class _Server(uvicorn.Server):
-    """Leaves signals to ``run_until_told``, which ends every part the same way."""
+    """A server that leaves signals to ``run_until_told``, as all parts do."""
 
     def __init__(self, config: uvicorn.Config, on_start: Callable[[], None]) -> None:
         super().__init__(config)
@@ -77,7 +77,7 @@ class _Server(uvicorn.Server):
 
 
 async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
-    """The DSS and its page."""
+    """The decision-support system with its page."""
     await _upgrade_history(settings, data)
     dss = Dss(settings, data, demo=demo)
     app = create_app(dss)
@@ -110,7 +110,7 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
 
 
 async def _upgrade_history(settings: Settings, data: Path) -> None:
-    """A database that is newer or broken ends the start; one that is away does not."""
+    """Upgrade the history; a newer or broken database ends the start."""
     try:
         await asyncio.to_thread(upgrade, _database_url(settings, data))
     except HopError as error:
@@ -129,7 +129,7 @@ def _print_link(settings: Settings, dss: Dss) -> None:
 
 
 async def fiware(settings: Settings) -> None:
-    """The embedded broker, Orion and IoT Agent."""
+    """The embedded MQTT broker, Orion and IoT Agent."""
     require_extra("demo", "iveg fiware")
     from iveg.embedded.server import serve_fiware
 
@@ -143,7 +143,7 @@ async def fiware(settings: Settings) -> None:
 
 
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:
-    """Simulated robots, people and air."""
+    """Simulated robots, people and climate."""
     from iveg.emulator.fleet import run_emulator
     from iveg.emulator.orders import read_translations
 
@@ -191,7 +191,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
 
 @contextlib.contextmanager
 def _truth(file: Path | None) -> "Iterator[TruthLog | None]":
-    """Where it is written down what was really in view, if that was asked for."""
+    """Log of the targets really in view, if requested."""
     if file is None:
         yield None
         return
@@ -203,7 +203,7 @@ def _truth(file: Path | None) -> "Iterator[TruthLog | None]":
 
 @contextlib.contextmanager
 def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
-    """DDS for robots that speak ROS 2, where that was asked for."""
+    """DDS for robots that speak ROS 2, if requested."""
     if not options.dds:
         yield None
         return
@@ -218,7 +218,7 @@ def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
 
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:
-    """Recorded logs of real robots, played like any robot."""
+    """Recorded logs of real robots, replayed as robots."""
     from iveg.adapters.bags import BagTopics
     from iveg.emulator.replay import run_replay
 
@@ -247,7 +247,7 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
 async def _refuse_replay(
     options: argparse.Namespace, settings: Settings, fleet: FleetDescription
 ) -> None:
-    """A recording must never be taken for a robot that is really there."""
+    """Refuse a replay that could be taken for a live robot."""
     for name, _ in options.pose:
         if name not in options.robot:
             raise DataFileError("--pose", name, "is none of the robots to be played")
@@ -284,7 +284,7 @@ async def _refuse_replay(
 
 
 def upgrade_database(settings: Settings, data: Path) -> int:
-    """Bring the history's database to the newest shape."""
+    """Upgrade the history's database to the newest schema."""
     data.mkdir(parents=True, exist_ok=True)
     upgrade(_database_url(settings, data))
     print("The database is up to date.")
@@ -292,7 +292,7 @@ def upgrade_database(settings: Settings, data: Path) -> int:
 
 
 def provision_fleet(settings: Settings) -> int:
-    """Make or mend the devices of the fleet, and say what was mended."""
+    """Create or repair the fleet's devices, and print the repairs."""
 
     async def work() -> None:
         service = settings.fiware_service, settings.fiware_servicepath

@@ -1,7 +1,7 @@
-"""What ``iveg doctor`` makes at Orion and the agent, and its removal.
+"""The probe that ``iveg doctor`` creates at Orion and the agent, and its removal.
 
-What is to be removed is noted before it is made: a request that was cancelled or timed
-out may have been carried out all the same.
+Each object is noted before its creation: a request that was cancelled or timed out may
+have been executed all the same.
 """
 
 import asyncio
@@ -15,7 +15,7 @@ from iveg.ngsi import names
 
 PROBE_ID, PROBE_TYPE = names.DOCTOR_ID, names.HEARTBEAT_TYPE
 DESCRIPTION = "iveg doctor"
-"""Of the subscription.  Not ``iVeg: …``: a running iVeg removes such strangers."""
+"""Of the subscription.  Not ``iVeg: …``: a running iVeg removes others of that name."""
 _ENTITY = f"/v2/entities/{PROBE_ID}"
 _TYPE = {"type": PROBE_TYPE}
 
@@ -24,12 +24,12 @@ class Probe:
     """The probe's device, entity and subscription.
 
     Args:
-        orion: Where the entity is.
-        agent: Where the device is.
+        orion: Client of the context broker.
+        agent: Client of the IoT Agent.
         apikey: First part of its topics.
 
     Attributes:
-        left_behind: What could not be removed, as sentences.
+        left_behind: Objects that could not be removed, as sentences.
     """
 
     def __init__(self, orion: OrionClient, agent: IotAgentClient, apikey: str) -> None:
@@ -40,16 +40,16 @@ class Probe:
         self.left_behind: list[str] = []
 
     def topic(self, last: str) -> str:
-        """A topic of the probe's."""
+        """A topic of the probe."""
         return f"/{self._apikey}/{PROBE_ID}/{last}"
 
     # --- making and using ---------------------------------------------------------
 
     async def make_device(self, orion_url: str) -> None:
-        """Make the device, and its group where iVeg has never run.
+        """Create the device, and its group where iVeg has never run.
 
         Raises:
-            HopError: the agent does not take it.
+            HopError: the agent refuses it.
         """
         self._made_device = self._touched_orion = True
         known = [one.get("apikey") for one in await self._agent.read_groups()]
@@ -61,7 +61,7 @@ class Probe:
             raise HopError("iot_agent", "says that there is such a device already")
 
     async def subscribe(self, url: str) -> str:
-        """Ask Orion to post changes of the entity; the id of the subscription.
+        """Subscribe at Orion to changes of the entity; returns the id.
 
         Raises:
             HopError: Orion does not take it.
@@ -70,9 +70,9 @@ class Probe:
         return await self._orion.create_subscription(_subscription(url))
 
     async def change(self, mark: str) -> None:
-        """Change the entity at Orion itself, past the agent.
+        """Change the entity at Orion directly, without the agent.
 
-        Another attribute than the measure's, which may still come.
+        The attribute differs from the measure's, which may still arrive.
 
         Raises:
             HopError: Orion does not take it.
@@ -83,7 +83,7 @@ class Probe:
         await self._orion.http.ask("POST", "/v2/entities", query=query, body=body)
 
     async def command(self, mark: str) -> None:
-        """Command it: ``cmd`` alone, with its type, or Orion loses it in silence.
+        """Command it: ``cmd`` alone, with its type, or Orion drops it without an error.
 
         Raises:
             HopError: Orion does not take it.
@@ -93,7 +93,7 @@ class Probe:
         await self._orion.http.ask("PATCH", path, query=_TYPE, body=command)
 
     async def holds(self, attribute: str, mark: str) -> bool:
-        """Whether Orion has the mark in an attribute.
+        """Whether the attribute at Orion contains the mark.
 
         Raises:
             HopError: Orion does not answer.
@@ -103,7 +103,7 @@ class Probe:
         return mark in found.text
 
     async def why_not_notified(self, subscription_id: str) -> str:
-        """Why Orion says that a notification did not arrive; empty where it does not.
+        """Orion's reason for an undelivered notification; empty if it gives none.
 
         Raises:
             HopError: Orion does not answer.
@@ -120,10 +120,10 @@ class Probe:
     # --- removing -----------------------------------------------------------------
 
     async def remove(self, within_s: float) -> None:
-        """Remove all that was made, the device first: it may still write.
+        """Remove everything, the device first, since it may still write.
 
         Args:
-            within_s: For all of it (s); a neighbour that does not answer has half.
+            within_s: Time limit in all (s); a server that does not answer gets half.
         """
         half = within_s / 2
         ends = asyncio.get_running_loop().time() + within_s
@@ -170,7 +170,7 @@ class Probe:
                 await self._orion.delete_registration(one["id"])
 
     async def _delete_entities(self) -> None:
-        """Ours, and what an agent made up of a measure that came after our device."""
+        """Entities of the probe, also one that the agent made from a late measure."""
         ids = [PROBE_ID, f"{names.ROBOT_TYPE}:{PROBE_ID}"]
         for entity_id, kind in await self._orion.find_entities(ids):
             await self._orion.delete_entity(entity_id, kind)

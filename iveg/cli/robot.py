@@ -1,4 +1,4 @@
-"""``iveg robot``, ``iveg robot check``: a ROS 2 robot joins, or says what it lacks."""
+"""``iveg robot`` connects a ROS 2 robot; ``iveg robot check`` reports what it lacks."""
 
 import argparse
 import asyncio
@@ -132,7 +132,7 @@ def _fleet(settings: Settings) -> FleetDescription:
 
 
 def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:
-    """What the gate holds the robot to; one that nobody described drives slowly."""
+    """Speed limits of the gate; a robot without description is slow."""
     known = robot.profile
     speed = known.max_speed if robot.is_described else UNDESCRIBED_SPEED
     return replace(
@@ -145,16 +145,16 @@ def _profile(robot: RobotDescription, config: RobotConfig) -> RobotProfile:
 async def refuse_second_gate(
     dds: Network, topic: str, discovery_s: float = 1.0, ghost_s: float = 6.0
 ) -> None:
-    """Only one program may drive a robot.
+    """Refuse a drive topic that another program publishes on.
 
     Args:
-        dds: Where.
-        topic: Of the drive.
-        discovery_s: Until everybody there is known (s).
+        dds: The DDS network.
+        topic: Topic of the drive.
+        discovery_s: Time of discovery (s).
         ghost_s: A gate that was killed is still announced for its lease of 3 s.
 
     Raises:
-        HopError: somebody else publishes on the topic.
+        HopError: another program publishes on the topic.
     """
     began = clock.now().mono
     await asyncio.sleep(discovery_s)
@@ -170,17 +170,17 @@ async def refuse_second_gate(
         await asyncio.sleep(0.1)
 
 
-# --- what was said -----------------------------------------------------------------
+# --- configuration -----------------------------------------------------------------
 
 
 def load_config(
     options: argparse.Namespace, environment: Mapping[str, str]
 ) -> tuple[RobotConfig, tuple[str, ...]]:
-    """File, then words of the command line; and a detector's class list.
+    """Configuration of file and command line, and a detector's class list.
 
     Raises:
         DataFileError: a file or a name that cannot be used.
-        SettingsError: a domain that is none.
+        SettingsError: invalid domain.
     """
     text, file = "", "robot.toml"
     if getattr(options, "config", None) is not None:
@@ -239,7 +239,7 @@ def _text_of(file: Path) -> str:
 def network_of(
     config: RobotConfig, environment: Mapping[str, str], what: str
 ) -> "DdsNetwork":
-    """Where ROS 2 is, for one command or option.
+    """DDS network for a command or option.
 
     Raises:
         MissingExtraError: Cyclone DDS is not installed.
@@ -257,7 +257,7 @@ def network_of(
 async def _check(
     robot_id: str, config: RobotConfig, network: "DdsNetwork", settings: Settings
 ) -> int:
-    """Listen for three seconds, publish nothing, and say what is missing."""
+    """Listen for three seconds without publishing, and print what is missing."""
     from iveg.adapters.dds import Dds
 
     heard: dict[str, Heard] = {}
@@ -309,7 +309,7 @@ def _no_broker(settings: Settings) -> str:
 def _hear(
     topic: str, payload: bytes, heard: dict[str, Heard], transforms: TransformBuffer
 ) -> float:
-    """Count a message; returns its stamp where it is odometry's (s)."""
+    """Count a message; returns its stamp (s) for odometry."""
     one = heard.setdefault(topic, Heard())
     one.count += 1
     try:

@@ -1,4 +1,4 @@
-"""Running one part in the foreground until it is told to end.
+"""Runs one part in the foreground until it is ended.
 
 Ctrl-C, SIGTERM and, where asked for, the end of the standard input all end a part the
 same way: it is cancelled, cleans up, and leaves with exit code 0.
@@ -23,7 +23,7 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def run_until_told(work: Coroutine[Any, Any, None], *, until_eof: bool = False) -> int:
-    """Run to the end or to the first signal; returns the exit code."""
+    """Run until the end or the first signal; returns the exit code."""
     return uvloop.run(_guard(work, until_eof=until_eof))
 
 
@@ -40,28 +40,28 @@ async def _guard(work: Coroutine[Any, Any, None], *, until_eof: bool) -> int:
 
 
 def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
-    """Nothing is ever written to us; the end means that whoever started us is gone."""
+    """Read standard input, which gets no data: its end is the parent's end."""
     if not os.read(sys.stdin.fileno(), 1024):
         loop.remove_reader(sys.stdin.fileno())
         task.cancel()
 
 
 def sign_in_link(settings: Settings, token: str) -> str:
-    """The address that signs a browser in."""
+    """Address that signs a browser in."""
     host = reached_at(settings.host)
     host = f"[{host}]" if ":" in host else host
     return f"http://{host}:{settings.port}/?token={token}"
 
 
 def reached_at(host: str) -> str:
-    """The address that others reach a server at: of every address, one that routes."""
+    """Address at which others reach a server; for "all addresses" one that routes."""
     if host not in EVERY_ADDRESS:
         return host
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     somewhere = "2001:db8::1" if ":" in host else "192.0.2.1"
     with socket.socket(family, socket.SOCK_DGRAM) as asking:
         try:
-            # Nothing is sent: the system only chooses the way.
+            # Nothing is sent: the system only chooses the route.
             asking.connect((somewhere, 9))
         except OSError:
             return "localhost"
@@ -69,7 +69,7 @@ def reached_at(host: str) -> str:
 
 
 def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None:
-    """Print the way in; for a person at a terminal also as a code for a phone."""
+    """Print the sign-in link; on a terminal also as a code for a phone."""
     out = out or sys.stdout
     link = sign_in_link(settings, token)
     print(f"iVeg: {link}", file=out, flush=True)
@@ -78,5 +78,5 @@ def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None
 
 
 def tell_ready() -> None:
-    """Say on the standard output that this part is up."""
+    """Report on standard output that this part is ready."""
     print("ready", flush=True)

@@ -1,9 +1,9 @@
 """The paper's evaluation as one command (``iveg experiment``).
 
-``plan`` says which scenarios run how often.  Each is played on a virtual clock
-(``stage``, ``rehearsal``), from which everything is counted, and through the real
-programs, which ``cli/experiment`` starts, ``watching`` listens to and ``slices`` times.
-``scoring`` and ``believing`` hold both against the emulator's truth, ``statistics``
-says how sure that is, ``outcome`` and ``notebook`` keep it, ``tables``, ``report`` and
-``compare`` show it beside the paper, ``progress`` says how far it is.
+``plan`` lists scenarios and repetitions.  Each run happens on a virtual clock
+(``stage``, ``rehearsal``), which gives the counts, and with the real programs, which
+``cli/experiment`` starts, ``observer`` records and ``slices`` times.  ``scoring`` and
+``believing`` compare both with the emulator's ground truth, ``statistics`` gives the
+intervals, ``outcome`` and ``notebook`` store the results, ``tables``, ``report`` and
+``compare`` present them beside the paper, ``progress`` shows the progress.
 """

@@ -1,4 +1,4 @@
-"""Whom a robot's costmap holds although it could not see them."""
+"""People in a robot's costmap whom its own sensors could not see."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,14 +11,14 @@ from iveg.experiment.scoring import Picture, SeenObject
 
 Held = Literal["nobody", "told", "own"]
 Belief = Callable[[float, float], Held]
-"""What stands at a place in ``map`` (m), and whether others told of it."""
+"""Content of a position in ``map`` (m), and whether peers reported it."""
 _TAKEN: Final = 50
-"""Of a cell of the costmap (0 to 100)."""
+"""Least cost of an occupied cell of the costmap (0 to 100)."""
 _SAME_MOMENT_S: Final = 0.1
 
 
 def belief_of(own: Costmap, told: Costmap) -> Belief:
-    """By what its own laser found, and that with whom it was told of."""
+    """Belief of the robot's own scan and of the costmap with peer reports."""
 
     def held(x: float, y: float) -> Held:
         if _is_taken(own, x, y):
@@ -29,7 +29,7 @@ def belief_of(own: Costmap, told: Costmap) -> Belief:
 
 
 def belief_in(answer: Mapping[str, Any]) -> Belief:
-    """By an answer of the API, in which both are one."""
+    """Belief of an API response, which combines both."""
     grid = np.asarray(answer["data"], np.int16)
     cells = grid.reshape(answer["height"], answer["width"])
 
@@ -45,12 +45,12 @@ def belief_in(answer: Mapping[str, Any]) -> Belief:
 def injections(
     truth: Sequence[Picture], beliefs: Sequence[tuple[float, Belief]], robot_id: str
 ) -> dict[str, int]:
-    """How often somebody whom a robot could not see stood in its costmap all the same.
+    """How often the costmap contained a person whom the robot could not see.
 
-    Of the moments at which another robot had a person in view and its own camera and
-    laser had not: ``asked`` so many, ``injected`` in so many.  Of the ``people`` whom
-    another had in view first, ``ahead`` so many stood there before its own camera had
-    them.
+    ``asked``: moments at which another robot had a person in view and this robot's
+    camera and laser had not; ``injected``: those in which its costmap contained the
+    person.  ``people``: people whom another robot had in view first; ``ahead``: those
+    in the costmap before its own camera had them.
     """
     asked = injected = 0
     sighted = _first_sights(truth, robot_id)
@@ -73,7 +73,7 @@ def injections(
 
 
 def _hidden(truth: Sequence[Picture], at: float, robot_id: str) -> list[SeenObject]:
-    """People whom others have in view at a moment, and this robot's camera has not."""
+    """People whom others have in view at a moment, but not this robot's camera."""
     near = [one for one in truth if abs(one.at - at) < _SAME_MOMENT_S]
     own = {s.key for one in near if one.robot_id == robot_id for s in one.seen}
     others = (s for one in near if one.robot_id != robot_id for s in one.seen)
@@ -82,7 +82,7 @@ def _hidden(truth: Sequence[Picture], at: float, robot_id: str) -> list[SeenObje
 
 
 def _first_sights(truth: Sequence[Picture], robot_id: str) -> dict[str, float]:
-    """When a robot's own camera first had each target in view (s)."""
+    """Time at which a robot's own camera first had each target in view (s)."""
     first: dict[str, float] = {}
     for picture in truth:
         if picture.robot_id == robot_id:

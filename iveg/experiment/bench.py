@@ -1,13 +1,13 @@
-"""Experiments that are started from the page: one at a time, each a program.
+"""Experiments started from the page: one at a time, each a program of its own.
 
 ::
 
-    nothing ──start──> running ──its own end──> done | broken
-                          │ stop, a live robot, iVeg's end: SIGTERM
-                          └ a death: what there is becomes a report, and says so
+    none ─────start──> running ──program ends──> done | broken
+                          │ stop, a live robot, iVeg ends: SIGTERM
+                          └ a crash: a partial report with the reason
 
-An experiment has ports, data and robots of its own; it only shares the processor, and
-gives way there.  Still none runs while a robot is connected that is really there.
+An experiment has ports, data and robots of its own; it only shares the processor, at
+low priority.  None runs while a live robot is connected.
 """
 
 import asyncio
@@ -25,12 +25,12 @@ from iveg.experiment.plan import PLANS, Size
 from iveg.models.experiment import Experiment, Experiments
 
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
-"""Of iVeg's settings: an experiment is somewhere else, but follows the same rule."""
+"""Settings of iVeg that an experiment inherits: it follows the same rule."""
 _NICENESS: Final = 10
 _LOOK_EVERY_S: Final = 1.0
 _GRACE_S: Final = 20.0
 _TOLD: Final = 300
-"""Characters of what a program said when it died."""
+"""Characters of a failed program's output that are kept."""
 _UNKNOWN: Final[Mapping[str, Any]] = {
     "state": "broken",
     "run": None,
@@ -43,12 +43,12 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
 
 
 class Bench:
-    """Starts, watches and lists experiments.
+    """Starts, supervises and lists experiments.
 
     Args:
-        place: Where they lie.
-        is_robot_there: Whether a robot is connected that is not known to be emulated.
-        command: What is run, before ``experiment run``.
+        place: Directory of the experiments.
+        is_robot_there: Whether a robot is connected that is not known to be simulated.
+        command: Program and arguments before ``experiment run``.
     """
 
     def __init__(
@@ -67,13 +67,13 @@ class Bench:
 
     @property
     def refused(self) -> str | None:
-        """Why none may be started now; None: one may."""
+        """Reason why none may be started now; None: one may."""
         if self._running is not None:
             return "running"
         return "live_robot" if self._is_robot_there() else None
 
     def start(self, size: Size) -> Experiment:
-        """Start one, or go on with the newest of this size that broke off.
+        """Start one, or continue the newest of this size that was interrupted.
 
         Raises:
             ExperimentRefusedError: one is running, or a live robot is connected.
@@ -91,31 +91,31 @@ class Bench:
         return self._told(directory)
 
     def stop(self) -> None:
-        """End the one that runs; it keeps what it has."""
+        """End the running one; it keeps its results so far."""
         self._end("stopped")
 
     async def close(self) -> None:
-        """IVeg ends, and with it what it started."""
+        """End the running one because iVeg ends."""
         self._end("interrupted")
         if self._task is not None:
             await asyncio.gather(self._task, return_exceptions=True)
 
     def list(self) -> Experiments:
-        """All, newest first."""
+        """All experiments, newest first."""
         found = sorted(self._found(), key=lambda one: -one.stat().st_mtime)
         return Experiments(
             items=[self._told(one) for one in found], refused=self.refused
         )
 
     def file(self, name: str, kind: str) -> Path | None:
-        """A report (``html``) or a result (``json``); None where there is none."""
+        """A report (``html``) or a result (``json``); None if absent."""
         for stem in ("result", "partial"):
             file = self._place / name / f"{stem}.{kind}"
             if file.is_file():
                 return file
         return None
 
-    # --- one on its way ---------------------------------------------------------------
+    # --- the running one ----------------------------------------------------------
 
     async def _run(self, size: Size, directory: Path) -> None:
         process = await asyncio.create_subprocess_exec(
@@ -139,7 +139,7 @@ class Bench:
             self._running = None
 
     async def _watch(self, process: asyncio.subprocess.Process) -> None:
-        """Until it ends or has to."""
+        """Wait until it ends or must end."""
         gone = asyncio.create_task(process.wait())
         while not gone.done() and not self._ended.is_set():
             if self._is_robot_there():
@@ -151,7 +151,7 @@ class Bench:
                 return_when=asyncio.FIRST_COMPLETED,
             )
             told.cancel()
-        # It may end by itself in this very moment.
+        # It may end by itself at the same moment.
         with contextlib.suppress(ProcessLookupError):
             if not gone.done():
                 process.terminate()
@@ -164,7 +164,7 @@ class Bench:
             self._why = why
             self._ended.set()
 
-    # --- those that there are ---------------------------------------------------------
+    # --- stored ones ----------------------------------------------------------------
 
     def _found(self) -> Iterator[Path]:
         if self._place.is_dir():
@@ -174,7 +174,7 @@ class Bench:
     def _told(self, directory: Path) -> Experiment:
         known = {**_UNKNOWN, **_progress(directory)}
         if known["state"] == "running" and directory != self._running:
-            # Somebody else's iVeg, or one that was killed together with it.
+            # Started by another iVeg, or by one that was killed together with it.
             known |= {"state": "broken", "why": "interrupted"}
         return Experiment(
             name=directory.name,
@@ -186,7 +186,7 @@ class Bench:
 
 
 def _began(directory: Path) -> float:
-    """When its plan was written down (Unix s)."""
+    """Time at which its plan was written (Unix s)."""
     file = directory / "plan.json"
     return (file if file.exists() else directory).stat().st_mtime
 
@@ -200,7 +200,7 @@ def _progress(directory: Path) -> dict[str, Any]:
 
 
 async def _last_words(process: asyncio.subprocess.Process) -> str:
-    """What it says on its way; a program that dies says last why."""
+    """The last output of a program, which gives the reason of a failure."""
     assert process.stderr is not None  # noqa: S101 - it was asked for
     last = b""
     async for line in process.stderr:
@@ -209,7 +209,7 @@ async def _last_words(process: asyncio.subprocess.Process) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """The machine's, without this iVeg's places and secrets."""
+    """The machine's environment without this iVeg's directories and secrets."""
     return {
         name: value
         for name, value in os.environ.items()
@@ -218,7 +218,7 @@ def _environment() -> dict[str, str]:
 
 
 def _close(directory: Path, code: int, why: str | None, said: str) -> None:
-    """Say how it ended, where it could not do that itself."""
+    """Record how it ended if the program could not."""
     told = _progress(directory)
     died = told.get("state") == "running"
     if died:
@@ -230,7 +230,7 @@ def _close(directory: Path, code: int, why: str | None, said: str) -> None:
 
 
 def _write_partial(directory: Path, why: str) -> None:
-    # What writes reports brings the emulator with it: not before it is needed.
+    # The report writer imports the emulator, so it is imported only when needed.
     from iveg.experiment.notebook import Notebook
 
     size = directory.name.partition("-")[0]

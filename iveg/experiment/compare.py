@@ -1,4 +1,4 @@
-"""Two results beside each other: better, worse, or nobody can tell."""
+"""Comparison of two results: better, worse, or undecided."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -17,10 +17,10 @@ _HOPS: Final[tuple[Hop, ...]] = ("uplink", "fiware", "robot_orion", "iveg")
 
 
 def write_comparison(before: Result, after: Result) -> str:
-    """As a table of text, with the 95 % interval of each difference.
+    """Text table with the 95 % interval of each difference.
 
     Raises:
-        DataFileError: one is of another version's format.
+        DataFileError: a result has the format of another version.
     """
     for result in (before, after):
         if result.get("format") != FORMAT:
@@ -53,7 +53,7 @@ def _rates(before: Result, after: Result) -> Iterator[tuple[str, Interval, Inter
 
 
 def _latencies(before: Result, after: Result) -> Iterator[str]:
-    """Bootstrapped intervals; what takes longer is worse."""
+    """Bootstrapped intervals; a longer time is worse."""
     old, new = slices_of(before), slices_of(after)
     was, now = spreads(old), spreads(new)
     cells: list[Cell] = [(data, hop) for data in DATA for hop in _HOPS]

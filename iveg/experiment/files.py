@@ -1,4 +1,4 @@
-"""Where experiments lie, and how their files are read and written."""
+"""Directories of experiments, and reading and writing of their files."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -15,10 +15,10 @@ _PLAN: Final = "plan.json"
 
 
 def read_json(file: Path) -> Any:
-    """A file of ours.
+    """Read one of our JSON files.
 
     Raises:
-        DataFileError: there is none, or it is no JSON.
+        DataFileError: the file is missing or is not JSON.
     """
     try:
         return orjson.loads(file.read_bytes())
@@ -27,16 +27,16 @@ def read_json(file: Path) -> Any:
 
 
 def write_json(file: Path, value: object) -> None:
-    """Whole or not at all: a crash leaves the file as it was."""
+    """Write atomically: after a crash the file is the old one or the new one."""
     fresh = file.with_suffix(".part")
     fresh.write_bytes(orjson.dumps(value))
     fresh.replace(file)
 
 
 def directory_of(place: Path, plan: Plan) -> Path:
-    """The newest experiment of this size, if it is this plan's and broke off, or a new.
+    """Directory of an experiment: the newest one of this plan if incomplete, or a new.
 
-    What another version or another plan began is not mixed with this one.
+    Results of another version or another plan are not mixed with this one.
     """
     known = sorted(place.glob(f"{plan.size}-*")) if place.is_dir() else []
     if known and not (known[-1] / "result.json").exists() and is_of(known[-1], plan):
@@ -45,7 +45,7 @@ def directory_of(place: Path, plan: Plan) -> Path:
 
 
 def is_of(directory: Path, plan: Plan) -> bool:
-    """Whether a directory is empty, or holds runs of this very plan and version."""
+    """Whether a directory is empty, or contains runs of this very plan and version."""
     try:
         return bool(read_json(directory / _PLAN) == _written(plan))
     except DataFileError:
@@ -53,10 +53,10 @@ def is_of(directory: Path, plan: Plan) -> bool:
 
 
 def claim(directory: Path, plan: Plan) -> None:
-    """Make a directory this plan's.
+    """Assign a directory to this plan.
 
     Raises:
-        DataFileError: it holds runs of another plan, or of another version.
+        DataFileError: it contains runs of another plan, or of another version.
     """
     directory.mkdir(parents=True, exist_ok=True)
     if not is_of(directory, plan):

@@ -1,4 +1,4 @@
-"""An experiment's directory: a file a run, so that what broke off can go on.
+"""An experiment's directory: one file per run, so that an interrupted one can continue.
 
 ::
 
@@ -22,10 +22,10 @@ from iveg.experiment.report import write_report
 
 
 class Notebook:
-    """What one experiment has come to.
+    """Stored results of one experiment.
 
     Raises:
-        DataFileError: the directory holds another one.
+        DataFileError: the directory contains another one.
     """
 
     def __init__(self, plan: Plan, directory: Path) -> None:
@@ -34,29 +34,29 @@ class Notebook:
         claim(directory, plan)
 
     def steps_left(self) -> list[PlannedRun]:
-        """Those that no earlier start has finished."""
+        """Steps that no earlier start has finished."""
         known = {(one["family"], one["number"]) for one in self._outcomes()}
         return [s for s in self._plan.steps() if (s.family, s.number) not in known]
 
     @property
     def done(self) -> int:
-        """How many runs are finished."""
+        """Number of finished runs."""
         return len(self._outcomes())
 
     def is_last(self, step: PlannedRun) -> bool:
-        """Whether nothing comes after it."""
+        """Whether no step follows."""
         return step == [*self._plan.steps()][-1]
 
     def keep(self, step: PlannedRun, outcome: Outcome) -> None:
-        """A run is finished."""
+        """Store a finished run."""
         write_json(self._file(step), outcome)
 
     def finish(self, chosen: Mapping[str, Any], why: str) -> Path:
-        """Write the result, or as much as there is.
+        """Write the result, or the part that exists.
 
         Args:
-            chosen: What of the settings has a say in it.
-            why: It broke off, or empty.
+            chosen: Settings that influence it.
+            why: Reason of an early end, or empty.
 
         Returns:
             The report.
@@ -73,7 +73,7 @@ class Notebook:
     def _outcomes(self) -> list[Outcome]:
         found = []
         for step in self._plan.steps():
-            # A file that cannot be read counts as a run that is still to come.
+            # A run with an unreadable file counts as not done.
             with contextlib.suppress(DataFileError):
                 found.append(read_json(self._file(step)))
         return found

@@ -1,4 +1,4 @@
-"""What comes out of the whole stack while a scenario runs, as a page would see it."""
+"""Records the output of the whole stack during a scenario, as a page receives it."""
 
 import asyncio
 import contextlib
@@ -24,14 +24,14 @@ _ORDER = ("passed", "missing", "reordered", "repeated")
 
 @dataclass(slots=True)
 class Watched:
-    """What was heard.
+    """Recorded output.
 
     Attributes:
-        pictures: As ``/live`` told them.
-        beliefs: What a robot's costmap held at some moments (Unix s).
-        slices: What messages took, a few seconds each.
-        order: By hop, how many messages passed, are missing, came out of order or
-            twice.
+        pictures: Detection frames of ``/live``.
+        beliefs: Content of a robot's costmap at some moments (Unix s).
+        slices: Latencies in slices of a few seconds.
+        order: By hop, messages that passed, are missing, out of order or
+            duplicated.
     """
 
     pictures: list[Picture] = field(default_factory=list)
@@ -41,13 +41,13 @@ class Watched:
 
 
 async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
-    """Listen for so long; what breaks off leaves what was heard.
+    """Record for ``seconds``; an error ends the recording with what it has.
 
     Args:
-        url: Of the page, ``http://…``.
-        token: Of a program.
-        seconds: For how long.
-        robot_id: Whose belief is asked for once a second.
+        url: Address of the page, ``http://…``.
+        token: Bearer token of a program.
+        seconds: Duration (s).
+        robot_id: Robot whose costmap is requested once a second.
     """
     watched = Watched()
     beside = [
@@ -78,7 +78,7 @@ async def _measure(url: str, token: str, seconds: float, watched: Watched) -> No
 
 
 async def _told(url: str, token: str) -> Any:
-    """What the latency API tells since iVeg's start; None: nothing."""
+    """Response of the latency API since iVeg's start; None: none."""
     bearer = {"Authorization": f"Bearer {token}"}
     path = f"{url}/api/v1/latency?window=24h&figures=false&bins=true"
     try:
@@ -104,7 +104,7 @@ def _order_between(
 async def _listen(url: str, token: str, watched: Watched) -> None:
     bearer = {"Authorization": f"Bearer {token}"}
     address = url.replace("http", "ws", 1) + "/live"
-    # A server that goes away ends the pictures, and what was heard stays.
+    # A closed connection ends the recording, which keeps its frames.
     with contextlib.suppress(WebSocketException, OSError):
         async with connect(address, additional_headers=bearer, proxy=None) as line:
             async for message in line:
@@ -126,7 +126,7 @@ async def _believe(url: str, token: str, robot_id: str, watched: Watched) -> Non
                 path = f"{url}/api/v1/costmap?robot={robot_id}"
                 answer = await client.get(path)
                 if answer.status_code == 200 and watched.pictures:
-                    # By the clock of the pictures, with which it is compared.
+                    # Clock of the detection frames, with which it is compared.
                     newest = watched.pictures[-1].at
                     watched.beliefs.append((newest, belief_in(answer.json())))
             await asyncio.sleep(_MAP_EVERY_S)
@@ -151,7 +151,7 @@ def picture_of(told: Mapping[str, Any]) -> Picture | None:
 
 
 def slowdowns_of(decisions: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """Decisions that slowed a robot: how many, applied, observed, without sight."""
+    """Decisions that slowed a robot: number, applied, observed, out of sight."""
     slowed = [one for one in decisions if one["reason"] in ("person", "robot")]
     return {
         "decided": len(slowed),

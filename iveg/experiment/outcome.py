@@ -1,4 +1,4 @@
-"""What one run came to, and all of them together, as JSON that outlives the program."""
+"""Results of one run, and of all runs together, as JSON."""
 
 import os
 import platform
@@ -26,7 +26,7 @@ Outcome = dict[str, Any]
 
 
 def counted_of(run: Rehearsed, robot_id: str) -> Outcome:
-    """What a run on the virtual clock came to; the same twice."""
+    """Result of a run on the virtual clock; reproducible."""
     real = [one for one, _ in run.pairs]
     return {
         "completed": run.completed,
@@ -43,7 +43,7 @@ def stack_of(
     decisions: Sequence[Mapping[str, Any]],
     robot_id: str,
 ) -> Outcome:
-    """What came through all programs in real time."""
+    """Result of the run in real time through all programs."""
     pairs = list(paired(truth, watched.pictures))
     return {
         "completed": bool(pairs),
@@ -58,7 +58,7 @@ def stack_of(
 
 
 def outcome_of(step: PlannedRun, counted: Outcome, stack: Outcome) -> Outcome:
-    """One run as it is kept."""
+    """One run as stored."""
     return {**asdict(step), "counted": counted, "stack": stack}
 
 
@@ -72,7 +72,7 @@ def result_of(
     chosen: Mapping[str, Any],
     why: str = "",
 ) -> dict[str, Any]:
-    """The whole experiment; ``why`` it ended early, empty where it did not."""
+    """The whole experiment; ``why`` is the reason of an early end, or empty."""
     stack = [one["stack"] for one in outcomes]
     slices = [piece for one in stack for piece in one["slices"]]
     return {
@@ -94,7 +94,7 @@ def result_of(
 
 
 def machine() -> dict[str, Any]:
-    """On what it ran."""
+    """The machine that it ran on."""
     return {
         "system": platform.platform(),
         "processor": platform.processor() or platform.machine(),
@@ -180,7 +180,7 @@ def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
 
 
 def read_truth(file: Path) -> list[Picture]:
-    """What the emulator wrote down; a last line that broke off is left out."""
+    """Ground truth of the emulator; an incomplete last line is omitted."""
     pictures = []
     for line in file.read_bytes().splitlines():
         try:

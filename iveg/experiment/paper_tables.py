@@ -1,4 +1,4 @@
-"""What the paper printed of its evaluation, and where it contradicts itself.
+"""Numbers that the paper printed of its evaluation, and their contradictions.
 
 The tables of YOLOx in simulation and in the field (``tab:yolo_metrics_sim``,
 ``tab:yolo_metrics_real2``), field by field; its two tables of latency are in
@@ -14,11 +14,11 @@ from iveg.domain.latency.paper import Place
 
 CLASSES: Final = ("farmer", "AGI", "AGII")
 COMPLETION: Final[Mapping[Place, float]] = {"simulation": 0.92, "field": 0.82}
-"""Of its runs."""
+"""Completed share of its runs."""
 CONFIDENCE: Final[Mapping[Place, float]] = {"simulation": 0.85, "field": 0.72}
-"""Of its detector, in the mean."""
+"""Mean confidence of its detector."""
 P95_BELOW_MS: Final[Mapping[Place, float]] = {"simulation": 202.0, "field": 320.0}
-"""What it promises of every kind of data from robot to Orion."""
+"""P95 that it states for every kind of data from robot to Orion (ms)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ _ROUNDING = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """Something printed that does not follow from what is printed beside it."""
+    """A printed number that does not follow from the numbers beside it."""
 
     place: Place
     row: str
@@ -118,4 +118,4 @@ AGAINST_ITS_TEXT: Final = (
     "A detector with a mean confidence of 72 % is heard beneath the threshold of the "
     "text's own rule (0.8) most of the time: see the shares that reached it.",
 )
-"""Where the paper's tables and text do not say the same (docs/experiment.md)."""
+"""Contradictions between the paper's tables and text (docs/experiment.md)."""

@@ -1,4 +1,4 @@
-"""Which scenarios are run, how often and for how long."""
+"""Scenarios of an experiment, with their repetitions and durations."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ Size = Literal["minimal", "quick", "full"]
 FAMILIES: Final = ("viewpoints", "peers", "together", "occluded", "nlos")
 """The paper's four scenarios and its test without a line of sight."""
 ROBOTS: Final = ("AGI", "AGII")
-"""The paper's fleet, whatever the site's own is."""
+"""The paper's fleet, independent of the site's own."""
 WATCHED: Final = "AGII"
-"""Whose costmap is looked into: the one that is blind in the paper's test."""
+"""Robot whose costmap is examined: the one without sight in the paper's test."""
 GREENHOUSE: Final = "mvsim-20x20"
 SEED: Final = 2026
 
@@ -20,9 +20,9 @@ class PlannedRun:
     """One run of one scenario.
 
     Attributes:
-        seconds: It lasts in real time, through all programs.
-        counted_s: It lasts on the virtual clock, where everything is counted (s).
-        seed: Of its people and its detector's noise.
+        seconds: Duration in real time, through all programs (s).
+        counted_s: Duration on the virtual clock, which gives the counts (s).
+        seed: Random seed of its people and its detector's noise.
     """
 
     family: str
@@ -33,7 +33,7 @@ class PlannedRun:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"{self.family}-{self.number}"
 
 
@@ -42,9 +42,9 @@ class Plan:
     """All runs of an experiment.
 
     Attributes:
-        seconds: Each run lasts in real time; ``runs`` of each family.
-        counted_s: Each run lasts on the virtual clock (s).
-        profile: Of the emulated detector: ``simulation`` or ``field``.
+        seconds: Duration of each run in real time; ``runs`` of each family.
+        counted_s: Duration of each run on the virtual clock (s).
+        profile: Detector profile of the emulator: ``simulation`` or ``field``.
     """
 
     size: Size
@@ -56,7 +56,7 @@ class Plan:
     counted_s: float = 60.0
 
     def steps(self) -> Iterator[PlannedRun]:
-        """In their order; every family's first runs come before any second."""
+        """All runs in order; every family's first run precedes any second one."""
         for number in range(1, self.runs + 1):
             for place, family in enumerate(self.families):
                 seed = self.seed + 100 * place + number

@@ -1,4 +1,4 @@
-"""How far an experiment has come: on a terminal, in plain lines, in a file for others.
+"""Progress of an experiment: on a terminal, in plain lines, in a file for others.
 
 ::
 
@@ -15,25 +15,25 @@ from iveg.experiment.plan import PlannedRun
 Phase = Literal["counting", "running"]
 State = Literal["running", "done", "broken"]
 _STARTS_S: Final = 8.0
-"""Programs of one run take so long to come and go."""
+"""Time to start and end the programs of one run (s)."""
 _COUNTED_SHARE: Final = 0.15
-"""A virtual second takes about so long."""
+"""Approximate real time of a virtual second (s)."""
 _WIDTH: Final = 20
 _SAID: Final = {"counting": "virtual clock", "running": "real time"}
 
 
 def expected_s(step: PlannedRun) -> float:
-    """About how long a run takes."""
+    """Estimated duration of a run (s)."""
     return step.seconds + _STARTS_S + _COUNTED_SHARE * step.counted_s
 
 
 class Progress:
-    """Tells how far it is.
+    """Reports the progress.
 
     Args:
-        directory: Where the file goes.
-        steps: Still to be run, in order; ``before``: how many were done earlier.
-        out: Where people read it.
+        directory: Directory of the file.
+        steps: Remaining runs, in order; ``before``: number of runs done earlier.
+        out: Text output.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Progress:
         self.tick(now)
 
     def end(self, step: PlannedRun, now: float) -> None:
-        """A run is done; how long it took says how long the others will take."""
+        """A run is done; its duration corrects the estimate for the others."""
         expected = self._expected.pop(step.name)
         if self._now is not None:
             took = (now - self._now[2]) / expected
@@ -71,18 +71,18 @@ class Progress:
         self.tick(now)
 
     def left_s(self, now: float) -> float:
-        """About how long it still takes (s)."""
+        """Estimated remaining time (s)."""
         left = self._slowness * sum(self._expected.values())
         return max(0.0, left - (0.0 if self._now is None else now - self._now[2]))
 
     def tick(self, now: float) -> None:
-        """Another second has passed."""
+        """One more second has passed."""
         self._keep("running", "", self.left_s(now))
         if self._is_terminal:
             print(f"\r\x1b[2K{self._line(now)}", end="", file=self._out, flush=True)
 
     def finish(self, why: str) -> None:
-        """It is over; ``why`` before its end, or empty."""
+        """The experiment is over; ``why`` is the reason of an early end, or empty."""
         self._keep("broken" if why else "done", why, 0.0)
         if self._is_terminal:
             print("\r\x1b[2K", end="", file=self._out, flush=True)

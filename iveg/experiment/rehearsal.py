@@ -1,7 +1,7 @@
-"""One run on the virtual clock, from which everything is counted.
+"""One run on the virtual clock, which gives all counts.
 
-What programs do in real time depends on when each gets the processor; here nothing
-does, so that two runs of one seed give the same counts on any machine.
+Real programs depend on the scheduling of the processor; this run does not, so that two
+runs of one seed give the same counts on any machine.
 """
 
 import asyncio
@@ -41,14 +41,14 @@ _SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
 
 @dataclass(slots=True)
 class Rehearsed:
-    """What came of it.
+    """Result of a run.
 
     Attributes:
-        pairs: Each picture, as it was and as iVeg told it.
-        beliefs: At some moments (s), what a robot's costmap holds.
-        decisions: As each ended.
+        pairs: Each detection frame, true and as iVeg reported it.
+        beliefs: At some moments (s), the content of a robot's costmap.
+        decisions: All decisions in their final state.
         touched: Moments at which a robot touched a person.
-        lost: Robots that were not live in the end.
+        lost: Robots that were not live at the end.
     """
 
     pairs: list[Pair] = field(default_factory=list)
@@ -59,12 +59,12 @@ class Rehearsed:
 
     @property
     def completed(self) -> bool:
-        """It went to its end: all robots live, nobody touched."""
+        """Whether it completed: all robots live, no collision."""
         return bool(self.pairs) and not self.touched and not self.lost
 
 
 class _Outside:
-    """The ports of a pipeline in which nobody presses anything.
+    """Ports of a pipeline without an operator.
 
     Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
     """
@@ -81,12 +81,12 @@ class _Outside:
             self.decisions[record.decision_id] = record
 
     async def flushed(self) -> None:
-        """Nothing here outlives a crash, nor has to."""
+        """Return; nothing is stored here."""
 
     async def set_desired_state(
         self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
     ) -> None:
-        """Nobody is stopped."""
+        """Ignore; no robot is stopped here."""
 
     async def wanted(
         self,
@@ -96,7 +96,7 @@ class _Outside:
         by: str,
         at: Instant,
     ) -> None:
-        """Likewise."""
+        """Ignore; no robot is stopped here."""
 
     async def named(
         self,
@@ -107,14 +107,14 @@ class _Outside:
         by: str,
         at: Instant,
     ) -> None:
-        """Likewise."""
+        """Ignore; no robot is released here."""
 
 
 class Rehearsal:
     """One scenario in a pipeline of its own.
 
     Args:
-        watched: The robot whose costmap is looked into.
+        watched: Robot whose costmap is examined.
     """
 
     def __init__(
@@ -166,7 +166,7 @@ class Rehearsal:
         )
 
     async def play(self, seconds: float) -> Rehearsed:
-        """From the beginning; lets others have their turn once a virtual second."""
+        """Run from the start; yields to other tasks once a virtual second."""
         for number in range(round(seconds / STEP_S)):
             self._stage.step()
             self._mapper.tick(self._now)
@@ -190,7 +190,7 @@ class Rehearsal:
             self._parts.ingest.offer(received)
 
     def _looked(self, rig: Rig) -> None:
-        """What is in view at the very moment of the picture."""
+        """Targets in view at the moment of the picture."""
         seen = (
             SeenObject(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
             for one, _ in in_view(rig, self._world)
@@ -198,7 +198,7 @@ class Rehearsal:
         self._detections.append(Picture(rig.robot_id, self._now.mono, tuple(seen)))
 
     def _told(self) -> Iterator[Pair]:
-        """What iVeg makes of the pictures of this step."""
+        """Detections that iVeg reports for the frames of this step."""
         looks, self._detections = self._detections, []
         for real in looks:
             frame = self._views.frame(real.robot_id, self._now)

@@ -103,7 +103,7 @@ def _head(result: Result) -> Iterator[str]:
 
 
 def _figures(result: Result) -> Iterator[str]:
-    """Plotly's own script lies in the file, so that it opens anywhere."""
+    """Figures; the file contains Plotly's own script, so that it opens offline."""
     if not result["latency"]["slices"]:
         return
     drawn = {

@@ -1,8 +1,8 @@
-"""Detections that iVeg told, against what was really in view, picture by picture.
+"""Reported detections compared with the ground truth, frame by frame.
 
-Mistakes of a detector last: a person who is missed in one picture is missed in the next
-twenty, too.  So pictures are counted, and how sure a rate is comes from how many
-*looks* they are: two seconds of one robot at one target, as long as a mistake lasts.
+Errors of a detector persist: a person missed in one frame is missed in the next twenty
+as well.  So frames are counted, but the confidence interval of a rate uses the number
+of *looks*: two seconds of one robot at one target, as long as an error lasts.
 """
 
 from bisect import bisect_left
@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from typing import Final
 
 OVERLAP: Final = 0.5
-"""Intersection over union from which on a box is right, as in AP@0.5."""
+"""Least intersection over union of a correct box, as in AP@0.5."""
 SIZE_M: Final = {"farmer": 0.5}
 _ROBOT_SIZE_M = 1.0
 _SAME_PICTURE_S = 0.06
 _LOOK_S = 2.0
-"""As long as the emulated detector goes on making one mistake, at most."""
+"""Longest duration of one error of the emulated detector (s)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +25,8 @@ class SeenObject:
     """A target in view, or a detection of one, by its centre in ``map`` (m).
 
     Attributes:
-        key: Tells targets apart; of a detection its place in the picture.
-        confidence: Of a detection (0 to 1).
+        key: Id of a target; of a detection its index in the frame.
+        confidence: Confidence of a detection (0 to 1).
     """
 
     key: str
@@ -38,7 +38,7 @@ class SeenObject:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What one robot had in view, or said it had, at a moment (Unix s)."""
+    """Targets that one robot had in view, or reported, at a moment (Unix s)."""
 
     robot_id: str
     at: float
@@ -46,16 +46,16 @@ class Picture:
 
 
 Pair = tuple[Picture, Picture]
-"""One picture: what was in view, and what was told of it."""
+"""One detection frame: the targets in view, and the reported detections."""
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Of one class; ``ap`` is average precision at an overlap of one half.
+    """Score of one class; ``ap`` is average precision at an overlap of one half.
 
     Attributes:
-        looks: At targets, and ``claims``: looks in which something was told; so many
-            are the counts worth, as pictures of one look are not independent.
+        looks: Looks at targets; ``claims``: looks with a reported detection.  Both
+            are effective sample sizes, as frames of one look are not independent.
     """
 
     tp: int = 0
@@ -67,23 +67,23 @@ class Score:
 
     @property
     def precision(self) -> float | None:
-        """0 to 1; None of nothing."""
+        """0 to 1; None without detections."""
         return self.tp / (self.tp + self.fp) if self.tp + self.fp else None
 
     @property
     def recall(self) -> float | None:
-        """0 to 1; None of nothing."""
+        """0 to 1; None without targets."""
         return self.tp / (self.tp + self.fn) if self.tp + self.fn else None
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """Counted pictures of one class, from which scores of many runs can be added.
+    """Counts of one class, from which scores of many runs can be added.
 
     Attributes:
-        found: Confidence of each picture of a target that was told.
-        missed: How many pictures of a target were told without it.
-        ghosts: Confidence of each box that belongs to no target.
+        found: Confidence of each reported detection of a target.
+        missed: Number of frames with a target in view but not reported.
+        ghosts: Confidence of each detection without a target.
         looks, claims: As in ``Score``.
     """
 
@@ -96,7 +96,7 @@ class Tally:
 
 @dataclass(slots=True)
 class _Count:
-    """A tally that grows; looks are (robot, target or none, which two seconds)."""
+    """A growing tally; looks are (robot, target or None, two-second interval)."""
 
     found: list[float] = field(default_factory=list)
     missed: int = 0
@@ -136,7 +136,7 @@ def tally(pairs: Iterable[Pair]) -> dict[str, Tally]:
 
 
 def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
-    """What was told beside what was in view at that moment, where that is known."""
+    """Reported frames with the ground truth of the same moment, where known."""
     views = _by_robot(truth)
     for picture in told:
         real = _nearest(views.get(picture.robot_id, ()), picture.at)
@@ -147,7 +147,7 @@ def paired(truth: Iterable[Picture], told: Iterable[Picture]) -> Iterator[Pair]:
 def match(
     real: Sequence[SeenObject], told: Sequence[SeenObject]
 ) -> tuple[dict[str, float], list[SeenObject]]:
-    """Each target's own detection, the surest first, and what belongs to none."""
+    """Detection of each target, most confident first, and unmatched detections."""
     matched: dict[str, float] = {}
     wrong: list[SeenObject] = []
     for one in sorted(told, key=lambda seen: -seen.confidence):
@@ -212,7 +212,7 @@ def _by_robot(pictures: Iterable[Picture]) -> dict[str, list[Picture]]:
 
 
 def _nearest(views: Sequence[Picture], at: float) -> Picture | None:
-    """The picture of that moment; None where nobody wrote one down."""
+    """The frame of that moment; None if there is no ground truth."""
     place = bisect_left(views, at, key=lambda one: one.at)
     near = views[max(0, place - 1) : place + 1]
     best = min(near, key=lambda one: abs(one.at - at), default=None)

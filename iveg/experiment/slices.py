@@ -1,9 +1,8 @@
-"""What messages took, in slices of a few seconds, as the latency API tells it.
+"""Latencies in slices of a few seconds, from the latency API.
 
-The API tells everything since iVeg's start; what lies between two answers is a slice.
-Slices of all runs add up to the experiment, and drawing them again and again says how
-sure a mean or a quantile is: messages of one slice follow each other too closely to be
-many proofs.
+The API reports totals since iVeg's start; the difference of two responses is a slice.
+The slices of all runs add up to the experiment, and resampling them gives the interval
+of a mean or a quantile: messages of one slice are not independent.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,12 +21,12 @@ Slice = dict[str, dict[str, dict[str, Any]]]
 left out."""
 _DRAWS: Final = 1000
 _FEWEST: Final = 4
-"""Of fewer slices nobody can tell how they scatter."""
+"""Least number of slices for an interval."""
 _SEED: Final = 14
 
 
 def slice_between(before: Sequence[Any], after: Sequence[Any]) -> Slice:
-    """What was measured between two answers' ``rows``."""
+    """Measurements between two responses' ``rows``."""
     old = {row["data"]: row["bins"] for row in before}
     found: Slice = {}
     for row in after:
@@ -67,20 +66,20 @@ def _sketch(bins: Mapping[str, Any] | None) -> Sketch:
 
 
 def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
-    """All slices as one."""
+    """All slices combined."""
     cells: list[Cell] = [(data, hop) for data in DATA for hop in HOPS]
     return {cell: merged(sketches_of(slices, cell)) for cell in cells}
 
 
 def spreads(slices: Sequence[Slice]) -> dict[Cell, LatencySummary]:
-    """The numbers of all slices together."""
+    """Statistics of all slices combined."""
     return {cell: spread_of(sketch) for cell, sketch in whole(slices).items()}
 
 
 def apart(
     before: Sequence[Slice], after: Sequence[Slice], cell: Cell
 ) -> Iterator[tuple[str, Interval]]:
-    """How much later a hop's mean and P95 are (ms), with bootstrapped intervals.
+    """Increase of a hop's mean and P95 (ms), with bootstrapped intervals.
 
     Slices are drawn with replacement (Efron 1979), a thousand times, seeded.
     """

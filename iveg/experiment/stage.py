@@ -1,10 +1,8 @@
-"""A greenhouse on a clock that is moved by hand.
+"""A greenhouse on a virtual clock.
 
-The emulator's world, the robots' own safety machines and all of iVeg between its doors,
-without a socket or a process.
-
-What goes from one to the other is written and read by the codec, as on the wire.  The
-same seed gives the same run on any machine, however busy it is.
+The emulator's world, the robots' own safety machines and iVeg's pipeline, without a
+socket or a process.  Their messages are encoded and decoded by the codec, as on the
+wire.  The same seed gives the same run on any machine, however busy it is.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -30,18 +28,18 @@ from iveg.robot.uplink import Uplink
 
 STEP_S: Final = 0.05
 _LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
-"""Steps between two looks, the first when everybody has said where it is, and between
-two words of navigation."""
+"""Steps between two camera frames, the first once all odometry was sent, and between two
+messages of navigation."""
 Looked = Callable[[Rig], None]
 
 
 @dataclass
 class Faults:
-    """What is wrong with a robot.
+    """Faults of a robot.
 
     Attributes:
-        mute: Nothing that it says arrives.
-        deaf: It drives as it likes whatever speed limit iVeg sets; holds still bite.
+        mute: None of its messages arrives.
+        deaf: It ignores iVeg's speed limits; holds still apply.
         clock_offset_s: Its wall clock is this far ahead (s).
     """
 
@@ -51,11 +49,11 @@ class Faults:
 
 
 class StagedRobot:
-    """One rig under its safety machine, whose effects are performed at once.
+    """One rig with its safety machine, whose effects are executed at once.
 
     Args:
-        hear: Where its messages go, by topic.
-        looked: Told when its camera has just taken a picture.
+        hear: Called with the topic and payload of its messages.
+        looked: Called when its camera has taken a picture.
         scan_every: Steps between two sweeps of its laser; 0: none.
     """
 
@@ -107,11 +105,11 @@ class StagedRobot:
             self._uplink.send(self._rig.navigation(), now)
 
     def _dated(self, now: Instant) -> Instant:
-        """What its own clocks show."""
+        """Readings of its own clocks."""
         return Instant(now.mono, now.wall + self.faults.clock_offset_s)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
-        """Hear iVeg's feedback to a robot of the fleet."""
+        """Take iVeg's feedback to a robot of the fleet."""
         feedback = codec.read_feedback(payload)
         self._echo.take(feedback.origin)
         self._perform(self._machine.feedback(topic, feedback, now.mono), now)
@@ -132,7 +130,7 @@ class StagedRobot:
 
 
 def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
-    """What a message says that came straight, read as iVeg does."""
+    """Decode a direct message as iVeg does."""
     reading = codec.read_measure(topic.split("/")[2], payload)
     assert reading.problems == ()  # noqa: S101 - both ends are ours
     for observation in reading.observations:
@@ -140,14 +138,14 @@ def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
 
 
 class Stage:
-    """One scenario that is played, a twentieth of a second at a time.
+    """One scenario in steps of a twentieth of a second.
 
     Args:
-        incidents: What goes wrong in it.
-        told: What iVeg has told the fleet; it grows.
-        move_clock: Told how many seconds have passed; answers the moment.
-        hear: Takes each message of a robot, by topic; they speak as soon as they are.
-        looked, scan_every: Of every robot.
+        incidents: Its faults.
+        told: Feedback that iVeg has published; it grows.
+        move_clock: Advances the clock by seconds; returns the time.
+        hear: Called with each message of a robot, from its creation on.
+        looked, scan_every: As for ``StagedRobot``.
     """
 
     def __init__(
@@ -176,7 +174,7 @@ class Stage:
         self._steps = 0
 
     def step(self) -> None:
-        """Let a twentieth of a second pass for everybody."""
+        """Advance everything by a twentieth of a second."""
         number = self._steps
         self._steps += 1
         self.now = self._move_clock(round(self._steps * STEP_S, 6))
@@ -190,14 +188,14 @@ class Stage:
         self._deliver()
 
     def happen(self, order: FaultOrder) -> None:
-        """Something goes wrong with a robot, or is well again."""
+        """Inject a fault into a robot, or end it."""
         faults = self._robots[order.robot].faults
         faults.clock_offset_s = order.clock_offset_s or faults.clock_offset_s
         faults.mute = faults.mute if order.mute is None else order.mute
         faults.deaf = faults.deaf if order.deaf is None else order.deaf
 
     def _deliver(self) -> None:
-        """Every robot listens to what is told to any."""
+        """Deliver new feedback to every robot."""
         told = self._told[self._delivered :]
         self._delivered += len(told)
         for feedback in told:

@@ -1,11 +1,11 @@
-"""How sure a share is, and whether two differ."""
+"""Confidence intervals of shares and of their differences."""
 
 from dataclasses import dataclass
 from math import sqrt
 from typing import Final, Literal
 
 _Z: Final = 1.959964
-"""Of 95 %."""
+"""Normal quantile for 95 %."""
 Verdict = Literal["better", "worse", "cannot tell"]
 
 
@@ -19,7 +19,7 @@ class Interval:
 
 
 def wilson(hits: float, of: float) -> Interval | None:
-    """The Wilson score interval (Wilson 1927); None of nothing."""
+    """The Wilson score interval (Wilson 1927); None without data."""
     if of <= 0:
         return None
     share, z2 = hits / of, _Z * _Z
@@ -29,7 +29,7 @@ def wilson(hits: float, of: float) -> Interval | None:
 
 
 def thinned(hits: int, of: int, worth: int) -> Interval | None:
-    """The same where ``of`` counts are worth only so many independent ones."""
+    """The same where ``of`` counts are worth only ``worth`` independent ones."""
     return wilson(hits * worth / of, worth) if of and worth else None
 
 
@@ -46,7 +46,7 @@ def difference(before: Interval, after: Interval) -> Interval:
 
 
 def verdict(apart: Interval) -> Verdict:
-    """Whether a share that should be high got better."""
+    """Whether a share that should be high improved."""
     if apart.low > 0.0:
         return "better"
     return "worse" if apart.high < 0.0 else "cannot tell"

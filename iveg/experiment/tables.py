@@ -1,4 +1,4 @@
-"""The report's tables: what the paper printed, and beside it what was measured."""
+"""Tables of the report: the paper's numbers beside the measured ones."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
@@ -121,7 +121,7 @@ SIGHT: Final = ("what", "here", "here, real time")
 
 
 def out_of_sight(result: Result) -> Rows:
-    """Slow-downs, and whom AGII was told of."""
+    """Slow-downs, and people out of AGII's sight that were reported to it."""
     here, real = result, result["stack"]
     for key, name in (
         ("decided", "slow-downs decided"),
@@ -145,7 +145,7 @@ STOPS: Final = ("robot", "robot's answer", "standing")
 
 
 def stops(result: Result) -> Rows:
-    """STOP of the fleet (ms since the press)."""
+    """STOP of the fleet (ms since the request)."""
     for one in result["stack"]["stops"]:
         answered = ms(one["answer_direct"]["p50_ms"])
         yield one["robot_id"], answered, ms(one["standing"]["p50_ms"])
@@ -180,7 +180,7 @@ RUNS: Final = (
 
 
 def runs(result: Result) -> Rows:
-    """One line each."""
+    """One line per run."""
     for one in result["runs"]:
         cells = [
             cell
