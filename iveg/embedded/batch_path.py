@@ -25,7 +25,7 @@ class _Item:
 
 
 async def batch_update(broker: ContextBroker, call: Call) -> Response:
-    """``POST /v2/op/update``: does what can be done and says what could not."""
+    """``POST /v2/op/update``: executes what is possible and reports what is not."""
     raw = _checked(call.object())
     items = [_read_item(call, one) for one in raw["entities"]]
     action = _OLD_WORDS.get(raw["actionType"], raw["actionType"])
@@ -35,10 +35,10 @@ async def batch_update(broker: ContextBroker, call: Call) -> Response:
 
 
 def _checked(raw: dict[str, Any]) -> dict[str, Any]:
-    """The request, if Orion would read on.
+    """The request, if Orion would process it further.
 
     Raises:
-        NgsiError: 400, with Orion's sentence, its slip of the pen included.
+        NgsiError: 400, with Orion's sentence, including its typing error.
     """
     if not raw:
         raise bad_request("empty payload")

@@ -1,6 +1,6 @@
-"""A context broker in memory that speaks NGSI-v2 as Orion 4.7 does.
+"""An in-memory context broker that implements NGSI-v2 as Orion 4.7 does.
 
-What it does not do is told in ``docs/fiware.md``.  HTTP is in ``ngsi_api``; here are
+Its limits are listed in ``docs/fiware.md``.  HTTP is in ``ngsi_api``; this module has
 the operations, which the embedded IoT Agent also calls directly.
 """
 
@@ -30,7 +30,7 @@ class ContextBroker:
     """Entities, subscriptions and registrations of all tenants.
 
     Args:
-        started: When it came up (s, Unix time).
+        started: Start time (s, Unix time).
     """
 
     def __init__(self, started: float) -> None:
@@ -39,7 +39,7 @@ class ContextBroker:
         self.outbox = Outbox(lambda: clock.now().wall)
 
     def tenant(self, service: str) -> Tenant:
-        """A tenant; one that was never heard of is empty."""
+        """The data of a tenant; empty for an unknown one."""
         known = self._tenants.get(service)
         if known is None:
             known = self._tenants[service] = Tenant()
@@ -52,7 +52,7 @@ class ContextBroker:
     # --- entities ---------------------------------------------------------------
 
     def find(self, scope: Scope, entity_id: str, entity_type: str = "") -> Entity:
-        """The entity that an id and perhaps a type stand for.
+        """Find the entity of an id and an optional type.
 
         Raises:
             NgsiError: 404 none, 409 several.
@@ -71,10 +71,10 @@ class ContextBroker:
         entity_type: str,
         changes: Mapping[str, EntityChange],
     ) -> Entity:
-        """Make a new entity and tell of it.
+        """Create an entity and notify its subscriptions.
 
         Raises:
-            NgsiError: 422, there is one already.
+            NgsiError: 422, the entity exists already.
         """
         entities = self.tenant(scope.service).entities
         if entities.get(scope.path, entity_id, entity_type) is not None:
@@ -92,7 +92,7 @@ class ContextBroker:
         entity_type: str,
         changes: Mapping[str, EntityChange],
     ) -> None:
-        """Make an entity, or add to and change its attributes."""
+        """Create an entity, or add to and change its attributes."""
         entity = self.tenant(scope.service).entities.get(
             scope.path, entity_id, entity_type
         )
@@ -109,7 +109,7 @@ class ContextBroker:
         *,
         forced: bool = False,
     ) -> None:
-        """Change attributes; create missing ones."""
+        """Change attributes; create the missing ones."""
         if changes:
             touched = apply(entity, changes, scope.now, forced=forced)
             self._tell(scope, entity, touched, "entityChange")
@@ -121,7 +121,7 @@ class ContextBroker:
         changes: Mapping[str, EntityChange],
         kind: str,
     ) -> Outcome:
-        """Make attributes; those that are there stay as they are.
+        """Create attributes; existing ones stay unchanged.
 
         Args:
             scope: Whose data.
@@ -144,12 +144,12 @@ class ContextBroker:
     def replace(
         self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
     ) -> None:
-        """Put attributes in place of all there were."""
+        """Replace all attributes."""
         fresh(entity, scope.now)
         self.append(scope, entity, changes)
 
     def delete(self, scope: Scope, entity: Entity) -> None:
-        """Forget an entity and tell those who asked to know."""
+        """Delete an entity and notify its subscriptions."""
         tenant = self.tenant(scope.service)
         tenant.entities.remove(entity)
         self._tell(scope, entity, touch_all(entity), "entityDelete")
@@ -158,7 +158,7 @@ class ContextBroker:
     def delete_attributes(
         self, scope: Scope, entity: Entity, names: Iterable[str]
     ) -> tuple[str, ...]:
-        """Forget attributes; those that were not there."""
+        """Delete attributes; returns the names of missing ones."""
         names = list(names)
         missing = tuple(name for name in names if name not in entity.attributes)
         for name in names:
@@ -177,10 +177,10 @@ class ContextBroker:
         *,
         forced: bool = False,
     ) -> None:
-        """Change attributes that are there; pass on those that are registered.
+        """Change existing attributes; forward registered ones to their providers.
 
         Raises:
-            NgsiError: 404 or 422, as Orion says it; what could be done is done.
+            NgsiError: 404 or 422, as Orion; the possible part is done.
         """
         outcome = await self.try_update(
             scope, entity_id, entity_type, changes, forced=forced
@@ -196,7 +196,7 @@ class ContextBroker:
         *,
         forced: bool = False,
     ) -> Outcome:
-        """Do of ``update`` what can be done, and say what could not."""
+        """Do the possible part of ``update``, and report the rest."""
         tenant = self.tenant(scope.service)
         entity = tenant.entities.find(scope.path, entity_id, entity_type)
         kind = entity.type if entity else entity_type
@@ -243,28 +243,28 @@ class ContextBroker:
     # --- subscriptions and registrations ----------------------------------------
 
     def subscribe(self, subscription: Subscription) -> None:
-        """Keep a subscription; it hears of changes from now on."""
+        """Store a subscription; it is notified of later changes."""
         tenant = self.tenant(subscription.service)
         tenant.subscriptions[subscription.id] = subscription
         tenant.concerned.clear()
 
     def resubscribe(self, subscription: Subscription) -> None:
-        """A subscription was changed."""
+        """Reload a changed subscription."""
         self.tenant(subscription.service).concerned.clear()
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """Forget a subscription and hang up on its receiver."""
+        """Delete a subscription and close its connection."""
         tenant = self.tenant(subscription.service)
         del tenant.subscriptions[subscription.id]
         tenant.concerned.clear()
         self.outbox.forget(subscription.id)
 
     def register(self, scope: Scope, registration: Registration) -> None:
-        """Keep a registration; Orion keeps duplicates too."""
+        """Store a registration; Orion stores duplicates too."""
         self.tenant(scope.service).registrations[registration.id] = registration
 
     def unregister(self, scope: Scope, registration_id: str) -> bool:
-        """Forget a registration; whether there was one."""
+        """Delete a registration; returns whether it existed."""
         known = self.tenant(scope.service).registrations
         return known.pop(registration_id, None) is not None
 

@@ -1,4 +1,4 @@
-"""Groups and devices as the IoT Agent keeps them, and how it shows them."""
+"""Groups and devices as the IoT Agent stores and lists them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ class AgentError(IvegError):
 
     Attributes:
         status: HTTP status.
-        name: The agent's word for it, such as ``DUPLICATE_DEVICE_ID``.
+        name: The agent's error name, such as ``DUPLICATE_DEVICE_ID``.
         message: The agent's sentence.
     """
 
@@ -37,7 +37,7 @@ class Tenancy:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """What devices with one API key have in common."""
+    """Common settings of the devices with one API key."""
 
     tenancy: Tenancy
     apikey: str
@@ -48,20 +48,20 @@ class Group:
 
     @property
     def commands(self) -> list[dict[str, Any]]:
-        """Commands that every device of the group takes."""
+        """Commands of every device of the group."""
         return list(self.document.get("commands") or [])
 
     def entity_name(self, device_id: str) -> str:
-        """The entity of a device that nobody has provisioned.
+        """Entity name of a device that was not provisioned.
 
-        Of the agent's expressions only the plain ``id`` is understood.
+        Of the agent's expressions only the plain ``id`` is supported.
         """
         if self.document.get("entityNameExp") == "id":
             return device_id
         return f"{self.entity_type}:{device_id}"
 
     def show(self) -> dict[str, Any]:
-        """The group as the agent lists it; the broker's address is not shown."""
+        """The group as the agent lists it, without the broker's address."""
         document = self.document
         shown = {
             "_id": self.id,
@@ -88,7 +88,7 @@ class Device:
     """One device.
 
     Attributes:
-        mapping: What the device calls an attribute → its NGSI name and type.
+        mapping: Attribute name of the device → its NGSI name and type.
         registration_id: Its registration at the context broker; empty for none.
     """
 
@@ -108,7 +108,7 @@ class Device:
 
     @property
     def static_attributes(self) -> list[dict[str, Any]]:
-        """Attributes that go along with every measure."""
+        """Attributes that are added to every measure."""
         return list(self.document.get("static_attributes") or [])
 
     def show(self) -> dict[str, Any]:
@@ -135,7 +135,7 @@ class Device:
 
 
 def read_group(raw: Any, tenancy: Tenancy) -> Group:
-    """Make a group from a ``POST``.
+    """Read a group from a ``POST``.
 
     Raises:
         AgentError: 400.
@@ -153,7 +153,7 @@ def read_group(raw: Any, tenancy: Tenancy) -> Group:
 
 
 def read_device(raw: Any, tenancy: Tenancy, group: Group | None) -> Device:
-    """Make a device from a ``POST``.
+    """Read a device from a ``POST``.
 
     Raises:
         AgentError: 400.
@@ -177,7 +177,7 @@ def read_device(raw: Any, tenancy: Tenancy, group: Group | None) -> Device:
 
 
 def changed_device(device: Device, raw: Mapping[str, Any]) -> Device:
-    """The device after a ``PUT``; what is not named stays."""
+    """The device after a ``PUT``; absent fields stay."""
     document = {**device.document, **raw}
     return replace(
         device,
@@ -234,7 +234,7 @@ class Registry:
         """Keep a group.
 
         Raises:
-            AgentError: 409, there is one for this API key and resource.
+            AgentError: 409, the API key and resource are in use.
         """
         key = (group.tenancy, group.resource, group.apikey)
         if key in self._groups:
@@ -278,14 +278,14 @@ class Registry:
         return found
 
     def group_of(self, apikey: str) -> Group | None:
-        """The group of an API key, in whatever tenancy."""
+        """The group of an API key, in any tenant."""
         for group in self._groups.values():
             if group.apikey == apikey:
                 return group
         return None
 
     def group_in(self, tenancy: Tenancy, apikey: str = "") -> Group | None:
-        """A group of a tenancy: that of the API key, else the first one."""
+        """A group of a tenant: that of the API key, else the first one."""
         for group in self._groups.values():
             if group.tenancy == tenancy and apikey in ("", group.apikey):
                 return group
@@ -311,21 +311,21 @@ class Registry:
         )
 
     def is_known(self, device: Device) -> bool:
-        """Whether a device with this id, API key and tenancy is kept."""
+        """Whether a device with this id, API key and tenant is stored."""
         return (device.tenancy, device.apikey, device.device_id) in self._devices
 
     def put(self, device: Device) -> None:
-        """Keep a device, in place of an older one with the same key."""
+        """Store a device; it replaces an older one with the same key."""
         self._devices[device.tenancy, device.apikey, device.device_id] = device
         self._by_topic[device.apikey, device.device_id] = device
 
     def remove(self, device: Device) -> None:
-        """Forget a device."""
+        """Delete a device."""
         del self._devices[device.tenancy, device.apikey, device.device_id]
         self._by_topic.pop((device.apikey, device.device_id), None)
 
     def device_of(self, apikey: str, device_id: str) -> Device | None:
-        """The device behind a topic; the agent's own key finds any by its id."""
+        """The device of a topic; the agent's default key finds any by its id."""
         found = self._by_topic.get((apikey, device_id))
         if found is not None or apikey != DEFAULT_APIKEY:
             return found
@@ -334,7 +334,7 @@ class Registry:
         )
 
     def device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device | None:
-        """The device that commands for an entity go to.
+        """The device that commands for an entity are sent to.
 
         Several may share the entity; MongoDB answers in the order of its index, so it
         is the one whose API key and id sort first, with the command or without.
@@ -349,7 +349,7 @@ class Registry:
 
 
 def no_group(resource: str, apikey: str) -> AgentError:
-    """404 for a group, in the agent's words."""
+    """404 for a group, in the agent's wording."""
     return AgentError(
         404,
         "DEVICE_GROUP_NOT_FOUND",

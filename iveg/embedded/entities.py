@@ -1,6 +1,6 @@
-"""Entities as Orion keeps them, and the changes that may be made to them.
+"""Entities as Orion stores them, and their changes.
 
-An attribute holds JSON text, not objects: what arrives once is shown many times.
+An attribute holds JSON text, not objects: a value arrives once and is sent many times.
 """
 
 import re
@@ -32,8 +32,8 @@ class Attribute:
         type: NGSI type.
         json: The value, as Orion prints it.
         metadata: Name → ``{"type": …, "value": …}`` as Orion prints it.
-        created: When it came to be (s, Unix time).
-        modified: When value or metadata last changed (s, Unix time).
+        created: Creation time (s, Unix time).
+        modified: Last change of value or metadata (s, Unix time).
     """
 
     type: str
@@ -53,7 +53,7 @@ class Attribute:
         )
 
     def noted(self, notes: Mapping[str, bytes]) -> "Attribute":
-        """The same with metadata that were never stored."""
+        """The same with metadata that are not stored."""
         return replace(self, metadata={**self.metadata, **notes})
 
     def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
@@ -71,7 +71,7 @@ class Attribute:
 
 @dataclass(frozen=True, slots=True)
 class EntityChange:
-    """What a request asks of one attribute; ``None`` leaves what is there."""
+    """Requested change of one attribute; ``None`` leaves the present value."""
 
     type: str | None
     value: Any
@@ -83,9 +83,9 @@ class Entity:
     """One entity; its attributes are replaced, never altered.
 
     Attributes:
-        path: Service path that it lives under.
-        created: When it came to be (s, Unix time).
-        modified: When it last changed (s, Unix time).
+        path: Service path.
+        created: Creation time (s, Unix time).
+        modified: Last change (s, Unix time).
     """
 
     id: str
@@ -97,19 +97,19 @@ class Entity:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What no two entities of a tenant share."""
+        """Unique key within a tenant."""
         return self.path, self.id, self.type
 
 
 @dataclass(frozen=True, slots=True)
 class Touched:
-    """What a change did, for the subscriptions to judge.
+    """Effect of a change, for the evaluation of subscriptions.
 
     Attributes:
         named: Attributes that the request named, in its order.
         changed: Those whose value or metadata is different now.
         values: Those whose value is different now.
-        before: What was there before, of those that were named.
+        before: Earlier values of the named attributes.
     """
 
     named: tuple[str, ...] = ()
@@ -130,10 +130,10 @@ class EntityStore:
         return self._by_key.get((path, entity_id, entity_type))
 
     def find(self, paths: str, entity_id: str, entity_type: str = "") -> Entity | None:
-        """The entity that an id, and perhaps a type, stands for.
+        """Find the entity of an id and an optional type.
 
         Raises:
-            NgsiError: 409, several answer to it.
+            NgsiError: 409, several entities match.
         """
         found = [
             entity
@@ -150,18 +150,18 @@ class EntityStore:
         return [one for one in self._by_key.values() if under(paths, one.path)]
 
     def add(self, entity: Entity) -> None:
-        """Keep a new entity."""
+        """Store a new entity."""
         self._by_key[entity.key] = entity
         self._by_id.setdefault(entity.id, []).append(entity)
 
     def remove(self, entity: Entity) -> None:
-        """Forget an entity."""
+        """Delete an entity."""
         del self._by_key[entity.key]
         self._by_id[entity.id].remove(entity)
 
 
 def under(paths: str, path: str) -> bool:
-    """Whether a service path is one of those asked for (``/a,/b/#``)."""
+    """Whether a service path is one of the requested ones (``/a,/b/#``)."""
     for wanted in paths.split(","):
         if wanted == path or wanted == "/#":
             return True
@@ -177,7 +177,7 @@ def apply(
     *,
     forced: bool = False,
 ) -> Touched:
-    """Carry out changes; attributes that are not there yet are made.
+    """Apply changes; missing attributes are created.
 
     Args:
         entity: Changed in place.
@@ -221,7 +221,7 @@ def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, 
 
 
 def _operated(old: Any, operation: Mapping[str, Any]) -> Any:
-    """Orion's update operators, which any key with ``$`` is taken for."""
+    """Orion's update operators; any key that begins with ``$`` is one."""
     name, argument = next(
         (key, value) for key, value in operation.items() if key.startswith("$")
     )
@@ -241,7 +241,7 @@ def _operated(old: Any, operation: Mapping[str, Any]) -> Any:
 
 
 def default_type(value: Any) -> str:
-    """The type that Orion gives to a value that came without one."""
+    """Type that Orion assigns to a value without type."""
     if isinstance(value, bool):
         return "Boolean"
     if isinstance(value, int | float):
@@ -252,7 +252,7 @@ def default_type(value: Any) -> str:
 
 
 def touch_all(entity: Entity) -> Touched:
-    """As if everything had changed: an entity that is new or gone."""
+    """Mark all attributes as changed, for a new or a deleted entity."""
     names = tuple(entity.attributes)
     return Touched(names, frozenset(names), frozenset(names))
 
@@ -263,7 +263,7 @@ def fresh(entity: Entity, now: float) -> None:
     entity.modified = now
 
 
-# --- reading what clients send ------------------------------------------------------
+# --- requests ---------------------------------------------------------------------
 
 
 def read_changes(
@@ -334,7 +334,7 @@ def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
 
 
 def metadata_json(kind: str, value: Any) -> bytes:
-    """One metadata as Orion prints it."""
+    """One metadata entry as Orion prints it."""
     text = date_text(value) if kind == "DateTime" else print_value(value)
     return b'{"type":%b,"value":%b}' % (quoted(kind), text)
 

@@ -1,4 +1,4 @@
-"""``/v2/entities`` and what lies below it."""
+"""``/v2/entities`` and the paths below it."""
 
 import re
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from iveg.embedded.views import write_attributes, write_entity
 async def list_entities(broker: ContextBroker, call: Call) -> Response:
     """``GET /v2/entities``.
 
-    Asked for by name, an attribute need not be there: the entity is listed without it.
+    A requested attribute may be missing: the entity is then listed without it.
     """
     query = call.request.query
     limit, offset = paging(query)
@@ -53,7 +53,7 @@ async def list_entities(broker: ContextBroker, call: Call) -> Response:
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """Which entities a list is to hold; what is empty or None fits all."""
+    """Filter of a list; empty or None fits all."""
 
     ids: tuple[str, ...]
     kinds: tuple[str, ...]
@@ -62,7 +62,7 @@ class _Wanted:
 
     @classmethod
     def read(cls, call: Call) -> "_Wanted":
-        """From the query.
+        """Read the filter from the query.
 
         Raises:
             NgsiError: 400.
@@ -80,7 +80,7 @@ class _Wanted:
         )
 
     def fits(self, entity_id: str, kind: str) -> bool:
-        """Whether an entity is one of them."""
+        """Whether an entity fits the filter."""
         return (
             (not self.ids or entity_id in self.ids)
             and (not self.kinds or kind in self.kinds)
@@ -120,7 +120,7 @@ async def get_attributes(broker: ContextBroker, call: Call) -> Response:
 async def _whole(
     broker: ContextBroker, call: Call
 ) -> tuple[Entity, Mapping[str, Attribute]]:
-    """One entity with what its providers tell of it."""
+    """One entity with the attributes of its providers."""
     entity_id, view = call.parts[1], call.view()
     tenant = broker.tenant(call.scope.service)
     entity = tenant.entities.find(call.scope.path, entity_id, call.kind)
@@ -129,7 +129,7 @@ async def _whole(
         return entity, told.get((entity.id, entity.type), {})
     for key, attributes in told.items():
         return _ghost(call.scope, *key), attributes
-    # Asked with its type, Orion finds that it does not know the entity.
+    # With its type in the request, Orion answers that it does not know the entity.
     for key in bare_entities(tenant, call.scope, view.names) if not call.kind else ():
         if key[0] == entity_id:
             return _ghost(call.scope, *key), {}
@@ -139,7 +139,7 @@ async def _whole(
 async def ask_providers(
     broker: ContextBroker, call: Call, entity_id: str, names: tuple[str, ...]
 ) -> Mapping[tuple[str, str], Mapping[str, Attribute]]:
-    """What providers tell of an entity's attributes, by its id and type."""
+    """Attributes that providers return for an entity, by its id and type."""
     if "skipForwarding" in call.options:
         return {}
     tenant = broker.tenant(call.scope.service)
@@ -186,7 +186,7 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
 async def update(
     broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
 ) -> None:
-    """Change what the entity or its providers have, as the options say."""
+    """Update attributes here or at providers, according to the options."""
     await broker.update(
         call.scope,
         call.parts[1],
@@ -197,5 +197,5 @@ async def update(
 
 
 def _ghost(scope: Scope, entity_id: str, kind: str) -> Entity:
-    """An entity that only a provider knows."""
+    """An entity that is known only to a provider."""
     return Entity(entity_id, kind, scope.path, scope.now, scope.now)

@@ -1,4 +1,4 @@
-"""What a broker passes on to the providers of its registrations, and asks of them."""
+"""Updates and queries that the broker forwards to providers of registrations."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -13,7 +13,7 @@ Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
 def providers(
     tenant: Tenant, scope: Scope, entity_id: str, kind: str, names: Iterable[str]
 ) -> list[tuple[Registration, list[str]]]:
-    """Which registration takes which names; the oldest one takes a name."""
+    """Names by registration; the oldest registration of a name gets it."""
     left = list(names)
     found = []
     for registration in tenant.registrations.values():
@@ -39,7 +39,7 @@ async def foreign(
     entity_type: str,
     names: tuple[str, ...],
 ) -> Foreign:
-    """What providers tell of one entity, or of all (empty id).
+    """Attributes that providers return for one entity, or for all (empty id).
 
     Args:
         tenant: Whose registrations.
@@ -73,10 +73,10 @@ async def foreign(
 def bare_entities(
     tenant: Tenant, scope: Scope, names: tuple[str, ...]
 ) -> list[tuple[str, str]]:
-    """Registered entities that nobody need be asked of, by id and type.
+    """Registered entities whose providers need not be queried, by id and type.
 
-    Asked for attributes of which no provider has one, Orion names the entities of
-    its registrations all the same.
+    When no provider has a requested attribute, Orion still lists the entities of its
+    registrations.
     """
     if not names or "*" in names:
         return []

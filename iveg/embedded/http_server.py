@@ -1,7 +1,7 @@
-"""A small HTTP/1.1 server: a request in, an answer out, connections kept alive.
+"""A small HTTP/1.1 server with keep-alive: request in, response out.
 
-Orion and the agent put their own headers on answers, refuse bodies before reading them
-and never tell who they are, which a framework would have to be talked out of.
+Orion and the agent set their own headers, refuse bodies before reading them and send no
+``Server`` header, which web frameworks do not allow easily.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ _MAX_WAITING = 64
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One request as it was read.
+    """One parsed request.
 
     Attributes:
         path: Decoded, without the query.
@@ -49,7 +49,7 @@ class Response:
 
 
 def json_response(value: object, status: int = 200) -> Response:
-    """An answer in JSON."""
+    """A response with a JSON body."""
     return Response(status, orjson.dumps(value))
 
 
@@ -61,14 +61,14 @@ async def http_server(handler: Handler, host: str, port: int) -> AsyncIterator[i
     """Serve while the block lasts.
 
     Args:
-        handler: Answers every request; one at a time for each connection.
+        handler: Answers requests, one at a time for each connection.
         host: Address to bind.
         port: TCP port; 0 for a free one.
 
     Yields:
-        The port that is listened on.
+        The port in use.
     """
-    connections: set[_Connection] = set()  # from the first byte to the last answer
+    connections: set[_Connection] = set()  # from the first byte to the last response
     server = await asyncio.get_running_loop().create_server(
         lambda: _Connection(handler, connections), host, port
     )
@@ -100,12 +100,12 @@ class _Connection(asyncio.Protocol):
         )
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """The client went; what it asked for is done all the same."""
+        """The client disconnected; its request is still executed."""
         self._transport = None
         self._requests.put_nowait(None)
 
     async def close(self) -> None:
-        """Drop the client and wait until its handler has gone."""
+        """Close the connection and wait until its handler has ended."""
         if self._transport is not None:
             self._transport.abort()
         if self._task is not None:
@@ -121,33 +121,33 @@ class _Connection(asyncio.Protocol):
                 self._transport.write(b"HTTP/1.1 400 Bad Request\r\n\r\n")
                 self._transport.close()
 
-    # --- what httptools calls ---------------------------------------------------
+    # --- httptools callbacks ----------------------------------------------------
 
     def on_message_begin(self) -> None:
-        """A request starts."""
+        """A request begins."""
         self._url = b""
         self._headers: dict[str, str] = {}
         self._body: list[bytes] = []
         self._size = 0
 
     def on_url(self, url: bytes) -> None:
-        """A part of its target."""
+        """Part of the request target."""
         self._url += url
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """One of its headers."""
+        """One header."""
         self._headers[name.decode("latin-1").lower()] = value.decode("latin-1")
 
     def on_body(self, body: bytes) -> None:
-        """A part of its body; what is beyond all limits is counted, not kept."""
+        """Part of the body; bytes beyond all limits are counted, not stored."""
         self._size += len(body)
         if self._size <= _MAX_BODY:
             self._body.append(body)
 
     def on_message_complete(self) -> None:
-        """The whole request is here."""
+        """The request is complete."""
         target = urlsplit(self._url.decode("ascii"), allow_fragments=False)
-        # urlsplit takes "//op/update" for a host, and that is how Orion calls agents.
+        # Orion requests "//op/update" from agents, which urlsplit would read as a host.
         path = self._url.decode("ascii").partition("?")[0]
         request = Request(
             self._parser.get_method().decode("ascii"),

@@ -1,8 +1,8 @@
-"""An IoT Agent for JSON: measures from MQTT into the context broker, commands back.
+"""An IoT Agent for JSON: measures from MQTT to the context broker, commands back.
 
-It shares the process with both brokers: it hears devices and hands their measures over
-by a call each.  Topics, payloads and the north port are what the real one shows; what
-it does not do is told in ``docs/fiware.md``.
+It runs in the process of both brokers: messages of devices and measures are passed by
+function calls.  Topics, payloads and the north port match the real agent; its limits
+are listed in ``docs/fiware.md``.
 """
 
 import logging
@@ -35,10 +35,10 @@ _log = logging.getLogger(__name__)
 
 
 class IotAgent:
-    """Devices, their measures and their commands.
+    """Devices with their measures and commands.
 
     Args:
-        broker: Where entities live.
+        broker: The context broker.
         mqtt: The MQTT broker that devices use.
     """
 
@@ -49,13 +49,13 @@ class IotAgent:
         self.url = ""
         """Address of the north port, for registrations; set when it is known."""
         self.discarded = 0
-        """Messages that were not taken; devices are never told."""
+        """Discarded messages; devices get no error."""
         mqtt.listen(self.hear)
 
-    # --- from devices -----------------------------------------------------------
+    # --- measures ---------------------------------------------------------------
 
     def hear(self, topic: str, payload: bytes) -> None:
-        """Take one MQTT message, if it is for the agent.
+        """Handle an MQTT message, if it is for the agent.
 
         Topics are ``/{apikey}/{device}/attrs``, ``…/attrs/{name}`` and ``…/cmdexe``,
         the first slash or nothing also as ``/json/`` or ``json/``.
@@ -133,10 +133,10 @@ class IotAgent:
     # --- devices ----------------------------------------------------------------
 
     def provision(self, raw: Any, tenancy: Tenancy) -> None:
-        """Make one device from a ``POST``.
+        """Create one device from a ``POST``.
 
         Raises:
-            AgentError: 400, or 409 where there is such a device.
+            AgentError: 400, or 409 if the device exists.
         """
         group = self._group_for(raw, tenancy)
         device = read_device(raw, tenancy, group)
@@ -160,7 +160,7 @@ class IotAgent:
         return device
 
     def _register(self, device: Device, now: float) -> Device:
-        """Tell the context broker that commands of this entity come here."""
+        """Register the commands of an entity at the context broker."""
         scope = self._scope(device.tenancy, now)
         entity = {"type": device.entity_type, "id": device.entity_name}
         document = {
@@ -172,7 +172,7 @@ class IotAgent:
         return replace(device, registration_id=registration.id)
 
     def change(self, old: Device, new: Device) -> None:
-        """Put a device in another's place; attributes it gained are written as null."""
+        """Replace a device; new attributes are written as null."""
         now = clock.now().wall
         self._unregister(old, now)
         self.registry.remove(old)
@@ -186,7 +186,7 @@ class IotAgent:
             )
 
     def forget(self, device: Device) -> None:
-        """Forget a device and what was registered for it."""
+        """Delete a device and its registration."""
         self._unregister(device, clock.now().wall)
         self.registry.remove(device)
 
@@ -195,15 +195,15 @@ class IotAgent:
             scope = self._scope(device.tenancy, now)
             self._broker.unregister(scope, device.registration_id)
 
-    # --- from the context broker --------------------------------------------------
+    # --- commands ----------------------------------------------------------------
 
     async def command(
         self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
     ) -> None:
-        """Carry out an ``op/update`` of one entity: publish its commands.
+        """Execute an ``op/update`` of one entity: publish its commands.
 
-        A command that the device does not have is passed over in silence, and one that
-        no robot listens to is lost: the agent says 204 to both.
+        An unknown command is ignored, and one without a connected robot is lost: the
+        agent answers 204 to both.
 
         Raises:
             AgentError: 404, no device has this entity.
@@ -229,7 +229,7 @@ class IotAgent:
     async def query(
         self, tenancy: Tenancy, name: str, kind: str, names: list[str]
     ) -> dict[str, Any]:
-        """Carry out an ``op/query`` of one entity: its commands, all empty.
+        """Execute an ``op/query`` of one entity: its commands, with empty values.
 
         Raises:
             AgentError: 404, no device has this entity.

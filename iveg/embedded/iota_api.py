@@ -1,4 +1,4 @@
-"""The agent's north port: groups, devices, and what the context broker asks of it."""
+"""North port of the agent: groups, devices, and requests of the context broker."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any
@@ -25,10 +25,10 @@ _Route = Callable[["IotaApi", Request], Awaitable[Response]]
 
 
 class IotaApi:
-    """Answers the requests that the IoT Agent would.
+    """Answers requests as the IoT Agent does.
 
     Args:
-        agent: Does what is asked.
+        agent: Executes them.
     """
 
     def __init__(self, agent: IotAgent) -> None:
@@ -113,7 +113,7 @@ class IotaApi:
         self.agent.forget(device)
         return Response(204)
 
-    # --- what the context broker asks -------------------------------------------
+    # --- context broker -------------------------------------------------------
 
     async def update(self, request: Request) -> Response:
         """``POST /op/update``."""
@@ -190,7 +190,7 @@ def _object(request: Request) -> dict[str, Any]:
     try:
         value = orjson.loads(request.body)
     except orjson.JSONDecodeError as error:
-        # The real agent lets its parser's complaint through as a 500.
+        # The real agent returns its parser's error as a 500.
         raise AgentError(500, "SyntaxError", str(error)) from None
     if not isinstance(value, dict):
         raise wrong_syntax()

@@ -1,4 +1,4 @@
-"""The embedded parts trust everybody, so only this machine may reach them."""
+"""Address check: without authentication the embedded parts bind to loopback only."""
 
 from ipaddress import ip_address
 
@@ -6,7 +6,7 @@ from iveg.domain.errors import SettingsError
 
 
 def require_loopback(setting: str, host: str) -> str:
-    """The host, if it is this machine's own loopback.
+    """Return the host if it is a loopback address.
 
     Raises:
         SettingsError: any other address; names the setting.

@@ -1,7 +1,7 @@
-"""From the bytes that a device publishes to changes of its entity.
+"""From the payload of a device to changes of its entity.
 
-What the agent discards without telling the device is discarded here too: text that is
-not JSON, bare numbers and strings, lists of numbers, a ``TimeInstant`` that is no date.
+Payloads that the agent discards without an error are discarded here too: text that is
+not JSON, bare numbers and strings, lists of numbers, an invalid ``TimeInstant``.
 """
 
 import re
@@ -31,10 +31,10 @@ _NOTHING: dict[str, Any] = {"undefined": None}
 def read_measures(
     device: Device, payload: bytes, now: float
 ) -> list[dict[str, EntityChange]] | None:
-    """Read what came on an ``attrs`` topic.
+    """Read the payload of an ``attrs`` topic.
 
     Returns:
-        One set of changes for each measure; None for what the agent discards.
+        One set of changes for each measure; None for a discarded payload.
 
     Raises:
         NgsiError: 400 or 413, what Orion says to the agent about it.
@@ -57,7 +57,7 @@ def read_measures(
 def read_single(
     device: Device, name: str, payload: bytes, now: float
 ) -> dict[str, EntityChange] | None:
-    """Read what came on ``attrs/{name}``; what is not JSON is kept as hexadecimal.
+    """Read the payload of ``attrs/{name}``; invalid JSON is stored as hexadecimal.
 
     Raises:
         NgsiError: 400 or 413, what Orion says to the agent about it.
@@ -114,7 +114,7 @@ def _read_one(
 def status_changes(
     results: Mapping[str, tuple[str, Any]], now: float
 ) -> dict[str, EntityChange]:
-    """What the agent writes about commands.
+    """Changes that the agent writes for the status of commands.
 
     Args:
         results: Command → status, and the answer (for a status of ``OK``).

@@ -1,9 +1,9 @@
-"""An MQTT broker inside the process, for greenhouses that have none yet.
+"""An MQTT broker in the process, for greenhouses without one.
 
-amqtt does the work; this module gives it a loopback port, anonymous clients and quiet
-logs, remembers who listens to which topic, and takes it down without leaving anything
-behind.  A neighbour in the same process may listen and publish by a call, which halves
-the latency of a measure and saves a third of its CPU time.
+It is based on amqtt; this module adds a loopback port, anonymous clients, reduced
+logging, a cache of subscribers per topic, and a complete shutdown.  Code in the same
+process may listen and publish by a call, which halves the latency of a measure and
+saves a third of its CPU time.
 """
 
 import asyncio
@@ -21,13 +21,13 @@ from iveg.embedded.loopback import require_loopback
 from iveg.embedded.mqtt_telemetry import BoundedWriter, TelemetryReader, publish_packet
 
 for _name in ("amqtt", "transitions"):
-    # Both tell every packet at INFO and DEBUG, which costs more than the packet.
+    # Both log every packet at INFO and DEBUG, which costs more than the packet.
     logging.getLogger(_name).setLevel(logging.WARNING)
 
 _log = logging.getLogger(__name__)
 
 
-# A client that does not confirm is one fact; amqtt tells it for each waiting message.
+# amqtt logs a client that does not confirm once for each pending message.
 quiet("amqtt.broker", "amqtt.mqtt.protocol.handler")
 _PATIENCE_S = 1.0
 _MOST_TOPICS = 10_000
@@ -46,7 +46,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
         port: TCP port; 0 for a free one.
 
     Yields:
-        The broker, listening.
+        The broker, ready.
 
     Raises:
         SettingsError: the address is not loopback.
@@ -69,7 +69,7 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
 
 
 def _require_free(host: str, port: int) -> None:
-    # amqtt would log a traceback and raise an error that hides which port it was.
+    # amqtt would log a traceback and raise an error without the port.
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -77,19 +77,18 @@ def _require_free(host: str, port: int) -> None:
 
 
 async def _close(broker: "MqttBroker") -> None:
-    # A cancelled caller must not leave the broker half closed.
+    # A cancelled caller must not leave the broker partly closed.
     await asyncio.shield(broker.close())
 
 
 class MqttBroker(Broker):  # type: ignore[misc]
-    """amqtt's broker with five things mended.
+    """amqtt's broker with five corrections.
 
-    It looks up a topic's audience once and not for every message; it lets a neighbour
-    in the process listen; it takes and gives telemetry (QoS 0) without a task for each
-    message; it delivers with the lesser quality of service of publication and
-    subscription, where amqtt takes the subscription's (MQTT 3.1.1 §3.8.4); and it
-    closes connections whose client went away rudely, which amqtt leaves to the garbage
-    collector.
+    It caches the subscribers of a topic; it lets code in the process listen; it
+    receives and sends telemetry (QoS 0) without a task for each message; it delivers
+    with the lesser quality of service of publication and subscription, where amqtt uses
+    the subscription's (MQTT 3.1.1 §3.8.4); and it closes connections whose client
+    vanished, which amqtt leaves to the garbage collector.
     """
 
     def __init__(self, config: dict[str, object]) -> None:
@@ -98,34 +97,34 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self._listeners: list[Listener] = []
         self._known_audience: dict[str, tuple[tuple[Any, int], ...]] = {}
         self._arriving: dict[str, int] = {}
-        """Client → quality of service of the publication that is being taken."""
+        """Client → quality of service of the publication being received."""
 
     @property
     def port(self) -> int:
-        """The port that is listened on."""
+        """Port in use."""
         instance = self._servers["default"].instance
         return int(instance.sockets[0].getsockname()[1])
 
-    # --- neighbours in the process ----------------------------------------------
+    # --- in-process clients -----------------------------------------------------
 
     def listen(self, listener: Listener) -> None:
-        """Have every message that clients publish, as it comes; must not block."""
+        """Call ``listener`` with every message of clients; it must not block."""
         self._listeners.append(listener)
 
     async def publish(
         self, topic: str, payload: bytes, qos: int, *, retain: bool
     ) -> None:
-        """Publish as a client would."""
+        """Publish a message."""
         await self._spread(None, topic, payload, qos)
         if retain:
             await self.retain_message(None, topic, payload, qos)
 
-    # --- amqtt's own, mended ----------------------------------------------------
+    # --- corrected methods ------------------------------------------------------
 
     async def _handle_message_delivery(
         self, client_session: Any, handler: Any, wait_deliver: asyncio.Future[Any]
     ) -> bool:
-        """A client published; amqtt would forget with which quality."""
+        """A client published; keeps the quality of service, which amqtt drops."""
         message = wait_deliver.result()
         client = str(client_session.client_id)
         self._arriving[client] = (message and message.qos) or 0
@@ -158,7 +157,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
     async def _spread(
         self, session: Any, topic: str, payload: bytes, most: int | None
     ) -> None:
-        """Write telemetry at once; what has to be confirmed goes amqtt's way."""
+        """Write telemetry at once; messages to be confirmed use amqtt's queue."""
         packet, confirmed = b"", False
         for listener, wanted in self._audience(topic):
             if wanted and most != 0:
@@ -181,7 +180,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
         topic, most = broadcast["topic"], broadcast.get("qos", 2)
         for session, wanted in self._audience(topic):
             handler = self._get_handler(session)
-            # Nobody here has a name, so nothing is kept for those who are away.
+            # All clients are anonymous, so nothing is stored for absent ones.
             if handler is None or session.transitions.state != "connected":
                 continue
             if not min(wanted, most):
@@ -206,7 +205,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
         await asyncio.gather(*kept, return_exceptions=True)
 
     def _audience(self, topic: str) -> tuple[tuple[Any, int], ...]:
-        """Who is subscribed to a topic, and with which quality."""
+        """Subscribers of a topic with their quality of service."""
         known = self._known_audience.get(topic)
         if known is None:
             if len(self._known_audience) >= _MOST_TOPICS:
@@ -222,7 +221,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
     async def add_subscription(
         self, subscription: tuple[str, int], session: Any
     ) -> int:
-        """A client subscribes."""
+        """Add a subscription of a client."""
         self._known_audience.clear()
         return int(await super().add_subscription(subscription, session))
 
@@ -264,8 +263,8 @@ class MqttBroker(Broker):  # type: ignore[misc]
             del self._open[task]
 
     async def close(self) -> None:
-        """Stop serving; nothing of ours is left running."""
-        # A client that never said CONNECT would keep a newer asyncio waiting for it.
+        """Stop serving; no task is left running."""
+        # A client without CONNECT would keep a newer asyncio waiting.
         patience = asyncio.get_running_loop().call_later(_PATIENCE_S, self._hang_up)
         await self.shutdown()
         patience.cancel()

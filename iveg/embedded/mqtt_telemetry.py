@@ -1,9 +1,8 @@
-"""The short way of telemetry through amqtt: no task, queue or lock for each message.
+"""Fast path of telemetry through amqtt: no task, queue or lock for each message.
 
-amqtt reads and writes through two adapters, and these stand in for its own.  Reading, a
-plain PUBLISH of QoS 0 is taken at once where the packet begins; every other packet is
-amqtt's as ever.  Writing, a client that reads too slowly
-misses telemetry instead of filling the memory.
+amqtt reads and writes through two adapters, which this module replaces.  On reading, a
+plain PUBLISH of QoS 0 is handled at once; every other packet goes to amqtt.  On
+writing, a client that reads too slowly misses telemetry instead of filling the memory.
 """
 
 import asyncio
@@ -17,24 +16,24 @@ _TELEMETRY = b"\x30"
 _LONGEST_LENGTH = 4
 _FORBIDDEN = re.compile("^\\$|[+#\0\ufffd]")
 MOST_UNSENT = 512 << 10
-"""What waits for one slow client (bytes): a fifth of a second of ten robots' scans.
-What has to be confirmed stands behind it."""
+"""Limit of the data pending for one slow client (bytes): a fifth of a second of ten
+robots' scans.  Messages to be confirmed queue behind it."""
 
 Take = Callable[[str, bytes], Awaitable[None]]
 
 
 class TelemetryReader(ReaderAdapter):  # type: ignore[misc]
-    """Reads one client's packets; keeps telemetry from amqtt.
+    """Reads one client's packets; handles telemetry without amqtt.
 
-    What was read of a packet is kept while the rest is waited for, because amqtt
+    The part of a packet that was read is kept while the rest is pending, because amqtt
     cancels a wait that is longer than the client's keep-alive.
 
     Args:
         reader: The connection.
-        take: Told topic and payload of each telemetry message.
+        take: Called with topic and payload of each telemetry message.
 
     Attributes:
-        admitted: Whether the client has said CONNECT and may publish.
+        admitted: Whether the client has sent CONNECT and may publish.
     """
 
     def __init__(self, reader: asyncio.StreamReader, take: Take) -> None:
@@ -53,7 +52,7 @@ class TelemetryReader(ReaderAdapter):  # type: ignore[misc]
             if not await self._is_taken(packet):
                 self._held = packet
         if n > len(self._held):
-            # The packet says more than it holds; the next one must not lend its bytes.
+            # The packet is shorter than stated; bytes of the next one must not fill it.
             short, self._held = self._held, b""
             raise asyncio.IncompleteReadError(short, n)
         part, self._held = self._held[:n], self._held[n:]
@@ -80,18 +79,18 @@ class TelemetryReader(ReaderAdapter):  # type: ignore[misc]
         end = start + int.from_bytes(packet[body:start], "big")
         topic = packet[start:end].decode(errors="replace")
         if end > len(packet) or not topic or _FORBIDDEN.search(topic) is not None:
-            # amqtt would lose its place in the stream; MQTT says to hang up.
+            # amqtt would lose its place in the stream; MQTT requires to disconnect.
             raise ConnectionResetError("a PUBLISH that nobody may send")
         await self._take(topic, packet[end:])
         return True
 
 
 def _body_length(head: bytes) -> int | None:
-    """Bytes that follow a fixed header; None while it is not complete."""
+    """Bytes after a fixed header; None while it is incomplete."""
     length = head[1:]
     if not length or (length[-1] & 0x80 and len(length) < _LONGEST_LENGTH):
         return None
-    # A fifth byte of length is amqtt's to complain about: it gets the head alone.
+    # A fifth length byte is an error that amqtt reports: it gets the head alone.
     if length[-1] & 0x80:
         return 0
     return sum((byte & 0x7F) << (7 * place) for place, byte in enumerate(length))
@@ -101,7 +100,7 @@ class BoundedWriter(StreamWriterAdapter):  # type: ignore[misc]
     """Writes to one client.
 
     Attributes:
-        missed: Telemetry messages that the client was too slow for.
+        missed: Telemetry messages dropped because the client was too slow.
     """
 
     def __init__(self, writer: asyncio.StreamWriter) -> None:
@@ -110,7 +109,7 @@ class BoundedWriter(StreamWriterAdapter):  # type: ignore[misc]
         self.missed = 0
 
     def write_telemetry(self, packet: bytes) -> None:
-        """Send a whole packet, or nothing to who does not read."""
+        """Send a whole packet, or nothing to a client that does not read."""
         if self._transport.get_write_buffer_size() > MOST_UNSENT:
             self.missed += 1
         else:

@@ -1,4 +1,4 @@
-"""NGSI-v2 over HTTP: paths and options in, Orion's statuses and sentences out."""
+"""NGSI-v2 over HTTP with Orion's paths, options, statuses and sentences."""
 
 from collections.abc import Awaitable, Callable
 
@@ -34,10 +34,10 @@ _Route = Callable[[ContextBroker, Call], Awaitable[Response]]
 
 
 class NgsiApi:
-    """Answers the requests that Orion would.
+    """Answers requests as Orion does.
 
     Args:
-        broker: Keeps what is told.
+        broker: The context broker.
     """
 
     def __init__(self, broker: ContextBroker) -> None:

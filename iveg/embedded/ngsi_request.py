@@ -1,4 +1,4 @@
-"""What every NGSI-v2 request has: headers, options, pages, a body; read or refused."""
+"""Common parts of NGSI-v2 requests: headers, options, paging, body."""
 
 import re
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ _OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """One request, read.
+    """One parsed request.
 
     Attributes:
         options: ``?options=``.
@@ -38,7 +38,7 @@ class Call:
 
     @property
     def key_values(self) -> bool:
-        """Whether the body's attributes are bare values."""
+        """Whether the body's attributes are plain values."""
         return "keyValues" in self.options
 
     @property
@@ -78,7 +78,7 @@ class Call:
         )
 
     def view(self) -> EntityView:
-        """What is to be shown.
+        """The requested representation.
 
         Raises:
             NgsiError: 400.
@@ -90,7 +90,7 @@ class Call:
 
 
 def check_size(request: Request) -> None:
-    """Refuse a body that is too long.
+    """Refuse a body that is too large.
 
     Raises:
         NgsiError: 413.
@@ -131,7 +131,7 @@ def check_body(request: Request) -> None:
 
 
 def check_accept(request: Request) -> None:
-    """Refuse a client that does not take JSON.
+    """Refuse a client that does not accept JSON.
 
     Raises:
         NgsiError: 406.
@@ -150,10 +150,10 @@ def check_accept(request: Request) -> None:
 
 
 def scope(request: Request, correlator: str, now: float) -> Scope:
-    """Whose data a request is about.
+    """Tenant and service path of a request.
 
     Raises:
-        NgsiError: 400, a tenant or service path that cannot be.
+        NgsiError: 400, invalid tenant or service path.
     """
     service = request.headers.get("fiware-service", "").lower()
     if _SERVICE.fullmatch(service) is None:
@@ -199,7 +199,7 @@ def read_options(request: Request) -> frozenset[str]:
     """``?options=``.
 
     Raises:
-        NgsiError: 400, one that Orion does not know.
+        NgsiError: 400, unknown to Orion.
     """
     options = frozenset(names(request.query.get("options")))
     if not options <= _OPTIONS:
@@ -208,12 +208,12 @@ def read_options(request: Request) -> frozenset[str]:
 
 
 def names(text: str | None) -> tuple[str, ...]:
-    """A list with commas."""
+    """A comma-separated list."""
     return tuple(name for name in (text or "").split(",") if name)
 
 
 def pattern(text: str | None, name: str) -> re.Pattern[str] | None:
-    """A regular expression of the query.
+    """A regular expression from the query.
 
     Raises:
         NgsiError: 400.

@@ -1,9 +1,9 @@
-"""Posts notifications: kept-alive HTTP/1.1, in order, never waiting for the slow.
+"""Delivery of notifications: HTTP/1.1, kept alive, in order, apart from slow receivers.
 
 Each subscription has one lane: a bounded queue and one connection.  Once a receiver has
-shown that it keeps connections open, a lane sends ahead of the answers (pipelining), so
-that a busy receiver costs no round trip a message.  Nothing is tried again except what
-a receiver never looked at because it had closed an idle connection.
+kept a connection open, a lane sends ahead of the responses (pipelining), so that a busy
+receiver costs no round trip per message.  A request is repeated only if the receiver
+never read it because it had closed an idle connection.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ CLOSED = "Server returned nothing (no headers, no data)"
 
 @dataclass(frozen=True, slots=True)
 class NotificationTarget:
-    """Where a lane goes."""
+    """Address of a lane's receiver."""
 
     host: str
     port: int
@@ -47,8 +47,8 @@ class Delivery:
 
     Attributes:
         request: Head and body, ready to send.
-        timeout_s: How long the answer may take.
-        done: Told the status and the body, or 0 and libcurl's words for what failed.
+        timeout_s: Time limit of the response (s).
+        done: Called with status and body, or with 0 and libcurl's wording of the error.
     """
 
     request: bytes
@@ -58,7 +58,7 @@ class Delivery:
 
 
 class DeliveryLane:
-    """A queue and one connection to one receiver; what is sent first arrives first."""
+    """A queue and one connection to one receiver, in order."""
 
     def __init__(self, target: NotificationTarget) -> None:
         self._target = target
@@ -71,10 +71,10 @@ class DeliveryLane:
         self._overflowing = False
         self._timer: asyncio.TimerHandle | None = None
         self.dropped = 0
-        """Deliveries that gave way to newer ones."""
+        """Deliveries dropped for newer ones."""
 
     def send(self, delivery: Delivery) -> None:
-        """Queue one delivery; beyond a thousand the oldest gives way."""
+        """Queue one delivery; beyond a thousand the oldest is dropped."""
         if len(self._waiting) >= _MAX_QUEUED:
             self._waiting.popleft().done(0, TIMED_OUT)
             self.dropped += 1
@@ -85,7 +85,7 @@ class DeliveryLane:
         self._pump()
 
     def close(self) -> None:
-        """Close the connection; what was not sent is lost."""
+        """Close the connection; unsent deliveries are lost."""
         self._closed = True
         self._stop_timer()
         if self._connecting is not None:
@@ -141,7 +141,7 @@ class DeliveryLane:
             self._waiting.popleft().done(0, reason)
 
     def answered(self, wire: "_Wire", status: int, body: bytes, *, keep: bool) -> None:
-        """The oldest delivery on the way has its answer."""
+        """The oldest delivery under way got its response."""
         if wire is not self._wire or not self._flying:
             return
         self._stop_timer()
@@ -155,7 +155,7 @@ class DeliveryLane:
             wire.close()
 
     def lost(self, wire: "_Wire") -> None:
-        """The connection is gone; what was never answered may go out once more."""
+        """The connection was lost; unanswered deliveries may be sent once more."""
         if wire is not self._wire or self._closed:
             return
         self._wire = None
@@ -191,7 +191,7 @@ class DeliveryLane:
 
 
 class _Wire(asyncio.Protocol):
-    """One connection of a lane: writes requests, reads answers."""
+    """One connection of a lane: writes requests, reads responses."""
 
     def __init__(self, lane: DeliveryLane) -> None:
         self._lane = lane
@@ -205,12 +205,12 @@ class _Wire(asyncio.Protocol):
             self._transport.write(request)
 
     def close(self) -> None:
-        """Hang up politely."""
+        """Close after pending data was sent."""
         if self._transport is not None:
             self._transport.close()
 
     def abort(self) -> None:
-        """Hang up at once."""
+        """Close at once."""
         if self._transport is not None:
             self._transport.abort()
 
@@ -219,27 +219,27 @@ class _Wire(asyncio.Protocol):
         self._transport = transport  # type: ignore[assignment]
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002 - asyncio's
-        """The receiver went, or we hung up on it."""
+        """The receiver or this side closed the connection."""
         self._transport = None
         self._lane.lost(self)
 
     def data_received(self, data: bytes) -> None:
-        """A part of an answer."""
+        """Part of a response."""
         try:
             self._parser.feed_data(data)
         except httptools.HttpParserError:
             self.abort()
 
     def on_message_begin(self) -> None:
-        """An answer starts."""
+        """A response begins."""
         self._body = []
 
     def on_body(self, body: bytes) -> None:
-        """A part of its body."""
+        """Part of the body."""
         self._body.append(body)
 
     def on_message_complete(self) -> None:
-        """The whole answer is here."""
+        """The response is complete."""
         status = self._parser.get_status_code()
         if status >= 200:
             keep = self._parser.should_keep_alive()
@@ -249,10 +249,10 @@ class _Wire(asyncio.Protocol):
 async def exchange(
     target: NotificationTarget, request: bytes, timeout_s: float
 ) -> tuple[int, bytes | str]:
-    """Send one request on a connection of its own and wait for the answer.
+    """Send one request on a connection of its own and wait for the response.
 
     Returns:
-        Status and body, or 0 and what failed.
+        Status and body, or 0 and the error.
     """
     answer: asyncio.Future[tuple[int, bytes | str]] = (
         asyncio.get_running_loop().create_future()

@@ -1,4 +1,4 @@
-"""Orion's refusals: a status and ``{"error", "description"}``."""
+"""Errors as Orion answers them: a status and ``{"error", "description"}``."""
 
 import orjson
 
@@ -13,7 +13,7 @@ class NgsiError(IvegError):
 
     Attributes:
         status: HTTP status.
-        error: Orion's word for it, such as ``BadRequest``.
+        error: Orion's error name, such as ``BadRequest``.
         description: Orion's sentence.
     """
 
@@ -28,7 +28,7 @@ class NgsiError(IvegError):
 
     @property
     def body(self) -> bytes:
-        """The JSON that tells the client."""
+        """The JSON body of the response."""
         return orjson.dumps({"error": self.error, "description": self.description})
 
 
@@ -48,7 +48,7 @@ def not_found(description: str = ENTITY_NOT_FOUND) -> NgsiError:
 
 
 def too_many() -> NgsiError:
-    """409 where an id alone names several entities."""
+    """409 for an id that matches several entities."""
     return NgsiError(
         409,
         "TooManyResults",

@@ -1,8 +1,8 @@
-"""How Orion prints numbers: at most nine decimals, and nonsense from 9.2e18 on.
+"""Numbers as Orion prints them: at most nine decimals, and wrong from 9.2e18 on.
 
-A LiDAR scan is 720 numbers of eleven decimals or more, thirty times a second and
-robot.  So long lists are rounded as arrays; Python looks only at a number whose tenth
-decimal lies so close to a half that doubles cannot tell, and at huge ones.
+A LiDAR scan is 720 numbers of eleven decimals or more, thirty times a second and robot.
+So long lists are rounded as arrays; only numbers whose tenth decimal is too close to a
+half for a double, and huge ones, are handled one by one.
 """
 
 from typing import Any
@@ -17,7 +17,7 @@ _HUGE = 9.2e18
 _PLAIN = 1e15
 """From 1e16 on orjson prints an exponent, which Orion does not."""
 _MANY = 16
-"""Fewer numbers are quicker one by one than as an array."""
+"""Least length at which an array is faster than single numbers."""
 _SCALE = 1e9
 _DOUBT = 2.0**-51
 """Share of a product that bounds its own rounding (2⁻⁵³) with room to spare."""
@@ -26,16 +26,16 @@ _TEN_DECIMALS = b".0000000000"
 _EXPONENT = b"0e"
 _EXACT_DIGITS = b"0" * 16
 _OTHERS = (b'"', b"{", b"t", b"f")
-"""What begins every string, object, true and false."""
+"""First bytes of every string, object, true and false."""
 
 
 def print_value(value: Any) -> bytes:
-    """The JSON text that Orion would print for a value."""
+    """JSON text that Orion would print for a value."""
     text = orjson.dumps(value)
     digits = text.translate(_TO_ZERO)
     if (
         _TEN_DECIMALS in digits
-        # A search for two bytes is slow where one of them is everywhere.
+        # A search for two bytes is slow where one of them is frequent.
         or (b"e" in text and _EXPONENT in digits)
         or _EXACT_DIGITS in digits
         or (b"-" in text and b"-0" in text)
@@ -50,11 +50,11 @@ def print_value(value: Any) -> bytes:
 
 
 def _print_array(values: list[Any], text: bytes) -> bytes:
-    """Print a long list of numbers and nulls; empty if it is another or one is huge.
+    """Print a long list of numbers and nulls; empty for other lists and huge numbers.
 
     Args:
         values: The list.
-        text: The same as JSON, which tells at memory speed what is in it.
+        text: The same as JSON, which is searched at memory speed.
     """
     nested = text.find(b"[", 1) >= 0
     if len(values) < _MANY or nested or any(mark in text for mark in _OTHERS):
@@ -79,12 +79,12 @@ def _nine_decimals(given: Floats) -> Floats:
     rounded: Floats = whole / _SCALE
     for index in np.flatnonzero(doubt):
         rounded[index] = round(float(given[index]), 9)
-    # Adding zero makes a plain zero of the negative one.
+    # Adding zero turns a negative zero into a positive one.
     return rounded + 0.0
 
 
 def _without_point(text: bytes) -> bytes:
-    """Print whole numbers as such: in a text of numbers ``.0`` ends nothing else."""
+    """Print whole numbers without ``.0``, which only ends numbers in such a text."""
     return text.replace(b".0,", b",").replace(b".0]", b"]").removesuffix(b".0")
 
 
@@ -106,10 +106,10 @@ def _as_double(value: Any) -> Any:
 
 
 def _number(value: float) -> float | int:
-    """A double as Orion's ``double2string`` leaves it.
+    """A double as printed by Orion's ``double2string``.
 
-    At 9.2e18 it changes to an exponent and then strips the zeros at the end, which are
-    the exponent's: 1e20 becomes 1e+2.  A client must be able to meet that here.
+    From 9.2e18 on it uses an exponent and then strips trailing zeros, also of the
+    exponent: 1e20 becomes 1e+2.  Clients can be tested against that here.
     """
     if abs(value) >= _HUGE:
         return float(f"{value:.17g}".rstrip("0"))

@@ -1,7 +1,7 @@
-"""What text Orion takes: JSON of a sane depth, no forbidden characters.
+"""Text that Orion accepts: JSON of limited depth without forbidden characters.
 
-Values are kept as the JSON text that Orion would print, made once when a measure
-arrives, so that a LiDAR sweep is neither walked nor written again for each subscriber.
+Values are stored as the JSON text that Orion would print, made once when a measure
+arrives, so that a LiDAR scan is not traversed or encoded again for each subscriber.
 """
 
 import re
@@ -21,16 +21,16 @@ UNRESTRICTED = "TextUnrestricted"
 
 
 def load_json(body: bytes) -> Any:
-    """Parse JSON that may be hostile.
+    """Parse JSON from an untrusted client.
 
     Raises:
-        NgsiError: 400, not JSON, or nested so deeply that it could not be walked.
+        NgsiError: 400, not JSON, or nested too deeply.
     """
     try:
         value = orjson.loads(body)
     except orjson.JSONDecodeError:
         raise parse_error() from None
-    # Counting brackets is quick and mostly enough; a path of points has many, flat.
+    # Counting brackets is fast and mostly enough; a path of points has many, flat ones.
     if body.count(b"[") + body.count(b"{") > _MAX_DEPTH and _too_deep(value):
         raise parse_error()
     return value
@@ -47,7 +47,7 @@ def _too_deep(value: Any) -> bool:
 
 
 def looks_clean(body: bytes) -> bool:
-    """Whether no string in a JSON text can hold a forbidden character.
+    """Whether no string in a JSON text can contain a forbidden character.
 
     A quotation mark inside a string needs a backslash, so the backslash stands for it.
     Eight searches at memory speed instead of a walk over every value.
@@ -56,7 +56,7 @@ def looks_clean(body: bytes) -> bool:
 
 
 def holds_forbidden(value: Any) -> bool:
-    """Whether any string or key inside holds one of ``< > " ' = ; ( )``."""
+    """Whether a string or key contains one of ``< > " ' = ; ( )``."""
     if isinstance(value, str):
         return not FORBIDDEN.isdisjoint(value)
     if isinstance(value, dict):
@@ -87,5 +87,5 @@ def check_name(name: str, what: str) -> None:
 
 @lru_cache(maxsize=4096)
 def quoted(text: str) -> bytes:
-    """A short text as JSON; names and types come again and again."""
+    """A short text as JSON, cached, since names and types recur."""
     return orjson.dumps(text)

@@ -1,4 +1,4 @@
-"""From a change to the notifications that tell of it."""
+"""From a change to its notifications."""
 
 import itertools
 import re
@@ -20,10 +20,10 @@ _WHOLE_MACRO = re.compile(r'"\$\{([^}"]*)\}"')
 
 
 class Outbox:
-    """Writes notifications and hands them to one lane for each subscription.
+    """Writes notifications and passes them to one lane for each subscription.
 
     Args:
-        now: Reads Unix time, for what is known only when a receiver has answered.
+        now: Returns Unix time, for the moment of a response.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -34,7 +34,7 @@ class Outbox:
         self._prefix = f"{secrets.token_hex(4)}-e4ec-11f1-9a0b-"
 
     def correlator(self) -> str:
-        """A name for one chain of requests."""
+        """Correlator of one chain of requests."""
         return f"{self._prefix}{next(self._correlators):012x}"
 
     def post(
@@ -92,7 +92,7 @@ class Outbox:
         )
 
     def _head(self, subscription: Subscription) -> bytes:
-        """The head's fixed part, written again only when the subscription changed."""
+        """Constant part of the head, rewritten only when the subscription changed."""
         known = self._heads.get(subscription.id)
         if known is None or known[0] is not subscription.document:
             known = (subscription.document, _write_head(subscription))
@@ -109,7 +109,7 @@ class Outbox:
         return known[1]
 
     def forget(self, subscription_id: str) -> None:
-        """A subscription is gone, or goes elsewhere; so is its connection."""
+        """Close the connection of a deleted or redirected subscription."""
         self._heads.pop(subscription_id, None)
         known = self._lanes.pop(subscription_id, None)
         if known is not None:
@@ -164,7 +164,7 @@ def _filled_json(template: object, entity: Entity) -> bytes:
 
 
 def _macro(name: str, entity: Entity) -> str:
-    """What ``${name}`` stands for, as JSON text."""
+    """Value of ``${name}`` as JSON text."""
     if name in ("id", "type"):
         return quoted(getattr(entity, name)).decode()
     attribute = entity.attributes.get(name)

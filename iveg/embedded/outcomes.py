@@ -1,12 +1,12 @@
-"""What became of an update, and the sentence with which Orion complains of it.
+"""Result of an update, and Orion's error sentence for it.
 
-An update of one entity and a batch do what they can and then say what they could not.
-Which error it is depends on whether anything was done at all::
+An update of one entity and a batch do the possible part and then report the rest.  The
+error depends on whether any part was done::
 
     none of the entities exists                → 404 NotFound (batch)
-    not one attribute could be changed         → 422 Unprocessable
-    some could                                 → 422 PartialUpdate
-    a provider had a part and not all was done → 404 PartialUpdate
+    no attribute could be changed              → 422 Unprocessable
+    some attributes could be changed           → 422 PartialUpdate
+    a provider took part, and not all was done → 404 PartialUpdate
 """
 
 from collections.abc import Iterable, Sequence
@@ -20,16 +20,16 @@ EXISTING = "one or more of the attributes in the request already exist: "
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of an update of one entity.
+    """Result of an update of one entity.
 
     Attributes:
         asked_kind: The type that the request named; empty if none.
         kind: The type of the entity, as far as known.
-        exists: Whether the entity is one of ours.
-        updated: Attributes of ours that were changed.
-        passed: Attributes that a provider took.
-        failed: Attributes that a provider did not take.
-        refused: Attributes that nobody has, or that may not be there and are.
+        exists: Whether the entity is stored here.
+        updated: Own attributes that were changed.
+        passed: Attributes that a provider accepted.
+        failed: Attributes that a provider did not accept.
+        refused: Attributes that do not exist, or that exist and must not.
     """
 
     entity_id: str
@@ -43,28 +43,28 @@ class Outcome:
 
     @property
     def complete(self) -> bool:
-        """Whether everything asked for was done."""
+        """Whether the whole request was done."""
         return self.exists_somewhere and not self.refused and not self.failed
 
     @property
     def exists_somewhere(self) -> bool:
-        """Whether we or a provider know the entity."""
+        """Whether the broker or a provider knows the entity."""
         return self.exists or bool(self.passed or self.failed)
 
     @property
     def forwarded(self) -> bool:
-        """Whether a provider had a part in it."""
+        """Whether a provider took part."""
         return bool(self.passed or self.failed)
 
     @property
     def named(self) -> str:
-        """The entity as Orion's sentences name it."""
+        """The entity as in Orion's sentences."""
         return f"{self.entity_id}/{self.asked_kind}".removesuffix("/")
 
     def raise_for_one(self, sentence: str = MISSING) -> None:
-        """Raise what Orion answers to an update of one entity, if it complains.
+        """Raise Orion's error for an update of one entity, if there is one.
 
-        An attribute of ours that was changed hides a command that was not passed on.
+        A changed own attribute hides a command that was not forwarded.
 
         Raises:
             NgsiError: 404 or 422.
@@ -81,7 +81,7 @@ class Outcome:
 
 
 def raise_for_batch(outcomes: Sequence[Outcome], sentence: str = MISSING) -> None:
-    """Raise what Orion answers to ``op/update``, if it complains.
+    """Raise Orion's error for ``op/update``, if there is one.
 
     Raises:
         NgsiError: 404 or 422.
@@ -106,7 +106,7 @@ def raise_for_batch(outcomes: Sequence[Outcome], sentence: str = MISSING) -> Non
 def _complaint(outcome: Outcome, *, first: bool) -> str:
     if outcome.exists:
         return f"{outcome.named} - {_listed(outcome.refused)}"
-    # Orion leaves the dash out for all but the first.
+    # Orion omits the dash for all but the first.
     return f"{outcome.named} {'- ' if first else ''}[entity itself]"
 
 

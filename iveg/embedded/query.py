@@ -1,4 +1,4 @@
-"""Choosing and ordering entities: the simple query language and ``orderBy``."""
+"""Selection and order of entities: the simple query language and ``orderBy``."""
 
 import re
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ _STATEMENT = re.compile(r"(!?)([^=!<>~:]+?)(?:(==|!=|>=|<=|~=|>|<|:)(.*))?")
 def matches_query(entity: Entity, query: str) -> bool:
     """Whether an entity fulfils every statement of ``?q=``.
 
-    Left out of Orion's language: metadata queries and geographical ones.
+    Not supported: metadata queries and geographical ones.
 
     Raises:
         NgsiError: 400, not a query.
@@ -81,7 +81,7 @@ def _read(text: str) -> Any:
 
 
 def ordered(entities: Iterable[Entity], order: str) -> list[Entity]:
-    """Entities in the order of ``?orderBy=``; ``!`` before a name turns it round.
+    """Entities in the order of ``?orderBy=``; ``!`` before a name reverses it.
 
     Raises:
         NgsiError: 400, a name comes twice.
@@ -97,7 +97,7 @@ def ordered(entities: Iterable[Entity], order: str) -> list[Entity]:
 
 
 def _rank(entity: Entity, name: str) -> tuple[int, float, str]:
-    """MongoDB's order: what is absent or null comes before everything else."""
+    """MongoDB's order: absent and null values come before all others."""
     if name in ("id", "type"):
         return 2, 0.0, str(getattr(entity, name))
     if name in ("dateCreated", "dateModified"):

@@ -1,8 +1,8 @@
-"""Attributes that live elsewhere: registrations, and asking their providers.
+"""Registrations: attributes of other context providers, and requests to them.
 
 A command is such an attribute.  An update of it goes to the provider as ``op/update``,
-a read as ``op/query``; a provider that is silent, slow or says no is to the client an
-entity that does not exist.
+a read as ``op/query``; for a provider that is silent, slow or refuses, the client gets
+an entity that does not exist.
 """
 
 import re
@@ -25,7 +25,7 @@ PATIENCE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """One context provider and what it has."""
+    """One context provider with its attributes."""
 
     id: str
     document: dict[str, Any]
@@ -39,24 +39,24 @@ class Registration:
 
     @property
     def attributes(self) -> tuple[str, ...]:
-        """Names of the attributes that it has; none named means all."""
+        """Names of its attributes; empty means all."""
         return tuple(self.document["dataProvided"].get("attrs", ()))
 
     @property
     def entities(self) -> list[dict[str, str]]:
-        """The entities that it has attributes of."""
+        """Entities with attributes of the provider."""
         found: list[dict[str, str]] = self.document["dataProvided"]["entities"]
         return found
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
-        """Whether it has something of an entity; an unknown type fits none."""
+        """Whether it has attributes of an entity; an unknown type fits none."""
         return any(
             _fits(one, "id", entity_id) and _fits(one, "type", entity_type)
             for one in self.entities
         )
 
     def show(self) -> dict[str, Any]:
-        """The registration as a client sees it."""
+        """The registration as a client gets it."""
         shown = {
             key: self.document[key] for key in ("description",) if key in self.document
         }
@@ -83,7 +83,7 @@ def _fits(one: Mapping[str, str], name: str, text: str) -> bool:
 
 
 def read_registration(raw: Any, path: str) -> Registration:
-    """Make a registration from a ``POST``.
+    """Read a registration from a ``POST``.
 
     Raises:
         NgsiError: 400.
@@ -101,7 +101,7 @@ def read_registration(raw: Any, path: str) -> Registration:
 
 @dataclass(frozen=True, slots=True)
 class Asking:
-    """In whose name a provider is asked."""
+    """Headers of a request to a provider."""
 
     service: str
     path: str
@@ -115,7 +115,7 @@ async def forward_update(
     changes: Mapping[str, EntityChange],
     asking: Asking,
 ) -> bool:
-    """Send attributes to their provider; whether it took them."""
+    """Send attributes to their provider; returns whether it accepted them."""
     written = {
         name: {
             "type": change.type or default_type(change.value),
@@ -137,10 +137,10 @@ async def forward_query(
     asking: Asking,
     now: float,
 ) -> dict[tuple[str, str], dict[str, Attribute]]:
-    """Ask a provider for attributes; nothing from one that does not answer.
+    """Query a provider for attributes; empty if it does not answer.
 
     Returns:
-        Id and type of each entity that it told of, with its attributes.
+        Id and type of each returned entity, with its attributes.
     """
     body = orjson.dumps({"entities": list(entities), "attrs": list(names)})
     resource = "/op/query?limit=20&offset=0&options=count"

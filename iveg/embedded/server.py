@@ -21,14 +21,14 @@ MakeApi = Callable[[IotAgent], IotaApi]
 
 @dataclass(frozen=True, slots=True)
 class Running:
-    """An embedded FIWARE that is up.
+    """A running embedded FIWARE.
 
     Attributes:
-        mqtt_port: Where devices connect.
+        mqtt_port: Port of the MQTT broker.
         orion_port: NGSI-v2.
         iota_port: North port of the agent.
-        broker: For looking inside.
-        agent: For looking inside.
+        broker: For inspection.
+        agent: For inspection.
     """
 
     mqtt_port: int

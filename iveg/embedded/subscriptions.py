@@ -1,4 +1,4 @@
-"""Who wants to hear of which change, and what became of telling them."""
+"""Subscriptions: which changes they match, and the state of their notifications."""
 
 import re
 import secrets
@@ -32,12 +32,12 @@ _DEFAULT_TIMEOUT_S = 5.0
 
 @dataclass(slots=True)
 class Subscription:
-    """One subscription and its history.
+    """One subscription and its counters.
 
     Attributes:
-        document: What the client asked for, merged with its later changes.
-        path: Service path that its entities live under.
-        service: Tenant, as the notification's header says it.
+        document: The client's request, merged with its later changes.
+        path: Service path of its entities.
+        service: Tenant, as in the notification's header.
         status: ``active``, ``inactive`` or ``oneshot``; expiry is by the clock.
     """
 
@@ -59,11 +59,11 @@ class Subscription:
     )
 
     def __post_init__(self) -> None:
-        """Make what is asked at every change quick to answer."""
+        """Prepare the document for fast evaluation at every change."""
         self.prepare()
 
     def prepare(self) -> None:
-        """Read the document again after it has changed."""
+        """Parse the document again after a change."""
         notification = self.notification
         self.view = EntityView(
             notification.get("attrsFormat", "normalized"),
@@ -93,25 +93,25 @@ class Subscription:
 
     @property
     def timeout_s(self) -> float:
-        """How long a receiver may take."""
+        """Time limit of a receiver's response (s)."""
         return self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
-        """Whether an entity is one of those subscribed to."""
+        """Whether an entity is subscribed to."""
         return any(
             _matches(kind, entity_type) and _matches(name, entity_id)
             for name, kind in self._entities
         )
 
     def expired(self, now: float) -> bool:
-        """Whether its end has come."""
+        """Whether it has expired."""
         expires: str = self.document.get("expires") or ""
         return bool(expires) and expires <= date_iso(now)
 
     def wants(self, touched: Touched, alteration: str, now: float) -> bool:
-        """Whether a change is one to tell of, now.
+        """Whether a change is to be notified now.
 
-        Throttling drops what comes too early; it is not sent later.
+        Throttling drops notifications that come too early; they are not sent later.
         """
         if self.status == "inactive" or self.expired(now):
             return False
@@ -144,7 +144,7 @@ class Subscription:
         return not changed.isdisjoint(watched)
 
     def shown(self, touched: Touched) -> EntityView:
-        """What the notification shows of the entity."""
+        """Attributes in the notification."""
         if not self.notification.get("onlyChangedAttrs"):
             return self.view
         names = self.view.names or touched.named
@@ -152,18 +152,18 @@ class Subscription:
         return EntityView(self.view.form, chosen or ("",), self.view.metadata)
 
     def sent(self, now: float) -> None:
-        """A notification goes out."""
+        """Count a notification that was sent."""
         self.times_sent += 1
         self.last_notification = now
         if self.status == "oneshot":
             self.status = "inactive"
 
     def told(self, now: float, status: int) -> None:
-        """The receiver answered; whatever it answered counts as success."""
+        """Record a response of the receiver; any status counts as success."""
         self.last_success, self.last_success_code, self.fails = now, status, 0
 
     def failed(self, now: float, reason: str) -> None:
-        """The receiver did not answer."""
+        """Record a missing response."""
         self.last_failure, self.last_failure_reason = now, reason
         self.fails += 1
         limit = self.notification.get("maxFailsLimit")
@@ -171,7 +171,7 @@ class Subscription:
             self.status = "inactive"
 
     def show(self, now: float) -> dict[str, Any]:
-        """The subscription as a client sees it."""
+        """The subscription as a client gets it."""
         document, condition = self.document, self.condition
         shown: dict[str, Any] = {"id": self.id}
         for name in ("description", "expires"):
@@ -238,7 +238,7 @@ def _matches(matcher: re.Pattern[str] | str, text: str) -> bool:
     return matcher.search(text) is not None
 
 
-# --- reading what clients send ------------------------------------------------------
+# --- requests ---------------------------------------------------------------------
 
 
 def new_id() -> str:
@@ -247,7 +247,7 @@ def new_id() -> str:
 
 
 def read_subscription(raw: Any, service: str, path: str) -> Subscription:
-    """Make a subscription from a ``POST``.
+    """Read a subscription from a ``POST``.
 
     Raises:
         NgsiError: 400, with Orion's sentence.
@@ -263,7 +263,7 @@ def read_subscription(raw: Any, service: str, path: str) -> Subscription:
 
 
 def update_subscription(subscription: Subscription, raw: Any) -> None:
-    """Carry out a ``PATCH``; each part that is named replaces the old one whole.
+    """Apply a ``PATCH``; each part in it replaces the old one completely.
 
     Raises:
         NgsiError: 400, with Orion's sentence.
@@ -320,7 +320,7 @@ def _check_condition(condition: Any) -> None:
     if not isinstance(condition, dict):
         raise bad_request("condition must be a JSON object")
     for name in _CONDITIONS_NOT_DONE:
-        # Left out in silence it would call for every change.
+        # Ignoring it would notify of every change.
         if name in condition:
             raise NgsiError(
                 501,

@@ -1,4 +1,4 @@
-"""Whose data there is, and on whose behalf somebody asks."""
+"""Tenants with their data, and the scope of a request."""
 
 from dataclasses import dataclass, field
 
@@ -9,12 +9,12 @@ from iveg.embedded.subscriptions import Subscription
 
 @dataclass(frozen=True, slots=True)
 class Scope:
-    """Whose data a request is about, and when it came.
+    """Tenant and service path of a request, and its time.
 
     Attributes:
         service: Tenant, lower case; empty for the default one.
         path: Service path, or several, or ``/#`` for reading.
-        correlator: Name of the chain of requests.
+        correlator: Correlator of the chain of requests.
         now: Seconds, Unix time.
     """
 
@@ -25,13 +25,13 @@ class Scope:
 
     @property
     def asking(self) -> Asking:
-        """The same, for a provider."""
+        """The same for a request to a provider."""
         return Asking(self.service, self.path, self.correlator)
 
 
 @dataclass(slots=True)
 class Tenant:
-    """Everything of one tenant."""
+    """All data of one tenant."""
 
     entities: EntityStore = field(default_factory=EntityStore)
     subscriptions: dict[str, Subscription] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Entities as text, in each of the representations that NGSI-v2 has."""
+"""Entities as JSON text, in each representation of NGSI-v2."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,17 +16,17 @@ from iveg.embedded.orion_text import quoted
 
 _BUILTIN = ("dateCreated", "dateModified", "alterationType")
 _NOTIFIED = frozenset(("actionType", "previousValue"))
-"""Metadata that exist in notifications alone."""
+"""Metadata that exist only in notifications."""
 
 
 @dataclass(frozen=True, slots=True)
 class EntityView:
-    """What a client wants to see.
+    """Requested representation.
 
     Attributes:
         form: ``normalized``, ``keyValues``, ``values`` or ``unique``.
-        names: Attributes in the order wanted; none for all, by name.
-        metadata: Metadata in the order wanted; none for all stored ones.
+        names: Attributes in the requested order; empty for all, by name.
+        metadata: Metadata in the requested order; empty for all stored ones.
     """
 
     form: str = "normalized"
@@ -35,7 +35,7 @@ class EntityView:
 
     @property
     def bare(self) -> bool:
-        """Whether attributes are shown as their values alone."""
+        """Whether attributes are shown as plain values."""
         return self.form in ("keyValues", "simplifiedKeyValues")
 
 
@@ -45,13 +45,13 @@ def write_entity(
     foreign: Mapping[str, Attribute] | None = None,
     alteration: str = "",
 ) -> bytes:
-    """One entity.
+    """JSON text of one entity.
 
     Args:
-        entity: What to show.
-        view: How to show it.
-        foreign: Attributes that a context provider added; shown after our own.
-        alteration: What happened to it, for those who ask.
+        entity: The entity.
+        view: Its representation.
+        foreign: Attributes of context providers, shown after the own ones.
+        alteration: Kind of change, where metadata request it.
     """
     chosen = _chosen(entity, view, foreign or {}, alteration)
     if view.form in ("values", "unique"):
@@ -64,11 +64,11 @@ def write_entity(
 def annotated(
     entity: Entity, touched: Touched, wanted: Sequence[str], alteration: str
 ) -> Entity:
-    """The entity with the metadata that only notifications have, where wanted.
+    """The entity with the metadata that only notifications have, where requested.
 
-    ``actionType`` says ``append`` or ``update`` of what the request named;
-    ``previousValue`` is what was there before it, also of what it did not name, and of
-    nothing where the entity itself is new.
+    ``actionType`` is ``append`` or ``update`` for attributes that the request named;
+    ``previousValue`` is the value before the request, also for attributes it did not
+    name, and is absent for a new entity.
     """
     if _NOTIFIED.isdisjoint(wanted):
         return entity

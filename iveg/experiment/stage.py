@@ -28,8 +28,8 @@ from iveg.robot.uplink import Uplink
 
 STEP_S: Final = 0.05
 _LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
-"""Steps between two camera frames, the first once all odometry was sent, and between two
-messages of navigation."""
+"""Steps between two camera frames, the first once all odometry was sent, and between
+two messages of navigation."""
 Looked = Callable[[Rig], None]
 
 
