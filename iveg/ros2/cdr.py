@@ -45,12 +45,12 @@ _M = TypeVar("_M", bound=Message)
 
 
 def read(message: type[_M], payload: bytes, left_out: Fields = _ALL) -> _M:
-    """Read one message; what follows it is padding and not looked at.
+    """Read one message; bytes after it are padding and ignored.
 
     Args:
         message: Its type.
         payload: With its encapsulation.
-        left_out: Fields that nobody looks at; they keep their default.
+        left_out: Unused fields; they keep their default.
 
     Raises:
         UnreadableError: bytes that this type does not describe.
@@ -83,7 +83,7 @@ def _codec_of(message: type[Message]) -> "_Codec":
 
 
 class _Codec:
-    """Steps over the wire, and how a message comes apart into values."""
+    """Encoding steps of a message, and its decomposition into values."""
 
     def __init__(self, message: type[Message]) -> None:
         leaves = list(_leaves(message))
@@ -99,7 +99,7 @@ class _Codec:
 
 
 def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kind]]:
-    """What lies on the wire in order, by dotted name; structures dissolved."""
+    """Values in the order of the wire, by dotted name, structures dissolved."""
     for name, kind in fields_of(message):
         if isinstance(kind, Structure) and not kind.many:
             yield from _leaves(kind.message, f"{within}{name}.")
@@ -116,7 +116,7 @@ class _Step(Protocol):
 
 @dataclass(slots=True)
 class _Out:
-    """What has been written."""
+    """Output buffer."""
 
     order: ByteOrder
     data: bytearray = field(default_factory=bytearray)

@@ -1,12 +1,13 @@
-"""A reader of one kind of message, written out as Python and compiled once.
+"""A reader for one message type, generated as Python source and compiled once.
 
 As ``dataclasses`` makes ``__init__``: a robot reads some hundred messages a second, and
 straight lines cost a third of what steps do that call each other.  Primitives that
 follow each other, the length of a text or sequence behind them included, are read by
 one ``struct`` call, prepared for each of the eight ways in which they can lie.
 
-A message is made as a draft, which has the same slots and can be written to, and then
-becomes what it is: the ``__init__`` of a frozen class takes five times as long.
+A message is created as a draft, a mutable class with the same slots, whose class is
+then
+changed: the ``__init__`` of a frozen class takes five times as long.
 """
 
 import struct
@@ -37,7 +38,7 @@ Decoder = Callable[[memoryview], Any]
 
 @cache
 def decoder_of(message: type[Message], order: ByteOrder, left_out: Fields) -> Decoder:
-    """What reads a message from behind its encapsulation.
+    """The function that reads a message after its encapsulation.
 
     Args:
         message: Its type.
@@ -59,7 +60,7 @@ def _draft_of(message: type[Message]) -> type:
 
 
 def layout(run: list[tuple[str, int, int]], start: int) -> str:
-    """``struct``'s words for a run that begins at ``start`` modulo eight.
+    """Format of ``struct`` for a run that begins at ``start`` modulo eight.
 
     Args:
         run: Code, size of one (bytes) and how many; ``x``: so many that are not read.
@@ -86,7 +87,7 @@ class _Parts:
 
 
 class _Source:
-    """The lines of a reader: ``d`` has ``z`` bytes, and ``at`` is where it stands."""
+    """Source lines of a reader: ``d`` has ``z`` bytes, ``at`` is the position."""
 
     def __init__(self, order: ByteOrder, left_out: Fields) -> None:
         self._order, self._left_out = order, left_out
@@ -100,14 +101,14 @@ class _Source:
         self._read: list[str] = []
 
     def compiled(self, made: str) -> Decoder:
-        """The function that returns what these words make."""
+        """Compile the function that returns the named value."""
         head = ["def decode(d):", " at, z = 0, len(d)"]
         exec("\n".join([*head, *self._lines, f" return {made}"]), self._names)  # noqa: S102
         decode: Decoder = self._names["decode"]
         return decode
 
     def message(self, message: type[Message]) -> "_Parts":
-        """Read a message; the names of what makes it."""
+        """Read a message; returns the expressions of its parts."""
         return _Parts(
             message,
             {
@@ -119,7 +120,7 @@ class _Source:
         )
 
     def made(self, parts: "_Parts") -> str:
-        """Make a message that was read; its name."""
+        """Create a message from its parts; returns its name."""
         self._flush()
         return self._make(parts)
 
@@ -136,7 +137,7 @@ class _Source:
         return made
 
     def _flush(self) -> None:
-        """Read the run that has gathered."""
+        """Read the collected run."""
         if not self._run:
             return
         layouts = [struct.Struct(self._order + layout(self._run, n)) for n in range(8)]
@@ -224,7 +225,7 @@ class _Source:
     # --- lines --------------------------------------------------------------------
 
     def _until(self, end: str, line: str) -> None:
-        """Read up to ``end``, if there is so much."""
+        """Read up to ``end``, if there are enough bytes."""
         self._line(f"end = {end}")
         self._line("if end > z: too_short(at)")
         self._line(line)

@@ -34,7 +34,7 @@ def _none() -> NDArray[np.float32]:
 
 @dataclass(frozen=True, slots=True)
 class Time:
-    """Seconds and the rest since 1970 (s, ns)."""
+    """Seconds and nanoseconds since 1970."""
 
     ROS: ClassVar[str] = "builtin_interfaces/msg/Time"
     sec: Int32 = 0
@@ -54,7 +54,7 @@ class Time:
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """How long (s, ns)."""
+    """A duration (s, ns)."""
 
     ROS: ClassVar[str] = "builtin_interfaces/msg/Duration"
     sec: Int32 = 0
@@ -63,7 +63,7 @@ class Duration:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """When something was measured and in which frame it is."""
+    """Time of measurement, and frame."""
 
     ROS: ClassVar[str] = "std_msgs/msg/Header"
     stamp: Time = Time()
@@ -106,7 +106,7 @@ class Vector3:
 
 @dataclass(frozen=True, slots=True)
 class Quaternion:
-    """A turn; the default is none."""
+    """A rotation; the default is the identity."""
 
     ROS: ClassVar[str] = "geometry_msgs/msg/Quaternion"
     x: Float64 = 0.0
@@ -135,7 +135,7 @@ class PoseStamped:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseWithCovariance:
-    """A pose and how sure it is."""
+    """A pose with its covariance."""
 
     ROS: ClassVar[str] = "geometry_msgs/msg/PoseWithCovariance"
     pose: Pose = Pose()
@@ -162,7 +162,7 @@ class TwistStamped:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TwistWithCovariance:
-    """A twist and how sure it is."""
+    """A twist with its covariance."""
 
     ROS: ClassVar[str] = "geometry_msgs/msg/TwistWithCovariance"
     twist: Twist = Twist()
@@ -171,7 +171,7 @@ class TwistWithCovariance:
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Where one frame is in another."""
+    """Pose of a frame in another."""
 
     ROS: ClassVar[str] = "geometry_msgs/msg/Transform"
     translation: Vector3 = Vector3()
@@ -180,7 +180,7 @@ class Transform:
 
 @dataclass(frozen=True, slots=True)
 class TransformStamped:
-    """Where ``child_frame_id`` is in the header's frame."""
+    """Pose of ``child_frame_id`` in the header's frame."""
 
     ROS: ClassVar[str] = "geometry_msgs/msg/TransformStamped"
     header: Header = Header()
@@ -190,7 +190,7 @@ class TransformStamped:
 
 @dataclass(frozen=True, slots=True)
 class TFMessage:
-    """What ``/tf`` and ``/tf_static`` carry."""
+    """Content of ``/tf`` and ``/tf_static``."""
 
     ROS: ClassVar[str] = "tf2_msgs/msg/TFMessage"
     transforms: tuple[TransformStamped, ...] = ()
@@ -212,7 +212,7 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """The way that navigation means to go."""
+    """Planned path of navigation."""
 
     ROS: ClassVar[str] = "nav_msgs/msg/Path"
     header: Header = Header()
@@ -290,7 +290,7 @@ class RegionOfInterest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraInfo:
-    """A camera's numbers; ``p`` is the projection of the rectified picture."""
+    """Calibration of a camera; ``p`` is the projection of the rectified picture."""
 
     ROS: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
     header: Header = Header()
@@ -308,7 +308,7 @@ class CameraInfo:
 
 @dataclass(frozen=True, slots=True)
 class PointField:
-    """One number of each point; ``datatype`` 7 is float32."""
+    """One field of each point; ``datatype`` 7 is float32."""
 
     ROS: ClassVar[str] = "sensor_msgs/msg/PointField"
     name: str = ""
@@ -348,7 +348,7 @@ class CompressedImage:
 
 @dataclass(frozen=True, slots=True)
 class ObjectHypothesis:
-    """What it may be; ``score`` 0 to 1."""
+    """Class hypothesis; ``score`` 0 to 1."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesis"
     class_id: str = ""
@@ -357,7 +357,7 @@ class ObjectHypothesis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObjectHypothesisWithPose:
-    """What it may be, and where."""
+    """Class hypothesis with pose."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesisWithPose"
     hypothesis: ObjectHypothesis = ObjectHypothesis()
@@ -375,7 +375,7 @@ class BoundingBox3D:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection3D:
-    """One seen thing."""
+    """One detected object."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/Detection3D"
     header: Header = Header()
@@ -386,7 +386,7 @@ class Detection3D:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection3DArray:
-    """One look of a detector that knows depth."""
+    """Detections of one picture, with depth."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
     header: Header = Header()
@@ -423,7 +423,7 @@ class BoundingBox2D:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection2D:
-    """One thing seen in a picture."""
+    """One object detected in a picture."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/Detection2D"
     header: Header = Header()
@@ -434,7 +434,7 @@ class Detection2D:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection2DArray:
-    """One look of a detector that knows no depth."""
+    """Detections of one picture, without depth."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/Detection2DArray"
     header: Header = Header()
@@ -464,7 +464,7 @@ class MeshFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marker:
-    """Something that RViz draws; ``type`` 3 is a cylinder, 9 a text."""
+    """A shape in RViz; ``type`` 3 is a cylinder, 9 a text."""
 
     ROS: ClassVar[str] = "visualization_msgs/msg/Marker"
     header: Header = Header()
@@ -490,7 +490,7 @@ class Marker:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerArray:
-    """What RViz draws at once."""
+    """Shapes in RViz."""
 
     ROS: ClassVar[str] = "visualization_msgs/msg/MarkerArray"
     markers: tuple[Marker, ...] = ()

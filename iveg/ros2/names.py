@@ -1,4 +1,4 @@
-"""How ROS 2 names appear on DDS, and which quality of service ROS asks for by default.
+"""ROS 2 names on DDS, and the default quality of service of ROS.
 
 Source: ROS 2 design, "Topic and Service name mapping to DDS", and the profiles of
 ``rmw`` and ``tf2_ros``.
@@ -15,12 +15,12 @@ _NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """What an endpoint asks for or offers.
+    """Quality of service that an endpoint requests or offers.
 
     Attributes:
-        reliable: What was lost is sent again; else best effort.
-        transient_local: Who comes late gets what was said before; else volatile.
-        depth: Newest messages that wait to be read.
+        reliable: Lost samples are sent again; else best effort.
+        transient_local: Late readers get earlier samples; else volatile.
+        depth: Number of newest messages kept for reading.
     """
 
     reliable: bool = True
@@ -28,7 +28,7 @@ class Qos:
     depth: int = 10
 
     def hears(self, offered: "Qos") -> bool:
-        """Whether a reader that asks for this is served by such a writer."""
+        """Whether a reader with this request matches a writer with that offer."""
         return (offered.reliable or not self.reliable) and (
             offered.transient_local or not self.transient_local
         )
@@ -69,7 +69,7 @@ def dds_topic(name: str) -> str:
 
 
 def ros_topic(dds: str) -> str | None:
-    """The ROS name of a DDS topic; None for what is not a ROS topic."""
+    """The ROS name of a DDS topic; None for other topics."""
     return dds.removeprefix(_PREFIX) if dds.startswith(_PREFIX + "/") else None
 
 

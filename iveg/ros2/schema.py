@@ -1,6 +1,6 @@
-"""How the fields of a ROS message are written down: Python types with their IDL ones.
+"""Schema of ROS messages: Python types annotated with IDL types.
 
-A message is a frozen dataclass whose fields say what they are on the wire::
+A message is a frozen dataclass whose annotations define the wire format::
 
     stamp: Time                                    a structure
     frame_id: str                                  a string
@@ -9,7 +9,7 @@ A message is a frozen dataclass whose fields say what they are on the wire::
     ranges: Annotated[Floats, Many("float32")]     a sequence of primitives
     poses: tuple[PoseStamped, ...]                 a sequence of structures
 
-``cdr`` makes codecs from that, ``adapters/dds`` the types that DDS announces.
+``cdr`` makes codecs from them, ``adapters/dds`` the types that DDS announces.
 """
 
 from dataclasses import dataclass, fields
@@ -39,7 +39,7 @@ PRIMITIVES: dict[str, tuple[str, int]] = {
 
 
 class Message(Protocol):
-    """A frozen dataclass that stands for a ROS message."""
+    """A frozen dataclass that represents a ROS message."""
 
     ROS: ClassVar[str]
     """Its ROS name, such as ``nav_msgs/msg/Odometry``."""

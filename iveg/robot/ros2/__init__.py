@@ -1,4 +1,4 @@
-"""A robot that speaks ROS 2: from its topics to Algorithm 1, from Algorithm 3 to them.
+"""ROS 2 side of a robot: topics to Algorithm 1, and Algorithm 3 to topics.
 
-Pure but for ``rig``: bytes and times come in as arguments, frozen values go out.
+Without I/O except ``rig``: bytes and times are arguments, frozen values are returned.
 """

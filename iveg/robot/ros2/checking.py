@@ -1,7 +1,7 @@
-"""``iveg robot check``: what is on DDS, what is missing, and what goes round the gate.
+"""``iveg robot check``: endpoints on DDS, missing ones, and bypasses of the gate.
 
-Pure: told what was seen during a few seconds, it says what a person would want to know
-before anything moves.
+Without I/O: from a few seconds of observed traffic it derives the report that an
+operator needs before the robot moves.
 """
 
 import math
@@ -23,13 +23,13 @@ _LEAST_HZ = {"odometry": 5.0, "scan": 2.0, "tf": 2.0}
 
 @dataclass(slots=True)
 class Heard:
-    """What came on one topic.
+    """Messages received on one topic.
 
     Attributes:
-        count: Messages.
-        unreadable: Of them.
-        age_s: Of the newest by its stamp, on our clock; None: unstamped.
-        frame: Of the newest.
+        count: Number of messages.
+        unreadable: Number that could not be read.
+        age_s: Age of the newest by its stamp, on our clock (s); None: unstamped.
+        frame: Frame of the newest.
     """
 
     count: int = 0
@@ -52,7 +52,7 @@ class CheckRow:
 
 @dataclass(frozen=True, slots=True)
 class CheckVerdict:
-    """What was found; nothing ``missing`` means that the robot may join."""
+    """Result of a check; the robot may connect if ``missing`` is empty."""
 
     rows: tuple[CheckRow, ...]
     chain: str
@@ -69,16 +69,16 @@ def judge(
     stamp: float,
     broker: str | None,
 ) -> CheckVerdict:
-    """Everything that a few seconds of listening tell.
+    """Evaluate a few seconds of observed traffic.
 
     Args:
-        config: What the robot's topics are called.
-        endpoints: Who is on DDS.
-        heard: By topic key.
-        transforms: As they were heard.
-        seconds: How long was listened (s).
-        stamp: Newest stamp of odometry (s), where the tree is looked at.
-        broker: Why the MQTT broker cannot be reached; None: it can.
+        config: Names of the robot's topics.
+        endpoints: Readers and writers on DDS.
+        heard: Received messages by topic key.
+        transforms: Received transforms.
+        seconds: Duration of the check (s).
+        stamp: Newest stamp of odometry (s), at which transforms are looked up.
+        broker: Reason why the MQTT broker cannot be reached; None: it can.
     """
     names = config.full_topics
     others = [one for one in endpoints if not one.own]
@@ -202,7 +202,7 @@ def _drive(config: RobotConfig, others: Iterable[Known]) -> list[str]:
 
 
 def lines(verdict: CheckVerdict) -> list[str]:
-    """The verdict as a person reads it."""
+    """Text lines of the result."""
     table = [("topic", "type", "writers", "Hz", "age", "")]
     for row in verdict.rows:
         known = row.age_s is not None and math.isfinite(row.age_s)

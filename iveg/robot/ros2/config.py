@@ -1,7 +1,7 @@
-"""``robot.toml``: what one robot's topics, frames and drive are called.
+"""``robot.toml``: names of a robot's topics and frames, and its drive.
 
-Whatever is not said is as ROS does it by default.  A file that cannot be used is
-refused with its line, its key and the reason.
+Absent keys have the defaults of ROS.  An invalid file is refused with line, key and
+reason.
 """
 
 import re
@@ -21,15 +21,15 @@ _FRAME = re.compile(r"/?[A-Za-z0-9_][A-Za-z0-9_/.-]{0,127}")
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Names as ROS nodes write them: relative ones are below the namespace.
+    """Names of topics as in ROS nodes: relative ones are below the namespace.
 
     Attributes:
-        detections_2d: With ``depth`` and ``camera_info`` beside ``detections_3d``;
-            empty: none.
-        mask: A mono picture in which pixel n belongs to the n-th detection; empty: the
-            whole box is taken.
-        obstacles: Where people and peers go for Nav2's obstacle layer.
-        markers: Where they go for RViz.
+        detections_2d: With ``depth`` and ``camera_info`` an alternative to
+            ``detections_3d``; empty: none.
+        mask: A mono picture in which value n marks the n-th detection; empty: the
+            whole box is used.
+        obstacles: Output of people and peers for Nav2's obstacle layer.
+        markers: Output of the same for RViz.
     """
 
     odometry: str = "odom"
@@ -49,10 +49,10 @@ class Topics:
     markers: str = "iveg/markers"
 
     def within(self, namespace: str) -> "Topics":
-        """All of them as full names.
+        """All names as full names.
 
         Raises:
-            UnreadableError: one that is not a ROS topic.
+            UnreadableError: a name is not a ROS topic.
         """
         return Topics(
             **{
@@ -65,7 +65,7 @@ class Topics:
 
 @dataclass(frozen=True, slots=True)
 class Frames:
-    """REP-105."""
+    """Frame names (REP-105)."""
 
     map: str = "map"
     odom: str = "odom"
@@ -74,7 +74,7 @@ class Frames:
 
 @dataclass(frozen=True, slots=True)
 class DriveConfig:
-    """The gate's drive.
+    """The drive behind the gate.
 
     Attributes:
         stamped_in: Navigation sends ``TwistStamped``; ``stamped_out``: the base wants
@@ -105,20 +105,20 @@ _QUALITIES: dict[str, Qos] = {
     "obstacles": names.DEFAULT,
     "markers": names.DEFAULT,
 }
-"""Best effort hears every writer; only what must not be lost is asked for reliably."""
+"""A best-effort reader matches every writer; only commands are read reliably."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotConfig:
-    """Everything that one robot's ROS 2 side is called.
+    """ROS 2 configuration of a robot.
 
     Attributes:
         domain: ``ROS_DOMAIN_ID``, 0 to 232.
         interface: Network interface; empty: any.
-        peers: Addresses to ask where multicast does not pass; none: multicast.
-        tf_max_age_s: How old a transform may be (s).
+        peers: Addresses for discovery without multicast; empty: multicast.
+        tf_max_age_s: Greatest age of a transform (s).
         class_list: File with a detector's class names, one a line; empty: as sent.
-        p_min: Least probability that is placed with depth.
+        p_min: Least probability of a detection that is located by depth.
         qualities: Quality of service by topic.
     """
 
@@ -136,12 +136,12 @@ class RobotConfig:
 
     @property
     def full_topics(self) -> Topics:
-        """The topics with their namespace."""
+        """The topics with the namespace."""
         return self.topics.within(self.namespace)
 
 
 def read_config(text: str, file: str) -> RobotConfig:
-    """Read ``robot.toml``; ``file`` is its name in complaints.
+    """Read ``robot.toml``; ``file`` is its name in error messages.
 
     Raises:
         DataFileError: naming line, key and reason.
@@ -217,13 +217,13 @@ def _qualities(page: "_Page", raw: Mapping[str, Any]) -> dict[str, Qos]:
 
 @dataclass(frozen=True, slots=True)
 class _Page:
-    """The text of a file, to find the line of what is wrong in it."""
+    """Text of the file, to find the line of an error."""
 
     file: str
     text: str
 
     def refuse(self, section: str, key: str, reason: str) -> DataFileError:
-        """The complaint about one key."""
+        """The error about one key."""
         name = f"{section}.{key}" if section else key
         line = self._line(section, key)
         return DataFileError(self.file, f"line {line}, {name}", reason)
@@ -244,7 +244,7 @@ class _Page:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """One table, read key by key; an unknown key is refused at once."""
+    """One table, read key by key; an unknown key is an error."""
 
     page: _Page
     root: Mapping[str, Any]
@@ -260,12 +260,12 @@ class _Table:
 
     @property
     def raw(self) -> Mapping[str, Any]:
-        """What the file says here."""
+        """Content of the table in the file."""
         table: Mapping[str, Any] = self.root.get(self.section, {})
         return table
 
     def get(self, key: str, default: Any, read: Callable[[Any], Any]) -> Any:
-        """A value as ``read`` makes it, which raises ValueError for a bad one."""
+        """A value converted by ``read``, which raises ValueError for an invalid one."""
         if key not in self.raw:
             return default
         try:
@@ -295,7 +295,7 @@ class _Table:
         return float(self.get(key, default, read))
 
     def maybe(self, key: str, least: float, most: float) -> float | None:
-        """A number within bounds, or None where none is said."""
+        """A number within bounds, or None if absent."""
         return self.number(key, least, most, 0.0) if key in self.raw else None
 
 
@@ -354,5 +354,5 @@ def _quality(value: Any) -> dict[str, object]:
 
 
 def read_classes(text: str) -> tuple[str, ...]:
-    """A detector's class names, one a line, in the order of their numbers."""
+    """A detector's class names, one per line, in the order of their numbers."""
     return tuple(line.strip() for line in text.splitlines() if line.strip())

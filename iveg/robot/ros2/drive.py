@@ -1,7 +1,7 @@
-"""The drive's side of Algorithm 3: wishes in, what the safety node lets through out.
+"""The drive's side of Algorithm 3: twists of navigation in, gated twists out.
 
-A wish that nobody can mean is a wish to rest.  Nothing is decided here about how fast
-the robot may be: that is the safety node's gate, and this module writes its word.
+A twist that cannot be read counts as zero.  The speed limit is decided by the gate of
+the safety node; this module only converts messages.
 """
 
 from iveg.domain.errors import UnreadableError
@@ -16,7 +16,7 @@ from iveg.ros2.schema import Message
 
 
 def message_of(*, stamped: bool) -> type[Message]:
-    """Which type a topic of twists has."""
+    """Message type of a topic of twists."""
     return m.TwistStamped if stamped else m.Twist
 
 
@@ -24,10 +24,10 @@ class DriveTopics:
     """Reads ``cmd_vel_in``, writes ``cmd_vel_out``.
 
     Args:
-        drive: Which of the two types each has.
-        topic: Full name of ``cmd_vel_in``, for troubles.
+        drive: Type of each of the two topics.
+        topic: Full name of ``cmd_vel_in``, for faults.
         base_link: Frame of stamped twists.
-        input_faults: Where what is wrong is noted.
+        input_faults: Record of faults.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class DriveTopics:
         self._newest = 0.0
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
-        """What upstream asks for; None for what is older than what it asked before."""
+        """The twist that upstream requests; None if older than the one before."""
         try:
             if not self._drive.stamped_in:
                 return read_twist(cdr.read(m.Twist, payload))
@@ -52,9 +52,9 @@ class DriveTopics:
 
     def _is_old(self, stamped: m.TwistStamped, now: float) -> bool:
         stamp = stamped.header.stamp.seconds
-        if stamp == 0.0:  # the sender stamps nothing
+        if stamp == 0.0:  # the sender sets no stamp
             return False
-        # A clock that was set back by more than a wish lives is believed again.
+        # A clock that was set back by more than the lifetime of a twist is accepted.
         if self._newest - 1.0 < stamp <= self._newest:
             self._input_faults.note("time_back", self._topic, now)
             return True
@@ -62,7 +62,7 @@ class DriveTopics:
         return False
 
     def write(self, twist: Twist2D, wall: float) -> bytes:
-        """The bytes for the base; ``wall`` is the robot's clock (Unix s)."""
+        """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
         written = write_twist(twist)
         if not self._drive.stamped_out:
             return cdr.write(written)

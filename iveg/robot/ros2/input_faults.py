@@ -1,7 +1,7 @@
-"""What is wrong with what a robot's topics say: named, counted, and what it costs.
+"""Faults of a robot's ROS 2 inputs: name, count and effect on the speed.
 
-A trouble lasts as long as it is noted, and two seconds more; while it lasts the robot
-is slow, or stands where driving on would be a guess.
+A fault lasts as long as it is noted, and two seconds more; while it lasts the robot is
+slow, or halts where driving on would be a guess.
 """
 
 from collections import Counter
@@ -16,14 +16,14 @@ LASTS_S = 2.0
 _MOST = 16
 
 STANDS = frozenset({"second_publisher"})
-"""Another program tells the drive where to go: what we let through decides nothing."""
+"""Faults that hold the robot: another publisher on the drive bypasses the gate."""
 HARMLESS = frozenset({"unknown_to_iveg", "nobody_there"})
-"""Cost no speed: silence is judged by the watchdog, and by the age of odometry."""
+"""Faults without effect: watchdog and age of odometry handle silence."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Noted:
-    """Since when and until when (monotonic, s); ``for_s`` None: since ``since``."""
+    """Start and end of a fault (monotonic, s); ``for_s`` None: since ``since``."""
 
     since: float
     last: float
@@ -31,23 +31,23 @@ class _Noted:
 
 
 class InputFaults:
-    """Keeps what was noted; times are monotonic seconds."""
+    """Record of faults; times are monotonic seconds."""
 
     def __init__(self) -> None:
         self._noted: dict[tuple[str, str], _Noted] = {}
         self.counters: Counter[str] = Counter()
-        """How often each was noted, by its code."""
+        """Number of notes by code."""
 
     def note(
         self, code: str, about: str, now: float, for_s: float | None = None
     ) -> None:
-        """Something is wrong at this moment.
+        """Note a fault at this moment.
 
         Args:
             code: A short, stable name.
             about: Topic or frames.
             now: Monotonic (s).
-            for_s: How long it has been so where that is known better.
+            for_s: Duration so far, where known from elsewhere (s).
         """
         self.counters[code] += 1
         key = clean(code), clean(about)
@@ -59,7 +59,7 @@ class InputFaults:
         self._noted[key] = _Noted(since, now, for_s)
 
     def faults(self, now: float) -> tuple[RobotFault, ...]:
-        """What lasts, in the order in which it began."""
+        """Present faults, in the order of their start."""
         if not self._noted:
             return ()
         self._noted = {
@@ -72,7 +72,7 @@ class InputFaults:
 
 
 def speed_of(faults: Iterable[RobotFault]) -> tuple[float, str | None]:
-    """The factor that is still no guess with these faults, and because of which."""
+    """Speed factor allowed with these faults, and the fault that determines it."""
     codes = [one.code for one in faults]
     for code in codes:
         if code in STANDS:

@@ -1,8 +1,8 @@
-"""Algorithm 1 on a ROS 2 robot: the newest of each topic, moved into ``map``.
+"""Algorithm 1 on a ROS 2 robot: newest message of each topic, transformed to ``map``.
 
-What has no place because a transform is missing or old goes out as unplaced, and the
-transform is named; nothing is placed by an old one.  Of all that waits only the newest
-message is read, so a flood costs no more than its bytes.
+A missing or old transform makes an observation unplaced, and the fault names it; no old
+transform is used.  Of all pending messages only the newest is read, so a flood costs no
+more than its bytes.
 """
 
 from collections import deque
@@ -45,7 +45,7 @@ TOPICS: dict[str, type[Message]] = {
     "battery": m.BatteryState,
     "path": m.Path,
 }
-"""What is listened to, in the order in which it is read."""
+"""Topics that are subscribed to, in the order of reading."""
 _UNREAD = frozenset(
     {
         (m.PoseWithCovariance, "covariance"),
@@ -53,7 +53,7 @@ _UNREAD = frozenset(
         (m.ObjectHypothesisWithPose, "pose"),
     }
 )
-"""What nothing here looks at; a box says where a thing is."""
+"""Fields that are not needed; the box has the position."""
 
 SILENT_S = 1.0
 _CLOCK_OFF_S = 10.0
@@ -62,19 +62,19 @@ _PICTURES = 6
 _SAME_PICTURE_S = 0.05
 _DEPTH_LATE_S = 0.3
 BATTERY_EVERY_S = 5.0
-"""A battery says nothing new more often than that."""
+"""Least time between two reports of the battery (s)."""
 
 _M = TypeVar("_M", bound=Message)
 
 
 PICTURES = ("depth", "mask")
-"""Large ones, of which few may wait."""
+"""Topics of large messages, of which few may be pending."""
 
 
 def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
-    """What a robot listens to: key → full name and type.
+    """Topics of a robot: key → full name and type.
 
-    A camera is listened to only where there are detections without depth.
+    A camera is read only where detections have no depth.
     """
     camera = (*PICTURES, "camera_info") if not topics.detections_2d else ()
     return {
@@ -86,7 +86,7 @@ def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Here:
-    """Where the robot was: in ``map``, and in its odometry's frame, at a stamp (s)."""
+    """Pose of the robot in ``map`` and in its odometry frame, at a stamp (s)."""
 
     in_map: Rigid
     in_odom: Rigid
@@ -96,13 +96,13 @@ class _Here:
 
 @dataclass(slots=True)
 class _Stamps:
-    """The stamps of one topic: newer ones count, until its clock was set back."""
+    """Stamps of one topic: newer ones count, until its clock was set back."""
 
     newest: float = 0.0
     back: int = 0
 
     def verdict(self, stamp: float) -> str:
-        """``new``, ``same``, ``back``, or ``reset`` when time really went back."""
+        """``new``, ``same``, ``back``, or ``reset`` when the clock was set back."""
         if stamp > self.newest or stamp == 0.0:
             self.newest, self.back = max(stamp, self.newest), 0
             return "new"
@@ -116,12 +116,12 @@ class _Stamps:
 
 
 class SensorInputs:
-    """Turns what topics say into observations.
+    """Converts ROS messages to observations.
 
     Args:
         config: Names of topics and frames.
         classes: A detector's class names by number; none: as sent.
-        sim_time: Stamps are a simulator's; they say nothing about clocks.
+        sim_time: Stamps are a simulator's and are not compared with clocks.
     """
 
     def __init__(
@@ -148,26 +148,26 @@ class SensorInputs:
         self._camera: m.CameraInfo | None = None
         self._look: tuple[m.Detection2DArray, float] | None = None
         self.battery: Battery | None = None
-        """What the battery said last."""
+        """Newest state of the battery."""
         self._battery_told = float("-inf")
         self.input_faults = InputFaults()
 
     @property
     def place(self) -> Rigid | None:
-        """Where the robot was last placed in ``map``."""
+        """Newest pose of the robot in ``map``."""
         return None if self._here is None else self._here.in_map
 
     @property
     def transforms(self) -> TransformBuffer:
-        """The tree as it is known."""
+        """Present transforms."""
         return self._transforms
 
-    # --- what came ----------------------------------------------------------------
+    # --- messages -----------------------------------------------------------------
 
     def hear(
         self, topic: str, arrived: Sequence[bytes], now: float, most: int = 0
     ) -> None:
-        """Take what waited on one of ``TOPICS``; ``most`` is how much could have."""
+        """Take pending messages of one of ``TOPICS``; ``most`` is its queue depth."""
         self._heard_at[topic] = now
         if most and len(arrived) >= most:
             self.input_faults.note("flood", self._name(topic), now)
@@ -184,7 +184,7 @@ class SensorInputs:
             self.input_faults.counters["transforms_refused"] += refused
 
     def tick(self, now: Instant) -> list[Sensed]:
-        """Everything that is new, odometry first."""
+        """New observations, odometry first."""
         if self._began is None:
             self._began = now.mono
         found: list[Sensed] = []
@@ -231,7 +231,7 @@ class SensorInputs:
     def _stamped(
         self, topic: str, message: type[_M], payload: bytes, now: Instant
     ) -> tuple[_M, float] | None:
-        """A message and its stamp (s); None for one that is no news."""
+        """A message and its stamp (s); None for an old one."""
         read = self._read(topic, message, payload, now.mono)
         if read is None:
             return None
@@ -252,7 +252,7 @@ class SensorInputs:
     def _note_silence(self, now: float) -> None:
         for topic in ("odometry", "scan"):
             heard = self._heard_at.get(topic)
-            # A robot may have no laser; one that had one and is silent is blind.
+            # A robot may lack a laser; one whose laser fell silent has a fault.
             since = self._began if heard is None and topic == "odometry" else heard
             if since is not None and now - since > SILENT_S:
                 self.input_faults.note("no_data", self._name(topic), now, now - since)
@@ -263,7 +263,7 @@ class SensorInputs:
         return self._lookup(self._frames.map, frame, stamp, now)
 
     def _lookup(self, outer: str, inner: str, stamp: float, now: float) -> Rigid | None:
-        """Where a frame is; None is noted as a trouble with its name."""
+        """Transform of a frame; None for a missing one, which is noted as a fault."""
         try:
             return self._transforms.lookup(outer, inner.lstrip("/"), stamp)
         except NoTransformError as error:
@@ -311,14 +311,14 @@ class SensorInputs:
         return [reading.read_scan(message, laser)]
 
     def _laser(self, frame: str, stamp: float, now: float) -> Rigid | None:
-        """Where the laser was as seen from where odometry says the robot is."""
+        """Pose of the laser relative to the robot's odometry pose."""
         here = self._here
         if here is not None:
             try:
                 in_odom = self._transforms.lookup(here.odom, frame.lstrip("/"), stamp)
                 return here.in_odom.inverse().compose(in_odom)
             except NoTransformError:
-                pass  # odometry need not be in the tree; the mount must be
+                pass  # odometry may be missing in the tree; the mount must be there
         return self._lookup(self._frames.base_link, frame, stamp, now)
 
     def _detections(self, payload: bytes, now: Instant) -> list[Sensed]:
@@ -351,7 +351,7 @@ class SensorInputs:
         if message is None:
             return []
         frame = message.header.frame_id or self._frames.map
-        # A plan is old by nature: it is where it is now.
+        # A path is old by nature: it is placed by the present transform.
         stamp = self._here.stamp if self._here else message.header.stamp.seconds
         place = self._in_map(frame, stamp, now.mono)
         return [] if place is None else [reading.read_path(message, place)]
@@ -393,7 +393,7 @@ class SensorInputs:
         return []
 
     def _grounded(self, now: Instant) -> list[Sensed]:
-        """The newest look once its depth picture is there, or has not come in time."""
+        """The newest detection frame once its depth picture arrived, or is overdue."""
         if self._look is None:
             return []
         look, since = self._look

@@ -1,8 +1,8 @@
-"""Who is near, as others saw it: for Nav2's costmap and for RViz.
+"""People and robots nearby, as reported by peers: for Nav2's costmap and for RViz.
 
 The paper's costmap injection.  A point cloud in ``base_link`` holds a disc for each
-person and peer, and a circle of far points that clear the layer: a layer of its own
-(docs/robots.md) marks the discs and forgets whoever has gone.  Markers are in ``map``.
+person and peer, and a circle of far points that clear the layer: a separate layer
+(docs/robots.md) marks the discs and removes old ones.  Markers are in ``map``.
 """
 
 import math
@@ -18,10 +18,10 @@ from iveg.domain.limits import LIMITS
 from iveg.ros2 import messages as m
 
 SILENT_S = LIMITS.feedback_stand_s
-"""Feedback that is older tells nobody's place."""
+"""Age from which feedback gives no positions (s)."""
 PERSON_M, PEER_M = 0.35, 0.75
 REACH_M = 8.0
-"""Marked up to here; the clearing circle is a metre beyond."""
+"""Greatest distance of a disc (m); the clearing circle is a metre beyond."""
 _MYSELF_M = 1.0
 _SPACING_M = 0.1
 _HEIGHT_M = 0.5
@@ -33,12 +33,12 @@ _CYLINDER, _TEXT = 3, 9
 
 @dataclass(frozen=True, slots=True)
 class Neighbour:
-    """Somebody in ``map`` (m).
+    """A person or robot in ``map`` (m).
 
     Attributes:
         kind: ``person`` or ``robot``.
-        radius: Of the body (m).
-        ring: Of the rule (m).
+        radius: Radius of the body (m).
+        ring: Radius of the rule (m).
     """
 
     kind: str
@@ -50,10 +50,10 @@ class Neighbour:
 
 
 class Neighbours:
-    """Keeps the newest feedback of each topic; times are monotonic seconds.
+    """Newest feedback of each topic; times are monotonic seconds.
 
     Args:
-        robot_id: Who is not one's own neighbour.
+        robot_id: This robot, which is left out.
     """
 
     def __init__(self, robot_id: str) -> None:
@@ -61,13 +61,13 @@ class Neighbours:
         self._told: dict[str, tuple[Feedback, float]] = {}
 
     def take(self, peer: str, feedback: Feedback, now: float) -> None:
-        """Keep what ``/{peer}/mqtt_feedback`` says."""
+        """Store the content of ``/{peer}/mqtt_feedback``."""
         self._told[peer] = feedback, now
         while len(self._told) > _MOST:
             del self._told[next(iter(self._told))]
 
     def present(self, own: Pose2D | None, now: float) -> list[Neighbour]:
-        """Everybody but this robot; one that two topics tell of is there once."""
+        """All but this robot; one reported on two topics is listed once."""
         live = [fb for fb, at in self._told.values() if now - at <= SILENT_S]
         found: dict[object, Neighbour] = {}
         for feedback in live:
@@ -96,7 +96,7 @@ class Neighbours:
 def cloud(
     neighbours: Iterable[Neighbour], own: Pose2D, stamp: m.Time, frame: str
 ) -> m.PointCloud2:
-    """Discs to be marked and a circle to be cleared, in ``base_link``."""
+    """Discs to mark and a circle to clear, in ``base_link``."""
     discs = [
         _disc(one, own)
         for one in neighbours
@@ -145,7 +145,7 @@ def _disc(one: Neighbour, own: Pose2D) -> NDArray[np.float64]:
 def markers(
     neighbours: Iterable[Neighbour], stamp: m.Time, frame: str
 ) -> m.MarkerArray:
-    """A body, its ring and its name each, that fade by themselves after a second."""
+    """Body, radius and name of each, with a lifetime of a second."""
     found: list[m.Marker] = []
     for number, one in enumerate(neighbours):
         place = m.Point(one.x, one.y, 0.9)

@@ -1,10 +1,10 @@
-"""Detections without depth of their own: boxes in a picture, and a depth picture.
+"""Detections without depth: boxes in a picture, located by a depth picture.
 
 The paper's grounding (``iveg.robot.grounding``) on ``vision_msgs/Detection2DArray``,
-a depth ``Image`` registered to the detector's camera, and its ``CameraInfo``.  Where
-there is a mask picture its pixel n belongs to the n-th detection, counted from 1, and
-255 to any.  Elsewhere the target is what of the box is about as far away as its middle:
-the whole box would have the wall behind a person as the person's back.
+a depth ``Image`` registered to the detector's camera, and its ``CameraInfo``.  In a
+mask picture value n marks the n-th detection, counted from 1, and 255 marks any.
+Without a mask the target is the part of the box at about the depth of its middle: the
+whole box would include the wall behind a person.
 """
 
 from collections.abc import Iterable
@@ -30,14 +30,14 @@ _DEPTHS: dict[str, tuple[str, float]] = {
     "mono16": ("u2", 0.001),
     "32FC1": ("f4", 1.0),
 }
-"""Encoding → number on the wire, and what one of it is (m)."""
+"""Encoding → number type, and its unit (m)."""
 _MASKS = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
 
 
 def nearest(
     pictures: Iterable[m.Image], stamp: float, within_s: float
 ) -> m.Image | None:
-    """The picture that was taken at a stamp, give or take."""
+    """The picture of a stamp, within ``within_s``."""
     best = min(
         pictures, key=lambda one: abs(one.header.stamp.seconds - stamp), default=None
     )
@@ -53,7 +53,7 @@ def read_camera(info: m.CameraInfo) -> Pinhole:
         UnreadableError: ``bad_camera``: no focal length, or pixels that are not square.
     """
     fx, fy, cx, cy = (float(info.p[n]) for n in (0, 5, 2, 6))
-    if fx == 0.0:  # drivers of rectified cameras may leave p out
+    if fx == 0.0:  # drivers of rectified cameras may omit p
         fx, fy, cx, cy = (float(info.k[n]) for n in (0, 4, 2, 5))
     usable = all(map(np.isfinite, (fx, fy, cx, cy))) and fx > 0.0
     if not usable or abs(fx - fy) > _SQUARE * fx:
@@ -95,18 +95,18 @@ def grounded(
     classes: tuple[str, ...],
     settings: Grounding,
 ) -> DetectionFrame:
-    """One look with its boxes in ``map``.
+    """One detection frame with its boxes in ``map``.
 
     Args:
-        look: What the detector saw.
+        look: Detections of the picture.
         picture: Depth at that moment.
-        mask: Which pixel belongs to which detection; None: all of a box.
-        place: Where the camera's optical frame is in ``map``.
+        mask: Detection of each pixel; None: the whole box.
+        place: Pose of the camera's optical frame in ``map``.
         classes: Names by number.
-        settings: The numbers that the paper leaves open.
+        settings: Parameters that the paper leaves open.
 
     Returns:
-        A target that is sure enough and has no place counts as unreadable.
+        A probable target without a position counts as unreadable.
     """
     owners = None if mask is None else _pixels(mask, _MASKS.get(mask.encoding, "u1"))
     answers = [
@@ -172,7 +172,7 @@ def _segment(
 def _cut(
     picture: NDArray[Any], corner: tuple[int, int], width: int, height: int
 ) -> NDArray[Any]:
-    """A part of a picture, zero beyond its edges; shape (height, width)."""
+    """Part of a picture, zero beyond its edges; shape (height, width)."""
     left, top = corner
     part = np.zeros((height, width), picture.dtype)
     rows, columns = picture.shape
@@ -184,7 +184,7 @@ def _cut(
 
 
 def _as_far_as_the_middle(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """What is within half a metre of the depth of a box's middle."""
+    """Pixels within half a metre of the depth at the middle of a box."""
     height, width = depth.shape
     middle = depth[height // 4 : -(-3 * height // 4), width // 4 : -(-3 * width // 4)]
     measured = middle[np.isfinite(middle) & (middle > 0.0)]

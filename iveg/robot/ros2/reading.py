@@ -1,7 +1,7 @@
-"""From ROS messages to what iVeg calls things; all that cannot be meant is refused.
+"""From ROS messages to domain values; values out of range are refused.
 
-Each function is the one place where its message is understood.  Numbers that are none
-raise ``UnreadableError`` with a short, stable reason, which is what gets counted.
+Each message is interpreted by one function.  Numbers that are not finite raise
+``UnreadableError`` with a short, stable reason, by which errors are counted.
 """
 
 import math
@@ -18,7 +18,7 @@ from iveg.robot.ros2.rigid import Rigid, rigid_of
 from iveg.ros2 import messages as m
 
 FASTEST_M_S = 20.0
-"""Faster than anything that drives between crop rows: a number that cannot be meant."""
+"""Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
 _FARTHEST_M = 1e6
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
@@ -26,7 +26,7 @@ _FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
 
 
 def read_pose(odometry: m.Odometry) -> Rigid:
-    """Where the robot is in the odometry's frame.
+    """Pose of the robot in the odometry frame.
 
     Raises:
         UnreadableError: ``not_a_number``.
@@ -39,7 +39,7 @@ def read_pose(odometry: m.Odometry) -> Rigid:
 
 
 def read_twist(twist: m.Twist) -> Twist2D:
-    """Forward speed and turning; a robot on wheels has no others.
+    """Forward speed and yaw rate; the other components do not apply to wheels.
 
     Raises:
         UnreadableError: ``not_a_number``, or ``absurd`` above 20 m/s or rad/s.
@@ -53,16 +53,16 @@ def read_twist(twist: m.Twist) -> Twist2D:
 
 
 def write_twist(twist: Twist2D) -> m.Twist:
-    """The other way."""
+    """Inverse of ``read_twist``."""
     return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
 
 
 def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
-    """A sweep of a laser that is mounted level, upright or upside down.
+    """A scan of a laser that is mounted level, upright or upside down.
 
     Args:
         scan: As it came.
-        laser: Where the laser is in ``base_link``.
+        laser: Pose of the laser in ``base_link``.
 
     Raises:
         UnreadableError: ``no_beams``, ``too_many_beams`` (above 4,096),
@@ -93,7 +93,7 @@ def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
 
 
 def _side(laser: Rigid) -> int:
-    """Which way its angles grow seen from above."""
+    """Direction of growing angles seen from above."""
     if laser.tilt <= _TILT:
         return 1
     if laser.tilt >= math.pi - _TILT:
@@ -104,11 +104,11 @@ def _side(laser: Rigid) -> int:
 def read_detection(
     detection: m.Detection3D, place: Rigid, classes: tuple[str, ...]
 ) -> Detection:
-    """A box in ``map``: the hull of the turned one.
+    """A box in ``map``: the hull of the rotated one.
 
     Args:
         detection: As it came.
-        place: Where its frame is in ``map``.
+        place: Pose of its frame in ``map``.
         classes: Names by number; empty: as sent.
 
     Raises:
@@ -121,7 +121,7 @@ def read_detection(
     if box is None or not all(0.0 <= side < math.inf for side in sides):
         raise UnreadableError("not_a_number", "a box")
     placed = place.compose(box)
-    # A turned box reaches as far as its half sides do together, along each axis.
+    # Half extent of a rotated box: sum of its projected half sides, for each axis.
     (x, y, z), (along, across, up) = placed.move, sides
     (a, b, c), (d, e, f), (g, h, i) = placed.rows
     dx = 0.5 * (abs(a) * along + abs(b) * across + abs(c) * up)
@@ -135,7 +135,7 @@ def read_detection(
 def read_hypothesis(
     results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
 ) -> tuple[str, float]:
-    """Class and probability of the likeliest.
+    """Class and score of the most probable hypothesis.
 
     Raises:
         UnreadableError: ``no_class`` or ``bad_probability``.
@@ -160,7 +160,7 @@ def _score(hypothesis: m.ObjectHypothesis) -> float:
 
 
 def hull_of(points: np.ndarray) -> Box3D:
-    """The upright box about points of shape (n, 3).
+    """The axis-aligned box of points, shape (n, 3).
 
     Raises:
         UnreadableError: ``not_a_number``, ``absurd``.
@@ -173,7 +173,7 @@ def hull_of(points: np.ndarray) -> Box3D:
 
 def _within_world(box: Box3D) -> Box3D:
     most = _FARTHEST_M
-    # What is no number is in no order either.
+    # Comparisons with NaN are false.
     if (
         -most <= box.xmin <= box.xmax <= most
         and -most <= box.ymin <= box.ymax <= most
@@ -184,7 +184,7 @@ def _within_world(box: Box3D) -> Box3D:
 
 
 def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigation:
-    """The way ahead in ``map``; a long one is thinned to 1,024 points.
+    """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:
         UnreadableError: ``not_a_number``.
@@ -202,7 +202,7 @@ def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigatio
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """What ``sensor_msgs/BatteryState`` says that people ask for.
+    """Content of ``sensor_msgs/BatteryState`` that iVeg uses.
 
     Attributes:
         percentage: 0 to 1; None when unknown.
@@ -216,9 +216,9 @@ class Battery:
 
 
 def read_battery(state: m.BatteryState) -> Battery:
-    """The battery.
+    """Read the state of the battery.
 
-    ROS writes NaN for what is not measured, and some drivers percent for a share.
+    ROS writes NaN for unmeasured values, and some drivers per cent instead of a share.
     """
     share: float | None = state.percentage
     if share is None or not math.isfinite(share) or not 0.0 <= share <= 100.0:
@@ -232,5 +232,5 @@ def read_battery(state: m.BatteryState) -> Battery:
 
 @lru_cache(1024)
 def clean(text: str) -> str:
-    """A text that Orion takes."""
+    """Text without characters that Orion refuses."""
     return clean_text(text.translate(_FORBIDDEN)).strip()

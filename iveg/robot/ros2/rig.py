@@ -1,9 +1,8 @@
-"""One robot between its ROS 2 topics and iVeg: Algorithms 1 and 3 at work over DDS.
+"""A robot between its ROS 2 topics and iVeg: Algorithms 1 and 3 over DDS.
 
-Thirty times a second the newest of each topic goes through the safety node to iVeg;
-each twist goes to the gate as it comes.  What the gate says is the only thing that is
-published on the drive's topic, again and again while it is zero, and when this process
-dies nothing is.
+Thirty times a second the newest message of each topic goes through the safety node to
+iVeg; each twist goes to the gate at once.  Only the gate's output is published on the
+drive's topic, repeatedly while it is zero; when this process ends, so does publishing.
 """
 
 import asyncio
@@ -32,10 +31,10 @@ from iveg.ros2.schema import Message
 _log = logging.getLogger(__name__)
 RATE_HZ = 30.0
 _DEPTH = 50
-"""A topic of which this much waits after a thirtieth of a second is flooded."""
+"""Pending messages after a thirtieth of a second that count as a flood."""
 _PICTURE_DEPTH = 2
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
-"""Twice, and five times a second."""
+"""Ticks between two checks of endpoints, and between two outputs of neighbours."""
 _KNOWN_WITHIN_S = 8.0
 _MET_WITHIN_S = 5.0
 
@@ -44,7 +43,7 @@ class Reader(Protocol):
     """A subscription."""
 
     def take(self) -> Sequence[bytes]:
-        """Everything that waits, oldest first."""
+        """All pending messages, oldest first."""
         ...
 
 
@@ -52,17 +51,17 @@ class Writer(Protocol):
     """A publication."""
 
     def write(self, payload: bytes) -> None:
-        """Send it."""
+        """Publish a message."""
         ...
 
     @property
     def readers(self) -> int:
-        """How many listen."""
+        """Number of subscribers."""
         ...
 
 
 class Known(Protocol):
-    """Somebody's writer or reader."""
+    """A writer or reader on the network."""
 
     @property
     def topic(self) -> str:
@@ -76,22 +75,22 @@ class Known(Protocol):
 
     @property
     def qos(self) -> Qos:
-        """What it offers or asks for."""
+        """Quality of service that it offers or requests."""
         ...
 
     @property
     def writes(self) -> bool:
-        """A writer, else a reader."""
+        """Whether it is a writer, else a reader."""
         ...
 
     @property
     def own(self) -> bool:
-        """It is ours."""
+        """Whether it belongs to this process."""
         ...
 
 
 class Network(Protocol):
-    """DDS, as far as a robot needs it."""
+    """The DDS network, as far as a robot needs it."""
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
         """Subscribe."""
@@ -102,23 +101,23 @@ class Network(Protocol):
         ...
 
     def endpoints(self) -> Sequence[Known]:
-        """All writers and readers there."""
+        """All writers and readers on the network."""
         ...
 
     def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
-        """Call back soon after news."""
+        """Call ``on_data`` soon after new data."""
         ...
 
 
 NodeMaker = Callable[
     [Callable[[Twist2D], None], Callable[[str, Feedback], None]], RobotNode
 ]
-"""Makes the safety node, given its drive and who is told feedback."""
+"""Makes the safety node from its drive and a callback for feedback."""
 
 
 @dataclass(frozen=True, slots=True)
 class _In:
-    """A topic that is read; ``most`` is how much can wait."""
+    """A topic that is read; ``most`` is the depth of its queue."""
 
     reader: Reader
     most: int
@@ -128,9 +127,9 @@ class Ros2Robot:
     """One robot.
 
     Args:
-        robot_id: Who it is for iVeg.
+        robot_id: Its id in iVeg.
         config: Names of topics and frames.
-        network: Where they are.
+        network: The network.
         make_node: Makes its safety node.
         classes: A detector's class names by number.
         sim_time: Stamps are a simulator's.
@@ -200,7 +199,7 @@ class Ros2Robot:
         )
 
     async def run(self) -> None:
-        """Ride on the robot until cancelled; the drive is left at rest."""
+        """Run until cancelled; the drive is left at rest."""
         self._network.watch([self._wishes.reader], self._on_wish)
         async with asyncio.TaskGroup() as tasks:
             for name, work in (
@@ -210,7 +209,7 @@ class Ros2Robot:
                 tasks.create_task(work, name=f"{self._id}-{name}")
 
     async def _sense_forever(self) -> None:
-        """One timer for all: each that wakes the process costs as much as its work."""
+        """Read all sensors on one timer: each wake-up costs as much as its work."""
         loop, ticks = asyncio.get_running_loop(), itertools.count()
         broken: asyncio.Future[None] = loop.create_future()
         due, timer = clock.now().mono, None
@@ -259,7 +258,7 @@ class Ros2Robot:
             self._log(faults)
 
     def _log(self, faults: tuple[RobotFault, ...]) -> None:
-        """Each trouble once when it begins and once when it is over."""
+        """Log each fault once at its start and once at its end."""
         said = frozenset((one.code, one.about) for one in faults)
         for code, about in said - self._said:
             _log.warning("%s: %s, %s", self._id, code, about)
@@ -279,7 +278,7 @@ class Ros2Robot:
             self.node.wish(wish)
 
     def _look_round(self) -> None:
-        """See who is there, whether somebody else drives, and whether iVeg knows us."""
+        """Check for other publishers on the drive, and for iVeg's knowledge of us."""
         now, out = clock.now().mono, self._names.cmd_vel_out
         others = [one for one in self._network.endpoints() if not one.own]
         if any(one.writes and one.topic == out for one in others):
@@ -306,7 +305,7 @@ class Ros2Robot:
         try:
             self._out.write(self._topics.write(twist, now.wall))
         except HopError as error:
-            # Nothing arrives, so the base halts by its own time-out.
+            # No command arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
             out = self._names.cmd_vel_out
             self._input_faults.note("drive_refused", out, now.mono)
@@ -329,5 +328,5 @@ class Ros2Robot:
 
 
 def _heard(writer: Writer | None) -> Writer | None:
-    """The writer if anybody listens."""
+    """The writer if it has subscribers."""
     return writer if writer is not None and writer.readers else None

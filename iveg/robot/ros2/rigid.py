@@ -1,6 +1,6 @@
-"""Where one frame is in another: a move and a turn, in plain numbers.
+"""Rigid transforms between frames, in plain numbers.
 
-For so few numbers NumPy only slows; a matrix is made where many points are moved.
+NumPy is slower for so few numbers; a matrix is made to transform many points.
 """
 
 import math
@@ -19,11 +19,11 @@ Rows = tuple[Three, Three, Three]
 
 @dataclass(frozen=True, slots=True)
 class Rigid:
-    """Where one frame is in another: p_outer = turn · p_inner + move (m).
+    """Pose of a frame in another: p_outer = turn · p_inner + move (m).
 
     Attributes:
-        move: Of the inner frame's origin (m).
-        q: Unit quaternion of the turn: x, y, z, w.
+        move: Position of the inner frame's origin (m).
+        q: Unit quaternion of the rotation: x, y, z, w.
     """
 
     move: Three = (0.0, 0.0, 0.0)
@@ -31,7 +31,7 @@ class Rigid:
 
     @property
     def rows(self) -> Rows:
-        """The turn as the rows of a matrix."""
+        """The rotation as rows of a matrix."""
         x, y, z, w = self.q
         return (
             (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -40,12 +40,12 @@ class Rigid:
         )
 
     def of(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points of the inner frame in the outer; shape (n, 3), (m)."""
+        """Points of the inner frame in the outer one; shape (n, 3), (m)."""
         moved: NDArray[np.float64] = points @ np.array(self.rows).T + self.move
         return moved
 
     def compose(self, inner: "Rigid") -> "Rigid":
-        """Where the inner one's inner frame is in this one's outer."""
+        """Product: the inner transform's inner frame in this one's outer frame."""
         x, y, z, w = self.q
         a, b, c, d = inner.q
         turned = (
@@ -59,14 +59,14 @@ class Rigid:
         return Rigid((u + right, v + up, t + out), turned)
 
     def inverse(self) -> "Rigid":
-        """Where the outer frame is in the inner."""
+        """The inverse transform."""
         x, y, z, w = self.q
         back = Rigid(q=(-x, -y, -z, w))
         u, v, t = back._turned(self.move)
         return Rigid((-u, -v, -t), back.q)
 
     def _turned(self, point: Three) -> Three:
-        """Turned: v + 2 w (q × v) + 2 q × (q × v)."""
+        """Rotated vector: v + 2 w (q × v) + 2 q × (q × v)."""
         x, y, z, w = self.q
         u, v, t = point
         a, b, c = 2 * (y * t - z * v), 2 * (z * u - x * t), 2 * (x * v - y * u)
@@ -77,7 +77,7 @@ class Rigid:
         )
 
     def flat(self) -> Pose2D:
-        """Seen from above."""
+        """Projection to the floor."""
         x, y, z, w = self.q
         yaw = math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
         return Pose2D(self.move[0], self.move[1], yaw)
@@ -88,7 +88,7 @@ class Rigid:
         return math.acos(max(-1.0, min(1.0, self.rows[2][2])))
 
     def towards(self, later: "Rigid", part: float) -> "Rigid":
-        """A part (0 to 1) of the way: straight, and turning least at an even pace."""
+        """A share (0 to 1) of the way: linear in position, spherical in rotation."""
         ends = zip(self.move, later.move, strict=True)
         x, y, z = (a + part * (b - a) for a, b in ends)
         return Rigid((x, y, z), _slerp(self.q, later.q, part))
@@ -98,7 +98,7 @@ HERE = Rigid()
 
 
 def rigid_of(translation: m.Vector3 | m.Point, rotation: m.Quaternion) -> Rigid | None:
-    """A translation and a quaternion of any length; None for what is no turn."""
+    """A translation and a quaternion of any length; None for an invalid rotation."""
     move = translation.x, translation.y, translation.z
     x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
     length = math.sqrt(x * x + y * y + z * z + w * w)

@@ -1,8 +1,8 @@
-"""The TF tree of one robot: buffered, interpolated, and honest about what it lacks.
+"""TF tree of one robot, buffered and interpolated.
 
-Source: REP-105 and ``tf2``'s buffer.  Unlike there nothing waits and nothing is
-extrapolated: a transform is taken between its neighbours in time, or a moment before
-the newest (``max_age_s``), or it is missing, and then it says since when.
+Source: REP-105 and ``tf2``'s buffer.  Unlike there lookups never wait or extrapolate: a
+transform is interpolated, or is the newest for up to ``max_age_s``, or it is missing,
+with the time since when.
 """
 
 from bisect import bisect_left
@@ -24,8 +24,8 @@ class NoTransformError(IvegError):
     """A link of the tree is missing or too old.
 
     Attributes:
-        link: Which, as people say it: ``map → odom``.
-        for_s: For how long (s); None: it never was.
+        link: Its two frames: ``map → odom``.
+        for_s: Time since the last one (s); None: there never was one.
     """
 
     def __init__(self, link: str, for_s: float | None) -> None:
@@ -44,7 +44,7 @@ class _At:
 
 
 class _Link:
-    """What a child frame's parent is, and where it was in it."""
+    """Parent of a child frame, with its transforms."""
 
     def __init__(self, parent: str, *, static: bool) -> None:
         self.parent = parent
@@ -52,7 +52,7 @@ class _Link:
         self.known: deque[_At] = deque(maxlen=_MOST_KEPT)
 
     def add(self, at: _At) -> bool:
-        """Keep it; False for one that is not newer than the newest."""
+        """Store it; False if it is not newer than the newest."""
         if self.static:
             self.known.clear()
         elif self.known and at.stamp <= self.known[-1].stamp:
@@ -64,10 +64,10 @@ class _Link:
 
 
 class TransformBuffer:
-    """Keeps the tree; stamps are seconds on the clock of the robot's messages.
+    """Buffer of the tree; stamps are seconds on the clock of the robot's messages.
 
     Args:
-        max_age_s: How much newer than the newest transform a datum may be (s).
+        max_age_s: Greatest lead of a datum over the newest transform (s).
     """
 
     def __init__(self, max_age_s: float = 0.5) -> None:
@@ -75,10 +75,10 @@ class TransformBuffer:
         self._links: dict[str, _Link] = {}
 
     def add(self, message: m.TFMessage, *, static: bool) -> int:
-        """Take what ``/tf`` or ``/tf_static`` says.
+        """Take a message of ``/tf`` or ``/tf_static``.
 
         Returns:
-            How many of its transforms cannot be used or are not news.
+            Number of its transforms that are unusable or not new.
         """
         return sum(not self._add(one, static=static) for one in message.transforms)
 
@@ -96,17 +96,17 @@ class TransformBuffer:
         return link.add(_At(one.header.stamp.seconds, rigid))
 
     def clear(self) -> None:
-        """Forget what moves: time itself has jumped."""
+        """Delete dynamic transforms, since the clock was reset."""
         self._links = {c: one for c, one in self._links.items() if one.static}
 
     def lookup(self, outer: str, inner: str, stamp: float) -> Rigid:
-        """Where ``inner`` is in ``outer`` at a stamp.
+        """Transform from ``inner`` to ``outer`` at a stamp.
 
         Raises:
             NoTransformError: a link is missing, or old at this stamp.
         """
         up = self._ancestors(inner)
-        if outer in up:  # as nearly always
+        if outer in up:  # the usual case
             return self._climb(up[: up.index(outer)], stamp)
         down = self._ancestors(outer)
         shared = next((frame for frame in up if frame in down), None)
@@ -123,7 +123,7 @@ class TransformBuffer:
         return found
 
     def _gap(self, up: Iterable[str], down: Iterable[str]) -> str:
-        """The link that would join two trees: from one's root to the other's."""
+        """Missing link between two trees: the root of one and the root of the other."""
         return f"{list(down)[-1]} → {list(up)[-1]}"
 
     def _climb(self, frames: Iterable[str], stamp: float) -> Rigid:
@@ -155,12 +155,12 @@ class TransformBuffer:
         return before.rigid.towards(after.rigid, part)
 
     def age(self, child: str, stamp: float) -> float | None:
-        """How old a frame's newest transform is (s); 0 for a static one."""
+        """Age of a frame's newest transform (s); 0 for a static one."""
         link = self._links.get(child)
         if link is None:
             return None
         return 0.0 if link.static else stamp - link.known[-1].stamp
 
     def chain(self, inner: str) -> tuple[str, ...]:
-        """A frame and all above it."""
+        """A frame and all its ancestors."""
         return tuple(self._ancestors(inner))
