@@ -8,6 +8,7 @@ animation frame that drew it; both clocks are this machine's.
     python -m benchmarks.glass --robots 2,10,20 --scenes calm,storm --seconds 10
     python -m benchmarks.glass --robots 20 --direct off
     python -m benchmarks.glass --robots 10 --pages 5
+    python -m benchmarks.glass --robots 10 --elsewhere 4
     python -m benchmarks.glass --robots 50 --hz 10
 
 prints a table and leaves ``test-output/glass.json`` and ``glass.html``.
@@ -95,9 +96,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "test-output")
     parser.add_argument("--hz", type=float, default=30.0)
     parser.add_argument("--pages", type=int, default=1, help="open side by side")
+    parser.add_argument(
+        "--elsewhere", type=int, default=0, help="pages that draw on other machines"
+    )
     parser.add_argument("--direct", default="all", help="IVEG_DIRECT_READ")
     asked, _ = parser.parse_known_args()
-    how = How(asked.seconds, asked.hz, asked.pages, asked.direct)
+    how = How(asked.seconds, asked.hz, asked.pages, asked.elsewhere, asked.direct)
     turns = itertools.product(
         asked.scenes.split(","),
         map(int, asked.robots.split(",")),
@@ -125,12 +129,14 @@ class How:
         seconds: Of measuring.
         hz: Of each sensor.
         pages: Open side by side; the first is measured.
+        elsewhere: Readers beside them (``benchmarks.readers``).
         direct: What iVeg reads straight from the broker.
     """
 
     seconds: float
     hz: float
     pages: int
+    elsewhere: int
     direct: str
 
 
@@ -152,6 +158,7 @@ def measure(browser: Browser, side: str, robots: int, scene: str, how: How) -> R
         tempfile.TemporaryDirectory() as directory,
         serving(Path(directory), robots, how.direct) as place,
         _fleet(place, robots, scene, how.hz),
+        _readers(place, how.elsewhere),
     ):
         context = browser.new_context(viewport={"width": 1280, "height": 900})
         page = context.new_page()
@@ -244,6 +251,13 @@ def _fleet(place: Place, robots: int, scene: str, hz: float) -> Iterator[None]:
     words = ["--port", str(place.mqtt), "--robots", str(robots), "--hz", str(hz)]
     words += ["--apikey", APIKEY, "--scene", scene]
     with _program([sys.executable, "-m", "tests.fleet", *words]):
+        yield
+
+
+@contextmanager
+def _readers(place: Place, pages: int) -> Iterator[None]:
+    words = ["--link", place.link, "--pages", str(pages)]
+    with _program([sys.executable, "-m", "benchmarks.readers", *words]):
         yield
 
 

@@ -6,9 +6,7 @@ sent; a browser that lets them pile up is told to come back for a snapshot.
 """
 
 import asyncio
-import contextlib
 from collections import Counter, deque
-from collections.abc import Callable
 from typing import Any
 
 from iveg.pipeline.topics import is_telemetry
@@ -20,25 +18,35 @@ class Subscriber:
     """Changes that one browser has not been sent yet.
 
     Attributes:
+        dirty: State topics that changed and are told at once, longest waiting first.
+        telemetry: The same of those whose sending is paced.
         wants_telemetry: False while no telemetry could be sent: a change is noted and
             wakes nobody.
     """
 
     def __init__(self) -> None:
         self.dirty: dict[str, None] = {}
+        self.telemetry: dict[str, None] = {}
         self.pending: deque[tuple[str, Any]] = deque()
         self.overflowed = False
         self.wants_telemetry = True
-        self._wake = asyncio.Event()
+        self._is_awake = False
+        self._sleep: asyncio.Future[None] | None = None
 
     def wake(self) -> None:
         """Signal that there is something to take."""
-        self._wake.set()
+        self._is_awake = True
+        if self._sleep is not None and not self._sleep.done():
+            self._sleep.set_result(None)
 
     def changed(self, topic: str) -> None:
         """Mark a state topic as changed."""
-        self.dirty[topic] = None
-        if self.wants_telemetry or not is_telemetry(topic):
+        if not is_telemetry(topic):
+            self.dirty[topic] = None
+            self.wake()
+            return
+        self.telemetry[topic] = None
+        if self.wants_telemetry:
             self.wake()
 
     def append(self, topic: str, item: Any) -> None:
@@ -50,29 +58,48 @@ class Subscriber:
         self.wake()
 
     async def news(self, within_s: float | None = None) -> None:
-        """Wait until there may be something to take, or for that long (s)."""
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(within_s):
-                await self._wake.wait()
-        self._wake.clear()
+        """Wait until there may be something to take, or for that long (s).
+
+        Some hundred times a second and browser, so a timer and no ``timeout``.
+        """
+        if not self._is_awake:
+            loop = asyncio.get_running_loop()
+            self._sleep = loop.create_future()
+            timer = None if within_s is None else loop.call_later(within_s, self.wake)
+            try:
+                await self._sleep
+            finally:
+                self._sleep = None
+                if timer is not None:
+                    timer.cancel()
+        self._is_awake = False
 
     def take_events(self) -> list[tuple[str, Any]]:
         """Every event since the last time, in order."""
+        if not self.pending:
+            return []
         events = list(self.pending)
         self.pending.clear()
         return events
 
-    def take_topics(self, wanted: Callable[[str], bool]) -> list[str]:
-        """The topics of a kind that changed, longest waiting first."""
-        topics = [topic for topic in self.dirty if wanted(topic)]
-        for topic in topics:
-            del self.dirty[topic]
-        return topics
+    def take_topics(self) -> list[str]:
+        """The topics that changed and are told at once."""
+        return _taken(self.dirty)
+
+    def take_telemetry(self) -> list[str]:
+        """The topics that changed and are paced."""
+        return _taken(self.telemetry)
 
     async def take(self) -> tuple[list[tuple[str, Any]], list[str]]:
         """Wait for news; returns events in order and the topics that changed."""
         await self.news()
-        return self.take_events(), self.take_topics(lambda _: True)
+        return self.take_events(), self.take_topics() + self.take_telemetry()
+
+
+def _taken(topics: dict[str, None]) -> list[str]:
+    taken = list(topics)
+    topics.clear()
+    return taken
 
 
 class Hub:

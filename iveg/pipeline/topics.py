@@ -228,6 +228,7 @@ def find(topic: str) -> tuple[Topic, str]:
     raise KeyError(topic)
 
 
+@lru_cache(maxsize=4096)
 def is_telemetry(topic: str) -> bool:
     """Whether a topic changes with each measure, so that its sending is paced."""
     return find(topic)[0].pace != "at once"

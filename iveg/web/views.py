@@ -148,12 +148,13 @@ class Views:
             return "STOPPED"
         return "SLOW" if factor < 1.0 else "RUNNING"
 
-    def motion(
-        self, robot_id: str, now: Instant
-    ) -> tuple[Odometry | None, float | None]:
-        """A robot's newest odometry and its age (s)."""
-        robot = self._world.robot(robot_id)
-        return robot.odometry, robot.age_s(now)
+    def odometry(self, robot_id: str) -> Odometry | None:
+        """A robot's newest odometry."""
+        return self._world.robot(robot_id).odometry
+
+    def age_s(self, robot_id: str, now: Instant) -> float | None:
+        """Its age (s); None while nobody knows."""
+        return self._world.robot(robot_id).age_s(now)
 
     def scan(self, robot_id: str) -> tuple[LaserScan, NDArray[np.float32]] | None:
         """A robot's newest sweep and its points in ``map``, shape (n, 2), (m)."""

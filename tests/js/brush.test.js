@@ -180,10 +180,10 @@ test("who asks is told when what it knew is on the canvas, not before", () => {
   frames.afterDrawn(() => {
     told.count += 1;
   });
-  drawing[0](0);
+  drawing[0](0, 0);
   equal(told.count, 0);
-  drawing[1](0);
-  drawing[1](0);
+  drawing[1](0, 0);
+  drawing[1](0, 0);
   equal(told.count, 1);
 });
 
@@ -195,7 +195,7 @@ test("a picture that was overtaken tells of itself by the one that overtook it",
     told += 1;
   });
   frames.ask();
-  drawing[1](0);
+  drawing[1](0, 0);
   equal(told, 1);
 });
 

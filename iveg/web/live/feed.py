@@ -11,7 +11,6 @@ from typing import Final
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Subscriber
-from iveg.pipeline.topics import is_telemetry
 from iveg.web.live.pacing import BYTES, CreditWindow
 from iveg.web.live.painting import Painting
 from iveg.web.live.telemetry import Part, TelemetryEncoder
@@ -21,7 +20,6 @@ PICTURE_S: Final = 1 / 15
 READ_OUT_S: Final = 0.1
 """Between two states of one robot, or lists of people."""
 
-_NEVER: Final = -1, float("-inf")
 _INF: Final = float("inf")
 
 
@@ -35,19 +33,22 @@ class TelemetryFeed:
         self._painting = painting
         self._encoder = encoder
         self._subscriber = subscriber
-        self._waiting: dict[str, None] = {}
+        self._moved: dict[str, None] = {}
+        """Robots, by topic; their positions go with each frame."""
+        self._read_outs: dict[str, float] = {}
+        self._pictures: dict[str, float] = {}
+        """Topics that have changed, and when each may be told (monotonic, s)."""
         self._told: dict[str, tuple[int, float]] = {}
         self._is_full = False
 
-    def painted(
-        self, number: object, now: float, at: object = None, within: object = None
-    ) -> None:
+    def painted(self, number: object, now: float, report: dict[str, object]) -> None:
         """The page has painted a frame: there may be credit for another.
 
-        ``at`` and ``within`` (s) are when, in its own words; None: it drew nothing.
+        ``report``, all in its own words: ``at`` and ``within`` (s) are when; without
+        ``at`` it drew nothing; ``wait`` (s) is how long the next frame may wait.
         """
-        if type(number) is int and self.window.painted(number, now):
-            self._painting.painted(number, at, within, now)
+        if type(number) is int and self.window.painted(number, now, report.get("wait")):
+            self._painting.painted(number, report.get("at"), report.get("within"), now)
             self._is_full = False
             self._subscriber.wake()
 
@@ -64,13 +65,15 @@ class TelemetryFeed:
 
     def next_frame(self, now: Instant) -> bytes | None:
         """A frame of the newest of everything that is due; None: not now."""
-        self._absorb()
         if self.window.opens_at > now.mono:
             return None
+        self._absorb()
         self._encoder.begin()
         frame = _Frame(self.window.room)
-        for topic in sorted(self._waiting, key=_rank):
-            self._add(frame, topic, now)
+        self._add_moves(frame, now)
+        # People and states before pictures, where there is no room for all.
+        self._add_due(frame, self._read_outs, now)
+        self._add_due(frame, self._pictures, now)
         self._is_full = frame.is_full
         if frame.is_empty:
             return None
@@ -80,44 +83,64 @@ class TelemetryFeed:
         return told
 
     def _absorb(self) -> None:
-        for topic in self._subscriber.take_topics(is_telemetry):
-            self._waiting[topic] = None
+        for topic in self._subscriber.take_telemetry():
             row, robot_id = topics.find(topic)
             if row is topics.ROBOT:
-                self._waiting[topics.ROBOT_STATE.of(robot_id)] = None
+                self._moved[topic] = None
+                self._note(self._read_outs, topics.ROBOT_STATE.of(robot_id), READ_OUT_S)
+            elif row.pace == "read-out":
+                self._note(self._read_outs, topic, READ_OUT_S)
+            else:
+                self._note(self._pictures, topic, PICTURE_S)
+
+    def _note(self, waiting: dict[str, float], topic: str, apart_s: float) -> None:
+        if topic in waiting:
+            return
+        told = self._told.get(topic)
+        waiting[topic] = -_INF if told is None else _next_after(told[1], apart_s)
 
     def _due_at(self) -> float:
         """When the first waiting part may go; parts without room wait for credit."""
-        times = (
-            _next_after(topic, self._told.get(topic, _NEVER)[1])
-            for topic in self._waiting
-            if _is_robot(topic) or not self._is_full
-        )
-        return min(times, default=_INF)
+        if self._moved:
+            return -_INF
+        if self._is_full:
+            return _INF
+        parts = min(self._read_outs.values(), default=_INF)
+        return min(parts, min(self._pictures.values(), default=_INF))
 
-    def _add(self, frame: "_Frame", topic: str, now: Instant) -> None:
-        version, published_at = self._told.get(topic, _NEVER)
-        if _next_after(topic, published_at) > now.mono:
-            return
-        part = self._part(topic, version, now)
-        if part is None or part.version == version:
-            del self._waiting[topic]
-        elif frame.take(topic, part):
-            del self._waiting[topic]
-            self._told[topic] = part.version, now.mono
-            self._painting.adds(topic, now.mono)
+    def _add_moves(self, frame: "_Frame", now: Instant) -> None:
+        for topic in self._moved:
+            move = self._encoder.move(topics.find(topic)[1], now)
+            if move is not None and move.version != self._version(topic):
+                frame.moves.append(move.head)
+                self._told[topic] = move.version, now.mono
+                self._painting.adds(topic, now.mono)
+        self._moved.clear()
+
+    def _add_due(
+        self, frame: "_Frame", waiting: dict[str, float], now: Instant
+    ) -> None:
+        for topic in [one for one, due in waiting.items() if due <= now.mono]:
+            version = self._version(topic)
+            part = self._part(topic, version, now)
+            if part is None or part.version == version:
+                del waiting[topic]
+            elif frame.take(part):
+                del waiting[topic]
+                self._told[topic] = part.version, now.mono
+                self._painting.adds(topic, now.mono)
+
+    def _version(self, topic: str) -> int:
+        told = self._told.get(topic)
+        return -1 if told is None else told[0]
 
     def _part(self, topic: str, since: int, now: Instant) -> Part | None:
         row, key = topics.find(topic)
-        match row.pace:
-            case "frame":
-                return self._encoder.move(key, now)
-            case "read-out" if row is topics.PEOPLE:
-                return self._encoder.people(since, now)
-            case "read-out":
-                return self._encoder.state(key, since, now)
-            case _:
-                return self._encoder.part(topic, now)
+        if row is topics.PEOPLE:
+            return self._encoder.people(since, now)
+        if row is topics.ROBOT_STATE:
+            return self._encoder.state(key, since, now)
+        return self._encoder.part(topic, now)
 
 
 class _Frame:
@@ -125,7 +148,7 @@ class _Frame:
 
     def __init__(self, room: int) -> None:
         self._room = room
-        self._moves: list[bytes] = []
+        self.moves: list[bytes] = []
         self._parts: list[bytes] = []
         self._scans: list[Part] = []
         self.heavy = 0
@@ -134,13 +157,10 @@ class _Frame:
     @property
     def is_empty(self) -> bool:
         """Whether the frame has no content."""
-        return not (self._moves or self._parts or self._scans)
+        return not (self.moves or self._parts or self._scans)
 
-    def take(self, topic: str, part: Part) -> bool:
+    def take(self, part: Part) -> bool:
         """Add a part; False where too much would be on its way at once."""
-        if _is_robot(topic):
-            self._moves.append(part.head)
-            return True
         # One that is larger than all room goes when nothing heavy is on its way.
         is_first = self._room == BYTES and self.heavy == 0
         if self.heavy + part.size > self._room and not is_first:
@@ -158,7 +178,7 @@ class _Frame:
         head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
             number,
             b",".join(self._parts),
-            b",".join(self._moves),
+            b",".join(self.moves),
             b",".join(scan.head for scan in self._scans),
         )
         head += b" " * (-len(head) % 4)
@@ -166,23 +186,12 @@ class _Frame:
         return b"".join((len(head).to_bytes(4, "little"), head, *bodies))
 
 
-def _is_robot(topic: str) -> bool:
-    return topics.find(topic)[0] is topics.ROBOT
-
-
-def _next_after(topic: str, published_at: float) -> float:
+def _next_after(told_at: float, apart_s: float) -> float:
     """When a topic may be told again (monotonic, s).
 
     Read-outs go together, at the same moments to all browsers: what takes all robots
     and people is worked out once for all of them.
     """
-    if _is_robot(topic) or published_at == _NEVER[1]:
-        return published_at
-    if _rank(topic):
-        return published_at + PICTURE_S
-    return (math.floor(published_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S
-
-
-def _rank(topic: str) -> int:
-    """People and states before pictures, where there is no room for all."""
-    return 1 if topics.find(topic)[0].pace == "picture" else 0
+    if apart_s == PICTURE_S:
+        return told_at + apart_s
+    return (math.floor(told_at / apart_s + 1e-6) + 1) * apart_s

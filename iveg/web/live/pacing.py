@@ -4,6 +4,9 @@ Buffers of the kernel, of the server and of the browser are queues without a siz
 telemetry that waits in them shows the past.  So the page says which frame it has
 painted, and no more than a window of unpainted frames is ever sent: further changes
 wait in slots, where the newest wins.
+
+A page also says how long the next frame may wait to come just in time for its next
+picture: one frame a picture is as fresh as many, and costs both sides a third.
 """
 
 from collections import deque
@@ -13,12 +16,16 @@ SUBPROTOCOL: Final = "iveg.2"
 """A browser asks for paced telemetry by this WebSocket subprotocol."""
 
 FRAMES: Final = 8
-"""Spread over the round trip: 300 ms away a page still gets 26 frames a second, and a
-page next door several between two of its own, so that none of them is old."""
+"""Spread over the round trip: 300 ms away a page still gets 26 frames a second."""
 BYTES: Final = 24_576
 """Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.004
 """Frames nearer to each other would cost more than the freshness that they bring."""
+PICTURE_S: Final = 0.015
+"""Between frames of which none is painted yet: a little less than screens take, so
+that who is late for a picture is sent something newer before the next."""
+LONGEST_WAIT_S: Final = 0.1
+"""For which a page may ask: more would show the past, and counts as nothing."""
 
 _LEARNS: Final = 0.5
 
@@ -36,6 +43,7 @@ class CreditWindow:
         self._sent: deque[_Sent] = deque()
         self._number = 0
         self._sent_at = float("-inf")
+        self._asked_at = float("-inf")
         self._round_trip_s = 0.0
 
     @property
@@ -53,7 +61,8 @@ class CreditWindow:
         """When the next frame may go; ``inf``: not before one is painted."""
         if len(self._sent) >= FRAMES:
             return float("inf")
-        return self._sent_at + max(GAP_S, self._round_trip_s / FRAMES)
+        gap_s = max(PICTURE_S, self._round_trip_s / FRAMES) if self._sent else GAP_S
+        return max(self._asked_at, self._sent_at + gap_s)
 
     @property
     def room(self) -> int:
@@ -66,8 +75,11 @@ class CreditWindow:
         self._sent_at = now
         self._sent.append(_Sent(self._number, heavy, now))
 
-    def painted(self, number: object, now: float) -> bool:
-        """The page has painted this frame and all before; whether that was news."""
+    def painted(self, number: object, now: float, wait: object = None) -> bool:
+        """The page has painted this frame and all before; whether that was news.
+
+        ``wait`` (s): in its own words, how long the next frame may wait.
+        """
         if type(number) is not int or number > self._number:
             return False
         if not self._sent or number < self._sent[0].number:
@@ -77,4 +89,12 @@ class CreditWindow:
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._sent and self._sent[0].number <= number:
             self._sent.popleft()
+        self._asked_at = now + _bounded(wait)
         return True
+
+
+def _bounded(wait: object) -> float:
+    if isinstance(wait, bool) or not isinstance(wait, int | float):
+        return 0.0
+    # True of no NaN, and of an integer of any length without an overflow.
+    return wait if 0.0 < wait <= LONGEST_WAIT_S else 0.0

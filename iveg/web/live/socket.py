@@ -25,7 +25,6 @@ from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Hub, Subscriber
-from iveg.pipeline.topics import is_telemetry
 from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
@@ -43,7 +42,7 @@ from iveg.web.views import Views
 _log = logging.getLogger(__name__)
 TOO_SLOW = 4008
 _SEND_LIMIT_S = 10.0
-_SESSION_CHECK_S = 0.5
+_CHECK_S = 0.5
 _MAX_MESSAGE = 65536
 _SNAPSHOT_LINES = 200
 _CACHE = 512
@@ -148,12 +147,9 @@ def router(
             now = clock()
             await line.say(text(topics.SNAPSHOT.name, snapshot(principal, now), now))
             async with asyncio.TaskGroup() as tasks:
-                sender = tasks.create_task(
-                    line.send_all() if feed is None else line.send_paced(feed),
-                    name="live-send",
-                )
+                sender = tasks.create_task(line.send(feed), name="live-send")
                 watcher = tasks.create_task(
-                    _watch_session(websocket, principal), name="live-session"
+                    _watch(websocket, principal, line), name="live-watch"
                 )
                 ear = ClientMessages(
                     websocket, subscriber, clock, stop, principal, feed
@@ -184,48 +180,53 @@ class Line:
         self._subscriber = subscriber
         self._encoder = encoder
         self._clock = clock
+        self._sending_since: float | None = None
 
     async def say(self, frame: bytes) -> None:
         """Send JSON."""
         await _sent(self._websocket.send_text(frame.decode()))
 
-    async def send_all(self) -> None:
-        """The newest of every topic, as fast as the browser reads."""
-        while True:
-            await self._subscriber.news()
-            if not await self._in_time(self._send_news(lambda _: True)):
-                return
+    async def send(self, feed: TelemetryFeed | None) -> None:
+        """Everything, as fast as the browser reads, and telemetry as fast as it paints.
 
-    async def send_paced(self, feed: TelemetryFeed) -> None:
-        """Telemetry as fast as the browser paints, everything else at once."""
-        while True:
-            await self._subscriber.news(feed.wait_s(self._clock().mono))
-            if not await self._in_time(self._send_with(feed)):
-                return
+        Without a ``feed`` telemetry is sent like all else.
+        """
+        loop = asyncio.get_running_loop()
+        while not self._subscriber.overflowed:
+            self._sending_since = None
+            within_s = None if feed is None else feed.wait_s(self._clock().mono)
+            await self._subscriber.news(within_s)
+            self._sending_since = loop.time()
+            await self._send_news()
+            if feed is None:
+                await self._send_topics(self._subscriber.take_telemetry())
+            else:
+                await self._send_frame(feed)
+        await self.close_slow()
 
-    async def _in_time(self, sending: Coroutine[Any, Any, None]) -> bool:
-        """Whether the browser still reads; one that does not is closed."""
-        try:
-            if not self._subscriber.overflowed:
-                async with asyncio.timeout(_SEND_LIMIT_S):
-                    await sending
-                return True
-        except TimeoutError:
-            pass
-        sending.close()
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the browser has not read for long."""
+        since = self._sending_since
+        now = asyncio.get_running_loop().time()
+        return since is not None and now - since > _SEND_LIMIT_S
+
+    async def close_slow(self) -> None:
+        """Close: the browser reads too slowly."""
         await _sent(self._websocket.close(TOO_SLOW))
-        return False
 
-    async def _send_with(self, feed: TelemetryFeed) -> None:
-        await self._send_news(lambda topic: not is_telemetry(topic))
+    async def _send_frame(self, feed: TelemetryFeed) -> None:
         frame = feed.next_frame(self._clock())
         if frame is not None:
             await _sent(self._websocket.send_bytes(frame))
 
-    async def _send_news(self, wanted: Callable[[str], bool]) -> None:
+    async def _send_news(self) -> None:
         for topic, item in self._subscriber.take_events():
             await self.say(self._encoder.event(topic, item))
-        for topic in self._subscriber.take_topics(wanted):
+        await self._send_topics(self._subscriber.take_topics())
+
+    async def _send_topics(self, changed: Iterable[str]) -> None:
+        for topic in changed:
             frame = self._encoder.frame(topic)
             if frame is None:
                 continue
@@ -235,12 +236,18 @@ class Line:
                 await self.say(frame)
 
 
-async def _watch_session(websocket: WebSocket, principal: Principal) -> None:
-    """Close soon after the session is over; STOP stays possible over HTTP."""
+async def _watch(websocket: WebSocket, principal: Principal, line: Line) -> None:
+    """Close soon after the session is over, or when the browser reads nothing.
+
+    STOP stays possible over HTTP.
+    """
     while True:
-        await asyncio.sleep(_SESSION_CHECK_S)
+        await asyncio.sleep(_CHECK_S)
         if not _may_still(websocket, principal, "read"):
             await _sent(websocket.close(NO_SESSION))
+            return
+        if line.is_stuck:
+            await line.close_slow()
             return
 
 
@@ -308,12 +315,8 @@ class ClientMessages:
         match message.get("type"):
             case "painted":
                 if self._feed is not None:
-                    self._feed.painted(
-                        message.get("frame"),
-                        self._clock().mono,
-                        message.get("at"),
-                        message.get("within"),
-                    )
+                    now = self._clock().mono
+                    self._feed.painted(message.get("frame"), now, message)
             case "ping":
                 t, server = message.get("t"), self._clock().wall
                 self._subscriber.append(topics.PONG.name, {"t": t, "server": server})

@@ -12,8 +12,8 @@ import numpy as np
 import orjson
 
 from iveg.domain.margins import LeastMargins
-from iveg.domain.observations import Instant, LaserScan
-from iveg.models.base import write_json
+from iveg.domain.observations import Instant, LaserScan, Odometry
+from iveg.models.base import rounded, write_json
 from iveg.models.people import Person
 from iveg.models.robot import Robot
 from iveg.pipeline import topics
@@ -56,7 +56,7 @@ class TelemetryEncoder:
         self._parts: dict[str, Part] = {}
         self._states: dict[str, _RobotState] = {}
         self._people = _People()
-        self._moved: dict[str, object] = {}
+        self._moves: dict[str, tuple[Odometry, Part]] = {}
         self._margins: LeastMargins | None = None
 
     def begin(self) -> None:
@@ -65,20 +65,21 @@ class TelemetryEncoder:
 
     def move(self, robot_id: str, now: Instant) -> Part | None:
         """Pose and motion of a robot; None before its first odometry."""
-        odometry, age_s = self._views.motion(robot_id, now)
+        odometry = self._views.odometry(robot_id)
         if odometry is None:
             return None
-        topic = topics.ROBOT.of(robot_id)
-        if self._moved.get(robot_id) is not odometry:
-            self._moved[robot_id] = odometry
-            pose, twist = odometry.pose, odometry.twist
-            place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
-            speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
-            age = None if age_s is None else round(age_s, 3)
-            told = [robot_id, now.mono, age, *place, *speed, odometry.origin.stamp]
-            head = orjson.dumps(told)
-            self._parts[topic] = Part(self._hub.versions[topic], head)
-        return self._parts[topic]
+        kept = self._moves.get(robot_id)
+        if kept is not None and kept[0] is odometry:
+            return kept[1]
+        pose, twist = odometry.pose, odometry.twist
+        place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
+        speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
+        age_s = rounded(self._views.age_s(robot_id, now))
+        told = [robot_id, now.mono, age_s, *place, *speed, odometry.origin.stamp]
+        version = self._hub.versions[topics.ROBOT.of(robot_id)]
+        part = Part(version, orjson.dumps(told))
+        self._moves[robot_id] = odometry, part
+        return part
 
     def state(self, robot_id: str, since: int, now: Instant) -> Part | None:
         """Other members of a robot that have changed since a version; None for none."""

@@ -289,9 +289,9 @@ async def test_a_silent_robots_tries_are_told_at_most_a_few_times_a_second() -> 
     looker = desk.hub.join()
     told = 0
     for _ in range(100):
-        looker.dirty.clear()
+        looker.telemetry.clear()
         await desk.wait(0.05)
-        told += "robots/AGI" in looker.dirty
+        told += "robots/AGI" in looker.telemetry
 
     assert 10 <= told <= 5 * 4
 

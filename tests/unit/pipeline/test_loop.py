@@ -131,7 +131,7 @@ def test_who_has_gone_gets_nothing() -> None:
     hub.leave(browser)
     hub.changed("robots/AGI")
 
-    assert (hub.watchers, browser.dirty) == (0, {})
+    assert (hub.watchers, browser.telemetry) == (0, {})
 
 
 def test_log_numbers_grow_also_over_a_restart() -> None:

@@ -1,7 +1,9 @@
 /**
  * When this page has painted what it has just heard: the map knows where there is one.
  *
- * @typedef {{afterDrawn: (fn: () => void) => void}} Painter
+ * @typedef {(beganMs?: number) => void} WhenPainted `beganMs`: when the frame of the
+ *   screen began (`performance.now()`), where something was drawn
+ * @typedef {{afterDrawn: (fn: WhenPainted) => void}} Painter
  */
 
 import { onNextFrame } from "./hub.js";
@@ -20,7 +22,7 @@ export function createPainting() {
     /**
      * Calls `fn` once what is known now has been painted, or a second later.
      *
-     * @param {() => void} fn
+     * @param {WhenPainted} fn
      */
     when(fn) {
       if (painter) once(painter, fn);
@@ -29,15 +31,16 @@ export function createPainting() {
   };
 }
 
-/** @param {Painter} painter @param {() => void} fn */
+/** @param {Painter} painter @param {WhenPainted} fn */
 function once(painter, fn) {
   let isDone = false;
-  const done = () => {
+  /** @type {WhenPainted} */
+  const done = (beganMs) => {
     if (isDone) return;
     isDone = true;
     clearTimeout(timer);
-    fn();
+    fn(beganMs);
   };
-  const timer = setTimeout(done, HIDDEN_MS);
+  const timer = setTimeout(() => done(), HIDDEN_MS);
   painter.afterDrawn(done);
 }

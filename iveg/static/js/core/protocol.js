@@ -108,8 +108,9 @@ export function writePing(t) {
 
 /**
  * @param {number} frame the newest that was painted
- * @param {{at: number, within: number} | null} [drawn] when, on the server's monotonic
- *   clock, and how wrong that may be (s); null where nothing was drawn or nobody knows
+ * @param {{at: number, within: number, wait?: number} | null} [drawn] when, on the
+ *   server's monotonic clock, and how wrong that may be (s); how long the next frame may
+ *   wait (s); null where nothing was drawn or nobody knows
  * @returns {string} as the server's counters know it: nothing before `type`, no spaces
  */
 export function writePainted(frame, drawn = null) {

@@ -13,7 +13,7 @@
  */
 
 import { createServerClock } from "./clock.js";
-import { createPace } from "./pace.js";
+import { createPace, withWait } from "./pace.js";
 import { createPainting } from "./painting.js";
 import {
   ProtocolError,
@@ -105,10 +105,11 @@ export function connect(options) {
     isFirstPong = true;
     const opened = new WebSocket(url, [SUBPROTOCOL]);
     opened.binaryType = "arraybuffer";
-    pace = createPace((frame, isDrawn) => {
+    pace = createPace((frame, nextMs) => {
       if (opened.readyState !== WebSocket.OPEN) return;
-      const drawn = draws && isDrawn ? clock.serverOf(performance.now()) : null;
-      opened.send(writePainted(frame, drawn));
+      const isDrawn = draws && nextMs !== null;
+      const drawn = isDrawn ? clock.serverOf(performance.now()) : null;
+      opened.send(writePainted(frame, drawn && withWait(drawn, nextMs ?? 0)));
     }, whenPainted);
     opened.addEventListener("open", ping);
     opened.addEventListener("message", (event) => hear(opened, event.data));

@@ -7,8 +7,9 @@
  *
  * @typedef {import("./picture.js").Picture} Picture
  * @typedef {import("./layers/trail.js").Trails} Trails
- * @typedef {(missingMs: number) => void} WhenDrawn `missingMs`: when the scans that are
- *   not in it may be drawn (ms from now); 0: all are
+ * @typedef {(missingMs: number, beganMs: number) => void} WhenDrawn `missingMs`: when the
+ *   scans that are not in it may be drawn (ms from now); 0: all are; `beganMs`: when that
+ *   frame of the screen began (`performance.now()`)
  * @typedef {{
  *   trails: Pick<Trails, "add" | "keepOnly" | "clear">,
  *   soon: (compose: () => void) => void,
@@ -26,10 +27,15 @@ import { createRemoteBrush } from "./remotebrush.js";
 export function createLocalBrush(canvas) {
   const trails = createTrails();
   const picture = createPicture(canvas, trails);
+  let beganMs = performance.now();
   return {
     trails,
-    soon: (compose) => void requestAnimationFrame(compose),
-    draw: (what, whenDrawn) => whenDrawn(picture.draw(what)),
+    soon: (compose) =>
+      void requestAnimationFrame((atMs) => {
+        beganMs = atMs;
+        compose();
+      }),
+    draw: (what, whenDrawn) => whenDrawn(picture.draw(what), beganMs),
     end() {},
   };
 }

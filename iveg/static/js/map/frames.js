@@ -6,7 +6,8 @@
  *
  * @typedef {import("./brush.js").Brush} Brush
  * @typedef {import("./picture.js").Picture} Picture
- * @typedef {(hasScans: boolean) => void} Seen whether the newest scans are in it, too
+ * @typedef {(hasScans: boolean, beganMs: number) => void} Seen whether the newest scans
+ *   are in it, too; when that frame of the screen began (`performance.now()`)
  */
 
 /**
@@ -33,8 +34,8 @@ export function createFrames(brush, compose) {
     const picture = compose();
     if (!picture) return;
     const seen = [...watchers].map((watch) => watch());
-    brush.draw(picture, (missingMs) => {
-      for (const tell of seen) tell(missingMs === 0);
+    brush.draw(picture, (missingMs, beganMs) => {
+      for (const tell of seen) tell(missingMs === 0, beganMs);
       clearTimeout(later);
       if (missingMs) later = setTimeout(ask, missingMs);
     });
@@ -56,15 +57,16 @@ export function createFrames(brush, compose) {
       return () => void watchers.delete(watch);
     },
     /**
-     * Calls `fn` once what is known now is on the canvas.
+     * Calls `fn` once what is known now is on the canvas, with when the frame of the
+     * screen began that it is in (`performance.now()`).
      *
-     * @param {() => void} fn
+     * @param {(beganMs: number) => void} fn
      */
     afterDrawn(fn) {
       const end = () => void watchers.delete(watch);
       /** @returns {Seen} */
-      const watch = () => () => {
-        if (watchers.has(watch)) fn();
+      const watch = () => (_, beganMs) => {
+        if (watchers.has(watch)) fn(beganMs);
         end();
       };
       watchers.add(watch);

@@ -54,11 +54,12 @@ function askForFrame() {
   requestAnimationFrame(draw);
 }
 
-function draw() {
+/** @param {number} beganMs */
+function draw(beganMs) {
   isAsked = false;
   if (!canvas || !newest) return;
   const missingMs = canvas.draw({ ...newest.picture, labels });
-  postMessage({ drawn: newest.n, missingMs });
+  postMessage({ drawn: newest.n, missingMs, began: performance.timeOrigin + beganMs });
 }
 
 addEventListener("message", take);

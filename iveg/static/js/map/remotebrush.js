@@ -13,7 +13,8 @@
  * @typedef {{n: number, parcel: Parcel, trails: TrailOrder[],
  *   vocabulary?: Vocabulary | null}} Order
  * @typedef {{canvas: OffscreenCanvas} | {trails: TrailOrder[]} | Order} ToWorker
- * @typedef {{ready: true} | {drawn: number, missingMs: number}} FromWorker
+ * @typedef {{ready: true} | {drawn: number, missingMs: number, began: number}} FromWorker
+ *   `began`: since 1970 (ms), because a worker's clock begins with itself
  */
 
 import { scriptUrl } from "../core/scripturl.js";
@@ -54,7 +55,7 @@ export function createRemoteBrush(canvas, onFailure) {
     if ("ready" in told) return handOver();
     const mine = underWay.find((one) => one.n === told.drawn);
     underWay = underWay.filter((one) => one.n > told.drawn);
-    mine?.whenDrawn(told.missingMs);
+    mine?.whenDrawn(told.missingMs, told.began - performance.timeOrigin);
     const compose = held;
     held = null;
     compose?.();

@@ -47,7 +47,7 @@ class Page:
 
     def paint(self) -> None:
         """Say that the newest frame was painted."""
-        self.feed.painted(self.frames[-1]["frame"], self.desk.clock().mono)
+        self.feed.painted(self.frames[-1]["frame"], self.desk.clock().mono, {})
 
     def told(self, member: str) -> list[Any]:
         """All that frames told under a member."""
@@ -173,6 +173,23 @@ def test_pictures_and_read_outs_go_as_often_as_eyes_need(
     assert topics.count("detections/AGI") <= seconds / PICTURE_S + 1
     assert topics.count("people") <= seconds / READ_OUT_S + 1
     assert topics.count("robots/AGI") <= seconds / READ_OUT_S + 1
+
+
+def test_the_next_frame_comes_when_the_page_asked_for_it(
+    desk: WebDesk, page: Page
+) -> None:
+    desk.drive("AGI")
+    page.read()
+    desk.clock.now += 0.005
+    page.feed.painted(1, desk.clock().mono, {"wait": 0.007})
+    desk.drive("AGI", 1.0)
+
+    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(0.007)
+    assert page.read() is None
+    desk.drive("AGI", 2.0)
+    desk.clock.now += 0.007 + 1e-6
+    page.read()
+    assert [move[3] for move in page.told("moves")] == [0.0, 2.0]
 
 
 def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:

@@ -2,7 +2,14 @@
 
 import pytest
 
-from iveg.web.live.pacing import BYTES, FRAMES, GAP_S, CreditWindow
+from iveg.web.live.pacing import (
+    BYTES,
+    FRAMES,
+    GAP_S,
+    LONGEST_WAIT_S,
+    PICTURE_S,
+    CreditWindow,
+)
 
 NOW = 1000.0
 
@@ -31,10 +38,39 @@ def test_what_is_painted_makes_room_for_as_much() -> None:
     assert window.opens_at < float("inf")
 
 
-def test_frames_keep_a_little_apart() -> None:
+def test_while_none_is_painted_there_is_a_frame_for_each_picture_of_a_screen() -> None:
     window = filled(1)
 
+    assert window.opens_at == NOW + PICTURE_S
+
+
+def test_what_is_painted_opens_the_window_at_once_with_a_little_between_frames() -> (
+    None
+):
+    window = filled(1)
+
+    window.painted(1, NOW + 0.001)
+
     assert window.opens_at == NOW + GAP_S
+
+
+def test_a_page_is_sent_the_next_frame_when_it_asked_for_it() -> None:
+    window = filled(1)
+
+    window.painted(1, NOW + 0.008, 0.005)
+
+    assert window.opens_at == NOW + 0.013
+
+
+@pytest.mark.parametrize(
+    "wait", [2 * LONGEST_WAIT_S, -1.0, float("nan"), float("inf"), "1", True, 10**400]
+)
+def test_no_page_can_ask_for_telemetry_from_the_past(wait: object) -> None:
+    window = filled(1)
+
+    window.painted(1, NOW + 0.02, wait)
+
+    assert window.opens_at == NOW + 0.02
 
 
 def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() -> None:
@@ -58,7 +94,7 @@ def test_a_round_trip_that_becomes_short_again_is_forgotten() -> None:
 
     window.sent(0, now)
 
-    assert window.opens_at - now == pytest.approx(GAP_S)
+    assert window.opens_at - now == pytest.approx(PICTURE_S)
 
 
 @pytest.mark.parametrize("word", [9, -1, 0, "1", True, 1.0, None, [1], 10**30])
