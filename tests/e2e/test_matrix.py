@@ -226,7 +226,7 @@ def test_without_the_server_the_page_says_so_and_draws_a_veil(
 ) -> None:
     visit(only, "/")
     only.locator("#map").scroll_into_view_if_needed()
-    before = _pixels(only)
+    before = until(lambda: _painted(only), 30.0, "a map")
 
     _newest(stack, "serve").kill()
 
@@ -281,6 +281,12 @@ def _ring(page: Page, stack: Site) -> tuple[float, float] | None:
 def _pixels(page: Page) -> list[int]:
     found: list[int] = page.locator("#map").evaluate(_THUMBNAIL)
     return found
+
+
+def _painted(page: Page) -> list[int] | None:
+    """The map's pixels, once it has been drawn at all."""
+    found = _pixels(page)
+    return found if any(found) else None
 
 
 def _changed(before: list[int], after: list[int]) -> float:
