@@ -357,7 +357,7 @@ class Dss:
 
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a subscription is one that this DSS keeps."""
-        return subscription_id in self.provisioner.subscription_ids
+        return self.provisioner.is_ours(subscription_id)
 
     def is_thinned(self, subscription_id: str) -> bool:
         """Whether Orion was told to leave out most of what a subscription is about."""

@@ -83,6 +83,7 @@ class Provisioner:
         self._warned: frozenset[str] = frozenset()
         self._gap = asyncio.Event()
         self._subscription_ids: frozenset[str] = frozenset()
+        self._is_subscribing = False
         self.throttle = Throttle(
             orion,
             link,
@@ -97,6 +98,18 @@ class Provisioner:
     def subscription_ids(self) -> frozenset[str]:
         """Ids of our subscriptions."""
         return self._subscription_ids | self.throttle.ids
+
+    def is_ours(self, subscription_id: str) -> bool:
+        """Whether a notification is one that was asked for.
+
+        Orion may notify of a subscription before it has said its id: while some are
+        made, each that brings our secret is ours.
+        """
+        return (
+            subscription_id in self._subscription_ids
+            or subscription_id in self.throttle.ids
+            or self._is_subscribing
+        )
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -276,11 +289,14 @@ class Provisioner:
             self._notify_token,
             wanted_for(self._robots),
         )
+        self._is_subscribing = True
         try:
             done: Ensured = await _made_sense("orion", work)
         except HopError as error:
             self._health_monitor.notify_error = error.detail
             return await self._blame("subscriptions", error)
+        finally:
+            self._is_subscribing = False
         first = not self._subscription_ids
         self._subscription_ids = done.ids
         self.throttle.found(done.copies, switches)

@@ -3,7 +3,8 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
+from typing import Any
 
 import orjson
 import pytest
@@ -37,16 +38,35 @@ async def first_ids(site: "Site") -> frozenset[str]:
     return site.provisioner.subscription_ids
 
 
+class HastyOrion(OrionClient):
+    """Notifies of each subscription before it says its id."""
+
+    def __init__(self, url: str) -> None:
+        super().__init__(url, *SERVICE)
+        self.notify: Callable[[str], object] = bool
+        self.taken: list[object] = []
+
+    async def create_subscription(self, document: Mapping[str, Any]) -> str:
+        made = await super().create_subscription(document)
+        self.taken.append(self.notify(made))
+        return made
+
+
 class Site:
     """Provisioner over a FIWARE that can be reached, or cannot."""
 
     def __init__(
-        self, fiware: Running, *, orion_url: str = "", agent_url: str = ""
+        self,
+        fiware: Running,
+        *,
+        orion_url: str = "",
+        agent_url: str = "",
+        orion: OrionClient | None = None,
     ) -> None:
         self.heard: list[tuple[str, bytes]] = []
         self.health_monitor = HealthMonitor(clock.now())
         self.ingest = Ingest({"AGI"}.__contains__)
-        self.orion = OrionClient(orion_url or fiware.orion_url, *SERVICE)
+        self.orion = orion or OrionClient(orion_url or fiware.orion_url, *SERVICE)
         self.agent = IotAgentClient(agent_url or fiware.iota_url, *SERVICE)
         self.link = MqttLink(
             BrokerAddress("127.0.0.1", fiware.mqtt_port),
@@ -100,6 +120,20 @@ async def test_an_empty_fiware_gets_devices_and_subscriptions(fiware: Running) -
     assert {one["id"] for one in kept} == site.provisioner.subscription_ids
     assert site.health_monitor.agent_error == ""
     assert site.health_monitor.orion_ok_at is not None
+
+
+async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(
+    fiware: Running,
+) -> None:
+    orion = HastyOrion(fiware.orion_url)
+    site = Site(fiware, orion=orion)
+    orion.notify = site.provisioner.is_ours
+    async with site.running():
+        ids = await first_ids(site)
+
+    assert orion.taken == [True] * len(wanted_for(["AGI"]))
+    assert site.provisioner.is_ours(next(iter(ids)))
+    assert not site.provisioner.is_ours("somebody else's")
 
 
 async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:
