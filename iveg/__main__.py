@@ -1,8 +1,12 @@
 """Starts the command line: ``python -m iveg``."""
 
+import gc
 import sys
 
-from iveg.cli import main
+# What is imported stays: to look through it again and again would find nothing.
+gc.set_threshold(100_000, 20, 50)
+
+from iveg.cli import main  # noqa: E402 - after the line above
 
 
 def run() -> None:

@@ -119,7 +119,9 @@ class Dss:
             lambda *told: self.latency.watch.passed_over(*told),
         )
         self.link = MqttLink(
-            broker_of(settings),
+            BrokerAddress.from_url(
+                settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+            ),
             "iveg",
             self._direct.subscriptions(),
             self._direct.read,
@@ -199,7 +201,7 @@ class Dss:
             robots=self.fleet.ids,
             apikey=settings.apikey,
             context_broker_url=settings.iota_cb_url or settings.orion_url,
-            notify_url=settings.notify_url or notify_url_of(settings),
+            notify_url=settings.notify_address,
             notify_token=self.notify_secret.current,
             boot=self._boot,
             read_clock=clock.now,
@@ -375,15 +377,3 @@ class Dss:
             __version__,
             self._demo,
         )
-
-
-def broker_of(settings: Settings) -> BrokerAddress:
-    """Where the MQTT broker is and who we are there."""
-    return BrokerAddress.from_url(
-        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
-    )
-
-
-def notify_url_of(settings: Settings) -> str:
-    """Where Orion reaches us when nobody said otherwise."""
-    return f"http://{settings.host}:{settings.port}/ngsi/notifications"

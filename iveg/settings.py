@@ -268,6 +268,12 @@ class Settings:
             )
         return settings
 
+    @property
+    def notify_address(self) -> str:
+        """Where Orion posts notifications to (URL)."""
+        own = f"http://{self.host}:{self.port}/ngsi/notifications"
+        return self.notify_url or own
+
     def to_environment(self) -> dict[str, str]:
         """The environment that gives the same settings to a child process."""
         return {

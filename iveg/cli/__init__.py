@@ -59,11 +59,11 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
             print(describe(), end="")
             return 0
         case "db":
-            from iveg.cli.parts import upgrade_database
+            from iveg.cli.serve import upgrade_database
 
             return upgrade_database(settings, data)
         case "provision":
-            from iveg.cli.parts import provision_fleet
+            from iveg.cli.provision import provision_fleet
 
             return provision_fleet(settings)
         case "doctor":
@@ -86,9 +86,9 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
                 settings, os.environ, data, emulator=emulator, ros2=options.ros2
             )
         case _:
-            from iveg.cli import parts
+            from iveg.cli.parts import run_part
 
-            return parts.run_part(options, settings, data)
+            return run_part(options, settings, data)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -34,7 +34,7 @@ from iveg.adapters.fiware_http import FiwareHttp
 from iveg.adapters.history.engine import describe, sqlite_url
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
-from iveg.app import broker_of, notify_url_of
+from iveg.cli.addresses import broker_of
 from iveg.cli.diagnosis import (
     LATE_S,
     Finding,
@@ -343,8 +343,7 @@ def _lag_told(health: Any) -> Lag | None:
 
 def _notify_host(settings: Settings) -> str:
     """Host that an iVeg with these settings names to Orion for notifications."""
-    url = settings.notify_url or notify_url_of(settings)
-    return urlsplit(url).hostname or settings.host
+    return urlsplit(settings.notify_address).hostname or settings.host
 
 
 def _bind_to(host: str) -> str:

@@ -21,8 +21,8 @@ PRODUCTION = """
 import sys
 for name in sys.argv[1:]:
     sys.modules[name] = None
-import iveg.app, iveg.cli.doctor, iveg.cli.parts, iveg.cli.robot
-import iveg.emulator.fleet, iveg.emulator.replay
+import iveg.cli.doctor, iveg.cli.emulator, iveg.cli.replay, iveg.cli.robot
+import iveg.cli.serve
 """
 
 

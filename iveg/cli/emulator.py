@@ -1,0 +1,94 @@
+"""Simulated robots as a process."""
+
+import argparse
+import asyncio
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.cli.addresses import broker_of
+from iveg.cli.memory import settle_memory
+from iveg.cli.running import tell_ready
+from iveg.emulator.fleet import run_emulator
+from iveg.emulator.orders import read_translations
+from iveg.emulator.truth import TruthLog
+from iveg.settings import Settings
+
+if TYPE_CHECKING:
+    from iveg.adapters.dds import Dds
+
+
+async def emulator(options: argparse.Namespace, settings: Settings) -> None:
+    """Simulated robots, people and climate."""
+    settle_memory()
+    fleet = load_fleet(settings.fleet, settings.robots)
+    robots = [one.robot_id for one in fleet.members.values() if one.kind == "live"]
+    if options.robots is not None:
+        more = range(len(robots) + 1, options.robots + 1)
+        robots = [*robots, *(f"AG{number}" for number in more)][: options.robots]
+    with (
+        TemporaryDirectory(prefix="iveg-robots-") as directory,
+        _network(options) as network,
+        _truth(options.truth) as truth,
+    ):
+        running = asyncio.create_task(
+            run_emulator(
+                robots=robots,
+                address=broker_of(settings),
+                apikey=settings.apikey,
+                greenhouse=load_greenhouse(settings.greenhouse),
+                scenario=options.scenario,
+                seed=options.seed,
+                profile=options.profile,
+                uplink=settings.uplink,
+                slow_s=settings.feedback_slow_s,
+                stand_s=settings.feedback_stand_s,
+                state_directory=Path(directory),
+                held=options.held,
+                rate_hz=options.hz,
+                faults=read_translations(options.fault, robots),
+                fault_port=options.fault_port,
+                network=network,
+                description=fleet,
+                truth=truth,
+                camera=options.camera,
+            ),
+            name="emulator",
+        )
+        tell_ready()
+        try:
+            await running
+        finally:
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+
+
+@contextlib.contextmanager
+def _truth(file: Path | None) -> Iterator[TruthLog | None]:
+    """Log of the targets really in view, if requested."""
+    if file is None:
+        yield None
+        return
+    with contextlib.closing(TruthLog(file)) as log:
+        yield log
+
+
+@contextlib.contextmanager
+def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
+    """DDS for robots that speak ROS 2, if requested."""
+    if not options.dds:
+        yield None
+        return
+    from iveg.cli.robot import load_config, network_of
+
+    config, _ = load_config(options, os.environ)
+    network = network_of(config, os.environ, "iveg emulator --dds")
+    from iveg.adapters.dds import Dds
+
+    with Dds(network) as dds:
+        yield dds

@@ -1,0 +1,27 @@
+"""The embedded FIWARE as a process."""
+
+from urllib.parse import urlsplit
+
+from iveg.adapters.extras import require_extra
+from iveg.cli.memory import settle_memory
+from iveg.cli.running import tell_ready
+from iveg.settings import Settings
+
+
+async def fiware(settings: Settings) -> None:
+    """The embedded MQTT broker, Orion and IoT Agent."""
+    require_extra("demo", "iveg fiware")
+    from iveg.embedded.server import serve_fiware
+
+    settle_memory()
+    await serve_fiware(
+        _address(settings.mqtt_url, 1883),
+        _address(settings.orion_url, 1026),
+        _address(settings.iota_url, 4041),
+        notify_ready=tell_ready,
+    )
+
+
+def _address(url: str, default_port: int) -> tuple[str, int]:
+    parts = urlsplit(url)
+    return parts.hostname or "127.0.0.1", parts.port or default_port

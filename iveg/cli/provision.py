@@ -1,0 +1,33 @@
+"""``iveg provision``: what FIWARE must know of the fleet, made or mended once."""
+
+import asyncio
+
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.iot_agent import IotAgentClient, provision
+from iveg.adapters.orion import OrionClient
+from iveg.settings import Settings
+
+
+def provision_fleet(settings: Settings) -> int:
+    """Create or repair the fleet's devices, and print the repairs."""
+
+    async def work() -> None:
+        service = settings.fiware_service, settings.fiware_servicepath
+        orion = OrionClient(settings.orion_url, *service)
+        agent = IotAgentClient(settings.iota_url, *service)
+        try:
+            done = await provision(
+                agent,
+                orion,
+                robots=load_fleet(settings.fleet, settings.robots).ids,
+                apikey=settings.apikey,
+                cbroker_url=settings.iota_cb_url or settings.orion_url,
+            )
+        finally:
+            await orion.close()
+            await agent.close()
+        said = [*done.mended, *done.problems]
+        print("\n".join(said) or "Everything was as it should be.")
+
+    asyncio.run(work())
+    return 0

@@ -1,0 +1,78 @@
+"""Recorded logs as robots, as a process."""
+
+import argparse
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from iveg.adapters import clock
+from iveg.adapters.bags import BagTopics
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.orion import OrionClient
+from iveg.cli.addresses import broker_of
+from iveg.cli.running import LOOPBACK
+from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import FleetDescription
+from iveg.emulator.replay import run_replay
+from iveg.settings import Settings
+
+_LIVE_ROBOT_S = 10.0
+
+
+async def replay(options: argparse.Namespace, settings: Settings) -> None:
+    """Recorded logs of real robots, replayed as robots."""
+    fleet = load_fleet(settings.fleet, settings.robots)
+    await _refuse_replay(options, settings, fleet)
+    with TemporaryDirectory(prefix="iveg-replay-") as directory:
+        await run_replay(
+            options.files,
+            options.robot,
+            address=broker_of(settings),
+            apikey=settings.apikey,
+            speed=options.speed,
+            loop=options.loop,
+            uplink=settings.uplink,
+            slow_s=settings.feedback_slow_s,
+            stand_s=settings.feedback_stand_s,
+            state_directory=Path(directory),
+            fleet=fleet,
+            topics=BagTopics(options.odom_topic, options.scan_topic),
+            bag_time=options.bag_time,
+            frame=options.frame,
+            poses=dict(options.pose),
+        )
+
+
+async def _refuse_replay(
+    options: argparse.Namespace, settings: Settings, fleet: FleetDescription
+) -> None:
+    """Refuse a replay that could be taken for a live robot."""
+    for name, _ in options.pose:
+        if name not in options.robot:
+            raise DataFileError("--pose", name, "is none of the robots to be played")
+    for name in options.robot:
+        if name not in fleet.members:
+            known = ", ".join(fleet.ids)
+            reason = f"is not in the fleet (IVEG_ROBOTS: {known})"
+            raise DataFileError("--robot", name, reason)
+        if fleet.of_robot(name).kind == "live":
+            reason = f"is a live robot of the fleet; {name}:recording in IVEG_ROBOTS"
+            raise DataFileError("--robot", name, f"{reason} makes it a recording")
+    if options.force:
+        return
+    host = broker_of(settings).host
+    if host not in LOOPBACK:
+        raise DataFileError(
+            "IVEG_MQTT_URL", host, "is not on loopback; --force if that is meant"
+        )
+    orion = OrionClient(
+        settings.orion_url, settings.fiware_service, settings.fiware_servicepath
+    )
+    try:
+        for robot_id in options.robot:
+            heard = await orion.modified_at(robot_id)
+            if heard is not None and clock.now().wall - heard < _LIVE_ROBOT_S:
+                raise DataFileError(
+                    "--robot", robot_id, "was live in the last 10 s; --force if meant"
+                )
+    finally:
+        await orion.close()

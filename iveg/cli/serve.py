@@ -1,0 +1,98 @@
+"""The dashboard and decision-support system as a process."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import uvicorn
+
+from iveg.adapters.history.engine import sqlite_url
+from iveg.adapters.history.migrate import upgrade
+from iveg.app import Dss
+from iveg.asgi import create_app
+from iveg.cli.memory import settle_memory
+from iveg.cli.running import tell_link, tell_ready
+from iveg.domain.errors import HopError
+from iveg.settings import Settings
+from iveg.web.live.bounded import BoundedSocket
+from iveg.web.prompt import prompt_http
+
+_log = logging.getLogger(__name__)
+_WS_MAX_BYTES = 65536
+
+
+class _Server(uvicorn.Server):
+    """A server that leaves signals to ``run_until_told``, as all parts do."""
+
+    def __init__(self, config: uvicorn.Config, on_start: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._on_start = on_start
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            self._on_start()
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
+    """The decision-support system with its page."""
+    await _upgrade_history(settings, data)
+    dss = Dss(settings, data, demo=demo)
+    app = create_app(dss)
+    server = _Server(
+        uvicorn.Config(
+            app,
+            http=prompt_http(app.state.orion),
+            host=settings.host,
+            port=settings.port,
+            log_config=None,
+            access_log=False,
+            ws=BoundedSocket,
+            ws_max_size=_WS_MAX_BYTES,
+            ws_ping_interval=10.0,
+            ws_ping_timeout=10.0,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        ),
+        on_start=tell_ready if demo else lambda: _print_link(settings, dss),
+    )
+    settle_memory()
+    dss.on_failure = lambda: setattr(server, "should_exit", True)
+    serving = asyncio.create_task(server.serve(), name="http")
+    try:
+        await asyncio.shield(serving)
+    except asyncio.CancelledError:
+        server.should_exit = True
+        await serving
+
+
+async def _upgrade_history(settings: Settings, data: Path) -> None:
+    """Upgrade the history; a newer or broken database ends the start."""
+    try:
+        await asyncio.to_thread(upgrade, _database_url(settings, data))
+    except HopError as error:
+        _log.warning("the history starts without its database: %s", error)
+
+
+def _database_url(settings: Settings, data: Path) -> str:
+    return settings.database_url or sqlite_url(data / "iveg.sqlite")
+
+
+def _print_link(settings: Settings, dss: Dss) -> None:
+    tell_link(settings, dss.sign_in_token)
+
+
+def upgrade_database(settings: Settings, data: Path) -> int:
+    """Upgrade the history's database to the newest schema."""
+    data.mkdir(parents=True, exist_ok=True)
+    upgrade(_database_url(settings, data))
+    print("The database is up to date.")
+    return 0
