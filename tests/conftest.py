@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,8 @@ import pytest
 from hypothesis import settings
 from playwright.sync_api import expect
 from xdist.scheduler import LoadScopeScheduling
+
+from iveg.cli.memory import settle_memory
 
 # A helper's failed assertion shows its values as a test's own does.
 pytest.register_assert_rewrite("tests.processes")
@@ -61,6 +64,17 @@ def _shared(nodeid: str) -> str | None:
     module = nodeid.split("::")[0]
     folder = module.removeprefix("tests/").rpartition("/")[0]
     return folder if folder in _TOGETHER else None
+
+
+def pytest_collection() -> None:
+    """What is imported stays; nobody looks through it for what nobody uses."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """From here on as in the programs that are tested."""
+    settle_memory()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
