@@ -117,8 +117,8 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a restart asserts a hold that a release has named",
-        "if kept is not None and kept in wanted.named:",
-        "if kept is not None and kept in wanted.asked[1:]:",
+        "if self.hold_id in self.named:",
+        "if self.hold_id in self.asked[1:]:",
         ("unit/pipeline/test_command.py",),
     ),
     Mutant(

@@ -6,7 +6,7 @@ nothing, so that a fault of one leaves the others alone.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NewType
+from typing import Literal, NewType
 
 TransportId = NewType("TransportId", str)
 """In JSON, columns, file names and translations."""
@@ -32,6 +32,10 @@ class Transport:
     confirms: bool = False
     one_at_a_time: bool = False
     alias: str = ""
+
+    def carries(self, order: Literal["stop", "release", "resume"]) -> bool:
+        """Whether it takes such an order."""
+        return self.can_stop if order == "stop" else self.can_release
 
     def switched(self, *, on: bool) -> "Transport":
         """The same transport, or one that carries no order."""

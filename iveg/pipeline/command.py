@@ -316,7 +316,7 @@ class Commander:
                     self._event_log.closed(effect, at)
                 case OffTable():
                     self._note_mistake(effect)
-        for command in _open(machine):
+        for command in machine.commands:
             if command.command_id in self.commands:
                 self.commands[command.command_id] = command
 
@@ -339,7 +339,7 @@ class Commander:
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         # What is open may know more than this step did: how late the agent is.
-        known = (*changed.commands, *_open(machine))
+        known = (*changed.commands, *machine.commands)
         self.commands |= {one.command_id: one for one in known}
         while len(self.commands) > _KEPT:
             del self.commands[next(iter(self.commands))]
@@ -393,8 +393,3 @@ class Commander:
     async def close(self) -> None:
         """Cancel the sends that are under way."""
         await self._sender.close()
-
-
-def _open(machine: StopMachine) -> tuple[Command, ...]:
-    """The commands of one robot that are followed now."""
-    return tuple(one for one in (machine.stop, machine.once) if one is not None)

@@ -269,8 +269,7 @@ class Views:
         return [
             self.command(command, now)
             for machine in self._commander.machines.values()
-            for command in (machine.stop, machine.once)
-            if command is not None
+            for command in machine.commands
         ]
 
     def alerts(self) -> list[Alert]:

@@ -26,7 +26,6 @@ LIST = "a list of what there is, one statement after the other"
 STATE = "one object with one state, each of its functions short; to be divided"
 LARGE_FILES = {
     "iveg/adapters/dds.py": "the one importer of cyclonedds",
-    "iveg/domain/stop/machine.py": "one machine, read in call order to its table",
     "iveg/robot/ros2/inputs.py": TABLE,
     "iveg/ros2/messages.py": TABLE,
 }

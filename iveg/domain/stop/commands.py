@@ -171,5 +171,13 @@ class Command:
             standstill_ms=self.times.ms_from_press(first),
         )
 
+    def ended(self, why: str) -> "Command":
+        """No longer followed; a release that the robot never confirmed says so."""
+        if self.kind == "stop":
+            return replace(self, state="REPLACED")
+        expired = why == "release_unconfirmed"
+        state: CommandState = "EXPIRED" if expired else "REPLACED"
+        return replace(self, state=state, reason=why)
+
     def _with(self, transport: TransportId, state: str) -> dict[TransportId, str]:
         return {**self.transports, transport: state}

@@ -1,12 +1,14 @@
 """Events of a STOP machine, and the effects that it asks for."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from iveg.domain.observations import Instant
 from iveg.domain.stop.attempt import Attempt
-from iveg.domain.stop.commands import PLAIN, Command, Press, State
-from iveg.domain.transports import TransportId
+from iveg.domain.stop.commands import PLAIN, Command, Kind, Press, State, Times
+from iveg.domain.stop.wanted import NEW_HOLD, Kept
+from iveg.domain.transports import Transport, TransportId
 
 Key = Literal[
     "requested",
@@ -27,6 +29,7 @@ Key = Literal[
     "running",
 ]
 """What can happen; also names the sentence that tells of it."""
+_ORDERS: Mapping[Key, Kind] = {"releasing": "release", "resuming": "resume"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +40,7 @@ class Event:
         new_id: Names the command that begins, and its hold unless one is ``kept``.
         by: Who wants it.
         press: What the page says of a press.
-        kept: A hold that the robot has already: it is held on to, none is added.
-        doubt: The challenge of a release that may still lift that hold.
+        kept: The hold that a STOP holds on to.
         attempt: The release or resume that begins.
     """
 
@@ -47,9 +49,31 @@ class Event:
     new_id: str = ""
     by: str = "iveg"
     press: Press = PLAIN
-    kept: str | None = None
-    doubt: str | None = None
+    kept: Kept = NEW_HOLD
     attempt: Attempt | None = None
+
+    def begins(self, robot_id: str, transports: Iterable[Transport]) -> Command:
+        """The command that begins with it; ``off`` on what does not carry it.
+
+        A release or resume is sent once, at once; a STOP as often as it takes.
+        """
+        kind = _ORDERS.get(self.key, "stop")
+        is_stop = kind == "stop"
+        plain = not is_stop or self.key in ("requested", "adopted")
+        ways = {one.id: "pending" if one.carries(kind) else "off" for one in transports}
+        return Command(
+            self.new_id,
+            robot_id,
+            kind,
+            "REQUESTED" if is_stop else "RELEASING",
+            Times.of(self.at, self.press),
+            requesters=(self.by,),
+            tries=0 if is_stop else 1,
+            reason=None if plain else self.key,
+            transports=ways,
+            drill=self.press.drill,
+            held_as=self.kept.hold_id,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +102,20 @@ class SendOnce:
     transports: tuple[TransportId, ...]
     ids: tuple[str, ...] = ()
     ours: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, attempt: Attempt, ours: Iterable[str]) -> "SendOnce":
+        """What an attempt sends; ``ours`` are STOPs of iVeg that the robot holds."""
+        command, ids = attempt.command, attempt.ids
+        return cls(
+            command.robot_id,
+            command.command_id,
+            "release" if command.kind == "release" else "resume",
+            attempt.challenge,
+            tuple(one for one, way in command.transports.items() if way != "off"),
+            ids,
+            tuple(one for one in ours if one in ids),
+        )
 
 
 @dataclass(frozen=True, slots=True)

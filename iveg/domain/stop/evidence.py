@@ -1,18 +1,14 @@
-"""The robot's newest report, its age, and what it allows people to ask for.
-
-The guards stand before the table of steps: a request that must not happen is refused
-here, and changes nothing.
-"""
+"""The robot's newest report, its age, and what it says of motion."""
 
 from collections import deque
-from collections.abc import Iterable
 from math import inf, isfinite
+from typing import Literal
 
-from iveg.domain.errors import CommandRefusedError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Hold, Instant, Origin, SafetyReport
-from iveg.domain.stop.commands import State
+from iveg.domain.stop.standstill import Standstill
 
+UNKNOWN = Origin()
 _REMEMBERED_ANSWERS = 64
 
 
@@ -30,12 +26,39 @@ class Evidence:
         self.report_at: Instant | None = None
         self.report_age_then = 0.0
         self.speed = 0.0
+        self._standstill = Standstill()
         self._answers: deque[tuple[str, int]] = deque(maxlen=_REMEMBERED_ANSWERS)
 
     def take(self, report: SafetyReport, at: Instant, age_s: float) -> None:
         """A new report, at most ``age_s`` old."""
         self.report, self.report_at, self.report_age_then = report, at, age_s
         self.speed = abs(report.linear)
+
+    def motion(
+        self, report: SafetyReport, at: Instant, *, sparse: bool
+    ) -> Literal["moves", "stands"] | None:
+        """What the newest report says of motion; None while it is not certain."""
+        if not stands(report):
+            self._standstill.forget()
+            return "moves"
+        # Five samples at rest over a second are a standstill.
+        measured = self._standstill.rested(at, report.origin, sparse=sparse)
+        if self.evidence_age(at) > LIMITS.report_stale_s:
+            return None  # it stood; nobody knows whether it stands
+        return "stands" if measured else None
+
+    def is_contradicted(
+        self, linear: float, angular: float, at: Instant, origin: Origin, age_s: float
+    ) -> bool:
+        """Whether odometry contradicts a standstill: three that move, measured later.
+
+        This one is proven to be no older than ``age_s``.
+        """
+        moves = max(abs(linear), abs(angular)) >= LIMITS.standing_speed
+        contradicted = self._standstill.odometry(at, origin, age_s, moves=moves)
+        if contradicted is not None:
+            self.speed = abs(linear)
+        return contradicted is True
 
     def is_news(self, answer: Origin) -> bool:
         """Whether this answer is new; an answer without origin always is."""
@@ -72,70 +95,6 @@ class Evidence:
             return 0.0
         age = self.evidence_age(now)
         return self.speed * max(0.0, age if isfinite(age) else self.report_age(now))
-
-    # --- guards -------------------------------------------------------------------
-
-    def guard_drill(self, robot_id: str, state: State, at: Instant) -> None:
-        """Only a robot that hardly moves is stopped to prove that STOP works.
-
-        Raises:
-            CommandRefusedError: stopped already, faster than a crawl, or unheard.
-        """
-        if state != "RUNNING":
-            raise CommandRefusedError(robot_id, "Drill", f"its state is {state}")
-        if self.report is None or not self._is_fresh(at):
-            raise CommandRefusedError(robot_id, "Drill", "its report is not fresh")
-        if max(self.speed, abs(self.report.linear)) > LIMITS.drill_speed_m_s:
-            raise CommandRefusedError(robot_id, "Drill", "it is moving")
-
-    def guard_release(
-        self, robot_id: str, state: State, at: Instant, seen: Iterable[str]
-    ) -> tuple[SafetyReport, tuple[str, ...]]:
-        """The report that a release rests on, and what it lifts.
-
-        Raises:
-            CommandRefusedError: not standing, no fresh report, or the set has changed.
-        """
-        report = self._guard_order(robot_id, "Release", state, at, "STANDING")
-        remote = tuple(hold.id for hold in report.holds if hold.ack == "remote")
-        if set(seen) not in (set(remote), {hold.id for hold in report.holds}):
-            raise CommandRefusedError(robot_id, "Release", "the holds changed")
-        if not remote:
-            why = "nothing holds it that iVeg may lift"
-            raise CommandRefusedError(robot_id, "Release", why)
-        return report, remote
-
-    def guard_resume(self, robot_id: str, state: State, at: Instant) -> SafetyReport:
-        """The report that a resume rests on.
-
-        Raises:
-            CommandRefusedError: still held, not standing, or no fresh report.
-        """
-        report = self._guard_order(robot_id, "Resume", state, at, "READY")
-        if report.holds:
-            raise CommandRefusedError(robot_id, "Resume", "it is still held")
-        return report
-
-    def _guard_order(
-        self, robot_id: str, asked: str, state: State, at: Instant, wanted: State
-    ) -> SafetyReport:
-        """The fresh report of a robot that stands."""
-        report = self.report
-        if state not in (wanted, "RUNNING"):
-            raise CommandRefusedError(robot_id, asked, f"its state is {state}")
-        if report is None or not self._is_fresh(at):
-            raise CommandRefusedError(robot_id, asked, "its report is not fresh")
-        if not stands(report):
-            raise CommandRefusedError(robot_id, asked, "it is moving")
-        if report.challenge is None:
-            raise CommandRefusedError(robot_id, asked, "it gave no challenge")
-        return report
-
-    def _is_fresh(self, at: Instant) -> bool:
-        """Whether the robot's last word has just come, and was not old when it came."""
-        if self.report_age(at) > LIMITS.report_fresh_s:
-            return False
-        return self.evidence_age(at) <= LIMITS.report_stale_s
 
 
 def stands(report: SafetyReport) -> bool:

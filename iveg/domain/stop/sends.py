@@ -6,10 +6,12 @@ every five.  One that takes one at a time (Orion): the next two seconds after th
 came back, and none to a robot that has it, unless there is no other transport.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Literal
 
 from iveg.domain.observations import Instant
+from iveg.domain.stop.commands import Command
+from iveg.domain.stop.effects import SendStop
 from iveg.domain.transports import Transport, TransportId
 
 FIWARE_PAUSE_S = 2.0
@@ -21,6 +23,11 @@ _EARLY_S = 1e-3
 
 Progress = Literal["asked", "delivered", "standing"]
 """What the robot has said so far: nothing, that it has it, that it stands."""
+_PROGRESS: Mapping[str, Progress] = {
+    "DELIVERED": "delivered",
+    "STILL_MOVING": "delivered",
+    "STANDING": "standing",
+}
 
 
 class Repeated:
@@ -94,10 +101,11 @@ class Sends:
             for one in carriers
         }
 
-    def begin(self) -> None:
-        """A new episode."""
+    def begin(self, at: Instant) -> None:
+        """A new episode: on every transport at once."""
         for way in self._ways.values():
             way.begin()
+        self.now(at)
 
     def now(self, at: Instant) -> None:
         """On every transport at once, whatever was due when."""
@@ -115,16 +123,15 @@ class Sends:
         if transport in self._ways:
             self._ways[transport].came_back(at)
 
-    def due(self, at: Instant, age_s: float, progress: Progress) -> list[TransportId]:
-        """The transports to send on now; they count as used.
-
-        Args:
-            at: This moment.
-            age_s: Since the press was accepted (s).
-            progress: What the robot has said so far.
-        """
+    def due(self, stop: Command, at: Instant) -> list[SendStop]:
+        """What to send of it now; that counts as sent."""
+        age_s = at.mono - stop.times.requested.mono
+        progress = _PROGRESS.get(stop.state, "asked")
+        hold_id = stop.hold_id or stop.command_id
         return [
-            name for name, way in self._ways.items() if way.is_due(at, age_s, progress)
+            SendStop(stop.robot_id, hold_id, name, stop.command_id)
+            for name, way in self._ways.items()
+            if way.is_due(at, age_s, progress)
         ]
 
 

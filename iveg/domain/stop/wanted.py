@@ -1,6 +1,24 @@
-"""The desired state of a robot in an earlier run of iVeg, as the disk remembers it."""
+"""What was wanted of a robot before: by an earlier run of iVeg, by an earlier STOP."""
 
 from dataclasses import dataclass
+
+from iveg.domain.limits import LIMITS
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A hold that the robot has already, and that a STOP holds on to.
+
+    Attributes:
+        hold_id: None: the STOP is a new hold.
+        challenge: Of a release that may still lift it.
+    """
+
+    hold_id: str | None = None
+    challenge: str | None = None
+
+
+NEW_HOLD = Kept()
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,3 +39,16 @@ class DesiredRecord:
     named: tuple[str, ...] = ()
     asked: tuple[str, ...] = ()
     challenge: str | None = None
+
+    def hold_to_assert(self) -> Kept:
+        """The hold that a STOP after a restart holds on to.
+
+        A hold that no release ever named cannot have been lifted, so asserting it again
+        adds none.  One that was named may have been: the robot would answer RELEASED
+        and hold nothing, so the hold is a new one; unless there are so many that
+        theirs is asserted until the robot's word, or its silence, decides.
+        """
+        if self.hold_id in self.named:
+            many = len(self.asked) >= LIMITS.most_holds
+            return Kept(self.hold_id, self.challenge) if many else NEW_HOLD
+        return Kept(self.hold_id)
