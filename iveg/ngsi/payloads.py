@@ -3,7 +3,7 @@
 import unicodedata
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field
 
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
@@ -221,7 +221,10 @@ class FeedbackValue(OriginFields):
     alert: AlertValue | None = None
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
-    speed_limits: Annotated[dict[str, SpeedLimitValue], Field(alias="mandates")] = {}
+    speed_limits: Annotated[
+        dict[str, SpeedLimitValue],
+        Field(validation_alias=AliasChoices("speed_limits", "mandates")),
+    ] = {}
     seen: dict[str, int] = {}
     backlog: Any = None
 

@@ -256,10 +256,10 @@ def _silent_observer(world: World, now: Instant) -> str | None:
         for robot in world.live_robots()
         if robot.detections_at is not None
     }
-    eyes = {
+    active = {
         name: age for name, age in ages.items() if age <= LIMITS.observer_forgotten_s
     }
-    if not eyes:
+    if not active:
         return ""
-    slowest = max(eyes, key=lambda name: eyes[name])
-    return slowest if eyes[slowest] > LIMITS.silence_s else None
+    slowest = max(active, key=lambda name: active[name])
+    return slowest if active[slowest] > LIMITS.silence_s else None

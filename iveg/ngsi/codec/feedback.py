@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import (
+    CLEAR,
     LONGEST_BACKLOG_S,
     Feedback,
     FeedbackAlert,
@@ -125,23 +126,38 @@ def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
 
 
 def _write_shared(feedback: Feedback) -> dict[str, Any]:
-    """What every robot is told alike."""
+    """What every robot is told alike.
+
+    A limit that limits nothing is left out, or the fleet's limits would be most of the
+    message.  ``mandates`` holds them all under the name that robots of the version
+    before read.
+    """
+    limits = {
+        robot_id: orjson.Fragment(orjson.dumps(_write_speed_limit(speed_limit)))
+        for robot_id, speed_limit in feedback.speed_limits.items()
+    }
     return {
         "alerts": [_write_alert(alert) for alert in feedback.alerts],
-        "mandates": {
-            robot_id: without_none(
-                {
-                    "speed_factor": speed_limit.speed_factor,
-                    "reason": speed_limit.reason,
-                    "cause": speed_limit.cause,
-                    "distance_m": rounded(speed_limit.distance_m),
-                    "decision_id": speed_limit.decision_id,
-                }
-            )
+        "speed_limits": {
+            robot_id: limits[robot_id]
             for robot_id, speed_limit in feedback.speed_limits.items()
+            if speed_limit != CLEAR
         },
+        "mandates": limits,
         "seen": dict(feedback.seen),
     }
+
+
+def _write_speed_limit(speed_limit: SpeedLimit) -> dict[str, Any]:
+    return without_none(
+        {
+            "speed_factor": speed_limit.speed_factor,
+            "reason": speed_limit.reason,
+            "cause": speed_limit.cause,
+            "distance_m": rounded(speed_limit.distance_m),
+            "decision_id": speed_limit.decision_id,
+        }
+    )
 
 
 def _write_alert(alert: FeedbackAlert) -> dict[str, Any]:

@@ -273,11 +273,18 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         Pose2D(1.0, 2.0, 0.1),
         Twist2D(0.5, 0.0),
         "t",
-        {"AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
+        {"AGI": SpeedLimit(), "AGII": SpeedLimit(0.5, "person", None, 1.43, "d-1")},
         {"AGII": 8731},
     )
 
     written = orjson.loads(codec.write_feedback(feedback))
+
+    limited = {
+        "speed_factor": 0.5,
+        "reason": "person",
+        "distance_m": 1.43,
+        "decision_id": "d-1",
+    }
 
     told = {
         "decision_id": "d-1",
@@ -304,16 +311,32 @@ def test_feedback_is_written_as_the_contract_says() -> None:
             "angular_velocity": 0.0,
             "stamp": "t",
         },
+        "speed_limits": {"AGII": limited},
         "mandates": {
-            "AGII": {
-                "speed_factor": 0.5,
-                "reason": "person",
-                "distance_m": 1.43,
-                "decision_id": "d-1",
-            }
+            "AGI": {"speed_factor": 1.0, "reason": "clear"},
+            "AGII": limited,
         },
         "seen": {"AGII": 8731},
     }
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
+        {"mandates": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
+        {
+            "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
+            "mandates": {"AGI": {"speed_factor": 1.0}, "AGII": {"speed_factor": 1.0}},
+        },
+    ],
+)
+def test_speed_limits_are_read_by_their_name_or_by_the_one_before(
+    limits: dict[str, object],
+) -> None:
+    feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **limits}))
+
+    assert feedback.speed_limits == {"AGI": SpeedLimit(0.5, "person")}
 
 
 def test_feedback_with_nothing_to_tell_says_null() -> None:
@@ -357,7 +380,7 @@ def test_a_backlog_that_cannot_be_read_costs_no_speed_limit(
         orjson.dumps(
             {
                 "robot_id": "AGI",
-                "mandates": {"AGI": {"speed_factor": 0.5}},
+                "speed_limits": {"AGI": {"speed_factor": 0.5}},
                 "backlog": told,
             }
         )

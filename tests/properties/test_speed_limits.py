@@ -1,4 +1,4 @@
-"""The ring under noise: it never flaps, never multiplies, never forgets."""
+"""Speed limits under noise: they never flap, never multiply, and none is forgotten."""
 
 import itertools
 import math
