@@ -10,7 +10,6 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import FastAPI
-from ulid import ULID
 
 from iveg import __version__
 from iveg.adapters import clock, log_filter, web_push
@@ -21,6 +20,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.history.engine import sqlite_file, sqlite_url
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.ids import new_id
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.journal import FileJournal
 from iveg.adapters.mail import MailSender
@@ -65,11 +65,6 @@ from iveg.web.security.authentication import (
 from iveg.web.views import Views
 
 _log = logging.getLogger(__name__)
-
-
-def new_id() -> str:
-    """A ULID: random, sortable by time, never reused."""
-    return str(ULID())
 
 
 class Dss:

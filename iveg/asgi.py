@@ -9,8 +9,9 @@ from starlette.staticfiles import StaticFiles
 
 from iveg import __version__
 from iveg.adapters import clock, web_push
+from iveg.adapters.ids import new_id
 from iveg.adapters.outside import is_public_target
-from iveg.app import Dss, new_id
+from iveg.app import Dss
 from iveg.web import notifications, problems
 from iveg.web.api import (
     alerts,
