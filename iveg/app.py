@@ -47,6 +47,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.latency import hours_of
+from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.restore import remember
@@ -123,6 +124,7 @@ class Dss:
             self._broker_back,
             self._broker_lost,
             self._direct.pass_over,
+            reading_apart_s(len(self.fleet.ids)),
         )
         self.orion = OrionClient(
             settings.orion_url, settings.fiware_service, settings.fiware_servicepath

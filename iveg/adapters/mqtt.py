@@ -66,6 +66,7 @@ class MqttLink:
         on_loss: Called once when a connection is lost.
         on_passed_over: Called with a topic and how many of its messages were not
             handed over because newer ones had come with them; before the newest.
+        apart_s: Least time between two readings (s); 0: whenever something comes.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class MqttLink:
         on_connect: Callable[[], None] | None = None,
         on_loss: Callable[[], None] | None = None,
         on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
+        apart_s: float = 0.0,
     ) -> None:
         self._address = address
         self._name = name
@@ -85,6 +87,7 @@ class MqttLink:
         self._on_connect = on_connect
         self._on_loss = on_loss
         self._on_passed_over = on_passed_over
+        self._apart_s = apart_s
         self._client: aiomqtt.Client | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._wake = asyncio.Event()
@@ -138,6 +141,7 @@ class MqttLink:
             socket_options=_NODELAY,
             max_queued_incoming_messages=_MAX_INCOMING,
             take=self._hand_telemetry,
+            apart_s=self._apart_s,
         ) as client:
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)

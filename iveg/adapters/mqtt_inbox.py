@@ -25,22 +25,62 @@ Take = Callable[[Mapping[str, bytes], Mapping[str, int]], None]
 
 
 class GreedyClient(aiomqtt.Client):
-    """A client that reads all that has arrived whenever its socket is readable.
+    """A client that reads all that has arrived, and then rests.
+
+    A fleet sends hundreds of messages in a second, and each event costs as much as
+    reading one of them: what comes within ``apart_s`` is read together.
 
     Args:
         take: Told the telemetry that has come, the newest of each topic.  It speaks
             MQTT 3.1.1.
+        apart_s: Least time between two readings (s); 0: whenever something comes.
     """
 
-    def __init__(self, *args: Any, take: Take, **kwargs: Any) -> None:
+    def __init__(
+        self, *args: Any, take: Take, apart_s: float = 0.0, **kwargs: Any
+    ) -> None:
         super().__init__(*args, protocol=aiomqtt.ProtocolVersion.V311, **kwargs)
         self._take = take
+        self._apart_s = apart_s
+        self._listens = False
 
     def _on_socket_open(self, client: paho.Client, userdata: Any, sock: Any) -> None:
-        # aiomqtt reads on while a socket has something pending; paho reads from this.
-        # Neither has a public way to say which socket.
-        client._sock = ReadAhead(sock, self._take)
-        super()._on_socket_open(client, userdata, client._sock)
+        # Paho reads from this; it has no public way to say which socket.
+        line = client._sock = ReadAhead(sock, self._take)
+        super()._on_socket_open(client, userdata, line)
+        # In place of the reader that has just been asked for, from the same thread.
+        self._loop.call_soon_threadsafe(self._listen, line)
+
+    def _listen(self, line: "ReadAhead") -> None:
+        """Read as soon as something comes."""
+        self._listens = True
+        self._loop.add_reader(line.fileno(), self._read, line)
+
+    def _read(self, line: "ReadAhead") -> None:
+        """Read what is there; then rest, or wait for an event if there was nothing."""
+        before = line.taken
+        try:
+            self._client.loop_read()
+            while line is self._client._sock and line.pending() > 0:
+                self._client.loop_read()
+        except Exception as error:  # as aiomqtt: the connection broke
+            if not self._disconnected.done():
+                self._disconnected.set_exception(error)
+            return
+        if line is not self._client._sock:
+            return
+        if line.taken == before:
+            self._listen(line)
+        elif self._apart_s:
+            if self._listens:
+                self._listens = False
+                self._loop.remove_reader(line.fileno())
+            self._loop.call_later(self._apart_s, self._read_again, line)
+
+    def _read_again(self, line: "ReadAhead") -> None:
+        """After a rest: the connection may have ended meanwhile."""
+        if line is self._client._sock:
+            self._read(line)
 
 
 class ReadAhead:
@@ -57,6 +97,8 @@ class ReadAhead:
         """Of a packet that is not whole yet."""
         self._held = memoryview(b"")
         self._may_take = True
+        self.taken = 0
+        """How often something came from the wire."""
 
     def __getattr__(self, name: str) -> Any:
         """Everything else is the socket's own."""
@@ -89,6 +131,7 @@ class ReadAhead:
         if not came:
             return False
         self._may_take = False
+        self.taken += 1
         telemetry, passed_over, others, self._begun = sort_packets(self._begun + came)
         self._held = memoryview(others)
         if telemetry:

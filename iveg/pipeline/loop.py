@@ -24,6 +24,14 @@ APART_S = 0.00025
 JUDGED_APART_S = 2 * APART_S
 """The same between two judgements: what robots are shown to be needs none."""
 _HEALTH_PERIOD_S = 1.0
+_WORTH_S = 0.001
+"""A shorter wait costs more than it saves."""
+
+
+def reading_apart_s(robots: int) -> float:
+    """Least time between two readings of the broker (s): taken is what was read."""
+    apart_s = APART_S * robots
+    return apart_s if apart_s > _WORTH_S else 0.0
 
 
 class RuleLoop:
@@ -68,11 +76,11 @@ class RuleLoop:
             await self._ingest.wait(max(0.0, waits_s))
             # What comes close together is taken together.
             early = taken_at + APART_S * robots - self._clock().mono
-            if early > 0.0:
+            if early > _WORTH_S:
                 await asyncio.sleep(early)
             now = self._clock()
             taken_at = now.mono
-            judges = taken_at - judged_at >= JUDGED_APART_S * robots
+            judges = taken_at - judged_at >= JUDGED_APART_S * robots - _WORTH_S
             self.step(self._ingest.drain(), now, judges=judges)
             if judges:
                 judged_at = taken_at

@@ -5,14 +5,14 @@ import contextlib
 import itertools
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.adapters.mqtt_inbox import ReadAhead, sort_packets
+from iveg.adapters.mqtt_inbox import GreedyClient, ReadAhead, sort_packets
 from iveg.embedded.mqtt_telemetry import publish_packet
 
 MANY = 300
@@ -91,6 +91,62 @@ async def test_a_busy_loop_reads_all_that_has_come_and_not_a_packet_a_turn() -> 
 
     assert heard == [f"t/{n}" for n in range(MANY)]
     assert turns < MANY / 3
+
+
+REST_S = 0.1
+
+
+async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
+    loop = asyncio.get_running_loop()
+    heard = asyncio.Queue[tuple[str, float]]()
+
+    def note(said: Mapping[str, bytes], _: object) -> None:
+        for topic in said:
+            heard.put_nowait((topic, loop.time()))
+
+    here, there = socket.socketpair()
+    with here, there:
+        here.setblocking(False)
+        client = GreedyClient("nowhere", take=note, apart_s=REST_S)
+        line = client._client._sock = ReadAhead(here, note)
+        client._listen(line)
+        async with asyncio.timeout(20.0):
+            there.sendall(publish_packet("first", b""))
+            first, at = await heard.get()
+            there.sendall(publish_packet("second", b""))
+            await asyncio.sleep(0.1 * REST_S)
+            there.sendall(publish_packet("third", b""))
+            (second, then), (third, later) = await heard.get(), await heard.get()
+            # Nothing comes during the next rest; then it waits for an event again.
+            await asyncio.sleep(2.0 * REST_S)
+            there.sendall(publish_packet("fourth", b""))
+            fourth, _ = await heard.get()
+        client._client._sock = None
+
+    assert (first, second, third, fourth) == ("first", "second", "third", "fourth")
+    assert then - at >= 0.9 * REST_S
+    assert later - then < 0.5 * REST_S
+
+
+async def test_a_line_that_ends_during_a_rest_is_lost_after_it() -> None:
+    lost = asyncio.Event()
+    with talking(publish_packet("t", b"x")) as port:
+        link = MqttLink(
+            BrokerAddress("127.0.0.1", port),
+            "test",
+            {"t": 0},
+            # The broker hangs up as soon as it hears from us again.
+            lambda *_: link.offer("bye", b""),
+            on_loss=lost.set,
+            apart_s=0.05,
+        )
+        running = asyncio.create_task(link.run())
+        async with asyncio.timeout(20.0):
+            await lost.wait()
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+
+    assert link.connects == 1
 
 
 def confirmed_packet(topic: str, payload: bytes) -> bytes:
