@@ -12,7 +12,10 @@ from collections.abc import Callable, Iterable
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
+    DetectionFrame,
     Observation,
+    Origin,
+    Overtaken,
     Received,
     kind_of,
 )
@@ -43,9 +46,11 @@ class Ingest:
     ) -> None:
         self._known = known
         self._passed = passed
-        self.is_past = is_past
+        self._is_past = is_past
         self._rejected = rejected
         self._queue: deque[tuple[Received, _Stream | None]] = deque()
+        self._identities: set[_Identity] = set()
+        """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
         """How much telemetry waits, by robot and kind."""
         self._wake = asyncio.Event()
@@ -63,13 +68,25 @@ class Ingest:
         way = "asked" if received.asked else received.road
         self.counters[f"{way}.{name}"] += 1
         self._passed(received)
+        if _is_twin_of_a_picture(received.observation):
+            self.counters[f"{name}.duplicate"] += 1
+            return
         stream = _stream(received)
         if len(self._queue) >= MAX_QUEUED and not self._make_room(stream):
             return
         self._queue.append((received, stream))
+        if not received.asked:
+            self._identities.add(_identity(received.observation))
         if stream is not None:
             self._waiting[stream] += 1
         self._wake.set()
+
+    def is_past(
+        self, robot_id: str, kind: type[Observation], boot: str, seq: int
+    ) -> bool:
+        """Whether a message cannot be news: it is here, or a later one was taken."""
+        waits = (robot_id, kind, boot, seq) in self._identities
+        return waits or self._is_past(robot_id, kind, boot, seq)
 
     def reject(self, source: str, reason: str, detail: str = "") -> None:
         """Count something that cannot be used; say so once for each source."""
@@ -91,17 +108,17 @@ class Ingest:
         """Everything that waits, oldest first."""
         while self._queue:
             received, stream = self._queue.popleft()
-            if stream is not None:
-                self._left(stream)
+            self._left(received, stream)
             yield received
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
+        # A timeout of asyncio costs more than most of what it would wait for.
+        timer = asyncio.get_running_loop().call_later(timeout_s, self._wake.set)
         try:
-            async with asyncio.timeout(timeout_s):
-                await self._wake.wait()
-        except TimeoutError:
-            return
+            await self._wake.wait()
+        finally:
+            timer.cancel()
         self._wake.clear()
 
     def _make_room(self, stream: "_Stream | None") -> bool:
@@ -121,8 +138,9 @@ class Ingest:
         index = next(
             number for number, (_, one) in enumerate(self._queue) if one == victim
         )
+        gone, _ = self._queue[index]
         del self._queue[index]
-        self._left(victim)
+        self._left(gone, victim)
         self._dropped(victim)
         return True
 
@@ -130,13 +148,36 @@ class Ingest:
         if stream is not None:
             self.counters[f"dropped.{stream[1].__name__}"] += 1
 
-    def _left(self, stream: "_Stream") -> None:
+    def _left(self, received: Received, stream: "_Stream | None") -> None:
+        self._identities.discard(_identity(received.observation))
+        if stream is None:
+            return
         self._waiting[stream] -= 1
         if not self._waiting[stream]:
             del self._waiting[stream]
 
 
 _Stream = tuple[str | None, type[Observation]]
+_Identity = tuple[str | None, type[Observation], str | None, int | None]
+_UNTOLD = Origin()
+
+
+def _identity(observation: Observation) -> _Identity:
+    """What tells a message from all others, where its sender counts."""
+    origin: Origin = getattr(observation, "origin", _UNTOLD)
+    robot_id = getattr(observation, "robot_id", None)
+    return robot_id, kind_of(observation), origin.boot, origin.seq
+
+
+def _is_twin_of_a_picture(observation: Observation) -> bool:
+    """Whether nothing follows from it but a count.
+
+    A copy of odometry or of a scan says which transport feeds the robot; one that calls
+    itself a replay is refused, and people are told.
+    """
+    if not isinstance(observation, Overtaken) or observation.origin.replay is not None:
+        return False
+    return observation.kind is DetectionFrame
 
 
 def _stream(received: Received) -> _Stream | None:

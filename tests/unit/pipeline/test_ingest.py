@@ -8,8 +8,12 @@ import pytest
 from iveg.domain.observations import (
     Climate,
     CommandAnswer,
+    DetectionFrame,
     Observation,
+    Odometry,
     Origin,
+    Overtaken,
+    Received,
     SafetyReport,
 )
 from iveg.domain.transports import DIRECT
@@ -174,3 +178,51 @@ def test_telemetry_drops_nothing_of_a_queue_that_holds_safety_alone() -> None:
 
     assert len(list(queue.drain())) == MAX_QUEUED
     assert queue.counters["dropped.Odometry"] == 1
+
+
+def test_a_message_that_waits_is_known_and_one_that_has_left_is_the_worlds() -> None:
+    queue = ingest()
+    queue.offer(received(detection_frame(origin=origin(7))))
+    waiting = queue.is_past("AGI", DetectionFrame, "boot-a", 7)
+    others = [
+        queue.is_past("AGI", DetectionFrame, "boot-a", 6),
+        queue.is_past("AGI", Odometry, "boot-a", 7),
+        queue.is_past("AGII", DetectionFrame, "boot-a", 7),
+    ]
+    list(queue.drain())
+
+    assert (waiting, others) == (True, [False] * 3)
+    assert not queue.is_past("AGI", DetectionFrame, "boot-a", 7)
+
+
+def test_what_orion_was_asked_for_hides_no_message() -> None:
+    queue = ingest()
+    queue.offer(replace(received(odometry(origin=origin(7))), asked=True))
+
+    assert not queue.is_past("AGI", Odometry, "boot-a", 7)
+
+
+def test_the_twin_of_a_picture_is_timed_and_counted_and_waits_for_nobody() -> None:
+    timed: list[Received] = []
+    queue = Ingest({"AGI"}.__contains__, passed=timed.append)
+    twin = received(Overtaken("AGI", origin(7), DetectionFrame))
+
+    queue.offer(twin)
+
+    assert (timed, queue.waiting) == ([twin], 0)
+    assert queue.counters["DetectionFrame.duplicate"] == 1
+
+
+@pytest.mark.parametrize(
+    "copy",
+    [
+        Overtaken("AGI", origin(7), Odometry),
+        Overtaken("AGI", replace(origin(7), replay="map"), DetectionFrame),
+    ],
+)
+def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> None:
+    queue = ingest()
+
+    queue.offer(received(copy))
+
+    assert queue.waiting == 1
