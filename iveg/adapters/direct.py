@@ -64,15 +64,19 @@ class DirectReader:
         self._passed_over = passed_over
         kinds = read_directly(scope)
         self._kinds = tuple(kinds)
+        self._apart_s = {
+            kind: row.apart_s for kind, row in kinds.items() if row.apart_s
+        }
+        self._due: dict[tuple[str, type[Observation]], float] = {}
         self._devices: dict[str, str] = {}
         self._sources: dict[str, tuple[str, type[Observation]]] = {}
         self._dense: set[str] = set()
         self._answers: dict[str, str] = {}
         self._subscriptions: dict[str, int] = {}
         for robot_id in robots:
-            for kind, qos in kinds.items():
+            for kind, row in kinds.items():
                 if kind in _SUFFIXES:
-                    self._listen(apikey, robot_id, _SUFFIXES[kind], qos, kind)
+                    self._listen(apikey, robot_id, _SUFFIXES[kind], row.qos, kind)
             if kinds:
                 self._listen(apikey, robot_id, "", 1)
                 answers = names.answer_topic(apikey, robot_id)
@@ -110,6 +114,9 @@ class DirectReader:
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
         at = self._clock()
+        if self._is_early(topic, at.mono):
+            self.pass_over(topic, 1)
+            return
         if topic in self._devices:
             reading = codec.read_measure(self._devices[topic], payload, self._is_past)
         elif topic in self._answers:
@@ -122,3 +129,13 @@ class DirectReader:
             if issubclass(kind_of(observation), self._kinds):
                 sparse = topic not in self._dense
                 self._offer(Received(observation, at, DIRECT.id, sparse=sparse))
+
+    def _is_early(self, topic: str, now: float) -> bool:
+        """Whether nobody would look at it: one of its kind has just been read."""
+        source = self._sources.get(topic)
+        if source is None or source[1] not in self._apart_s:
+            return False
+        if now < self._due.get(source, 0.0):
+            return True
+        self._due[source] = now + self._apart_s[source[1]]
+        return False

@@ -31,6 +31,8 @@ from iveg.pipeline.topics import Topic
 
 Scope = Literal["all", "safety", "off"]
 _SCOPES: dict[Scope, int] = {"off": 0, "safety": 1, "all": 2}
+SCANS_APART_S = 0.045
+"""A page draws 15 a second and the costmap 4; of 30 that come every second is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,7 @@ class Kind:
             seen, those of a command on the machine.
         direct: From which scope on it is read straight from MQTT; ``off`` never.
         qos: There.  At 0 the inbox keeps the newest of a topic alone.
+        apart_s: There, least time between two of a robot that are read (s).
         low: When it is worth a P3 alert.
         kept: Whether the history keeps it as a reading, once a minute.
     """
@@ -73,6 +76,7 @@ class Kind:
     touches: tuple[Topic, ...] = ()
     direct: Scope = "off"
     qos: int = 0
+    apart_s: float = 0.0
     low: Low | None = None
     kept: bool = False
 
@@ -84,7 +88,13 @@ def _low_battery(battery: Battery) -> float | None:
 
 KINDS = (
     Kind(Odometry, lands="odometry", touches=(topics.ROBOT,), direct="all"),
-    Kind(LaserScan, lands="scan", touches=(topics.SCAN,), direct="all"),
+    Kind(
+        LaserScan,
+        lands="scan",
+        touches=(topics.SCAN,),
+        direct="all",
+        apart_s=SCANS_APART_S,
+    ),
     Kind(DetectionFrame, may_drop=False, lands="frame", direct="safety", qos=1),
     Kind(
         SafetyReport,
@@ -115,11 +125,11 @@ def kind(observation: Observation) -> Kind:
     return _BY_TYPE[kind_of(observation)]
 
 
-def read_directly(scope: Scope) -> dict[type[Observation], int]:
-    """What is read straight from MQTT in a scope, with its quality of service."""
+def read_directly(scope: Scope) -> dict[type[Observation], Kind]:
+    """What is read straight from MQTT in a scope."""
     most = _SCOPES[scope]
     return {
-        row.of: row.qos
+        row.of: row
         for row in KINDS
         if row.direct != "off" and _SCOPES[row.direct] <= most
     }

@@ -7,6 +7,7 @@ from iveg.adapters.direct import DirectReader
 from iveg.domain.observations import (
     CommandAnswer,
     DetectionFrame,
+    LaserScan,
     Observation,
     Odometry,
     Received,
@@ -29,10 +30,11 @@ class Bench:
         self.offered: list[Received] = []
         self.rejected: list[tuple[str, str, str]] = []
         self.passed_over: list[tuple[str, type[Observation], int]] = []
+        self.clock = FakeClock()
         self.reader = DirectReader(
             "iveg",
             ["AGI"],
-            FakeClock(),
+            self.clock,
             self.offered.append,
             lambda *problem: self.rejected.append(problem),
             scope,
@@ -101,6 +103,19 @@ def test_what_was_overtaken_unread_is_told_by_robot_and_kind() -> None:
     bench.reader.pass_over("/iveg/AGI/cmdexe", 2)
 
     assert bench.passed_over == [("AGI", Odometry, 2)]
+
+
+def test_of_scans_at_30_hz_every_second_is_read_and_the_others_are_told() -> None:
+    bench = Bench()
+
+    for turn in range(30):
+        bench.clock.now = turn / 30
+        bench.reader.read("/AGI/iveg/lidar2D", codec.write_scan(scan()))
+        bench.reader.read("/AGI/iveg/odom", codec.write_odometry(odometry()))
+
+    read = [type(one.observation) for one in bench.offered]
+    assert (read.count(LaserScan), read.count(Odometry)) == (15, 30)
+    assert bench.passed_over == 15 * [("AGI", LaserScan, 1)]
 
 
 @pytest.mark.parametrize(
