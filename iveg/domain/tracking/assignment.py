@@ -22,6 +22,9 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
     """
     if not costs or not costs[0]:
         return []
+    plain = _undisputed(costs)
+    if plain is not None:
+        return plain
     if len(costs) > len(costs[0]):
         flipped = assign([list(column) for column in zip(*costs, strict=True)])
         return sorted((row, column) for column, row in flipped)
@@ -32,6 +35,21 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
         for row, column in enumerate(columns)
         if math.isfinite(costs[row][column])
     ]
+
+
+def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
+    """The pairs where no row has a choice and no two want one column; else None.
+
+    So it is nearly always: each person in a picture is near one place.
+    """
+    pairs = []
+    for row, offers in enumerate(costs):
+        columns = [column for column, cost in enumerate(offers) if cost < _NEVER]
+        if len(columns) > 1:
+            return None
+        pairs += [(row, column) for column in columns]
+    taken = {column for _, column in pairs}
+    return pairs if len(taken) == len(pairs) else None
 
 
 def _columns_of_rows(costs: Sequence[Sequence[float]]) -> list[int]:

@@ -106,15 +106,18 @@ class People:
             Every detection that could be placed, judged and, if confident, assigned.
         """
         observer = world.robot(frame.robot_id)
+        pose = observer.pose_at_stamp(frame.origin.own_s)
         placed = [
             judged
             for detection in frame.detections
-            if (judged := _place(detection, frame, observer, rule)) is not None
+            if (judged := _place(detection, pose, rule)) is not None
         ]
         if rule.possible_people:
             placed = self._suspect(placed, frame.robot_id, at)
-        placed = [_match_peer(one, observer, world, at) for one in placed]
-        placed = [self._doubt(one, frame, observer) for one in placed]
+        placed = [
+            self._doubt(_match_peer(one, observer, world, at), pose, observer)
+            for one in placed
+        ]
         self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
         return self._assign(placed, observer, at, new_id)
 
@@ -131,15 +134,12 @@ class People:
             for one in placed
         ]
 
-    def _doubt(
-        self, one: Placed, frame: DetectionFrame, observer: RobotState
-    ) -> Placed:
+    def _doubt(self, one: Placed, pose: Pose2D | None, observer: RobotState) -> Placed:
         """Doubt a detection beyond the walls (docs/safety.md, "The rule")."""
+        if one.kind != "alert" or one.peer is not None or pose is None:
+            return one
         x, y, _ = one.position
         if self._bounds is None or self._bounds.contains(x, y, _BEYOND_WALL_M):
-            return one
-        pose = observer.pose_at_stamp(frame.origin.own_s)
-        if one.kind != "alert" or one.peer is not None or pose is None:
             return one
         return replace(one, doubtful=(pose, observer.profile.camera_range))
 
@@ -153,7 +153,7 @@ class People:
             for index, one in enumerate(out)
             if one.kind == "alert" and one.peer is None
         ]
-        before = set(self.known)
+        before = self.known.copy()
         tracks = self._tracker.take(
             [
                 PlacedDetection(
@@ -168,8 +168,16 @@ class People:
         self.turned_away = tracks.count(None)
         for index, track in zip(wanting, tracks, strict=True):
             if track is not None:
-                out[index] = replace(
-                    out[index], person=self.known[track], appeared=track not in before
+                one, appeared = out[index], track not in before
+                out[index] = Placed(
+                    one.detection,
+                    one.position,
+                    one.kind,
+                    one.class_,
+                    self.known[track],
+                    appeared=appeared,
+                    possible=one.possible,
+                    doubtful=one.doubtful,
                 )
         return out
 
@@ -191,14 +199,11 @@ class People:
 
 
 def _place(
-    detection: Detection,
-    frame: DetectionFrame,
-    observer: RobotState,
-    rule: DetectionRule,
+    detection: Detection, pose: Pose2D | None, rule: DetectionRule
 ) -> Placed | None:
+    """Place one detection of a robot that stood at ``pose``; None: nobody knows."""
     x, y, z = detection.box.centre
     if detection.frame_id == "base_link":
-        pose = observer.pose_at_stamp(frame.origin.own_s)
         if pose is None:
             return None
         x, y = pose.transform(x, y)

@@ -15,7 +15,7 @@ ever showed both.
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import Class
 from iveg.domain.limits import LIMITS
@@ -68,7 +68,9 @@ class Tracker:
         """
         chains = self._continue_chains(picture, at)
         picture = [
-            replace(one, sighting=self._chained(one.sighting, old))
+            PlacedDetection(
+                one.class_, self._chained(one.sighting, old), one.decision_id
+            )
             for one, old in zip(picture, chains, strict=True)
         ]
         tracks = self._choose_tracks(picture, chains, at)
@@ -83,7 +85,7 @@ class Tracker:
         """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
         left = tuple(look for look in person.sightings if look != sighting)
-        self.known[person_id] = replace(person, sightings=left)
+        self.known[person_id] = person.seen_as(person.newest, left)
         return self.known[person_id]
 
     def forget(self, now: Instant) -> list[Person]:
@@ -131,9 +133,9 @@ class Tracker:
         self, sighting: Sighting, old: tuple[str, Sighting] | None
     ) -> Sighting:
         if old is not None:
-            return replace(sighting, chain=old[1].chain)
+            return sighting.in_chain(old[1].chain)
         self._chains += 1
-        return replace(sighting, chain=self._chains)
+        return sighting.in_chain(self._chains)
 
     # --- tracks -------------------------------------------------------------------
 
@@ -199,12 +201,9 @@ class Tracker:
         kept = tuple(
             look for look in person.sightings if look.age_s(at) <= LIMITS.ring_lasts_s
         )
-        newest = max(person.newest, sighting, key=lambda look: look.at.mono)
-        self.known[track] = replace(
-            person,
-            newest=newest,
-            sightings=(*kept, sighting),
-        )
+        later = sighting.at.mono > person.newest.at.mono
+        newest = sighting if later else person.newest
+        self.known[track] = person.seen_as(newest, (*kept, sighting))
         return track
 
     def _begin(self, one: PlacedDetection, at: Instant) -> str | None:
@@ -269,18 +268,20 @@ class Tracker:
 
     def _twin_of(self, track: str, at: Instant) -> str | None:
         person = self.known[track]
-        apart = self._together.get(track, set())
+        if person.newest.reach_m:
+            return None
+        apart, x, y = self._together.get(track, set()), person.newest.x, person.newest.y
         for other in self.known.values():
             if (
                 # First what nearly all fail: in a storm this is asked of everybody.
-                abs(other.newest.x - person.newest.x) <= self.merge_m
+                abs(other.newest.x - x) <= self.merge_m
+                and abs(other.newest.y - y) <= self.merge_m
                 and other is not person
                 and other.class_ == person.class_
                 and other.newest.recording == person.newest.recording
                 and other.person_id not in apart
                 and other.age_s(at) <= LIMITS.seen_s
                 and not other.newest.reach_m
-                and not person.newest.reach_m
                 and _distance(other.newest, person.newest) <= self.merge_m
             ):
                 return other.person_id
@@ -289,10 +290,9 @@ class Tracker:
     def _join(self, first: str, second: str) -> None:
         """Every sighting of both is kept: names change, rings do not."""
         older, younger = self.known[first], self.known[second]
-        self.known[first] = replace(
-            older,
-            newest=max(older.newest, younger.newest, key=lambda look: look.at.mono),
-            sightings=(*older.sightings, *younger.sightings),
+        self.known[first] = older.seen_as(
+            max(older.newest, younger.newest, key=lambda look: look.at.mono),
+            (*older.sightings, *younger.sightings),
         )
         apart = self._together.get(second, set()) - {first}
         self._remove(second)
