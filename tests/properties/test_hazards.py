@@ -25,6 +25,19 @@ STEPS = st.lists(
 """Pause (s), who moves and looks, to where, and whom it sees (half metres)."""
 
 
+DRIFTS = st.lists(
+    st.tuples(
+        st.sampled_from([0.0, 0.01, 0.01, 0.1, 0.45, 11.0]),
+        st.sampled_from(FLEET[:3]),
+        st.tuples(st.integers(-16, 16), st.integers(-3, 3)),
+        st.lists(st.tuples(st.integers(-16, 16), st.integers(-3, 3)), max_size=2),
+    ),
+    min_size=1,
+    max_size=25,
+)
+"""The same in quarters of a metre, all within a few metres of one another."""
+
+
 def named(changes: Iterable[LimitChange]) -> list[tuple[object, ...]]:
     return [
         (
@@ -37,26 +50,43 @@ def named(changes: Iterable[LimitChange]) -> list[tuple[object, ...]]:
     ]
 
 
-def play(
-    steps: list[tuple[float, str, tuple[int, int], list[tuple[int, int]]]],
-) -> list[object]:
+Steps = list[tuple[float, str, tuple[int, int], list[tuple[int, int]]]]
+
+
+def play(steps: Steps, metre: float = 2.0) -> list[object]:
     scene, told = Scene(FLEET), list[object]()
     for pause, robot_id, (x, y), seen in steps:
         scene.now += pause
-        scene.drive(robot_id, x / 2, y / 2)
-        scene.look(robot_id, *(person(px / 2, py / 2) for px, py in seen))
+        scene.drive(robot_id, x / metre, y / metre)
+        scene.look(robot_id, *(person(px / metre, py / metre) for px, py in seen))
         told.append((scene.judge(), named(scene.changes), scene.everyone))
     return told
 
 
-@given(STEPS)
-def test_arrays_find_what_looking_at_each_finds(
-    steps: list[tuple[float, str, tuple[int, int], list[tuple[int, int]]]],
-) -> None:
+def assert_alike(steps: Steps, metre: float) -> None:
+    """The rule finds the same whether it looks at each or only at who is near."""
     with pytest.MonkeyPatch.context() as one_by_one:
         one_by_one.setattr(zones, "_FEW_PAIRS", 10**9)
-        expected = play(steps)
+        expected = play(steps, metre)
     with pytest.MonkeyPatch.context() as arrays:
         arrays.setattr(zones, "_FEW_PAIRS", -1)
-        found = play(steps)
+        found = play(steps, metre)
     assert found == expected
+
+
+@given(STEPS)
+def test_arrays_find_what_looking_at_each_finds(steps: Steps) -> None:
+    assert_alike(steps, 2.0)
+
+
+@given(DRIFTS)
+def test_neighbours_of_half_a_second_ago_are_all_that_looking_at_each_finds(
+    steps: Steps,
+) -> None:
+    assert_alike(steps, 4.0)
+
+
+def test_a_peer_that_comes_back_where_it_was_lost_is_found() -> None:
+    both: Steps = [(0.0, "R0", (0, 0), []), (0.1, "R1", (0, 4), [])]
+    alone: Steps = [(10.9, "R0", (0, 0), []), (1.5, "R0", (0, 0), [])]
+    assert_alike([*both, *alone, (0.1, "R1", (0, 4), [])], 4.0)

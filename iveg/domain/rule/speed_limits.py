@@ -17,7 +17,7 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.overload import Overload
-from iveg.domain.rule.zones import NOT_FAR_M, Zone, zones_near
+from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 
@@ -71,6 +71,7 @@ class SpeedLimits:
         self._open: dict[str, dict[str, Crossing]] = {}
         """By robot and cause."""
         self.overload = Overload()
+        self._zones = ZoneFinder()
 
     @property
     def crossings(self) -> Iterable[Crossing]:
@@ -86,7 +87,7 @@ class SpeedLimits:
         new_id: str,
     ) -> tuple[dict[str, SpeedLimit], list[LimitChange]]:
         """Judge the whole fleet; ``new_id`` begins the ids of new decisions."""
-        near = zones_near(world, people, rule, now, self._open)
+        near = self._zones.near(world, people, rule, now, self._open)
         changes: list[LimitChange] = []
         for robot in world.robots.values():
             zones = list(near(robot))

@@ -1,7 +1,8 @@
 """Circles that slow robots, and which of them each robot is near.
 
-Few circles are compared with every robot one by one; many are compared as arrays, so
-that a circle costs nothing unless a robot is near it.
+Few circles are compared with every robot one by one.  Many are compared as arrays, with
+room for how far all may go in half a second; until then, or until somebody appears or
+goes farther, only what was within reach is looked at (Verlet's neighbour list).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,6 +24,8 @@ NOT_FAR_M = 0.01
 """So far outside a ring nobody can be inside, whatever rounding does."""
 _FEW_PAIRS = 150
 """Robots times circles; beyond, arrays are quicker."""
+_ROOM_M, _HOLDS_S = 0.5, 0.5
+"""So far anybody may go, and so much older get, before all are compared again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,142 +80,230 @@ def _zones_of(
 
 
 def _peers(world: World, rule: DetectionRule, now: Instant) -> Iterator[Zone]:
-    for peer, age in _moving(world, now):
-        yield _circle_of(peer, rule.radius_at(age))
-
-
-def _moving(world: World, now: Instant) -> Iterator[tuple[RobotState, float]]:
-    """Peers that one gives way to, and how old their poses are (s)."""
     for peer in world.robots.values():
-        since = peer.likely_pose_at()
-        # A recording cannot yield, and nobody yields to it.
-        if peer.odometry is None or since is None or peer.is_replay:
-            continue
-        age = max(0.0, now.mono - since)
-        known = peer.age_s(now)
-        at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
-        if not at_rest and age <= LIMITS.ring_lasts_s:
-            yield peer, age
+        circle = _circle_of(peer, rule, now)
+        if circle is not None:
+            yield circle
 
 
-def _circle_of(peer: RobotState, radius_m: float) -> Zone:
-    assert peer.odometry is not None  # noqa: S101 - it moves
+def _circle_of(peer: RobotState, rule: DetectionRule, now: Instant) -> Zone | None:
+    """The circle of a peer that one gives way to."""
+    since = peer.likely_pose_at()
+    # A recording cannot yield, and nobody yields to it.
+    if peer.odometry is None or since is None or peer.is_replay:
+        return None
+    age = max(0.0, now.mono - since)
+    known = peer.age_s(now)
+    at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
+    if at_rest or age > LIMITS.ring_lasts_s:
+        return None
     pose, name = peer.odometry.pose, peer.robot_id
-    return Zone("robot", name, name, pose.x, pose.y, radius_m)
+    return Zone("robot", name, name, pose.x, pose.y, rule.radius_at(age))
 
 
 Near = Callable[[RobotState], Iterable[Zone]]
 """A robot → every circle that it is in or was in, and perhaps others; in order."""
 
 
-def zones_near(
-    world: World,
-    people: People,
-    rule: DetectionRule,
-    now: Instant,
-    inside: Mapping[str, Mapping[str, Any]],
-) -> Near:
-    """Find out once which robots are near which circles.
+class ZoneFinder:
+    """Finds out which robots are near which circles."""
 
-    Args:
-        world: The fleet.
-        people: Everybody.
-        rule: How wide a ring is.
-        now: The rings' age is counted from.
-        inside: By robot the causes that it is told to be slow for: never left out.
-    """
-    if len(world.robots) * (len(people.known) + len(world.robots)) <= _FEW_PAIRS:
-        everything = list(zones_of(world, people, rule, now))
-        return lambda _: everything
-    placed = _Placed.of(world)
-    near = _people_near(placed, people, rule, now)
-    peers = _peers_near(placed, world, rule, now, inside)
-    order = {person_id: place for place, person_id in enumerate(people.known)}
-    circles: dict[str, list[Zone]] = {}
+    def __init__(self) -> None:
+        self._known: _Neighbours | None = None
 
-    def found(robot: RobotState) -> Iterable[Zone]:
-        mine, wanted = inside.get(robot.robot_id), near.get(robot.robot_id, set())
-        if mine:
-            wanted = wanted | (mine.keys() & order.keys())
-        for person_id in sorted(wanted, key=order.__getitem__):
-            if person_id not in circles:
-                person = people.known[person_id]
-                circles[person_id] = list(_zones_of(person, world, rule, now))
-            yield from circles[person_id]
-        yield from peers.get(robot.robot_id, ())
+    def near(
+        self,
+        world: World,
+        people: People,
+        rule: DetectionRule,
+        now: Instant,
+        inside: Mapping[str, Mapping[str, Any]],
+    ) -> Near:
+        """Which robots are near which circles now.
 
-    return found
+        Args:
+            world: The fleet.
+            people: Everybody.
+            rule: How wide a ring is.
+            now: The rings' age is counted from.
+            inside: By robot the causes that it is told to be slow for: never left out.
+        """
+        if len(world.robots) * (len(people.known) + len(world.robots)) <= _FEW_PAIRS:
+            everything = list(zones_of(world, people, rule, now))
+            return lambda _: everything
+        known = self._known
+        if known is None or not known.hold(world, people, rule, now):
+            known = self._known = _Neighbours.of(world, people, rule, now)
+        return _Circles(known, world, people, rule, now, inside).near
+
+
+class _Circles:
+    """The circles of one judgement, each made once and only if a robot may be near."""
+
+    def __init__(
+        self,
+        neighbours: "_Neighbours",
+        world: World,
+        people: People,
+        rule: DetectionRule,
+        now: Instant,
+        inside: Mapping[str, Mapping[str, Any]],
+    ) -> None:
+        self._neighbours, self._inside = neighbours, inside
+        self._world, self._people = world, people
+        self._rule, self._now = rule, now
+        self._made: dict[str, list[Zone]] = {}
+
+    def near(self, robot: RobotState) -> Iterable[Zone]:
+        """What ``Near`` says: people in the order of their names, then peers."""
+        robot_id, known = robot.robot_id, self._people.known
+        inside = self._inside.get(robot_id, {}).keys()
+        people = self._neighbours.people.get(robot_id, _NOBODY) | inside
+        here = [known[one] for one in people if one in known]
+        here.sort(key=lambda one: one.number)
+        for person in here:
+            yield from self._of(person.person_id, self._of_person)
+        robots = self._world.robots
+        peers = self._neighbours.peers.get(robot_id, _NOBODY) | inside
+        for peer in robots if len(peers) > 1 else peers:
+            if peer in peers and peer in robots:
+                yield from self._of(peer, self._of_peer)
+
+    def _of(self, name: str, make: Callable[[str], list[Zone]]) -> list[Zone]:
+        made = self._made.get(name)
+        if made is None:
+            made = self._made[name] = make(name)
+        return made
+
+    def _of_person(self, person_id: str) -> list[Zone]:
+        person = self._people.known[person_id]
+        return list(_zones_of(person, self._world, self._rule, self._now))
+
+    def _of_peer(self, robot_id: str) -> list[Zone]:
+        peer = self._world.robots[robot_id]
+        circle = _circle_of(peer, self._rule, self._now)
+        return [] if circle is None else [circle]
+
+
+_NOBODY: frozenset[str] = frozenset()
+_Place = tuple[float, float, float]
+"""Of a robot: x, y (m), and the moment of its pose (monotonic, s)."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Placed:
-    """Robots of which it is known where they are; ``places`` has shape (n, 2) (m)."""
+class _Neighbours:
+    """Who may come near whom within half a second.
 
-    names: list[str]
-    places: Floats
+    Attributes:
+        at: When all were compared (monotonic, s).
+        places: Where robots were then; ``looks`` what was known of people.
+        people: Robot → people; ``peers``: robot → robots.
+        checked: The newest of each person that is still within reach of ``looks``.
+    """
+
+    at: float
+    radius_m: float
+    places: Mapping[str, _Place]
+    looks: Mapping[str, Person]
+    people: Mapping[str, set[str]]
+    peers: Mapping[str, set[str]]
+    checked: dict[str, Person]
 
     @classmethod
-    def of(cls, world: World) -> "_Placed":
-        """As the world knows them now."""
-        placed = [
-            (robot.robot_id, robot.odometry.pose)
+    def of(
+        cls, world: World, people: People, rule: DetectionRule, now: Instant
+    ) -> "_Neighbours":
+        """Compare everybody with everybody."""
+        places = {
+            robot.robot_id: place
             for robot in world.robots.values()
-            if robot.odometry is not None
+            if (place := _place_of(robot)) is not None
+        }
+        robots = np.array(list(places.values())).reshape(-1, 3).T
+        spots, names = people.spots, list(places)
+        x, y, since, reach = spots.columns
+        near, beside = dict[str, set[str]](), dict[str, set[str]]()
+        age, limit = _reach(rule, now, since, reach)
+        limit[age > LIMITS.ring_lasts_s] = -1.0
+        for row, column in _within(robots, x, y, limit):
+            near.setdefault(names[row], set()).add(spots.owners[column][0])
+        x, y, since = robots
+        # A peer that has long been silent may speak again.
+        for row, column in _within(robots, x, y, _reach(rule, now, since)[1]):
+            # A robot is near itself, which does not slow it.
+            if row != column:
+                beside.setdefault(names[row], set()).add(names[column])
+        looks = dict(people.known)
+        return cls(now.mono, rule.radius_m, places, looks, near, beside, dict(looks))
+
+    def hold(
+        self, world: World, people: People, rule: DetectionRule, now: Instant
+    ) -> bool:
+        """Whether nobody else can be near anybody by now."""
+        return (
+            0.0 <= now.mono - self.at <= _HOLDS_S
+            and rule.radius_m == self.radius_m
+            and all(map(self._is_still_there, world.robots.values()))
+            and all(map(self._is_still_seen_there, people.known.values()))
+        )
+
+    def _is_still_there(self, robot: RobotState) -> bool:
+        if robot.odometry is None:
+            return True
+        place, now = self.places.get(robot.robot_id), _place_of(robot)
+        if place is None or now is None:
+            return False
+        return _is_as_near(now, place)
+
+    def _is_still_seen_there(self, person: Person) -> bool:
+        if self.checked.get(person.person_id) is person:
+            return True
+        before = self.looks.get(person.person_id)
+        if before is None:
+            return False
+        spots = [
+            (one.x, one.y, one.at.mono, one.reach_m)
+            for one in before.sightings
+            if self.at - one.at.mono <= LIMITS.ring_lasts_s
         ]
-        places = np.array([(pose.x, pose.y) for _, pose in placed]).reshape(-1, 2)
-        return cls([name for name, _ in placed], places)
-
-    def within(self, x: Floats, y: Floats, limit: Floats) -> Iterator[tuple[str, int]]:
-        """Which robots are within ``limit`` (m) of which places."""
-        dx, dy = x - self.places[:, :1], y - self.places[:, 1:]
-        rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-            yield self.names[row], column
-
-
-def _people_near(
-    placed: _Placed, people: People, rule: DetectionRule, now: Instant
-) -> dict[str, set[str]]:
-    """Robot → the people whom it may be near."""
-    spots = people.spots
-    x, y, seen_at, reach = spots.columns
-    age = np.maximum(0.0, now.mono - seen_at)
-    ring = ring_radius(rule.radius_m, age, np.minimum, np.maximum)
-    ring = np.maximum(reach, ring) + 2 * NOT_FAR_M
-    limit = np.where(age <= LIMITS.ring_lasts_s, ring, -1.0)
-    near: dict[str, set[str]] = {}
-    for robot_id, column in placed.within(x, y, limit):
-        near.setdefault(robot_id, set()).add(spots.owners[column][0])
-    return near
+        for look in person.sightings:
+            here = look.x, look.y, look.at.mono
+            if not any(
+                _is_as_near(here, spot[:3]) and look.reach_m <= spot[3]
+                for spot in spots
+            ):
+                return False
+        self.checked[person.person_id] = person
+        return True
 
 
-def _peers_near(
-    placed: _Placed,
-    world: World,
-    rule: DetectionRule,
-    now: Instant,
-    inside: Mapping[str, Mapping[str, Any]],
-) -> dict[str, list[Zone]]:
-    """Robot → the peers that it may be near or is slow for."""
-    peers = list(_moving(world, now))
-    rows = {name: row for row, name in enumerate(placed.names)}
-    places = placed.places[[rows[peer.robot_id] for peer, _ in peers]]
-    ages = np.array([age for _, age in peers])
-    limit = ring_radius(rule.radius_m, ages, np.minimum, np.maximum) + 2 * NOT_FAR_M
-    chosen: dict[str, set[int]] = {}
-    for robot_id, column in placed.within(places[:, 0], places[:, 1], limit):
-        # A robot is near itself, which does not slow it.
-        if peers[column][0].robot_id != robot_id:
-            chosen.setdefault(robot_id, set()).add(column)
-    place = {peer.robot_id: column for column, (peer, _) in enumerate(peers)}
-    for robot_id, causes in inside.items():
-        if known := {place[cause] for cause in causes.keys() & place.keys()}:
-            chosen[robot_id] = chosen.get(robot_id, set()) | known
+def _place_of(robot: RobotState) -> _Place | None:
+    """None where nobody knows."""
+    since = robot.likely_pose_at()
+    if robot.odometry is None or since is None:
+        return None
+    return robot.odometry.pose.x, robot.odometry.pose.y, since
 
-    def circle(column: int) -> Zone:
-        peer, age = peers[column]
-        return _circle_of(peer, rule.radius_at(age))
 
-    return {
-        name: [circle(one) for one in sorted(mine)] for name, mine in chosen.items()
-    }
+def _is_as_near(now: _Place, before: _Place) -> bool:
+    """Whether something is not far from where it was, and not older than that."""
+    dx, dy = now[0] - before[0], now[1] - before[1]
+    return dx * dx + dy * dy <= _ROOM_M * _ROOM_M and now[2] >= before[2]
+
+
+def _reach(
+    rule: DetectionRule, now: Instant, since: Floats, reach: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
+    """Ages (s), and how near a robot must be to come into such a ring soon (m)."""
+    age: Floats = np.maximum(0.0, now.mono - since)
+    ring = ring_radius(rule.radius_m, age + _HOLDS_S, np.minimum, np.maximum)
+    return age, np.maximum(reach, ring) + 2 * _ROOM_M + 2 * NOT_FAR_M
+
+
+def _within(
+    robots: Floats, x: Floats, y: Floats, limit: Floats
+) -> Iterator[tuple[int, int]]:
+    """Which robots (columns of x, y, …) are within ``limit`` (m) of which places."""
+    dx, dy = x - robots[0][:, None], y - robots[1][:, None]
+    rows, columns = np.nonzero((dx * dx + dy * dy <= limit * limit) & (limit > 0.0))
+    return zip(rows.tolist(), columns.tolist(), strict=True)
