@@ -4,12 +4,14 @@ Every scan judges each cell in its reach: free, if the beam in that direction we
 further; taken, if it ended there (Moravec and Elfes' occupancy grid, in log-odds with
 the clamps of OctoMap, so that a crate that is carried away is soon forgotten).  Cells
 that no beam reaches any more fade to unknown.  People and peers are laid over the grid
-with their ring at the moment of the request.  Left out: beams are lines without width.
+with their ring at the moment of the request.  Left out: beams are lines without width,
+and come from the nearest quarter of a cell.
 """
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +25,9 @@ MAX_CELLS = 400_000
 UNKNOWN = -1
 _HIT, _MISS = 0.85, -0.4
 _LEAST, _MOST = -2.0, 3.5
-_HALF_LIFE_S = 20.0
+_HALF_LIFE_S, _FADES_EVERY_S = 20.0, 0.25
+_PARTS = 4
+"""Of a cell along each axis: places that a sensor may have, each worked out once."""
 _KNOWN = 0.05
 """Log-odds nearer to zero than this say nothing."""
 _REACH_M = 15.0
@@ -134,9 +138,11 @@ class Occupancy:
         np.clip(part, _LEAST, _MOST, out=part)
 
     def fade(self, mono: float) -> None:
-        """Let the knowledge of the last call age until ``mono`` (s)."""
+        """Let what is known age until ``mono`` (s), or almost."""
         if self._faded is not None:
             passed = max(0.0, mono - self._faded)
+            if passed < _FADES_EVERY_S:
+                return
             self._log *= np.float32(0.5 ** (passed / _HALF_LIFE_S))
         self._faded = mono
 
@@ -207,35 +213,80 @@ def sweep_of(scan: LaserScan, pose: Pose2D, grid: Grid) -> Sweep:
     """
     sensor = pose.compose(scan.mount)
     reach = min(scan.range_max, _REACH_M)
-    cells = grid.window(sensor.x, sensor.y, reach)
-    dx, dy = grid.offsets(cells, sensor.x, sensor.y)
-    change = np.zeros((dy.shape[0], dx.shape[1]), np.float32)
+    row, column = grid.index(sensor.x, sensor.y)
+    around = math.ceil(reach / grid.resolution)
+    cells = (
+        _overlap(row - around, 2 * around + 1, grid.height),
+        _overlap(column - around, 2 * around + 1, grid.width),
+    )
+    shape = cells[0].stop - cells[0].start, cells[1].stop - cells[1].start
+    change = np.zeros(shape, np.float32)
     if change.size and scan.ranges.size:
-        distance = np.hypot(dx, dy)
-        free = distance < _free_to(scan, sensor.yaw, dx, dy, reach) - grid.resolution
-        change[free] = _MISS
-        row, column = _hits(scan, pose, sensor, grid, reach)
-        inside = (row >= cells[0].start) & (row < cells[0].stop)
-        inside &= (column >= cells[1].start) & (column < cells[1].stop)
-        change[row[inside] - cells[0].start, column[inside] - cells[1].start] = _HIT
+        distance, bearing = _seen_from(grid, sensor, around)
+        part = (
+            slice(cells[0].start - row + around, cells[0].stop - row + around),
+            slice(cells[1].start - column + around, cells[1].stop - column + around),
+        )
+        free_to = _free_to(scan, sensor.yaw, bearing[part], reach)
+        free = distance[part] < free_to - np.float32(grid.resolution)
+        np.multiply(free, np.float32(_MISS), out=change)
+        rows, columns = _hits(scan, pose, sensor, grid, reach)
+        inside = (rows >= cells[0].start) & (rows < cells[0].stop)
+        inside &= (columns >= cells[1].start) & (columns < cells[1].stop)
+        change[rows[inside] - cells[0].start, columns[inside] - cells[1].start] = _HIT
     return Sweep(cells, change)
 
 
-def _free_to(scan: LaserScan, yaw: float, dx: _Log, dy: _Log, reach: float) -> _Log:
+def _seen_from(grid: Grid, sensor: Pose2D, around: int) -> tuple[_Log, _Log]:
+    """Distances (m) and bearings (rad) of the cells around a sensor, about exactly."""
+    x = (sensor.x - grid.xmin) / grid.resolution
+    y = (sensor.y - grid.ymin) / grid.resolution
+    parts = (math.floor((one - math.floor(one)) * _PARTS) for one in (x, y))
+    return _cells_around(grid.resolution, around, *parts)
+
+
+@lru_cache(maxsize=_PARTS * _PARTS)
+def _cells_around(
+    resolution: float, around: int, part_x: int, part_y: int
+) -> tuple[_Log, _Log]:
+    """Where cells are, from a sensor in that part of the cell in the middle.
+
+    The angles of a hundred thousand cells cost more than all else in a sweep.
+    """
+    cells = np.arange(-around, around + 1, dtype=np.float32) + 0.5
+    dx = (cells - (part_x + 0.5) / _PARTS)[None, :] * resolution
+    dy = (cells - (part_y + 0.5) / _PARTS)[:, None] * resolution
+    return (
+        np.hypot(dx, dy).astype(np.float32),
+        np.arctan2(dy, dx).astype(np.float32),
+    )
+
+
+def _free_to(scan: LaserScan, yaw: float, bearing: _Log, reach: float) -> _Log:
     """Length of the beam towards each cell (m); 0 where there is no beam."""
-    count = scan.ranges.size
-    step = scan.angle_increment
-    bearing = np.arctan2(dy, dx) - np.float32(yaw + scan.angle_min)
-    # A scan may turn either way; whole turns are taken out in its own direction.
-    beam = np.mod(bearing, math.copysign(math.tau, step)) * np.float32(1.0 / step)
-    index = np.rint(beam).astype(np.int32)
-    if abs(count * step) >= math.tau - 1.5 * abs(step):
-        index %= count
-    ranges = scan.ranges
+    step, first = scan.angle_increment, yaw + scan.angle_min
+    turn = math.tau / abs(step)
+    # A scan may turn either way.  Beams are counted from a bearing that no cell is
+    # before, in the scan's own direction, and then less than two turns.
+    side = math.copysign(math.pi, step)
+    whole = math.copysign(math.tau, step)
+    first -= whole * math.ceil((first + side) / whole)
+    beam = bearing * np.float32(1.0 / step) - np.float32(first / step)
+    beam -= (beam >= turn) * np.float32(turn)
+    index = (beam + np.float32(0.5)).astype(np.intp)
+    return _lengths(scan, math.ceil(turn) + 2, reach).take(index, mode="clip")
+
+
+def _lengths(scan: LaserScan, size: int, reach: float) -> _Log:
+    """How far each beam of a turn went (m); 0 where there is none, or no use in it."""
+    ranges, count = scan.ranges, scan.ranges.size
     usable = (ranges >= scan.range_min) | np.isinf(ranges)
     went = np.where(usable, np.minimum(ranges, reach), 0.0).astype(np.float32)
-    looked = index < count
-    return np.where(looked, went[np.minimum(index, count - 1)], np.float32(0.0))
+    if abs(count * scan.angle_increment) >= math.tau - 1.5 * abs(scan.angle_increment):
+        return np.resize(went, size)  # all round: after the last comes the first
+    lengths = np.zeros(size, np.float32)
+    lengths[: min(count, size)] = went[:size]
+    return lengths
 
 
 def _hits(
