@@ -134,8 +134,8 @@ async def whole_way(dss: Dss, line: Line, bodies: list[bytes]) -> float:
     for one in bodies:
         await line.post(one)
     spent = (time.process_time() - began) / len(bodies) * 1000
-    for received in dss.ingest.drain():
-        dss.evaluator.world.apply(received)
+    for received in dss.pipeline.ingest.drain():
+        dss.pipeline.world.apply(received)
     return spent
 
 

@@ -1,26 +1,40 @@
 """Composition of the pipeline from its ports, for iVeg and for its tests."""
 
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
+from iveg.domain.messages import Channel, Contacts
 from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
 from iveg.pipeline.command import Commander
+from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
-from iveg.pipeline.ports import CommandPort, FleetPort, StopJournal
+from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.messenger import Messenger
+from iveg.pipeline.ports import (
+    Clock,
+    CommandPort,
+    ContactStore,
+    FleetPort,
+    RuleStore,
+    Sender,
+    StopJournal,
+)
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
+from iveg.pipeline.rules import Rules
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +94,40 @@ class Pipeline:
     evaluator: Evaluator
     commander: Commander
     loop: RuleLoop
+
+    def counters(self) -> Counter[str]:
+        """Everything that is counted in it."""
+        total = Counter(self.ingest.counters)
+        total.update(self.world.counters)
+        total.update(self.commander.counters)
+        total["live.browsers"] = self.hub.watchers
+        total["nlos.protected"] = self.evaluator.protected_unseen
+        return total
+
+
+@dataclass(frozen=True, slots=True)
+class KeptChoices:
+    """What people have chosen while iVeg ran, and where that is kept.
+
+    Attributes:
+        rules: Every version of the rule, oldest first.
+        contacts: Whom iVeg tells outside.
+    """
+
+    rule_store: RuleStore
+    contact_store: ContactStore
+    rules: Sequence[DetectionRule] = ()
+    contacts: Contacts = field(default_factory=Contacts)
+
+
+@dataclass(frozen=True, slots=True)
+class Services:
+    """Parts beside the rule loop, for people; STOP and speed limits need none."""
+
+    rules: Rules
+    messenger: Messenger
+    mapper: Mapper
+    coverage: CoverageMonitor
 
 
 def build(
@@ -141,4 +189,22 @@ def build(
         evaluator,
         commander,
         loop,
+    )
+
+
+def build_services(
+    parts: Pipeline, kept: KeptChoices, senders: Mapping[Channel, Sender], clock: Clock
+) -> Services:
+    """The parts beside a pipeline; raised alerts reach the messenger."""
+    evaluator, event_log = parts.evaluator, parts.event_log
+    greenhouse, alerts = evaluator.greenhouse, evaluator.alerts
+    messenger = Messenger(
+        kept.contacts, kept.contact_store, senders, alerts, event_log, clock
+    )
+    alerts.on_raised = messenger.offer
+    return Services(
+        Rules(evaluator, kept.rule_store, event_log, kept.rules),
+        messenger,
+        Mapper(parts.world, greenhouse.bounds),
+        CoverageMonitor(parts.world, greenhouse),
     )

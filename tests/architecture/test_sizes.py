@@ -30,8 +30,6 @@ LARGE_FILES = {
     "iveg/ros2/messages.py": TABLE,
 }
 LARGE_FUNCTIONS = {
-    "iveg/app.py Dss.__init__": LIST,
-    "iveg/asgi.py create_app": LIST,
     "iveg/cli/__init__.py _parser": LIST,
     "iveg/emulator/fleet.py run_emulator": LIST,
     "iveg/emulator/replay.py run_replay": LIST,

@@ -183,7 +183,7 @@ def _live(desk: WebDesk) -> dict[str, Any]:
     told = {f"live {topic}": _read(desk.encoder.frame(topic)) for topic in _TOPICS}
     told["live log"] = _read(desk.encoder.event("log", log_record()))
     ana, now = Principal("ana", "operator"), desk.clock()
-    told["live snapshot"] = orjson.loads(write_json(desk.snapshot(ana, now)))
+    told["live snapshot"] = orjson.loads(write_json(desk.face.snapshot(ana, now)))
     del told["live snapshot"]["log"]  # how many lines there are is nobody's business
     stop = desk.commander.machine("AGII").stop
     told["live commands/{id}"] = _read(desk.encoder.event("commands/x", stop))

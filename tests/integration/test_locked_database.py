@@ -68,7 +68,7 @@ async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
         signed_in = await browser.get("/", params={"token": "ab" * 32})
         assert (await press(browser)).status_code == 202
         cookies = {**browser.cookies}
-        await dss.recorder.caught_up()
+        await dss.stores.recorder.caught_up()
     assert signed_in.status_code in (302, 303, 307)
 
     with ExitStack() as stack:
@@ -76,16 +76,16 @@ async def test_f20_with_a_locked_database_iveg_starts_stops_signs_in_and_judges(
         async with asyncio.timeout(30), running(tmp_path) as (dss, browser):
             browser.cookies.update(cookies)
             async with asyncio.timeout(SOON_S):
-                machine = dss.commander.machine("AGI")
+                machine = dss.pipeline.commander.machine("AGI")
                 await so(lambda: machine.wants_stop)
                 read = await browser.get("/api/v1/robots")
                 pressed = await press(browser)
-                dss.ingest.offer(Received(odometry("AGI", 3.0), clock.now()))
-                robot = dss.evaluator.world.robot("AGI")
+                dss.pipeline.ingest.offer(Received(odometry("AGI", 3.0), clock.now()))
+                robot = dss.pipeline.world.robot("AGI")
                 await so(lambda: robot.odometry is not None)
-                judged = dss.evaluator.speed_limits["AGI"]
+                judged = dss.pipeline.evaluator.speed_limits["AGI"]
 
-            written = dss.recorder.counters["history_written"]
+            written = dss.stores.recorder.counters["history_written"]
             stack.close()  # an end that waits for the database is another matter
 
     assert machine.stop is not None

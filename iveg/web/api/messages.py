@@ -13,6 +13,8 @@ from fastapi import APIRouter, Depends
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
+from iveg.adapters import web_push
+from iveg.adapters.outside import is_public_target
 from iveg.domain import messages
 from iveg.domain.messages import Channel, Contacts, Language, Level, Message, Text
 from iveg.domain.observations import Instant
@@ -158,18 +160,11 @@ class Desk:
 
     Attributes:
         messenger: Who keeps and tells people.
-        new_key: Makes this server's key; ``public_key`` is what browsers are told.
-        is_key: Whether a browser's key is one (these three: ``adapters.web_push``).
-        is_reachable: Whether an https address may be used at all, by its looks.
         new_id: Names a device.
         clock: The time.
     """
 
     messenger: Messenger
-    new_key: Callable[[], str]
-    public_key: Callable[[str], str]
-    is_key: Callable[[str], bool]
-    is_reachable: Callable[[str], bool]
     new_id: Callable[[], str]
     clock: Callable[[], Instant]
 
@@ -181,7 +176,7 @@ class Desk:
     def answer(self) -> Response:
         """All of it, as operators read it."""
         key = self.contacts.push.key
-        public = self.public_key(key) if key else None
+        public = web_push.public_key(key) if key else None
         last, counts = self.messenger.last, self.messenger.counters
         return Json(Messages.of(self.contacts, public, last, counts))
 
@@ -199,7 +194,8 @@ class Desk:
             return "Web push was never on here."
         if len(_others(push, body.endpoint)) >= messages.MOST_DEVICES:
             return "There are as many devices as can be told."
-        if not self.is_key(body.keys.p256dh) or not self.is_reachable(body.endpoint):
+        is_key = web_push.is_public_key(body.keys.p256dh)
+        if not is_key or not is_public_target(body.endpoint):
             return "That is no subscription of a public push service."
         return ""
 
@@ -240,7 +236,7 @@ def _add_channels(routes: APIRouter, desk: Desk) -> None:
     async def put_webhook(body: WebhookBody, who: _Operator) -> Response:
         """Change the webhook."""
         hook = body.applied_to(desk.contacts.webhook)
-        if not desk.is_reachable(hook.url):
+        if not is_public_target(hook.url):
             return _refused("The address must be a public https one.")
         return await desk.change(
             "webhook", who, lambda all_: replace(all_, webhook=hook)
@@ -249,9 +245,7 @@ def _add_channels(routes: APIRouter, desk: Desk) -> None:
     @routes.put("/push", response_model=Messages)
     async def put_push(body: PushBody, who: _Operator) -> Response:
         """Change web push; the first time makes this server's key."""
-        return await desk.change(
-            "push", who, lambda all_: _switched(all_, body, desk.new_key)
-        )
+        return await desk.change("push", who, lambda all_: _switched(all_, body))
 
 
 def _add_devices(routes: APIRouter, desk: Desk) -> None:
@@ -273,8 +267,8 @@ def _add_devices(routes: APIRouter, desk: Desk) -> None:
         return await desk.change("push", who, lambda all_: all_.without({device_id}))
 
 
-def _switched(all_: Contacts, body: PushBody, new_key: Callable[[], str]) -> Contacts:
-    key = all_.push.key or new_key()
+def _switched(all_: Contacts, body: PushBody) -> Contacts:
+    key = all_.push.key or web_push.new_key()
     push = replace(all_.push, on=body.on, contact=body.contact, key=key)
     return replace(all_, push=push)
 

@@ -59,7 +59,7 @@ class Desk:
         self.sink = FakeRecorder()
         self.rejected: list[tuple[str, str]] = []
         self.description = fleet_of(*robots)
-        parts = build(
+        self.parts = parts = build(
             self.description,
             greenhouse,
             Ports(

@@ -4,45 +4,23 @@ import asyncio
 import contextlib
 from collections import Counter
 from collections.abc import AsyncIterator
-from typing import Any
+from functools import cache
 
 import httpx
 import uvicorn
-from fastapi import FastAPI
 
-from iveg.adapters import web_push
-from iveg.adapters.outside import is_public_target
-from iveg.domain.messages import CHANNELS, Contacts
+from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
-from iveg.domain.stop import Press
-from iveg.models.snapshot import Server, Snapshot, User
-from iveg.ngsi.codec import format_stamp
-from iveg.pipeline import topics
-from iveg.pipeline.mapping import Mapper
-from iveg.pipeline.messenger import Messenger
-from iveg.pipeline.rules import Rules
-from iveg.web import notifications, problems
-from iveg.web.api import (
-    alerts,
-    commands,
-    costmap,
-    health,
-    latency,
-    messages,
-    metrics,
-    robots,
-    rule,
-)
+from iveg.pipeline.build import KeptChoices, build_services
+from iveg.web import notifications
+from iveg.web.api import metrics
+from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import socket
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.routes import Pages
 from iveg.web.prompt import prompt_http
-from iveg.web.security import headers
-from iveg.web.security.authentication import (
-    Authenticator,
-    NotifySecret,
-    Principal,
-    Role,
-)
+from iveg.web.security.authentication import Authenticator, NotifySecret, Role
 from iveg.web.views import Views
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.rule_store import FakeRuleStore
@@ -53,12 +31,14 @@ API_TOKEN = "a-token-for-programs"
 SECRET = "ab" * 32
 TENANT = {"Fiware-Service": "agroconnect", "Fiware-ServicePath": "/greenhouse"}
 
+_pages = cache(Pages)
+
 
 class WebDesk(Desk):
     """A desk that browsers, programs and Orion can reach."""
 
-    def __init__(self, robots_: tuple[str, ...] = ("AGI", "AGII")) -> None:
-        super().__init__(robots_)
+    def __init__(self, robots: tuple[str, ...] = ("AGI", "AGII")) -> None:
+        super().__init__(robots)
         self.heard: list[Instant] = []
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.authenticator = Authenticator(
@@ -66,19 +46,12 @@ class WebDesk(Desk):
             api_token=API_TOKEN,
             clock=self.clock,
         )
-        self.mapper = Mapper(self.world, self.evaluator.greenhouse.bounds)
         self.rule_store = FakeRuleStore()
-        self.rules = Rules(self.evaluator, self.rule_store, self.event_log, [])
         self.contact_store = FakeContacts()
         self.senders = {name: FakeSender(name) for name in CHANNELS}
-        self.messenger = Messenger(
-            Contacts(),
-            self.contact_store,
-            {**self.senders},
-            self.evaluator.alerts,
-            self.event_log,
-            self.clock,
-        )
+        kept = KeptChoices(self.rule_store, self.contact_store)
+        self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
+        self.rules = self.services.rules
         self.views = Views(
             self.evaluator,
             self.commander,
@@ -87,13 +60,7 @@ class WebDesk(Desk):
             lambda: Counter({"some": 1}),
         )
         self.encoder = socket.Encoder(self.views, self.hub, self.clock)
-        self.app = FastAPI()
-        self.app.state.authenticator = self.authenticator
-        for router in self._routers():
-            self.app.include_router(router)
-        problems.install(self.app)
-        self.app.add_middleware(headers.BodyLimit)
-        orion = notifications.NotificationEndpoint(
+        self.notifications = notifications.NotificationEndpoint(
             self.ingest,
             NotifySecret(SECRET),
             self.clock,
@@ -102,59 +69,20 @@ class WebDesk(Desk):
             self.heard.append,
             "thinned".__eq__,
         )
-        self.app.router.routes.append(orion.route())
-        self.notifications = orion
-        self.app.add_middleware(notifications.NotificationsFirst, endpoint=orion)
-
-    def _routers(self) -> list[Any]:
-        return [
-            socket.router(
-                self.hub,
-                self.encoder,
-                self.snapshot,
-                self.clock,
-                self.stop,
-                self.latency.watch,
-            ),
-            robots.router(self.views, self.clock),
-            costmap.router(self.mapper, self.evaluator, self.clock),
-            commands.router(self.commander, self.clock),
-            alerts.router(self.evaluator, self.clock),
-            rule.router(self.rules, self.clock),
-            messages.router(
-                messages.Desk(
-                    self.messenger,
-                    web_push.new_key,
-                    web_push.public_key,
-                    web_push.is_public_key,
-                    is_public_target,
-                    self.ids,
-                    self.clock,
-                )
-            ),
-            health.router(self.clock, self.views.health),
-            latency.router(self.latency.watch, self.clock),
-            metrics.router(
-                self.clock,
-                self.views.health,
-                self.latency.watch,
-                lambda: self.queues,
-            ),
-        ]
-
-    # --- what the web asks --------------------------------------------------------
-
-    def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
-        return Snapshot(
-            t=format_stamp(now.wall),
-            server=Server(boot="iveg-boot", version="1", demo=True, wall=now.wall),
-            user=User(name=principal.name, role=principal.role),
-            **topics.read_all(self.views, now),
+        self.face = Face(
+            pipeline=self.parts,
+            services=self.services,
+            views=self.views,
+            authenticator=self.authenticator,
+            orion=self.notifications,
+            site=Site("field", robots, "1", demo=True),
+            boot="iveg-boot",
+            queues=lambda: self.queues,
+            clock=self.clock,
+            new_id=self.ids,
         )
-
-    async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
-        targets = self.commander.machines if robot_id is None else [robot_id]
-        await self.commander.stop(targets, by, self.clock(), press)
+        self.pages = _pages(self.face.site)
+        self.app = build_app(self.face, self.pages, live_routers(self.face))
 
     # --- who asks -----------------------------------------------------------------
 

@@ -51,7 +51,7 @@ async def test_one_press_over_http_and_over_the_socket_is_one_command() -> None:
     said = {"press_id": "p", "pressed_at": START.wall - 0.25}
     async with desk.browser() as browser:
         first = await browser.post("/api/v1/robots/AGI/stop", json=said)
-        await desk.stop("AGI", "ana", read_press({"type": "stop", **said}))
+        await desk.face.stop("AGI", "ana", read_press({"type": "stop", **said}))
         again = await browser.post("/api/v1/robots/AGI/stop", json=said)
 
     assert first.json()["command_id"] == again.json()["command_id"]

@@ -84,7 +84,7 @@ async def test_no_secret_comes_out_again() -> None:
     answer = await ask(desk, "GET")
 
     secrets = ["tomato", "s3cret", mine["keys"]["auth"], mine["endpoint"]]
-    secrets.append(desk.messenger.contacts.push.key)
+    secrets.append(desk.services.messenger.contacts.push.key)
     assert [one for one in secrets if one in answer.text] == []
     assert answer.json()["email"]["has_password"] is True
     assert answer.json()["webhook"]["host"] == "hooks.coop.es"
@@ -110,7 +110,7 @@ async def test_an_empty_password_keeps_the_one_that_is_there() -> None:
 
     await ask(desk, "PUT", "/email", {**EMAIL, "password": None, "least": "P2"})
 
-    kept = desk.messenger.contacts.email
+    kept = desk.services.messenger.contacts.email
     assert (kept.password, kept.least) == ("tomato", "P2")
 
 
@@ -125,7 +125,7 @@ async def test_a_kept_password_is_sent_to_no_other_server(other: Any) -> None:
     answer = await ask(desk, "PUT", "/email", {**EMAIL, "password": None, **other})
 
     assert answer.status_code == 422
-    assert desk.messenger.contacts.email.server == "smtp.coop.es"
+    assert desk.services.messenger.contacts.email.server == "smtp.coop.es"
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ async def test_a_push_service_at_home_or_a_key_that_is_none_is_refused(
     answer = await ask(desk, "POST", "/devices", {**device(), **wrong})
 
     assert answer.status_code == 422
-    assert desk.messenger.contacts.push.devices == ()
+    assert desk.services.messenger.contacts.push.devices == ()
 
 
 async def test_a_test_says_what_came_of_it_and_the_next_one_waits() -> None:
@@ -214,7 +214,7 @@ async def test_a_full_disk_changes_nothing() -> None:
     answer = await ask(desk, "PUT", "/webhook", HOOK)
 
     assert answer.status_code == 503
-    assert desk.messenger.contacts.webhook.url == ""
+    assert desk.services.messenger.contacts.webhook.url == ""
 
 
 def test_a_letter_says_how_grave_and_when_in_the_readers_language() -> None:

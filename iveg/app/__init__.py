@@ -1,0 +1,5 @@
+"""Composition root of the DSS: settings → parts.  Wires, decides nothing."""
+
+from iveg.app.dss import Dss
+
+__all__ = ["Dss"]

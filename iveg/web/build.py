@@ -1,0 +1,128 @@
+"""Composition of the web face from its parts, for iVeg and for its tests."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import APIRouter, FastAPI
+
+from iveg.domain.observations import Instant
+from iveg.domain.stop import Press
+from iveg.models.snapshot import Server, Snapshot, User
+from iveg.ngsi.codec import format_stamp
+from iveg.pipeline import topics
+from iveg.pipeline.build import Pipeline, Services
+from iveg.pipeline.ports import Clock, Ids
+from iveg.web import notifications, problems
+from iveg.web.api import (
+    alerts,
+    commands,
+    costmap,
+    coverage,
+    health,
+    latency,
+    messages,
+    metrics,
+    robots,
+    rule,
+)
+from iveg.web.live import socket
+from iveg.web.pages.contexts import Site
+from iveg.web.pages.routes import Pages
+from iveg.web.security import headers, rate_limits
+from iveg.web.security.authentication import Authenticator, Principal
+from iveg.web.security.signin import SignInLink
+from iveg.web.views import Views
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Face:
+    """The parts that everybody is shown who asks what there is now.
+
+    Attributes:
+        orion: Takes Orion's notifications.
+        boot: Random, new at each start.
+        queues: How full the queues are.
+    """
+
+    pipeline: Pipeline
+    services: Services
+    views: Views
+    authenticator: Authenticator
+    orion: notifications.NotificationEndpoint
+    site: Site
+    boot: str
+    queues: Callable[[], metrics.Queues]
+    clock: Clock
+    new_id: Ids
+
+    def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
+        """Everything that is known, for a browser that has just come."""
+        server = Server(
+            boot=self.boot,
+            version=self.site.version,
+            demo=self.site.demo,
+            wall=now.wall,
+        )
+        return Snapshot(
+            t=format_stamp(now.wall),
+            server=server,
+            user=User(name=principal.name, role=principal.role),
+            **topics.read_all(self.views, now),
+        )
+
+    async def stop(self, robot_id: str | None, by: str, press: Press) -> None:
+        """STOP one robot, or all."""
+        commander = self.pipeline.commander
+        targets = commander.machines if robot_id is None else [robot_id]
+        await commander.stop(targets, by, self.clock(), press)
+
+
+def live_routers(face: Face) -> Iterator[APIRouter]:
+    """The routes of what there is now: all but history, experiments and pages."""
+    parts, beside, views, clock = face.pipeline, face.services, face.views, face.clock
+    watch, evaluator = parts.latency.watch, parts.evaluator
+    encoder = socket.Encoder(views, parts.hub, clock)
+    yield socket.router(parts.hub, encoder, face.snapshot, clock, face.stop, watch)
+    yield robots.router(views, clock)
+    yield costmap.router(beside.mapper, evaluator, clock)
+    yield coverage.router(beside.coverage, clock)
+    yield commands.router(parts.commander, clock)
+    yield alerts.router(evaluator, clock)
+    yield rule.router(beside.rules, clock)
+    yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
+    yield latency.router(watch, clock)
+    yield health.router(clock, views.health)
+    yield metrics.router(clock, views.health, watch, face.queues)
+
+
+def build_app(
+    face: Face,
+    pages: Pages,
+    routers: Iterable[APIRouter],
+    **facts: Any,
+) -> FastAPI:
+    """The application with these routes, and what stands before them.
+
+    Args:
+        face: Its parts.
+        pages: Draws problems for people.
+        routers: Its routes.
+        facts: What FastAPI is told besides.
+    """
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, **facts)
+    app.state.authenticator, app.state.orion = face.authenticator, face.orion
+    app.router.routes.append(face.orion.route())
+    for router in routers:
+        app.include_router(router)
+    problems.install(app, pages.problem)
+    identify, clock = face.authenticator.identify, face.clock
+    app.add_middleware(headers.BodyLimit)
+    app.add_middleware(rate_limits.SocketLimits, identify=identify, clock=clock)
+    app.add_middleware(
+        SignInLink, authenticator=face.authenticator, refusal=pages.refused_link
+    )
+    # Last is outermost: a refusal carries the headers, too.
+    app.add_middleware(headers.SecurityHeaders)
+    app.add_middleware(notifications.NotificationsFirst, endpoint=face.orion)
+    return app
