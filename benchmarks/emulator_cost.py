@@ -48,14 +48,14 @@ def spent(world: SimulatedWorld) -> dict[str, float]:
         at = timed("people", at)
         for robot_id, rig in world.rigs.items():
             uplink = uplinks[robot_id]
-            wish = rig.wish(now, world)
+            wish = rig.requested_twist(now, world)
             rig.drive(wish if tick > RATE_HZ else Twist2D(0.0, 0.0))
             rig.move(1.0 / RATE_HZ)
             uplink.send(rig.odometry(), Instant(now, now))
             at = timed("drive", at)
             uplink.send(rig.scan(world), Instant(now, now))
             at = timed("laser", at)
-            uplink.send(rig.look(now, world), Instant(now, now))
+            uplink.send(rig.detect(now, world), Instant(now, now))
             at = timed("camera", at)
     return parts
 

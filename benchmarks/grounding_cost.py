@@ -17,7 +17,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
 from iveg.emulator.depth import DepthCamera, DepthView, Foliage, person_shape, take
 from iveg.emulator.greenhouse import Disc, Scenery
-from iveg.robot.grounding.locate import Mount, body_of, look
+from iveg.robot.grounding.locate import Mount, body_of, ground_frame
 
 ROUNDS, REPEATS = 5, 20
 DISTANCES_M = (1.5, 3.0, 6.0)
@@ -57,7 +57,9 @@ def main() -> None:
         if segment is None:
             raise SystemExit("The person is not in the picture.")
         mount = Mount.of(AGI)
-        whole = cost(partial(look, "AGI", Origin(), [segment], view.depth, mount))
+        whole = cost(
+            partial(ground_frame, "AGI", Origin(), [segment], view.depth, mount)
+        )
         erosion = cost(partial(body_of, segment))
         print(
             f"{ahead:7.1f} m {segment.width:8} × {segment.height:3} "

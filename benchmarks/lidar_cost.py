@@ -12,7 +12,7 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Rig, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
 from iveg.ngsi.codec import write_scan
 
 RATE_HZ = 30.0
@@ -36,7 +36,7 @@ def cost(work: Callable[[], object]) -> float:
     return best
 
 
-def message(rig: Rig, world: SimulatedWorld) -> bytes:
+def message(rig: RobotHardware, world: SimulatedWorld) -> bytes:
     return write_scan(rig.scan(world))
 
 

@@ -27,7 +27,7 @@ from iveg.domain.world import World
 from iveg.emulator.camera import DETECTORS, person_target
 from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Rig, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")
 SEEDS = (1, 2, 3, 4, 5)
@@ -81,7 +81,7 @@ class Run:
             now = step * STEP_S
             self.emulated.walk(STEP_S)
             for place, rig in enumerate(self.emulated.rigs.values()):
-                rig.drive(rig.wish(now, self.emulated))
+                rig.drive(rig.requested_twist(now, self.emulated))
                 rig.move(STEP_S)
                 said = replace(rig.odometry(), origin=self._origin(now))
                 self.world.apply(Received(said, _at(now)))
@@ -92,8 +92,8 @@ class Run:
                 self.people.forget(_at(now))
                 self._judge(now)
 
-    def _look(self, rig: Rig, now: float) -> None:
-        frame = rig.look(now, self.emulated)
+    def _look(self, rig: RobotHardware, now: float) -> None:
+        frame = rig.detect(now, self.emulated)
         applied = replace(frame, origin=self._origin(now))
         self.world.apply(Received(applied, _at(now)))
         self.people.sight(applied, self.world, self.rule, _at(now), f"d{self.seq}")

@@ -64,6 +64,6 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         fleet=dss.fleet,
     )
     yield sign_in_code.router(dss.sign_in_token)
-    yield experiments.router(dss.bench)
+    yield experiments.router(dss.experiments)
     yield experiments.page_router(pages)
     yield service_worker.router()

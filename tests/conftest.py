@@ -10,7 +10,7 @@ from hypothesis import settings
 from playwright.sync_api import expect
 from xdist.scheduler import LoadScopeScheduling
 
-from iveg.cli.memory import settle_memory
+from iveg.cli.garbage_collection import tune_garbage_collection
 
 # A helper's failed assertion shows its values as a test's own does.
 pytest.register_assert_rewrite("tests.processes")
@@ -73,7 +73,7 @@ def pytest_collection() -> None:
 
 def pytest_collection_finish() -> None:
     """From here on as in the programs that are tested."""
-    settle_memory()
+    tune_garbage_collection()
     gc.enable()
 
 

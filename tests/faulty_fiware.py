@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 import orjson
 
-from iveg.cli.running import run_until_told, tell_ready
+from iveg.cli.running import report_ready, run_until_stopped
 from iveg.embedded.context_broker import ContextBroker
 from iveg.embedded.devices import Tenancy
 from iveg.embedded.http_server import Request, Response
@@ -119,12 +119,12 @@ def main() -> int:
     urls = settings.mqtt_url, settings.orion_url, settings.iota_url
     parts = [urlsplit(url) for url in urls]
     mqtt, orion, iota = ((part.hostname or "", part.port or 0) for part in parts)
-    return run_until_told(
+    return run_until_stopped(
         serve_fiware(
             mqtt,
             orion,
             iota,
-            notify_ready=tell_ready,
+            notify_ready=report_ready,
             make_agent=FaultyAgent,
             make_api=FaultyApi,
         )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareHttp
-from iveg.adapters.orphan_entities import Entities, remove_strays
+from iveg.adapters.orphan_entities import Entities, remove_orphans
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -178,7 +178,7 @@ async def provision(
     # Last, so that the probe's return says that all the others are there again.
     mended += await _ensure_device(agent, known, _heartbeat_device(apikey))
     mended += await _remove_doctor(agent, known)
-    mended += await remove_strays(orion, known, robots)
+    mended += await remove_orphans(orion, known, robots)
     return Provisioned(tuple(mended), tuple(problems))
 
 

@@ -81,7 +81,7 @@ class FileJournal:
         except OSError as error:
             _log.warning("the command journal could not be compacted: %s", error)
 
-    async def wanted(
+    async def log_desired(
         self,
         robot_id: str,
         desired: Literal["stopped", "run"],
@@ -95,7 +95,7 @@ class FileJournal:
         """
         await self._write(_entry(robot_id, desired, hold_id, by, at.wall))
 
-    async def named(
+    async def log_release(
         self,
         robot_id: str,
         hold_id: str,

@@ -9,8 +9,8 @@ from email.utils import format_datetime, make_msgid
 
 import aiosmtplib
 
-from iveg.adapters.outside import Outside
-from iveg.domain.errors import OutsideError
+from iveg.adapters.outbound import OutboundHttp
+from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
     Contacts,
     Delivery,
@@ -33,8 +33,8 @@ class MailSender:
         write: The message in words.
     """
 
-    def __init__(self, outside: Outside, write: Write) -> None:
-        self._outside = outside
+    def __init__(self, outside: OutboundHttp, write: Write) -> None:
+        self._outbound = outside
         self._write = write
 
     async def send(
@@ -46,16 +46,16 @@ class MailSender:
             return []
         text = self._write(message, email.language)
         try:
-            async with asyncio.timeout(self._outside.timeout_s):
+            async with asyncio.timeout(self._outbound.timeout_s):
                 return await self._send(email, text, now)
         except TimeoutError:
             why = "no_answer"
-        except (OutsideError, aiosmtplib.SMTPException, OSError) as error:
+        except (OutboundError, aiosmtplib.SMTPException, OSError) as error:
             why = _why(error)
         return [Delivery("email", one.who, now, why) for one in email.recipients]
 
     async def _send(self, email: Email, text: Text, now: Instant) -> list[Delivery]:
-        connection = await self._outside.connect(email.server, email.port)
+        connection = await self._outbound.connect(email.server, email.port)
         own = connection.getsockname()[0]
         client = aiosmtplib.SMTP(
             hostname=email.server,
@@ -64,10 +64,10 @@ class MailSender:
             local_hostname=f"[IPv6:{own}]" if ":" in own else f"[{own}]",
             use_tls=email.security == "tls",
             start_tls=email.security == "starttls",
-            tls_context=await self._outside.tls(),
+            tls_context=await self._outbound.tls(),
             username=email.user or None,
             password=email.password or None,
-            timeout=self._outside.timeout_s,
+            timeout=self._outbound.timeout_s,
         )
         async with client:
             return [
@@ -97,7 +97,7 @@ async def _letter(
 
 def _why(error: Exception) -> str:
     match error:
-        case OutsideError():
+        case OutboundError():
             return error.why
         case aiosmtplib.SMTPAuthenticationError():
             return "sign_in"

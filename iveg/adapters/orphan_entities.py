@@ -26,7 +26,7 @@ class Entities(Protocol):
         """Remove one."""
 
 
-async def remove_strays(
+async def remove_orphans(
     orion: Entities, devices: Mapping[str, Document], robots: Iterable[str]
 ) -> list[str]:
     """Remove the entities that no device of ours feeds; says which.

@@ -66,7 +66,7 @@ class FileSessions:
             _log.warning("sessions are not remembered: %s", error)
         return tuple(sessions)
 
-    def keep(self, sessions: Iterable[Session]) -> None:
+    def save(self, sessions: Iterable[Session]) -> None:
         """Write these to disk soon; returns at once. The newest call wins."""
         with self._lock:
             is_writing = self._newest is not None

@@ -83,12 +83,12 @@ class Throttle:
         while True:
             await asyncio.sleep(_LOOKS_EVERY_S)
             try:
-                await self.look()
+                await self.check()
             except (HopError, AttributeError, KeyError, TypeError, ValueError):
                 # It is down, or answered JSON that means nothing here.
                 await asyncio.sleep(_AGAIN_S)
 
-    async def look(self) -> None:
+    async def check(self) -> None:
         """Switch every copy that must be switched.
 
         Raises:

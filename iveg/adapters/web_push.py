@@ -20,8 +20,8 @@ from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
 from iveg.adapters.mail import Write
-from iveg.adapters.outside import Outside
-from iveg.domain.errors import OutsideError
+from iveg.adapters.outbound import OutboundHttp
+from iveg.domain.errors import OutboundError
 from iveg.domain.messages import Contacts, Delivery, Device, Message, Push
 from iveg.domain.observations import Instant
 
@@ -36,8 +36,8 @@ _GONE = (404, 410)
 class PushSender:
     """Sends to every browser that asked for it."""
 
-    def __init__(self, outside: Outside, write: Write) -> None:
-        self._outside = outside
+    def __init__(self, outside: OutboundHttp, write: Write) -> None:
+        self._outbound = outside
         self._write = write
 
     async def send(
@@ -55,7 +55,7 @@ class PushSender:
         text = self._write(message, device.language)
         content = orjson.dumps({"title": text.title, "body": text.body})
         try:
-            status = await self._outside.post(
+            status = await self._outbound.post(
                 device.endpoint,
                 encrypted(content, decode(device.p256dh), decode(device.auth)),
                 {
@@ -67,7 +67,7 @@ class PushSender:
                 },
             )
             failed = _failed(status)
-        except OutsideError as error:
+        except OutboundError as error:
             failed = error.why
         except ValueError:
             failed = "gone"  # what the browser told is no key: it cannot be reached

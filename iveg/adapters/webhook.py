@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import orjson
 
-from iveg.adapters.outside import Outside
-from iveg.domain.errors import OutsideError
+from iveg.adapters.outbound import OutboundHttp
+from iveg.domain.errors import OutboundError
 from iveg.domain.messages import Contacts, Delivery, Message
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
@@ -16,8 +16,8 @@ _HEADERS = {"Content-Type": "application/json", "User-Agent": "iVeg"}
 class WebhookSender:
     """Posts each message once."""
 
-    def __init__(self, outside: Outside) -> None:
-        self._outside = outside
+    def __init__(self, outside: OutboundHttp) -> None:
+        self._outbound = outside
 
     async def send(
         self, contacts: Contacts, message: Message, now: Instant
@@ -28,8 +28,8 @@ class WebhookSender:
             return []
         body = orjson.dumps(body_of(message, now))
         try:
-            status = await self._outside.post(hook.url, body, _HEADERS)
-        except OutsideError as error:
+            status = await self._outbound.post(hook.url, body, _HEADERS)
+        except OutboundError as error:
             return [Delivery("webhook", hook.who, now, error.why)]
         failed = None if 200 <= status < 300 else "refused"
         return [Delivery("webhook", hook.who, now, failed)]

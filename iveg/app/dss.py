@@ -21,7 +21,7 @@ from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.mail import MailSender
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
-from iveg.adapters.outside import Outside
+from iveg.adapters.outbound import OutboundHttp
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
@@ -35,7 +35,7 @@ from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.experiment.bench import Bench
+from iveg.experiment.runner import ExperimentRunner
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
@@ -87,14 +87,16 @@ class Dss:
         tenant = settings.fiware_service, settings.fiware_servicepath
         self.orion = OrionClient(settings.orion_url, *tenant)
         self.agent = IotAgentClient(settings.iota_url, *tenant)
-        self.outside = Outside()
+        self.outbound = OutboundHttp()
         kept = self._kept_choices()
         choices = Choices(kept.rules[-1], Drills(settings.drill_days), self._boot)
         greenhouse = load_greenhouse(settings.greenhouse)
         self.pipeline = build(self.fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
         self.provisioner = self._provisioner()
-        self.bench = Bench(self.stores.directory / "experiments", self._is_robot_there)
+        self.experiments = ExperimentRunner(
+            self.stores.directory / "experiments", self._is_robot_there
+        )
         self.face = self._face(tenant)
 
     # --- what the parts are given -------------------------------------------------
@@ -156,9 +158,9 @@ class Dss:
     def _senders(self) -> dict[Channel, Sender]:
         write = messages.writer()
         return {
-            "push": PushSender(self.outside, write),
-            "email": MailSender(self.outside, write),
-            "webhook": WebhookSender(self.outside),
+            "push": PushSender(self.outbound, write),
+            "email": MailSender(self.outbound, write),
+            "webhook": WebhookSender(self.outbound),
         }
 
     def _provisioner(self) -> Provisioner:
@@ -232,13 +234,13 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
-            await self.bench.close()
+            await self.experiments.close()
             self.pipeline.evaluator.leave(clock.now())
             await self.pipeline.commander.close()
             await self.stores.close()
             await self.orion.close()
             await self.agent.close()
-            self.outside.close()
+            self.outbound.close()
 
     async def _live(self) -> None:
         parts, beside, stores = self.pipeline, self.services, self.stores

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
-from iveg.cli.running import LOOPBACK, run_until_told, tell_link
+from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
 from iveg.ros2.names import namespace_of
 from iveg.settings import Settings
@@ -67,7 +67,7 @@ def demo(
         parts += _ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
     elif emulator:
         parts.append(["emulator"])
-    return run_until_told(_supervise(parts, placed, child_environment))
+    return run_until_stopped(_supervise(parts, placed, child_environment))
 
 
 def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
@@ -165,7 +165,7 @@ async def _supervise(
             process = await start_part(arguments, environment)
             running.append((arguments[0], process))
             await wait_ready(arguments[0], process)
-        tell_link(settings, settings.sign_in_token)
+        print_sign_in_link(settings, settings.sign_in_token)
         await asyncio.gather(*(_watch(name, process) for name, process in running))
     finally:
         await stop_parts([process for _, process in reversed(running)])

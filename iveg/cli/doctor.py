@@ -46,7 +46,7 @@ from iveg.cli.diagnosis import (
     table,
 )
 from iveg.cli.probe import Probe
-from iveg.cli.running import run_until_told
+from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
 from iveg.domain.hops import Check, Hop
 from iveg.embedded.http_server import Request, Response, http_server
@@ -67,7 +67,7 @@ _ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - read, not boun
 def run_doctor(settings: Settings, data: Path) -> int:
     """Examine, print the table, remove the probe; returns the exit code."""
     examination = Examination(settings, data)
-    run_until_told(examination.run())
+    run_until_stopped(examination.run())
     rows = judge(examination.findings, examination.stack)
     print(table(rows))
     for sentence in examination.left_behind:

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.cli.addresses import broker_of
-from iveg.cli.memory import settle_memory
-from iveg.cli.running import tell_ready
+from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.running import report_ready
 from iveg.emulator.fleet import run_emulator
-from iveg.emulator.orders import read_translations
+from iveg.emulator.orders import read_fault_arguments
 from iveg.emulator.truth import TruthLog
 from iveg.settings import Settings
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     """Simulated robots, people and climate."""
-    settle_memory()
+    tune_garbage_collection()
     fleet = load_fleet(settings.fleet, settings.robots)
     robots = [one.robot_id for one in fleet.members.values() if one.kind == "live"]
     if options.robots is not None:
@@ -51,7 +51,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
                 state_directory=Path(directory),
                 held=options.held,
                 rate_hz=options.hz,
-                faults=read_translations(options.fault, robots),
+                faults=read_fault_arguments(options.fault, robots),
                 fault_port=options.fault_port,
                 network=network,
                 description=fleet,
@@ -60,7 +60,7 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
             ),
             name="emulator",
         )
-        tell_ready()
+        report_ready()
         try:
             await running
         finally:

@@ -22,13 +22,12 @@ from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
 from iveg.adapters.orion import OrionClient
 from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
-from iveg.cli.running import run_until_told
+from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment import compare
 from iveg.experiment.files import directory_of, read_json
-from iveg.experiment.notebook import Notebook
 from iveg.experiment.observer import watch
 from iveg.experiment.outcome import (
     Outcome,
@@ -39,7 +38,8 @@ from iveg.experiment.outcome import (
 )
 from iveg.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, PlannedRun
 from iveg.experiment.progress import Progress
-from iveg.experiment.rehearsal import Rehearsal
+from iveg.experiment.run_store import RunStore
+from iveg.experiment.virtual_run import VirtualRun
 from iveg.settings import Settings
 
 _STOPS_WITHIN_S = 4.0
@@ -67,10 +67,12 @@ def experiment(
     if embedded:
         require_extra("demo", "iveg experiment")
     named = with_fiware(settings, options.fiware)
-    placed = placed_in(directory, on_free_ports(named, environment, fiware=embedded))
-    lab = Lab(Notebook(plan, directory), plan.profile, placed, embedded=embedded)
+    placed = experiment_settings(
+        directory, on_free_ports(named, environment, fiware=embedded)
+    )
+    lab = Lab(RunStore(plan, directory), plan.profile, placed, embedded=embedded)
     work = lab.run(environment)
-    return run_until_told(work, until_eof=options.until_eof) or lab.exit_code
+    return run_until_stopped(work, until_eof=options.until_eof) or lab.exit_code
 
 
 def with_fiware(settings: Settings, words: list[str]) -> Settings:
@@ -91,7 +93,7 @@ def with_fiware(settings: Settings, words: list[str]) -> Settings:
     return replace(settings, orion_url=web[0], iota_url=web[1], mqtt_url=broker)
 
 
-def placed_in(directory: Path, settings: Settings) -> Settings:
+def experiment_settings(directory: Path, settings: Settings) -> Settings:
     """The paper's fleet in its greenhouse, with data and secrets of its own."""
     return replace(
         settings,
@@ -116,7 +118,7 @@ class Lab:
         exit_code: 1 if it ended before its plan was complete.
     """
 
-    notebook: Notebook
+    notebook: RunStore
     profile: str
     settings: Settings
     embedded: bool = True
@@ -168,7 +170,7 @@ class Lab:
         self, step: PlannedRun, environment: Mapping[str, str], progress: Progress
     ) -> None:
         progress.begin(step, "counting", clock.now().mono)
-        rehearsal = Rehearsal(step, self.profile, self._rule, WATCHED)
+        rehearsal = VirtualRun(step, self.profile, self._rule, WATCHED)
         played = await self._while_all_run(rehearsal.play(step.counted_s))
         counted = counted_of(played, WATCHED)
         progress.begin(step, "running", clock.now().mono)

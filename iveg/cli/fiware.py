@@ -3,8 +3,8 @@
 from urllib.parse import urlsplit
 
 from iveg.adapters.extras import require_extra
-from iveg.cli.memory import settle_memory
-from iveg.cli.running import tell_ready
+from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.running import report_ready
 from iveg.settings import Settings
 
 
@@ -13,12 +13,12 @@ async def fiware(settings: Settings) -> None:
     require_extra("demo", "iveg fiware")
     from iveg.embedded.server import serve_fiware
 
-    settle_memory()
+    tune_garbage_collection()
     await serve_fiware(
         _address(settings.mqtt_url, 1883),
         _address(settings.orion_url, 1026),
         _address(settings.iota_url, 4041),
-        notify_ready=tell_ready,
+        notify_ready=report_ready,
     )
 
 

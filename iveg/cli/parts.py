@@ -9,14 +9,14 @@ from collections.abc import Coroutine
 from pathlib import Path
 from typing import Any
 
-from iveg.cli.running import run_until_told
+from iveg.cli.running import run_until_stopped
 from iveg.settings import Settings
 
 
 def run_part(options: argparse.Namespace, settings: Settings, data: Path) -> int:
     """Run one part until it is ended; returns the exit code."""
     work = _work_of(options, settings, data)
-    return run_until_told(work, until_eof=options.until_eof)
+    return run_until_stopped(work, until_eof=options.until_eof)
 
 
 def _work_of(

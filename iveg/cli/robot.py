@@ -13,7 +13,7 @@ from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.cli.running import LOOPBACK, run_until_told, tell_ready
+from iveg.cli.running import LOOPBACK, report_ready, run_until_stopped
 from iveg.domain.errors import (
     DataFileError,
     HopError,
@@ -69,7 +69,7 @@ def run_robot(
 
     with Lease(data / "robots" / f"{options.id}.lease", options.id):
         work = _ride(options, settings, data, config, classes, network)
-        return run_until_told(work, until_eof=options.until_eof)
+        return run_until_stopped(work, until_eof=options.until_eof)
 
 
 async def _ride(
@@ -92,7 +92,7 @@ async def _ride(
             robot.node.release_locally()
         running = asyncio.create_task(robot.run(), name=f"robot-{options.id}")
         try:
-            tell_ready()
+            report_ready()
             await running
         finally:
             running.cancel()

@@ -22,7 +22,9 @@ EVERY_ADDRESS = ("0.0.0.0", "::")  # noqa: S104 - told apart, not bound
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
-def run_until_told(work: Coroutine[Any, Any, None], *, until_eof: bool = False) -> int:
+def run_until_stopped(
+    work: Coroutine[Any, Any, None], *, until_eof: bool = False
+) -> int:
     """Run until the end or the first signal; returns the exit code."""
     return uvloop.run(_guard(work, until_eof=until_eof))
 
@@ -48,12 +50,12 @@ def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
 
 def sign_in_link(settings: Settings, token: str) -> str:
     """Address that signs a browser in."""
-    host = reached_at(settings.host)
+    host = reachable_host(settings.host)
     host = f"[{host}]" if ":" in host else host
     return f"http://{host}:{settings.port}/?token={token}"
 
 
-def reached_at(host: str) -> str:
+def reachable_host(host: str) -> str:
     """Address at which others reach a server; for "all addresses" one that routes."""
     if host not in EVERY_ADDRESS:
         return host
@@ -68,7 +70,9 @@ def reached_at(host: str) -> str:
         return str(asking.getsockname()[0])
 
 
-def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None:
+def print_sign_in_link(
+    settings: Settings, token: str, out: TextIO | None = None
+) -> None:
     """Print the sign-in link; on a terminal also as a code for a phone."""
     out = out or sys.stdout
     link = sign_in_link(settings, token)
@@ -77,6 +81,6 @@ def tell_link(settings: Settings, token: str, out: TextIO | None = None) -> None
         segno.make(link, micro=False).terminal(out, compact=True)
 
 
-def tell_ready() -> None:
+def report_ready() -> None:
     """Report on standard output that this part is ready."""
     print("ready", flush=True)

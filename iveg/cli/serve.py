@@ -13,8 +13,8 @@ from iveg.adapters.history.engine import sqlite_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app import Dss
 from iveg.asgi import create_app
-from iveg.cli.memory import settle_memory
-from iveg.cli.running import tell_link, tell_ready
+from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.running import print_sign_in_link, report_ready
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.live.bounded import BoundedSocket
@@ -25,7 +25,7 @@ _WS_MAX_BYTES = 65536
 
 
 class _Server(uvicorn.Server):
-    """A server that leaves signals to ``run_until_told``, as all parts do."""
+    """A server that leaves signals to ``run_until_stopped``, as all parts do."""
 
     def __init__(self, config: uvicorn.Config, on_start: Callable[[], None]) -> None:
         super().__init__(config)
@@ -62,9 +62,9 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
             timeout_graceful_shutdown=2,
             server_header=False,
         ),
-        on_start=tell_ready if demo else lambda: _print_link(settings, dss),
+        on_start=report_ready if demo else lambda: _print_link(settings, dss),
     )
-    settle_memory()
+    tune_garbage_collection()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
     serving = asyncio.create_task(server.serve(), name="http")
     try:
@@ -87,7 +87,7 @@ def _database_url(settings: Settings, data: Path) -> str:
 
 
 def _print_link(settings: Settings, dss: Dss) -> None:
-    tell_link(settings, dss.sign_in_token)
+    print_sign_in_link(settings, dss.sign_in_token)
 
 
 def upgrade_database(settings: Settings, data: Path) -> int:

@@ -2,8 +2,8 @@
 
 A map without people says something only of cells that were in view.  Aisles are divided
 into cells; a cell counts as seen when a live robot's camera would have seen a whole
-person in its middle, with nothing in between (``sight.looks_from``).  The same view may
-take a ring away.  Recorded robots do not count.
+person in its middle, with nothing in between (``sight.visible_from``).  The same view
+may take a ring away.  Recorded robots do not count.
 """
 
 import math
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from iveg.domain.greenhouse import Greenhouse, Lane
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.tracking.sight import looks_from
+from iveg.domain.tracking.sight import visible_from
 
 CELL_M = 1.0
 MOST_CELLS = 4000
@@ -62,12 +62,12 @@ class Coverage:
         self._centres = np.concatenate(parts) if parts else np.empty((0, 2))
         self._looked_at = np.full(len(self._centres), -np.inf)
 
-    def look(self, robots: Iterable[RobotState], now: Instant) -> None:
+    def update(self, robots: Iterable[RobotState], now: Instant) -> None:
         """Take in what the cameras of these robots look at now."""
         if not len(self._centres):
             return
         for robot in robots:
-            seen = looks_from(robot, self._centres, self._greenhouse, now)
+            seen = visible_from(robot, self._centres, self._greenhouse, now)
             self._looked_at[seen] = now.mono
 
     def ages(self, now: Instant) -> list[list[int | None]]:

@@ -8,7 +8,7 @@ IvegError
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
-├── OutsideError            an address outside iVeg that took no message
+├── OutboundError            an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
@@ -94,7 +94,7 @@ class ExperimentRefusedError(IvegError):
         self.why = why
 
 
-class OutsideError(IvegError):
+class OutboundError(IvegError):
     """An address outside iVeg took no message.
 
     Attributes:

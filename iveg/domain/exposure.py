@@ -35,15 +35,15 @@ class Exposure:
 
     Attributes:
         since: The first evaluation of the day.
-        looked: The newest evaluation; ``looks`` how many there were.
+        evaluated_at: The newest evaluation; ``evaluations`` how many there were.
         known_s: Time whose margins are known (s), with nobody near included.
         negative_s: The part of it in which some robot could not have stopped in time.
         unknown_s: Time in which some margin, or the whole fleet, was unknown (s).
     """
 
     since: Instant
-    looked: Instant
-    looks: int = 0
+    evaluated_at: Instant
+    evaluations: int = 0
     known_s: float = 0.0
     negative_s: float = 0.0
     unknown_s: float = 0.0
@@ -69,10 +69,13 @@ class Exposures:
         """Whether the next evaluation is due."""
         # Ticks come a little early; an evaluation must not wait for the one after.
         return (
-            self.today is None or now.mono - self.today.looked.mono >= PERIOD_S - 1e-3
+            self.today is None
+            or now.mono - self.today.evaluated_at.mono >= PERIOD_S - 1e-3
         )
 
-    def look(self, margins: Sequence[Margin], now: Instant, *, seen: bool) -> Exposure:
+    def update(
+        self, margins: Sequence[Margin], now: Instant, *, seen: bool
+    ) -> Exposure:
         """Take one evaluation of the margins.
 
         Args:
@@ -83,15 +86,15 @@ class Exposures:
         before = self.today
         if before is None or _day(before.since) != _day(now):
             before = Exposure(
-                since=now, looked=now if before is None else before.looked
+                since=now, evaluated_at=now if before is None else before.evaluated_at
             )
-        past = min(max(0.0, now.mono - before.looked.mono), _LONGEST_S)
+        past = min(max(0.0, now.mono - before.evaluated_at.mono), _LONGEST_S)
         known = [one for one in margins if one.known and one.age_s <= LIMITS.seen_s]
         least = min(known, key=lambda one: one.margin_m, default=None)
         self.today = replace(
             _spend(before, past, least, whole=seen and len(known) == len(margins)),
-            looked=now,
-            looks=before.looks + 1,
+            evaluated_at=now,
+            evaluations=before.evaluations + 1,
             worst=_worse(before.worst, least, now),
         )
         return self.today

@@ -23,7 +23,7 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.order import OrderVerdict, StreamOrder
+from iveg.domain.stream_order import OrderVerdict, StreamOrder
 from iveg.domain.transports import FIWARE, TransportId
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]

@@ -27,10 +27,10 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
-from iveg.domain.order import OrderVerdict
 from iveg.domain.probe import ProbeLag
-from iveg.domain.robot_news import dated, learn_kind, take_in
 from iveg.domain.robot_state import RobotState
+from iveg.domain.robot_updates import dated, learn_kind, take_in
+from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import FIWARE
 
 _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1

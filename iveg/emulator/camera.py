@@ -187,7 +187,7 @@ class Detector:
         self._rng = rng
         self._encounters: dict[str, _Encounter] = {}
 
-    def look(
+    def detect(
         self, now: float, pose: Pose2D, targets: Sequence[Target], scenery: Scenery
     ) -> tuple[Detection, ...]:
         """One frame.

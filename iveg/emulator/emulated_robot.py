@@ -16,7 +16,7 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, in_slots
 from iveg.emulator.relay import Relay
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import REST, Rig, SimulatedWorld
+from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
 from iveg.robot.node import RobotNode
 from iveg.robot.uplink import Form
 
@@ -70,7 +70,7 @@ class EmulatedRobot:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: RobotHardware,
         world: SimulatedWorld,
         settings: FleetSettings,
         relay: Relay | None = None,
@@ -89,7 +89,7 @@ class EmulatedRobot:
         self._battery_told = -_BATTERY_EVERY_S
         self._is_odometry_frozen = False
         self._is_deaf = False
-        self._wish = REST
+        self._requested = REST
         self._clock_offset_s = 0.0
 
     def _new_node(self, *, held: bool) -> RobotNode:
@@ -135,9 +135,9 @@ class EmulatedRobot:
         if self._node_task is not None:
             # While twists have no effect navigation requests zero: the gate requires
             # that before it lets the robot move again.
-            wish = self._rig.wish(now, self._world)
-            self._wish = wish if node.may_drive else REST
-            node.wish(self._wish)
+            requested = self._rig.requested_twist(now, self._world)
+            self._requested = requested if node.may_drive else REST
+            node.request_twist(self._requested)
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if self._node_task is None:
             return
@@ -159,15 +159,15 @@ class EmulatedRobot:
     def _look(self, _: float) -> None:
         if self._node_task is None:
             return
-        self._node.sense(self._rig.look(self._now(), self._world))
+        self._node.sense(self._rig.detect(self._now(), self._world))
         if self._settings.truth is not None:
             at = self._read_clock().wall
-            self._settings.truth.looked(self._rig, self._world, at)
+            self._settings.truth.record(self._rig, self._world, at)
 
     def _obey_gate(self, command: Twist2D) -> None:
         """Apply the gate's command; with the fault ``deaf`` only a halt."""
         ignores = self._is_deaf and command != REST
-        self._rig.drive(self._wish if ignores else command)
+        self._rig.drive(self._requested if ignores else command)
 
     def _read_clock(self) -> Instant:
         """The robot's own clocks; the wall clock may be wrong."""

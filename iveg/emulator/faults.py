@@ -18,7 +18,7 @@ _PATIENCE_S = 5.0
 Obey = Callable[[Order], str | None]
 
 
-async def open_faults(port: int, obey: Obey) -> tuple[asyncio.Server, int]:
+async def open_fault_port(port: int, obey: Obey) -> tuple[asyncio.Server, int]:
     """Open the endpoint; orders are accepted until the server is closed.
 
     Args:

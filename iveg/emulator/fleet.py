@@ -19,7 +19,7 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.emulated_robot import EmulatedRobot, FleetSettings
-from iveg.emulator.faults import open_faults
+from iveg.emulator.faults import open_fault_port
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder, Order
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every
@@ -29,7 +29,7 @@ from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import Camera, Rig, SimulatedWorld, climate_at
+from iveg.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
 from iveg.robot.ros2.config import RobotConfig
@@ -123,7 +123,7 @@ async def run_emulator(
     if fault_port is None:
         await fleet.run(incidents)
         return
-    server, port = await open_faults(fault_port, fleet.obey)
+    server, port = await open_fault_port(fault_port, fleet.obey)
     async with server:
         _log.info("faults are taken on 127.0.0.1:%d", port)
         if on_fault_port is not None:
@@ -136,7 +136,7 @@ def _base(
     network: Network,
     configs: Mapping[str, RobotConfig],
     rate_hz: float,
-    rig: Rig,
+    rig: RobotHardware,
 ) -> Ros2Base:
     usual = RobotConfig(namespace=f"/{namespace_of(rig.robot_id)}")
     config = configs.get(rig.robot_id, usual)
@@ -157,7 +157,7 @@ class SimulatedFleet:
         world: SimulatedWorld,
         settings: FleetSettings,
         radio_seed: int | None = None,
-        bases: Callable[[Rig], Ros2Base] | None = None,
+        bases: Callable[[RobotHardware], Ros2Base] | None = None,
     ) -> None:
         self._world = world
         self._settings = settings

@@ -62,7 +62,9 @@ class Follower:
         ahead = self._route.ahead(self._index, count, self._direction)
         return tuple((float(x), float(y)) for x, y in ahead[::10])
 
-    def wish(self, pose: Pose2D, now: float, discs: Sequence[Disc]) -> Twist2D:
+    def requested_twist(
+        self, pose: Pose2D, now: float, discs: Sequence[Disc]
+    ) -> Twist2D:
         """The twist that navigation requests.
 
         Args:

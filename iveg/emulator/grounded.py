@@ -25,7 +25,7 @@ from iveg.emulator.depth import (
 )
 from iveg.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.cloud import Pinhole
-from iveg.robot.grounding.locate import Grounding, Mount, look
+from iveg.robot.grounding.locate import Grounding, Mount, ground_frame
 
 _WIDTH, _HEIGHT = 320, 240
 """A quarter of the pixels of a D435, which is enough at 8 m."""
@@ -91,7 +91,9 @@ class GroundedCamera:
         segment = view.segment(1, one.target.class_id, one.probability)
         if segment is None:
             return (), 0
-        frame = look("", Origin(), [segment], view.depth, self._mount, _SETTINGS)
+        frame = ground_frame(
+            "", Origin(), [segment], view.depth, self._mount, _SETTINGS
+        )
         return frame.detections, frame.unreadable
 
 

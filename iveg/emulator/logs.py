@@ -37,7 +37,7 @@ _HALF_SIZE_M, _HEIGHT_M = 0.25, 1.75
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class RecordingEntry:
     """One line of a log.
 
     Attributes:
@@ -62,7 +62,7 @@ class LogReader:
         self._file = file
         self._reported: set[int] = set()
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[RecordingEntry]:
         """All entries from the start, in the order of the file.
 
         Raises:
@@ -87,7 +87,7 @@ class LogReader:
             return gzip.open(self._file, "rb")
         return self._file.open("rb")
 
-    def _entry(self, number: int, line: bytes) -> Entry | None:
+    def _entry(self, number: int, line: bytes) -> RecordingEntry | None:
         if not line.strip():
             return None
         try:
@@ -147,7 +147,7 @@ _LINE: TypeAdapter[_OdometryLine | _ScanLine | _DetectionLine] = TypeAdapter(
 )
 
 
-def _read(line: bytes) -> Entry:
+def _read(line: bytes) -> RecordingEntry:
     if len(line) >= _LONGEST_LINE:
         raise UnreadableError("too_long", f"more than {_LONGEST_LINE} bytes")
     value = _LINE.validate_python(load_json(line))
@@ -155,11 +155,11 @@ def _read(line: bytes) -> Entry:
         case _OdometryLine():
             pose = Pose2D(value.x, value.y, value.yaw)
             twist = Twist2D(value.v, value.w)
-            return Entry(value.t, Odometry("", Origin(), pose, twist))
+            return RecordingEntry(value.t, Odometry("", Origin(), pose, twist))
         case _ScanLine():
-            return Entry(value.t, _scan(value))
+            return RecordingEntry(value.t, _scan(value))
         case _DetectionLine():
-            return Entry(value.t, _detection(value))
+            return RecordingEntry(value.t, _detection(value))
 
 
 def _scan(line: _ScanLine) -> LaserScan:

@@ -96,7 +96,9 @@ def read_order(body: bytes) -> Order:
     return _validated(PersonOrder if "person" in value else FaultOrder, value)
 
 
-def read_translations(words: Sequence[str], robots: Sequence[str]) -> list[FaultOrder]:
+def read_fault_arguments(
+    words: Sequence[str], robots: Sequence[str]
+) -> list[FaultOrder]:
     """Parse the orders of a command line: ``field=value``, or ``robot:field=value``.
 
     Args:

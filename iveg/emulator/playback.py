@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry
-from iveg.emulator.logs import Entry
+from iveg.emulator.logs import RecordingEntry
 
 _READ_AHEAD = 256
 """Entries searched for the next pose; beyond, the last pose is kept."""
@@ -28,7 +28,9 @@ class Playback:
         has_detector: Whether a detection was read: then none means an empty frame.
     """
 
-    def __init__(self, open_: Callable[[], Iterator[Entry]], *, loop: bool) -> None:
+    def __init__(
+        self, open_: Callable[[], Iterator[RecordingEntry]], *, loop: bool
+    ) -> None:
         self._open = open_
         self._loop = loop
         self.ended = False
@@ -37,7 +39,7 @@ class Playback:
 
     def _start_over(self) -> None:
         self._source = self._open()
-        self._ahead: deque[Entry] = deque()
+        self._ahead: deque[RecordingEntry] = deque()
         self._poses_ahead: deque[tuple[float, Odometry]] = deque()
         self._picture: tuple[Detection, ...] = ()
         self._taken_at = 0.0
@@ -70,7 +72,7 @@ class Playback:
             if isinstance(entry.observation, Odometry):
                 self._poses_ahead.append((entry.at, entry.observation))
 
-    def _take(self, entry: Entry) -> None:
+    def _take(self, entry: RecordingEntry) -> None:
         match entry.observation:
             case Odometry():
                 self._last = self._poses_ahead.popleft()

@@ -8,7 +8,7 @@ from iveg.adapters.bags import Bag, BagMessage, BagTopics
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Odometry, Origin
-from iveg.emulator.logs import Entry, LogReader
+from iveg.emulator.logs import LogReader, RecordingEntry
 
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap", ".bag")
 _LONGEST_S = 1e7
@@ -17,7 +17,7 @@ _LONGEST_S = 1e7
 class Recording(Protocol):
     """One recorded run of one robot."""
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[RecordingEntry]:
         """All entries from the start; at least one is odometry.
 
         Raises:
@@ -87,11 +87,11 @@ class FixedRecording:
         self._recording = recording
         self._stands = Odometry("", Origin(), pose, Twist2D(0.0, 0.0))
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[RecordingEntry]:
         """All entries, the pose first."""
         entries = self._recording.entries()
         first = next(entries)
-        yield Entry(first.at, self._stands)
+        yield RecordingEntry(first.at, self._stands)
         yield first
         yield from entries
 
@@ -109,12 +109,12 @@ class BagRecording:
         self._by_bag = bag_time or (first is not None and first.stamp_s <= 0.0)
         self._start = 0.0 if first is None else self._time_of(first)
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[RecordingEntry]:
         """All entries from the start; entries with absurd stamps are omitted."""
         for message in self._bag.messages():
             at = self._time_of(message) - self._start
             if abs(at) <= _LONGEST_S:
-                yield Entry(at, message.observation)
+                yield RecordingEntry(at, message.observation)
 
     def _time_of(self, message: BagMessage) -> float:
         return message.logged_s if self._by_bag else message.stamp_s

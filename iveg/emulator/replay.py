@@ -210,7 +210,9 @@ class ReplayedRobot:
     def _step(self, dt: float) -> None:
         node, step = self._node, min(dt, _LONGEST_STEP_S)
         full = Twist2D(self._profile.max_speed, 0.0)
-        node.wish(full if node.may_drive and not self._playback.ended else _REST)
+        node.request_twist(
+            full if node.may_drive and not self._playback.ended else _REST
+        )
         self._pace = self._slowed(self._command.linear_x, step)
         self._playback.advance(self._pace * self._speed * step)
         if self._playback.ended:

@@ -16,7 +16,7 @@ from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
-from iveg.emulator.world import REST, Rig, SimulatedWorld
+from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.rig import Network
@@ -43,21 +43,23 @@ class Navigation:
         self._stuck_since: float | None = None
         self._rests_until = -math.inf
 
-    def wish(self, wish: Twist2D, driven: Twist2D, now: float) -> Twist2D:
+    def requested_twist(
+        self, requested: Twist2D, driven: Twist2D, now: float
+    ) -> Twist2D:
         """The twist requested now; ``driven`` was the last command of the base."""
         if now < self._rests_until:
             return REST
-        if wish == REST or driven != REST:
+        if requested == REST or driven != REST:
             self._stuck_since = None
         elif self._stuck_since is None:
             self._stuck_since = now
         elif now - self._stuck_since > _GIVES_UP_S:
             self._stuck_since, self._rests_until = None, now + _RESTS_S
             return REST
-        return wish
+        return requested
 
 
-class Base:
+class DriveWatchdog:
     """The drive's own watchdog: the newest command while it is valid."""
 
     def __init__(self) -> None:
@@ -96,7 +98,7 @@ class Ros2Base:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: RobotHardware,
         world: SimulatedWorld,
         network: Network,
         config: RobotConfig,
@@ -107,7 +109,7 @@ class Ros2Base:
         self._rig, self._world = rig, world
         self._frames = config.frames
         self._rate_hz = rate_hz
-        self._base, self._navigation = Base(), Navigation()
+        self._base, self._navigation = DriveWatchdog(), Navigation()
         self._odom_in_map = rig.vehicle.pose
         self._run_began = 0.0
         self._is_odometry_frozen = False
@@ -155,8 +157,8 @@ class Ros2Base:
         self._take_commands(now.mono)
         command = self._base.command(now.mono)
         self._rig.drive(command)
-        wish = self._rig.wish(now.mono - self._run_began, self._world)
-        asked = self._navigation.wish(wish, command, now.mono)
+        requested = self._rig.requested_twist(now.mono - self._run_began, self._world)
+        asked = self._navigation.requested_twist(requested, command, now.mono)
         self._wishes.write(cdr.write(write_twist(asked)))
         self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
         if not self._is_odometry_frozen:
@@ -207,7 +209,7 @@ class Ros2Base:
 
     def _look(self, _: float) -> None:
         now = clock.now()
-        frame = self._rig.look(now.mono - self._run_began, self._world)
+        frame = self._rig.detect(now.mono - self._run_began, self._world)
         header = m.Header(m.Time.of(now.wall), self._frames.base_link)
         seen = tuple(_detection(one, header) for one in frame.detections)
         self._seen.write(cdr.write(m.Detection3DArray(header, seen)))

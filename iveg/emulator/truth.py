@@ -7,10 +7,12 @@ from typing import TextIO
 import orjson
 
 from iveg.emulator.camera import Target
-from iveg.emulator.world import Rig, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
 
 
-def in_view(rig: Rig, world: SimulatedWorld) -> Iterator[tuple[Target, float]]:
+def in_view(
+    rig: RobotHardware, world: SimulatedWorld
+) -> Iterator[tuple[Target, float]]:
     """Targets in view of a robot's camera, with the visible share (0 to 1)."""
     for target in world.targets_for(rig.robot_id):
         part = rig.part_seen(target, world)
@@ -29,7 +31,7 @@ class TruthLog:
     def __init__(self, file: Path) -> None:
         self._file: TextIO = file.open("w", encoding="utf-8", buffering=1)
 
-    def looked(self, rig: Rig, world: SimulatedWorld, at: float) -> None:
+    def record(self, rig: RobotHardware, world: SimulatedWorld, at: float) -> None:
         """Record a robot's view at its picture (``at`` Unix s, by its own clock)."""
         visible = []
         for target, part in in_view(rig, world):

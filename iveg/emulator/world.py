@@ -46,7 +46,7 @@ _LASER = LaserModel()
 _FALSE_PERSON_CONFIDENCE = 0.95
 
 
-class Rig:
+class RobotHardware:
     """Hardware and navigation of one robot; the safety node sits in between.
 
     Attributes:
@@ -104,12 +104,12 @@ class Rig:
         """Footprint of the robot."""
         return self.vehicle.body(self.robot_id)
 
-    def wish(self, now: float, around: "SimulatedWorld") -> Twist2D:
+    def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
         discs = [person.disc for person in around.people]
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())
-        return self._follower.wish(self.vehicle.pose, now, discs)
+        return self._follower.requested_twist(self.vehicle.pose, now, discs)
 
     # --- sensors ------------------------------------------------------------------
 
@@ -133,13 +133,13 @@ class Rig:
             sweep(sensor, _LASER, around.scenery, people, others, self._rng),
         )
 
-    def look(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
+    def detect(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
         """One frame of camera and detector; empty when nothing is seen."""
         pose = self.vehicle.pose
         targets = around.targets_for(self.robot_id)
         if self.hides_people:
             targets = [target for target in targets if target.class_id != PERSON]
-        found = self._detector.look(now, pose, targets, around.scenery)
+        found = self._detector.detect(now, pose, targets, around.scenery)
         if self.false_person is not None:
             x, y = self.false_person
             ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
@@ -182,8 +182,8 @@ class SimulatedWorld:
         )
         generators = [np.random.default_rng(stream) for stream in streams]
         self.scenery = Scenery.of(greenhouse)
-        self.rigs: Mapping[str, Rig] = {
-            robot_id: Rig(
+        self.rigs: Mapping[str, RobotHardware] = {
+            robot_id: RobotHardware(
                 robot_id, layout.profiles[robot_id], script, detector, rng, camera
             )
             for (robot_id, script), rng in zip(

@@ -8,7 +8,7 @@ from iveg.domain.latency.account import Cell
 from iveg.domain.latency.hops import DATA, Hop
 from iveg.experiment.outcome import slices_of
 from iveg.experiment.paper_tables import CLASSES
-from iveg.experiment.slices import apart, spreads
+from iveg.experiment.slices import latency_changes, spreads
 from iveg.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]
@@ -58,7 +58,7 @@ def _latencies(before: Result, after: Result) -> Iterator[str]:
     was, now = spreads(old), spreads(new)
     cells: list[Cell] = [(data, hop) for data in DATA for hop in _HOPS]
     for cell in cells:
-        for name, between in apart(old, new, cell):
+        for name, between in latency_changes(old, new, cell):
             one, other = was[cell], now[cell]
             pair = (one.mean, other.mean) if name == "mean" else (one.p95, other.p95)
             shown = "".join(f"{1000.0 * (value or 0.0):>12.2f}" for value in pair)

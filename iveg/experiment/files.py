@@ -39,12 +39,16 @@ def directory_of(place: Path, plan: Plan) -> Path:
     Results of another version or another plan are not mixed with this one.
     """
     known = sorted(place.glob(f"{plan.size}-*")) if place.is_dir() else []
-    if known and not (known[-1] / "result.json").exists() and is_of(known[-1], plan):
+    if (
+        known
+        and not (known[-1] / "result.json").exists()
+        and belongs_to(known[-1], plan)
+    ):
         return known[-1]
     return place / f"{plan.size}-{len(known) + 1:03d}"
 
 
-def is_of(directory: Path, plan: Plan) -> bool:
+def belongs_to(directory: Path, plan: Plan) -> bool:
     """Whether a directory is empty, or contains runs of this very plan and version."""
     try:
         return bool(read_json(directory / _PLAN) == _written(plan))
@@ -59,7 +63,7 @@ def claim(directory: Path, plan: Plan) -> None:
         DataFileError: it contains runs of another plan, or of another version.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    if not is_of(directory, plan):
+    if not belongs_to(directory, plan):
         reason = "holds runs of another plan or version; name another directory"
         raise DataFileError(str(directory), "", reason)
     write_json(directory / _PLAN, _written(plan))

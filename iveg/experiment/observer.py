@@ -13,7 +13,7 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
 from iveg.domain.stamps import parse_stamp
-from iveg.experiment.believing import Belief, belief_in
+from iveg.experiment.beliefs import Belief, belief_in
 from iveg.experiment.scoring import Picture, SeenObject
 from iveg.experiment.slices import Slice, slice_between
 
@@ -23,7 +23,7 @@ _ORDER = ("passed", "missing", "reordered", "repeated")
 
 
 @dataclass(slots=True)
-class Watched:
+class ObservedRun:
     """Recorded output.
 
     Attributes:
@@ -40,7 +40,7 @@ class Watched:
     order: dict[str, dict[str, int]] = field(default_factory=dict)
 
 
-async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
+async def watch(url: str, token: str, seconds: float, robot_id: str) -> ObservedRun:
     """Record for ``seconds``; an error ends the recording with what it has.
 
     Args:
@@ -49,7 +49,7 @@ async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
         seconds: Duration (s).
         robot_id: Robot whose costmap is requested once a second.
     """
-    watched = Watched()
+    watched = ObservedRun()
     beside = [
         asyncio.create_task(_listen(url, token, watched)),
         asyncio.create_task(_believe(url, token, robot_id, watched)),
@@ -63,7 +63,7 @@ async def watch(url: str, token: str, seconds: float, robot_id: str) -> Watched:
     return watched
 
 
-async def _measure(url: str, token: str, seconds: float, watched: Watched) -> None:
+async def _measure(url: str, token: str, seconds: float, watched: ObservedRun) -> None:
     """A slice every few seconds, the last one at the end."""
     slices = max(1, math.floor(seconds / _SLICE_S))
     start = before = await _told(url, token)
@@ -101,7 +101,7 @@ def _order_between(
     }
 
 
-async def _listen(url: str, token: str, watched: Watched) -> None:
+async def _listen(url: str, token: str, watched: ObservedRun) -> None:
     bearer = {"Authorization": f"Bearer {token}"}
     address = url.replace("http", "ws", 1) + "/live"
     # A closed connection ends the recording, which keeps its frames.
@@ -111,14 +111,14 @@ async def _listen(url: str, token: str, watched: Watched) -> None:
                 _hear(message, watched)
 
 
-def _hear(message: str | bytes, watched: Watched) -> None:
+def _hear(message: str | bytes, watched: ObservedRun) -> None:
     if isinstance(message, str) and message.startswith('{"topic":"detections/'):
         picture = picture_of(orjson.loads(message)["data"])
         if picture is not None:
             watched.pictures.append(picture)
 
 
-async def _believe(url: str, token: str, robot_id: str, watched: Watched) -> None:
+async def _believe(url: str, token: str, robot_id: str, watched: ObservedRun) -> None:
     bearer = {"Authorization": f"Bearer {token}"}
     async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
         while True:

@@ -13,19 +13,19 @@ import orjson
 from iveg import __version__
 from iveg.domain.latency.account import LatencySummary
 from iveg.domain.latency.hops import DATA, HOPS
-from iveg.experiment.believing import injections
-from iveg.experiment.observer import Watched, slowdowns_of
+from iveg.experiment.beliefs import injections
+from iveg.experiment.observer import ObservedRun, slowdowns_of
 from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.plan import Plan, PlannedRun
-from iveg.experiment.rehearsal import Rehearsed
 from iveg.experiment.scoring import Picture, SeenObject, Tally, paired, score, tally
 from iveg.experiment.slices import Slice, spreads
 from iveg.experiment.statistics import thinned
+from iveg.experiment.virtual_run import VirtualRunResult
 
 Outcome = dict[str, Any]
 
 
-def counted_of(run: Rehearsed, robot_id: str) -> Outcome:
+def counted_of(run: VirtualRunResult, robot_id: str) -> Outcome:
     """Result of a run on the virtual clock; reproducible."""
     real = [one for one, _ in run.pairs]
     return {
@@ -38,7 +38,7 @@ def counted_of(run: Rehearsed, robot_id: str) -> Outcome:
 
 
 def stack_of(
-    watched: Watched,
+    watched: ObservedRun,
     truth: Sequence[Picture],
     decisions: Sequence[Mapping[str, Any]],
     robot_id: str,

@@ -76,7 +76,7 @@ def spreads(slices: Sequence[Slice]) -> dict[Cell, LatencySummary]:
     return {cell: spread_of(sketch) for cell, sketch in whole(slices).items()}
 
 
-def apart(
+def latency_changes(
     before: Sequence[Slice], after: Sequence[Slice], cell: Cell
 ) -> Iterator[tuple[str, Interval]]:
     """Increase of a hop's mean and P95 (ms), with bootstrapped intervals.

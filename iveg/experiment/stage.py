@@ -15,7 +15,7 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import REST, Rig, SimulatedWorld
+from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
 from iveg.ngsi import codec
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
@@ -30,7 +30,7 @@ STEP_S: Final = 0.05
 _LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
 """Steps between two camera frames, the first once all odometry was sent, and between
 two messages of navigation."""
-Looked = Callable[[Rig], None]
+Looked = Callable[[RobotHardware], None]
 
 
 @dataclass
@@ -59,7 +59,7 @@ class StagedRobot:
 
     def __init__(
         self,
-        rig: Rig,
+        rig: RobotHardware,
         now: Instant,
         hear: Callable[[str, bytes], None],
         looked: Looked = lambda _: None,
@@ -87,10 +87,10 @@ class StagedRobot:
         """Navigate, drive, sense."""
         into_run = number * STEP_S
         free = self._machine.may_drive
-        wish = self._rig.wish(into_run, world) if free else REST
-        self._perform(self._machine.wish(wish, now.mono), now)
+        requested = self._rig.requested_twist(into_run, world) if free else REST
+        self._perform(self._machine.request_twist(requested, now.mono), now)
         if self.faults.deaf and free:
-            self._rig.drive(wish)
+            self._rig.drive(requested)
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
         self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
@@ -99,7 +99,7 @@ class StagedRobot:
         if self._scan_every and number % self._scan_every == 0:
             self._uplink.send(self._rig.scan(world), now)
         if number % _LOOK_EVERY == 1:
-            self._uplink.send(self._rig.look(into_run, world), now)
+            self._uplink.send(self._rig.detect(into_run, world), now)
             self._looked(self._rig)
         if number % _NAVIGATION_EVERY == 0:
             self._uplink.send(self._rig.navigation(), now)

@@ -104,7 +104,7 @@ def _negative(exposure: Exposure | None, now: Instant) -> NegativeMargin:
         share=rounded(day.share, 5),
         known_s=round(day.known_s, 1),
         unknown_s=round(day.unknown_s, 1),
-        count=day.looks,
+        count=day.evaluations,
         since=None if exposure is None else moment(day.since),
         age_s=_looked_s(exposure, now),
     )
@@ -115,14 +115,14 @@ def _worst(exposure: Exposure | None, now: Instant) -> WorstMargin:
     return WorstMargin(
         margin=None if worst is None else Margin.of(worst.margin),
         at=None if worst is None else moment(worst.at),
-        count=0 if exposure is None else exposure.looks,
+        count=0 if exposure is None else exposure.evaluations,
         since=None if exposure is None else moment(exposure.since),
         age_s=_looked_s(exposure, now),
     )
 
 
 def _looked_s(exposure: Exposure | None, now: Instant) -> float | None:
-    return None if exposure is None else round(now.mono - exposure.looked.mono, 1)
+    return None if exposure is None else round(now.mono - exposure.evaluated_at.mono, 1)
 
 
 def _ms(seconds: float | None) -> float | None:

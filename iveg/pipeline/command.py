@@ -160,7 +160,7 @@ class Commander:
         await asyncio.gather(
             self._event_log.flushed(),
             *(
-                self._journal.wanted(one.robot_id, "stopped", one.hold_id, by, at)
+                self._journal.log_desired(one.robot_id, "stopped", one.hold_id, by, at)
                 for one in stands
             ),
         )
@@ -354,7 +354,7 @@ class Commander:
         if desired is not None:
             by = "iveg" if command is None else command.requesters[0]
             self._sender.start(
-                self._journal.wanted(
+                self._journal.log_desired(
                     machine.robot_id, desired, machine.hold_id, by, at
                 ),
                 f"journal-{machine.robot_id}",

@@ -8,7 +8,7 @@ import asyncio
 from iveg.domain.coverage import Coverage
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
-from iveg.domain.tracking.sight import is_looking
+from iveg.domain.tracking.sight import is_detecting
 from iveg.domain.world import World
 from iveg.pipeline.ports import Clock
 
@@ -34,8 +34,8 @@ class CoverageMonitor:
 
     def tick(self, now: Instant) -> None:
         """Take in what the cameras have in view now."""
-        self.coverage.look(self._world.live_robots(), now)
+        self.coverage.update(self._world.live_robots(), now)
 
     def cameras(self, now: Instant) -> int:
         """Number of cameras that work now, wherever they are."""
-        return sum(is_looking(robot, now) for robot in self._world.live_robots())
+        return sum(is_detecting(robot, now) for robot in self._world.live_robots())

@@ -8,8 +8,8 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
-from iveg.domain.order import OrderVerdict
 from iveg.domain.rule.overload import Overload
+from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.world import World
 from iveg.pipeline import topics

@@ -82,11 +82,11 @@ class Evaluator:
         """How often a robot slowed for a person or peer out of its own sight."""
         self._speed_limits = SpeedLimits(greenhouse)
         overload = self._speed_limits.overload
-        self.looks = DetectionTracking(
+        self.tracking = DetectionTracking(
             world, self.people, event_log, hub, new_id, overload
         )
         self._staleness = Staleness(world, self.people, greenhouse, event_log, hub)
-        other = self.looks.other
+        other = self.tracking.other
         self._feedback_publisher = FeedbackPublisher(
             world, self.people, other, fleet, stamp, boot, backlog
         )
@@ -108,7 +108,7 @@ class Evaluator:
     @property
     def placed(self) -> Mapping[str, list[Placed]]:
         """Detections of each robot's newest frame, faint ones included."""
-        return self.looks.placed
+        return self.tracking.placed
 
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
         """A decision that is still in memory, with the verdicts of now."""
@@ -142,7 +142,7 @@ class Evaluator:
             return False
         observation = received.observation
         if isinstance(observation, DetectionFrame):
-            self.looks.take(observation, received, verdict, self.rule)
+            self.tracking.take(observation, received, verdict, self.rule)
             self._notice(observation.robot_id, received.at)
         if verdict != "new":
             return False
@@ -269,7 +269,7 @@ class Evaluator:
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Let time pass: silence, ages, overdue links, alerts, heartbeat."""
         self._staleness.tick(now)
-        self.looks.forget(now)
+        self.tracking.forget(now)
         self._first_reports.forget(self.people.known)
         self.settle()
         self._judge(now)
@@ -286,7 +286,7 @@ class Evaluator:
         margins = [*margins_of(fleet, self.people.known.values(), now)]
         ages = [robot.age_s(now) for robot in fleet]
         seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
-        self._exposures.look(margins, now, seen=seen)
+        self._exposures.update(margins, now, seen=seen)
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.events import LogEvent
-from iveg.domain.latency.behind import Remark
 from iveg.domain.latency.hops import DATA, HOPS, Data, Hop
+from iveg.domain.latency.overloads import Remark
 from iveg.domain.latency.sketch import Sketch, merged, read_bins, write_bins
 from iveg.domain.latency.watch import LatencyWatch, Measured
 from iveg.domain.observations import Instant, Received

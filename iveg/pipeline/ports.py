@@ -58,7 +58,7 @@ class FleetPort(Protocol):
 class StopJournal(Protocol):
     """Append-only file that outlives a crash and a lost database."""
 
-    async def wanted(
+    async def log_desired(
         self,
         robot_id: str,
         desired: Literal["stopped", "run"],
@@ -68,7 +68,7 @@ class StopJournal(Protocol):
     ) -> None:
         """Write a robot's desired state down; returns when it is on disk."""
 
-    async def named(
+    async def log_release(
         self,
         robot_id: str,
         hold_id: str,

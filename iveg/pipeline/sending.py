@@ -126,7 +126,7 @@ class Sender:
         if machine.hold_id is None or not effect.ours:
             return
         by = "iveg" if machine.stop is None else machine.stop.requesters[0]
-        await self._journal.named(
+        await self._journal.log_release(
             effect.robot_id,
             machine.hold_id,
             effect.ours,

@@ -5,7 +5,7 @@ its content was measured after that feedback left iVeg (docs/interfaces/mqtt.md)
 """
 
 from iveg.domain.observations import FeedbackRef, Origin
-from iveg.domain.order import StreamOrder
+from iveg.domain.stream_order import StreamOrder
 
 
 class Echo:

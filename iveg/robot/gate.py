@@ -10,7 +10,7 @@ from iveg.domain.geometry import Twist2D
 
 REST = Twist2D(0.0, 0.0)
 NEUTRAL_S = 0.5
-WISH_LIVES_S = 0.5
+TWIST_VALID_S = 0.5
 RAMP_M_S2, RAMP_RAD_S2 = 0.5, 2.0
 _NEUTRAL_BELOW = 1e-3
 _LONGEST_STEP_S = 0.1
@@ -30,7 +30,7 @@ class Gate:
     def __init__(self, max_speed: float, max_turn: float) -> None:
         self._max_speed = max_speed
         self._max_turn = max_turn
-        self._wish, self._wished_at = REST, -math.inf
+        self._requested, self._requested_at = REST, -math.inf
         self._last, self._last_at = REST, -math.inf
         self._neutral_needed = True
         self._neutral_since: float | None = None
@@ -40,10 +40,10 @@ class Gate:
         """Whether upstream must still request zero before the robot may move."""
         return self._neutral_needed
 
-    def wish(self, twist: Twist2D, now: float) -> None:
+    def request_twist(self, twist: Twist2D, now: float) -> None:
         """Take upstream's newest twist; one that is not finite counts as zero."""
         finite = math.isfinite(twist.linear_x) and math.isfinite(twist.angular_z)
-        self._wish, self._wished_at = (twist if finite else REST), now
+        self._requested, self._requested_at = (twist if finite else REST), now
 
     def require_neutral(self) -> None:
         """Require zero from upstream for 0.5 s before the robot may move again."""
@@ -57,31 +57,33 @@ class Gate:
             may_drive: False while anything holds the robot.
             now: Monotonic (s).
         """
-        wish = self._wish if now - self._wished_at <= WISH_LIVES_S else REST
+        requested = (
+            self._requested if now - self._requested_at <= TWIST_VALID_S else REST
+        )
         if may_drive and self._neutral_needed:
-            self._watch_neutral(wish, now)
+            self._watch_neutral(requested, now)
         if not may_drive or self._neutral_needed:
-            wish = REST
+            requested = REST
         step = min(_LONGEST_STEP_S, max(0.0, now - self._last_at))
-        self._last = self._ramped(self._limited(wish, factor), step)
+        self._last = self._ramped(self._limited(requested, factor), step)
         self._last_at = now
         return self._last
 
-    def _watch_neutral(self, wish: Twist2D, now: float) -> None:
-        if max(abs(wish.linear_x), abs(wish.angular_z)) > _NEUTRAL_BELOW:
+    def _watch_neutral(self, requested: Twist2D, now: float) -> None:
+        if max(abs(requested.linear_x), abs(requested.angular_z)) > _NEUTRAL_BELOW:
             self._neutral_since = None
         elif self._neutral_since is None:
             self._neutral_since = now
         elif now - self._neutral_since >= NEUTRAL_S:
             self._neutral_needed = False
 
-    def _limited(self, wish: Twist2D, factor: float) -> Twist2D:
+    def _limited(self, requested: Twist2D, factor: float) -> Twist2D:
         over = max(
             1.0,
-            abs(wish.linear_x) / self._max_speed,
-            abs(wish.angular_z) / self._max_turn,
+            abs(requested.linear_x) / self._max_speed,
+            abs(requested.angular_z) / self._max_turn,
         )
-        return _scaled(wish, factor / over)
+        return _scaled(requested, factor / over)
 
     def _ramped(self, aim: Twist2D, step: float) -> Twist2D:
         fastest = _grown(self._last.linear_x, aim.linear_x, RAMP_M_S2 * step)

@@ -94,7 +94,7 @@ class Judgement:
             and abs(motion.twist.angular_z) < LIMITS.standing_speed
         )
 
-    def moved(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
+    def take_odometry(self, pose: Pose2D | None, twist: Twist2D, now: float) -> None:
         """Take odometry; one with a number that is not finite is ignored.
 
         Odometry without a pose gives the speed, which confirms a standstill, but no
@@ -104,14 +104,14 @@ class Judgement:
         if all(map(math.isfinite, (*place, twist.linear_x, twist.angular_z))):
             self._motion = Motion(pose, twist, now)
 
-    def told(self, topic: str, feedback: Feedback, now: float) -> None:
+    def take_feedback(self, topic: str, feedback: Feedback, now: float) -> None:
         """Take a message of ``/{topic}/mqtt_feedback``."""
         if self._peer_feedback.take(topic, feedback, self._own(now), now):
             self.watchdog.heard(feedback.seen.get(self._id), now)
 
     def settle(self, now: float) -> None:
         """Evaluate this moment."""
-        self.watchdog.look(now)
+        self.watchdog.tick(now)
         slowed = self.cap.reason in ("person", "robot")
         raw = lowest(
             (

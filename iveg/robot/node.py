@@ -202,9 +202,9 @@ class RobotNode:
             for one in observations:
                 self._uplink.send(one, own)
 
-    def wish(self, twist: Twist2D) -> None:
+    def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
-        self._perform(self._machine.wish(twist, self._read_clock().mono))
+        self._perform(self._machine.request_twist(twist, self._read_clock().mono))
 
     def limit(self, factor: float, cause: str | None = None) -> None:
         """Limit the speed factor (0, 0.5 or 1) for the robot's own software.
@@ -265,7 +265,7 @@ class RobotNode:
             self.counters[error.reason] += 1
             return
         self._echo.take(feedback.origin)
-        self._uplink.rates.told(feedback.backlog_s, now)
+        self._uplink.rates.take_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
         self._perform(self._machine.feedback(peer, feedback, now))
         if self._on_feedback_read is not None:

@@ -127,16 +127,16 @@ class SafetyMachine:
         self._judge(now)
         return self._effects(now)
 
-    def wish(self, twist: Twist2D, now: float) -> tuple[Effect, ...]:
+    def request_twist(self, twist: Twist2D, now: float) -> tuple[Effect, ...]:
         """Take the twist that upstream navigation requests."""
-        self._gate.wish(twist, now)
+        self._gate.request_twist(twist, now)
         return self.tick(now)
 
     def odometry(
         self, pose: Pose2D | None, twist: Twist2D, now: float
     ) -> tuple[Effect, ...]:
         """Take measured pose (None: not in ``map``) and speed."""
-        self._judgement.moved(pose, twist, now)
+        self._judgement.take_odometry(pose, twist, now)
         return self.tick(now)
 
     def limit(self, cap: Cap) -> None:
@@ -147,7 +147,7 @@ class SafetyMachine:
         self, topic: str, feedback: Feedback, now: float
     ) -> tuple[Effect, ...]:
         """Take a message of ``/{topic}/mqtt_feedback``."""
-        self._judgement.told(topic, feedback, now)
+        self._judgement.take_feedback(topic, feedback, now)
         return self.tick(now)
 
     def reported(self, seq: int, now: float) -> None:

@@ -33,7 +33,7 @@ class SinglePayload:
         self._saw_nothing = False
         self._unplaced = 0
 
-    def look(self, frame: DetectionFrame) -> None:
+    def take(self, frame: DetectionFrame) -> None:
         """Take a detection frame; it replaces what is left of the one before."""
         self._detections = sorted(frame.detections, key=lambda one: one.probability)
         self._saw_nothing = not frame.detections and not frame.unreadable

@@ -147,7 +147,7 @@ class Uplink:
         if isinstance(observation, LaserScan):
             single.scan = observation
         elif isinstance(observation, DetectionFrame):
-            single.look(observation)
+            single.take(observation)
         elif isinstance(observation, Odometry):
             origin = self._origin("", at)
             payload = single.write(replace(observation, origin=origin))

@@ -39,7 +39,7 @@ class Watchdog:
 
         A number that was never sent, or none, is no evidence of freshness.
         """
-        self.look(now)
+        self.tick(now)
         evidence = None if seen is None else self._sent.get(seen)
         if evidence is None:
             return
@@ -50,7 +50,7 @@ class Watchdog:
                 self._fresh_since, self._fresh_count = now, 0
             self._fresh_count += 1
 
-    def look(self, now: float) -> None:
+    def tick(self, now: float) -> None:
         """Notice that time has passed: after an interruption freshness counts anew."""
         age = self.age(now)
         if age is None or age > self._slow_s:

@@ -55,7 +55,7 @@ def _drive(world: SimulatedWorld, seconds: float) -> Iterator[float]:
     for step in range(round(seconds / _STEP_S)):
         now = step * _STEP_S
         for rig in world.rigs.values():
-            rig.drive(rig.wish(now, world))
+            rig.drive(rig.requested_twist(now, world))
         for rig in world.rigs.values():
             rig.move(_STEP_S)
         world.walk(_STEP_S)

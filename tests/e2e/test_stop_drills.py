@@ -167,5 +167,5 @@ def _let_in(directory: Path, name: str, role: str, token: str) -> None:
     now = time.time()
     digest = hashlib.sha256(token.encode()).hexdigest()
     store = FileSessions(directory / "sessions.jsonl")
-    store.keep([Session(digest, name, role, now, now)])
+    store.save([Session(digest, name, role, now, now)])
     store.close()

@@ -22,7 +22,7 @@ class FakeJournal:
         self.opened = asyncio.Event()
         self.opened.set()
 
-    async def wanted(
+    async def log_desired(
         self,
         robot_id: str,
         desired: Literal["stopped", "run"],
@@ -33,7 +33,7 @@ class FakeJournal:
         await self.opened.wait()
         self.lines.append((robot_id, desired, hold_id, by))
 
-    async def named(
+    async def log_release(
         self,
         robot_id: str,
         hold_id: str,

@@ -1,7 +1,7 @@
 """Stand-ins for what lies outside iVeg: servers on loopback that keep what came.
 
-They speak TLS with a certificate of their own; ``Outside`` is told by argument that
-loopback may be reached and that this certificate is believed.
+They speak TLS with a certificate of their own; ``OutboundHttp`` is told by argument
+that loopback may be reached and that this certificate is believed.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ from cryptography.hazmat.primitives.serialization import (
     PrivateFormat,
 )
 
-from iveg.adapters.outside import Outside
+from iveg.adapters.outbound import OutboundHttp
 
 Talk = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]]
 
@@ -55,9 +55,9 @@ def contexts() -> tuple[ssl.SSLContext, ssl.SSLContext]:
     return server, ssl.create_default_context(cadata=pem.decode("ascii"))
 
 
-def loopback(timeout_s: float = 5.0) -> Outside:
+def loopback(timeout_s: float = 5.0) -> OutboundHttp:
     """The door, for a test that has its servers at home."""
-    return Outside(lambda address: address.is_loopback, contexts()[1], timeout_s)
+    return OutboundHttp(lambda address: address.is_loopback, contexts()[1], timeout_s)
 
 
 @dataclass

@@ -118,7 +118,9 @@ class Robot:
     async def live(self) -> None:
         while True:
             self.node.sense(self.odometry())
-            self.node.wish(self.wished if self.node.may_drive else Twist2D(0.0, 0.0))
+            self.node.request_twist(
+                self.wished if self.node.may_drive else Twist2D(0.0, 0.0)
+            )
             await asyncio.sleep(0.05)
 
     @property

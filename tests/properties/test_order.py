@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.domain.observations import Odometry
-from iveg.domain.order import StreamOrder
+from iveg.domain.stream_order import StreamOrder
 from iveg.domain.world import World
 from tests.builders import odometry, origin, received
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Twist2D
-from iveg.emulator.ros2_base import TIMEOUT_S, Base
+from iveg.emulator.ros2_base import TIMEOUT_S, DriveWatchdog
 from iveg.robot.caps import Cap
 from iveg.robot.effects import Drive as Told
 from iveg.robot.gate import RAMP_M_S2, RAMP_RAD_S2, REST
@@ -56,7 +56,7 @@ class Gate:
     """One gate between two topics, and the base behind it."""
 
     rig: Rig = field(default_factory=Rig)
-    base: Base = field(default_factory=Base)
+    base: DriveWatchdog = field(default_factory=DriveWatchdog)
     runs: bool = True
     wished: Twist2D = REST
     wished_at: float = -math.inf
@@ -90,7 +90,7 @@ class Gate:
         wish = self.topics.read(payload, self.rig.now)
         if wish is not None:
             self.wished, self.wished_at = wish, self.rig.now
-            self.rig.perform(self.rig.machine.wish(wish, self.rig.now))
+            self.rig.perform(self.rig.machine.request_twist(wish, self.rig.now))
 
     def on_wait(self, steps: int) -> None:
         for _ in range(steps):

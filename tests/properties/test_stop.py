@@ -26,7 +26,6 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.domain.order import StreamOrder
 from iveg.domain.stop import (
     Changed,
     Closed,
@@ -39,6 +38,7 @@ from iveg.domain.stop import (
     SetDesiredState,
     StopMachine,
 )
+from iveg.domain.stream_order import StreamOrder
 from iveg.domain.transports import TransportId
 from iveg.ngsi import codec
 from iveg.robot import effects as robot
@@ -299,7 +299,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
             self.carry(rig.machine.feedback("AGI", feedback, self.now))
             self._odometry(rig.speed)
         neutral = rig.machine.may_drive
-        self.carry(rig.machine.wish(rig.wished if neutral else REST, self.now))
+        self.carry(rig.machine.request_twist(rig.wished if neutral else REST, self.now))
 
     def _odometry(self, speed: float) -> None:
         self.moved_at = self.now if speed >= 0.02 else self.moved_at

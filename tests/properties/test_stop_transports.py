@@ -145,7 +145,7 @@ def act(rig: Late) -> None:
             rig.iveg_restarts()
         case "robot":
             # Reports of the last boot die with it: which of two boots is the newer is
-            # a question of its own (``domain/order``).
+            # a question of its own (``domain/stream_order``).
             rig.ways["from_fiware"].forget()
             rig.the_robot_reboots()
         case _:

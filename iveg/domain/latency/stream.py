@@ -13,7 +13,7 @@ from typing import Final
 
 from iveg.domain.latency.hops import HOPS, Data, Exclusion, Hop
 from iveg.domain.latency.offset import ClockOffset
-from iveg.domain.latency.order import SequenceLoss
+from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.series import Series
 from iveg.domain.latency.trace import Tracer
 from iveg.domain.observations import Instant, Origin

@@ -8,7 +8,6 @@ message, it gets its place in a ring.
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from iveg.domain.latency.behind import Overloads
 from iveg.domain.latency.hops import (
     DATA,
     LONGEST_S,
@@ -19,6 +18,7 @@ from iveg.domain.latency.hops import (
     data_of_kind,
 )
 from iveg.domain.latency.offset import ClockOffset
+from iveg.domain.latency.overloads import Overloads
 from iveg.domain.latency.series import SLICE_S, Series
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
@@ -134,7 +134,7 @@ class LatencyWatch:
         self._second_at = now.mono
         for stream in self._streams.values():
             stream.second()
-        self.overloads.look(self.streams, now.mono)
+        self.overloads.update(self.streams, now.mono)
         if now.mono - self._slice_at >= SLICE_S:
             self._begin_slice(now)
 

@@ -97,7 +97,7 @@ def can_see(
     return in_picture and greenhouse.in_sight(camera.x, camera.y, x, y)
 
 
-def looks_from(
+def visible_from(
     robot: RobotState, spots: _Spots, greenhouse: Greenhouse, now: Instant
 ) -> NDArray[np.intp]:
     """The spots that a robot's camera has in view now, with nothing in between.
@@ -129,7 +129,7 @@ def looks_from(
     return np.array(clear, np.intp)
 
 
-def is_looking(robot: RobotState, now: Instant) -> bool:
+def is_detecting(robot: RobotState, now: Instant) -> bool:
     """Whether a robot's camera works and its place is known."""
     return _camera_of(robot, now) is not None
 

@@ -190,7 +190,7 @@ def to_detection(
     return Detection(found.class_id, found.probability, box, frame)
 
 
-def look(
+def ground_frame(
     robot_id: str,
     origin: Origin,
     segments: Iterable[Segment],

@@ -275,7 +275,7 @@ class Ros2Robot:
             return
         wish = self._topics.read(waited[-1], now)
         if wish is not None:
-            self.node.wish(wish)
+            self.node.request_twist(wish)
 
     def _look_round(self) -> None:
         """Check for other publishers on the drive, and for iVeg's knowledge of us."""

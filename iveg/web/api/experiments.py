@@ -29,7 +29,7 @@ _REPORT_POLICY = (
 it has neither cookie nor API."""
 
 
-class Bench(Protocol):
+class ExperimentRunner(Protocol):
     """What runs experiments."""
 
     def start(self, size: Size) -> Experiment:
@@ -54,7 +54,7 @@ class Wanted(BaseModel):
     """`quick` takes three minutes, `full` about twenty, `minimal` some seconds."""
 
 
-def router(bench: Bench) -> APIRouter:
+def router(bench: ExperimentRunner) -> APIRouter:
     """Read by all, started and stopped by operators."""
     routes = APIRouter(prefix="/api/v1", tags=["experiments"])
     reader = [Depends(require("read"))]

@@ -15,8 +15,8 @@ from starlette.responses import Response
 from iveg.domain.latency.account import Cell, LatencySummary, collect, merge, spread_of
 from iveg.domain.latency.hops import DATA, HOPS, WINDOW_S, Data, Hop, Window
 from iveg.domain.latency.offset import ClockOffset
-from iveg.domain.latency.order import SequenceLoss
 from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.trace import Trace

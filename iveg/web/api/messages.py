@@ -14,7 +14,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from iveg.adapters import web_push
-from iveg.adapters.outside import is_public_target
+from iveg.adapters.outbound import is_public_target
 from iveg.domain import messages
 from iveg.domain.messages import Channel, Contacts, Language, Level, Message, Text
 from iveg.domain.observations import Instant

@@ -33,7 +33,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class Appearance:
     """Appearance that this browser chose; remembered in its cookies."""
 
     language: str = "es"
@@ -42,7 +42,7 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PageFrame:
     """Context of ``base.html``, which surrounds every page.
 
     Attributes:
@@ -52,7 +52,7 @@ class Frame:
     """
 
     site: Site
-    look: Look
+    look: Appearance
     route: str
     name: str | None = None
     role: str | None = None
@@ -63,7 +63,7 @@ class LivePage:
     """``live.html``: the five widgets, empty until ``/live`` speaks."""
 
     template: ClassVar[str] = "live.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +71,7 @@ class HistoryPage:
     """``history.html``: the shell that the history scripts fill."""
 
     template: ClassVar[str] = "history.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class AlertsPage:
     """``alerts.html``: what is active, the sound, and what was."""
 
     template: ClassVar[str] = "alerts.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class CommandsPage:
     """``commands.html``: every STOP, release and resume with its times."""
 
     template: ClassVar[str] = "commands.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ class FleetPage:
     """``fleet.html``: the data path from robot to screen, the robots, their devices."""
 
     template: ClassVar[str] = "fleet.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class ClimatePage:
     """``climate.html``: the air in the greenhouse."""
 
     template: ClassVar[str] = "climate.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class LatencyPage:
     """``latency.html``: latency, hop by hop."""
 
     template: ClassVar[str] = "latency.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class ExperimentsPage:
     """``experiments.html``: the paper's evaluation, started and watched."""
 
     template: ClassVar[str] = "experiments.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class SettingsPage:
     """``settings.html``: the rule in force, and what this device remembers."""
 
     template: ClassVar[str] = "settings.html"
-    frame: Frame
+    frame: PageFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class DecisionPage:
     """
 
     template: ClassVar[str] = "decision.html"
-    frame: Frame
+    frame: PageFrame
     decision_id: str
 
 
@@ -153,7 +153,7 @@ class DayPage:
     """
 
     template: ClassVar[str] = "day.html"
-    frame: Frame
+    frame: PageFrame
     day: Day
     before: str
     after: str
@@ -164,7 +164,7 @@ class DocsPage:
     """``docs.html``: the HTTP interface, drawn from our own OpenAPI document."""
 
     template: ClassVar[str] = "docs.html"
-    frame: Frame
+    frame: PageFrame
     document: ApiDoc
 
 
@@ -177,7 +177,7 @@ class AboutPage:
     """
 
     template: ClassVar[str] = "about.html"
-    frame: Frame
+    frame: PageFrame
     rule: DetectionRule
 
 
@@ -191,7 +191,7 @@ class SignInPage:
     """
 
     template: ClassVar[str] = "signin.html"
-    frame: Frame
+    frame: PageFrame
     address: str
     wrong: bool = False
 
@@ -206,7 +206,7 @@ class ErrorPage:
     """
 
     template: ClassVar[str] = "error.html"
-    frame: Frame
+    frame: PageFrame
     status: int
     sentence: str
 

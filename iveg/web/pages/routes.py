@@ -22,18 +22,18 @@ from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
     AlertsPage,
+    Appearance,
     ClimatePage,
     CommandsPage,
     DecisionPage,
     DocsPage,
     ErrorPage,
     FleetPage,
-    Frame,
     HistoryPage,
     LatencyPage,
     LivePage,
-    Look,
     Page,
+    PageFrame,
     SettingsPage,
     SignInPage,
     Site,
@@ -87,12 +87,12 @@ class Pages:
 
     def frame(
         self, request: Request, route: str, visitor: Visitor | None = None
-    ) -> Frame:
+    ) -> PageFrame:
         """The frame around a page for this reader."""
         look = _look(request)
         if visitor is None:
-            return Frame(self._site, look, route)
-        return Frame(self._site, look, route, visitor.name, visitor.role)
+            return PageFrame(self._site, look, route)
+        return PageFrame(self._site, look, route, visitor.name, visitor.role)
 
     def draw(self, page: Page, status: int = 200) -> HTMLResponse:
         """A page as a response.
@@ -227,13 +227,13 @@ def _identified(request: Request) -> Visitor | None:
     return visitor
 
 
-def _look(request: Request) -> Look:
+def _look(request: Request) -> Appearance:
     cookies = request.cookies
     language = cookies.get(LANGUAGE_COOKIE, "")
     if language not in LANGUAGES:
         language = preferred_language(request.headers.get("accept-language", ""))
     theme = _theme(cookies.get(THEME_COOKIE))
-    return Look(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
+    return Appearance(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
 
 
 def _theme(wanted: str | None) -> Theme:

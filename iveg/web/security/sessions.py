@@ -30,7 +30,7 @@ class SessionStore(Protocol):
     def load(self) -> Sequence[Session]:
         """All that were kept."""
 
-    def keep(self, sessions: Iterable[Session]) -> None:
+    def save(self, sessions: Iterable[Session]) -> None:
         """Keep these from now on; must not block."""
 
 
@@ -122,7 +122,7 @@ class Sessions:
     def _keep(self) -> None:
         self._kept_at = self._clock().wall
         if self._store is not None:
-            self._store.keep(self._sessions.values())
+            self._store.save(self._sessions.values())
 
 
 def _role_at(session: Session, now: float) -> Role | None:

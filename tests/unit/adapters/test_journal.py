@@ -18,7 +18,7 @@ async def write(path: Path, *lines: tuple[str, str]) -> FileJournal:
     journal = FileJournal(path)
     for robot_id, desired in lines:
         assert desired in ("stopped", "run")
-        await journal.wanted(
+        await journal.log_desired(
             robot_id, "stopped" if desired == "stopped" else "run", "01A", "ana", START
         )
     return journal
@@ -57,8 +57,8 @@ async def test_what_a_release_has_named_is_known_and_still_wanted(
 ) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
-    await journal.named("AGI", "01A", ["01A", "01B"], "c1", "ana", START)
-    await journal.wanted("AGI", "stopped", "01C", "iveg", START)
+    await journal.log_release("AGI", "01A", ["01A", "01B"], "c1", "ana", START)
+    await journal.log_desired("AGI", "stopped", "01C", "iveg", START)
     journal.close()
 
     assert FileJournal(path).read() == {
@@ -71,9 +71,9 @@ async def test_a_release_that_came_true_is_over_but_its_names_stay_known(
 ) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
-    await journal.named("AGI", "01A", ["01A"], "c1", "ana", START)
-    await journal.wanted("AGI", "run", None, "ana", START)
-    await journal.wanted("AGI", "stopped", "01B", "ben", START)
+    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
+    await journal.log_desired("AGI", "run", None, "ana", START)
+    await journal.log_desired("AGI", "stopped", "01B", "ben", START)
     journal.close()
 
     assert FileJournal(path).read() == {
@@ -85,7 +85,9 @@ async def test_of_the_names_the_last_sixty_four_are_kept(tmp_path: Path) -> None
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
     for number in range(70):
-        await journal.named("AGI", "01A", ["01A", f"n{number}"], "c", "ana", START)
+        await journal.log_release(
+            "AGI", "01A", ["01A", f"n{number}"], "c", "ana", START
+        )
     journal.close()
 
     named = FileJournal(path).read()["AGI"].named
@@ -155,7 +157,7 @@ async def test_lines_of_many_at_once_are_whole(tmp_path: Path) -> None:
     journal = FileJournal(path)
     await asyncio.gather(
         *(
-            journal.wanted(f"R{number}", "stopped", "01A", "ana", START)
+            journal.log_desired(f"R{number}", "stopped", "01A", "ana", START)
             for number in range(40)
         )
     )
@@ -182,11 +184,11 @@ async def _live_long(journal: FileJournal, rnd: Random) -> None:
         ids = [f"n{rnd.randrange(number + 1)}" for _ in range(rnd.randrange(1, 4))]
         if what == "named":
             names = list(dict.fromkeys(ids))
-            await journal.named(robot, ids[0], names, f"c{number}", "ana", START)
+            await journal.log_release(robot, ids[0], names, f"c{number}", "ana", START)
         else:
             hold = None if what == "run" else ids[0]
             desired: Literal["stopped", "run"] = "run" if hold is None else "stopped"
-            await journal.wanted(robot, desired, hold, f"by{number}", START)
+            await journal.log_desired(robot, desired, hold, f"by{number}", START)
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -205,7 +207,7 @@ async def test_a_compacted_journal_says_what_the_long_one_said(
 
     # A press and a release more say the same on both.
     again = FileJournal(path)
-    await again.wanted("AGI", "stopped", "new", "ben", START)
+    await again.log_desired("AGI", "stopped", "new", "ben", START)
     again.close()
     assert FileJournal(path).read()["AGI"].hold_id == "new"
 
@@ -215,13 +217,13 @@ async def test_names_of_releases_survive_that_the_journal_is_compacted(
 ) -> None:
     path = tmp_path / "commands.jsonl"
     journal = await write(path, ("AGI", "stopped"))
-    await journal.named("AGI", "01A", ["01A"], "c1", "ana", START)
-    await journal.wanted("AGI", "run", None, "ana", START)
+    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
+    await journal.log_desired("AGI", "run", None, "ana", START)
     journal.close()
     assert FileJournal(path).read() == {}
 
     later = FileJournal(path)
-    await later.wanted("AGI", "stopped", "01B", "ben", START)
+    await later.log_desired("AGI", "stopped", "01B", "ben", START)
     later.close()
 
     assert FileJournal(path).read() == {

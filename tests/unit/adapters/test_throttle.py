@@ -89,7 +89,7 @@ COPIES = {
 async def test_only_copies_of_odometry_and_scans_are_throttled() -> None:
     bench = await Bench().found()
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == COPIES
     assert {one.get("throttling", 0) for one in bench.store.kept.values()} == {0, 1}
 
@@ -97,18 +97,18 @@ async def test_only_copies_of_odometry_and_scans_are_throttled() -> None:
 async def test_the_robot_whose_direct_copy_is_lost_gets_all_of_orions() -> None:
     bench = await Bench().found()
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     bench.hear(1.5, direct=("AGII",))
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == {"iVeg: odometry AGII", "iVeg: lidar AGII"}
 
 
 async def test_every_switch_reads_the_entities_once() -> None:
     bench = await Bench().found()
-    await bench.throttle.look()
+    await bench.throttle.check()
     bench.hear(6.0)
     for _ in range(3):
-        await bench.throttle.look()
+        await bench.throttle.check()
     assert bench.reads == 1
 
 
@@ -117,21 +117,21 @@ async def test_a_read_that_failed_is_done_at_the_next_look() -> None:
     bench.hear(6.0)
     bench.refuses_to_read = True
     with pytest.raises(HopError):
-        await bench.throttle.look()
+        await bench.throttle.check()
     bench.refuses_to_read = False
-    await bench.throttle.look()
-    await bench.throttle.look()
+    await bench.throttle.check()
+    await bench.throttle.check()
     assert bench.reads == 2
 
 
 async def test_a_restart_takes_what_stands_and_changes_nothing() -> None:
     before = await Bench().found()
     before.hear(6.0)
-    await before.throttle.look()
+    await before.throttle.check()
     calls = before.store.calls
 
     after = await Bench(before.store).found()
-    await after.throttle.look()
+    await after.throttle.check()
 
     assert after.store.calls == calls
     assert after.throttled() == COPIES
@@ -141,11 +141,11 @@ async def test_a_restart_takes_what_stands_and_changes_nothing() -> None:
 async def test_a_restart_without_a_direct_copy_brings_all_again() -> None:
     before = await Bench().found()
     before.hear(6.0)
-    await before.throttle.look()
+    await before.throttle.check()
 
     after = await Bench(before.store).found()
     after.hear(1.5, direct=())
-    await after.throttle.look()
+    await after.throttle.check()
 
     assert after.throttled() == set()
 
@@ -154,11 +154,11 @@ async def test_an_orion_that_ignores_the_change_gets_new_subscriptions() -> None
     bench = await Bench(StubbornStore()).found()
     others = set(bench.store.kept) - bench.throttle.ids
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == COPIES
     assert set(bench.store.kept) == others | bench.throttle.ids
     bench.hear(1.5, direct=())
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == set()
     assert len(bench.store.kept) == len(WANTED)
 
@@ -167,7 +167,7 @@ async def test_what_was_listed_before_a_switch_is_not_believed_after_it() -> Non
     bench = await Bench().found()
     listed, switches = dict(bench.throttle.copies), bench.throttle.switches
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     bench.throttle.found(listed, switches)
     assert all(throttled for _, throttled in bench.throttle.copies.values())
 
@@ -191,7 +191,7 @@ async def test_nothing_is_throttled_where_that_is_not_allowed() -> None:
     bench = await Bench().found()
     bench.throttle.allowed = False
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == set()
     assert bench.reads == 0
 
@@ -201,7 +201,7 @@ async def test_what_an_earlier_run_throttled_is_let_go_where_that_is_not_allowed
 ):
     bench = await Bench().found()
     bench.hear(6.0)
-    await bench.throttle.look()
+    await bench.throttle.check()
     bench.throttle.allowed = False
-    await bench.throttle.look()
+    await bench.throttle.check()
     assert bench.throttled() == set()

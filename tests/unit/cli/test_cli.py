@@ -10,7 +10,7 @@ import pytest
 from iveg import __version__
 from iveg.cli import UNUSABLE, main
 from iveg.cli.demo import on_free_ports
-from iveg.cli.running import sign_in_link, tell_link
+from iveg.cli.running import print_sign_in_link, sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings, describe
 
@@ -189,7 +189,7 @@ class Screen(io.StringIO):
 def test_13_16_a_terminal_shows_the_link_as_a_code_too_and_a_log_does_not() -> None:
     terminal, log = Screen(is_terminal=True), Screen(is_terminal=False)
     for out in (terminal, log):
-        tell_link(Settings(), "abc", out)
+        print_sign_in_link(Settings(), "abc", out)
 
     assert log.getvalue() == "iVeg: http://127.0.0.1:8000/?token=abc\n"
     link, *code = terminal.getvalue().splitlines()

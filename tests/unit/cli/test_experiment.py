@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.cli.experiment import placed_in, refuse_live_robots, with_fiware
+from iveg.cli.experiment import experiment_settings, refuse_live_robots, with_fiware
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.settings import Settings
 from tests.faulty_fiware import faulty_fiware
@@ -41,7 +41,7 @@ def test_half_a_fiware_is_refused(words: list[str]) -> None:
 def test_the_fleet_is_the_papers_and_secrets_are_new(tmp_path: Path) -> None:
     site = Settings(robots=("R1",), api_token="known", greenhouse="none")
 
-    placed = placed_in(tmp_path, site)
+    placed = experiment_settings(tmp_path, site)
 
     assert placed.robots == ("AGI", "AGII")
     assert placed.greenhouse == "mvsim-20x20"

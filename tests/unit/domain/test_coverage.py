@@ -23,7 +23,7 @@ def looking(seconds: float = 0.0) -> tuple[Scene, Coverage]:
     scene, coverage = Scene(greenhouse=GREENHOUSE), Coverage(GREENHOUSE)
     scene.drive("AGI", 4.0, linear=0.0)
     scene.look("AGI")
-    coverage.look(scene.world.live_robots(), at(seconds))
+    coverage.update(scene.world.live_robots(), at(seconds))
     return scene, coverage
 
 
@@ -53,7 +53,7 @@ def test_ages_grow_and_what_was_looked_at_long_ago_is_not_seen_now() -> None:
 
 def test_a_robot_that_is_silent_looks_at_nothing() -> None:
     scene, coverage = looking()
-    coverage.look(scene.world.live_robots(), at(2.0))
+    coverage.update(scene.world.live_robots(), at(2.0))
 
     assert coverage.ages(at(2.0))[0][6] == 2
 

@@ -18,9 +18,9 @@ LONG_AGO = replace(NEAR, age_s=1.1)
 
 def watch(days: Exposures, *looks: list[Margin], seen: bool = True) -> None:
     """One look each half a second."""
-    begin = 0 if days.today is None else days.today.looks
+    begin = 0 if days.today is None else days.today.evaluations
     for number, margins in enumerate(looks):
-        days.look(margins, at(PERIOD_S * (begin + number)), seen=seen)
+        days.update(margins, at(PERIOD_S * (begin + number)), seen=seen)
 
 
 def test_each_look_stands_for_the_time_since_the_one_before() -> None:
@@ -30,7 +30,7 @@ def test_each_look_stands_for_the_time_since_the_one_before() -> None:
 
     today = days.today
     assert today is not None
-    assert (today.looks, today.known_s, today.negative_s) == (5, 2.0, 0.5)
+    assert (today.evaluations, today.known_s, today.negative_s) == (5, 2.0, 0.5)
     assert today.share == pytest.approx(0.25)
 
 
@@ -69,9 +69,9 @@ def test_a_margin_that_is_known_to_be_negative_needs_no_other() -> None:
 
 def test_a_look_after_a_long_silence_does_not_stand_for_all_of_it() -> None:
     days = Exposures()
-    days.look([NEAR], at(0), seen=True)
+    days.update([NEAR], at(0), seen=True)
 
-    days.look([NEAR], at(3600), seen=True)
+    days.update([NEAR], at(3600), seen=True)
 
     assert days.today is not None
     assert days.today.negative_s == pytest.approx(2 * PERIOD_S)
@@ -80,13 +80,13 @@ def test_a_look_after_a_long_silence_does_not_stand_for_all_of_it() -> None:
 def test_at_midnight_a_new_account_begins() -> None:
     days, midnight = Exposures(), 86_400.0 * 20_000
     before, after = Instant(10.0, midnight - 0.5), Instant(10.5, midnight)
-    days.look([NEAR], before, seen=True)
+    days.update([NEAR], before, seen=True)
 
-    days.look([WIDE], after, seen=True)
+    days.update([WIDE], after, seen=True)
 
     today = days.today
     assert today is not None
-    assert (today.since, today.looks, today.negative_s) == (after, 1, 0.0)
+    assert (today.since, today.evaluations, today.negative_s) == (after, 1, 0.0)
     assert today.worst is not None
     assert today.worst.margin == WIDE
 

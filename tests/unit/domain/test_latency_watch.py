@@ -234,7 +234,7 @@ def test_an_agent_that_falls_behind_is_named_within_three_seconds() -> None:
     chain.run(3.0)
 
     said = chain.said()
-    assert list(said) in (["latency.behind.fiware"], ["latency.growing.fiware"])
+    assert list(said) in (["latency.overloads.fiware"], ["latency.growing.fiware"])
     assert [slots["lag"] for slots in said.values()] == [pytest.approx(1.7, abs=0.15)]
 
 
@@ -245,7 +245,7 @@ def test_a_robot_whose_way_up_falls_behind_is_named_within_three_seconds() -> No
     chain.up = still(1.4)
     chain.run(3.0)
 
-    assert set(chain.said()) & {"latency.behind.uplink", "latency.growing.uplink"}
+    assert set(chain.said()) & {"latency.overloads.uplink", "latency.growing.uplink"}
 
 
 def test_a_hop_that_has_caught_up_is_named_no_more() -> None:

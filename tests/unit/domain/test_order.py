@@ -3,7 +3,7 @@
 import pytest
 
 from iveg.domain.observations import Origin
-from iveg.domain.order import StreamOrder
+from iveg.domain.stream_order import StreamOrder
 from tests.builders import START, origin
 
 YEARS_S = 5 * 365 * 86400.0

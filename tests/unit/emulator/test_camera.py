@@ -38,7 +38,7 @@ def looks(
     seed: int = 1,
 ) -> list[tuple[Detection, ...]]:
     detector = Detector(AGI, model, np.random.default_rng(seed))
-    return [detector.look(n * every_s, pose, [target], scenery) for n in range(count)]
+    return [detector.detect(n * every_s, pose, [target], scenery) for n in range(count)]
 
 
 def person(x: float, y: float) -> Target:

@@ -38,7 +38,9 @@ class Trip:
     def drive(self, seconds: float) -> "Trip":
         for _ in range(round(seconds / DT)):
             self.now += DT
-            wish = self.follower.wish(self.vehicle.pose, self.now, self.discs)
+            wish = self.follower.requested_twist(
+                self.vehicle.pose, self.now, self.discs
+            )
             self.vehicle.step(wish, DT)
             self.places.append(self.vehicle.pose)
             self.twists.append(self.vehicle.twist)

@@ -92,9 +92,9 @@ def test_the_detector_tells_who_has_no_place_until_the_next_look() -> None:
         AGI, DETECTORS["perfect"], np.random.default_rng(1), lambda *_: ((), 1)
     )
 
-    seen = detector.look(0.0, HERE, [person(3.0)], CROP)
+    seen = detector.detect(0.0, HERE, [person(3.0)], CROP)
     lost = detector.lost
-    detector.look(10.0, HERE, [], CROP)
+    detector.detect(10.0, HERE, [], CROP)
 
     assert (seen, lost, detector.lost) == ((), 1, 0)
 
@@ -111,8 +111,8 @@ def test_both_cameras_find_the_same_people_in_nearly_the_same_places() -> None:
         for world in (drawn, grounded):
             world.walk(0.1)
         for robot_id in ("AGI", "AGII"):
-            truth = drawn.rigs[robot_id].look(tick / 10, drawn).detections
-            found = grounded.rigs[robot_id].look(tick / 10, grounded)
+            truth = drawn.rigs[robot_id].detect(tick / 10, drawn).detections
+            found = grounded.rigs[robot_id].detect(tick / 10, grounded)
             assert len(found.detections) + found.unreadable == len(truth)
             for one, other in zip(found.detections, truth, strict=False):
                 away = math.dist(one.box.centre[:2], other.box.centre[:2])

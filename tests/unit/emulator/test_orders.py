@@ -7,8 +7,8 @@ from iveg.emulator.orders import (
     FaultOrder,
     OrderPlace,
     PersonOrder,
+    read_fault_arguments,
     read_order,
-    read_translations,
 )
 
 FLEET = ("AGI", "AGII")
@@ -73,7 +73,7 @@ def test_words_of_a_command_line_are_the_same_orders() -> None:
         "drop_percent=10",
     ]
 
-    assert read_translations(words, FLEET) == [
+    assert read_fault_arguments(words, FLEET) == [
         FaultOrder(robot="AGII", freeze_odometry="repeat"),
         FaultOrder(robot="AGI", false_person=OrderPlace(x=1.0, y=2.0)),
         FaultOrder(robot="AGI", drop_percent=10.0),
@@ -96,4 +96,4 @@ def test_a_word_that_is_no_order_is_refused_with_one_sentence(
     word: str, why: str
 ) -> None:
     with pytest.raises(DataFileError, match=f"^--fault, {word}: {why}"):
-        read_translations([word], FLEET)
+        read_fault_arguments([word], FLEET)

@@ -5,7 +5,7 @@ import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
-from iveg.emulator.logs import Entry, LogReader
+from iveg.emulator.logs import LogReader, RecordingEntry
 from iveg.emulator.playback import Playback
 from tests import data
 from tests.builders import scan
@@ -14,21 +14,21 @@ from tests.unit.domain.scene import Scene
 DATA = Path(data.__file__).parent
 
 
-def moved(at: float, x: float, yaw: float = 0.0, v: float = 1.0) -> Entry:
+def moved(at: float, x: float, yaw: float = 0.0, v: float = 1.0) -> RecordingEntry:
     pose, twist = Pose2D(x, 0.0, yaw), Twist2D(v, 0.0)
-    return Entry(at, Odometry("", Origin(), pose, twist))
+    return RecordingEntry(at, Odometry("", Origin(), pose, twist))
 
 
-def swept(at: float) -> Entry:
-    return Entry(at, scan())
+def swept(at: float) -> RecordingEntry:
+    return RecordingEntry(at, scan())
 
 
-def saw(at: float, x: float = 0.5) -> Entry:
+def saw(at: float, x: float = 0.5) -> RecordingEntry:
     box = Box3D(x - 0.5, x + 0.5, 0.0, 1.0, 0.0, 1.0)
-    return Entry(at, Detection("farmer", 0.9, box, "map"))
+    return RecordingEntry(at, Detection("farmer", 0.9, box, "map"))
 
 
-def log(*entries: Entry) -> Callable[[], Iterator[Entry]]:
+def log(*entries: RecordingEntry) -> Callable[[], Iterator[RecordingEntry]]:
     return lambda: iter(entries)
 
 

@@ -10,7 +10,7 @@ from iveg.adapters.bags import BagTopics
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.emulator.logs import Entry
+from iveg.emulator.logs import RecordingEntry
 from iveg.emulator.recordings import open_recording
 from tests.data.bags import (
     ODOMETRY,
@@ -36,11 +36,11 @@ KINDS = [
 
 def entries(
     path: Path, topics: BagTopics | None = None, *, bag_time: bool = False
-) -> list[Entry]:
+) -> list[RecordingEntry]:
     return list(open_recording(path, MOUNT, topics, bag_time=bag_time).entries())
 
 
-def poses(found: Sequence[Entry]) -> list[Pose2D]:
+def poses(found: Sequence[RecordingEntry]) -> list[Pose2D]:
     return [e.observation.pose for e in found if isinstance(e.observation, Odometry)]
 
 

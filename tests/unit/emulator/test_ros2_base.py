@@ -12,7 +12,7 @@ from iveg.domain.observations import DetectionFrame, LaserScan, Navigation, Odom
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder
-from iveg.emulator.ros2_base import TIMEOUT_S, Base, Ros2Base
+from iveg.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
 from iveg.emulator.ros2_base import Navigation as Nav
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.world import REST, SimulatedWorld
@@ -29,7 +29,7 @@ AHEAD = Twist2D(0.5, 0.1)
 
 
 def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
-    base = Base()
+    base = DriveWatchdog()
     before = base.command(0.0)
     base.told(AHEAD, 10.0)
 
@@ -42,7 +42,7 @@ def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
 
 def test_navigation_that_makes_no_progress_asks_for_rest_and_tries_again() -> None:
     nav = Nav()
-    asked = [nav.wish(AHEAD, REST, n / 10) for n in range(40)]
+    asked = [nav.requested_twist(AHEAD, REST, n / 10) for n in range(40)]
 
     assert asked[0] == AHEAD
     rests = [n for n, twist in enumerate(asked) if twist == REST]
@@ -54,7 +54,7 @@ def test_navigation_that_makes_no_progress_asks_for_rest_and_tries_again() -> No
 def test_navigation_that_drives_never_gives_up() -> None:
     nav = Nav()
 
-    assert {nav.wish(AHEAD, AHEAD, n / 10) for n in range(40)} == {AHEAD}
+    assert {nav.requested_twist(AHEAD, AHEAD, n / 10) for n in range(40)} == {AHEAD}
 
 
 # --- topics -------------------------------------------------------------------------

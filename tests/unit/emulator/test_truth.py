@@ -21,8 +21,8 @@ def test_a_person_whom_the_detector_misses_is_in_the_truth(tmp_path: Path) -> No
     rig = world.rigs["AGI"]
 
     with closing(TruthLog(tmp_path / "truth.jsonl")) as log:
-        told = rig.look(0.0, world)
-        log.looked(rig, world, 1000.5)
+        told = rig.detect(0.0, world)
+        log.record(rig, world, 1000.5)
 
     [picture] = read_truth(tmp_path / "truth.jsonl")
     [person] = world.discs()

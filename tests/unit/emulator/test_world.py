@@ -36,7 +36,7 @@ def run(world: SimulatedWorld, seconds: float, dt: float = 0.1) -> Iterator[floa
     for step in range(round(seconds / dt)):
         now = step * dt
         for rig in world.rigs.values():
-            rig.drive(rig.wish(now, world))
+            rig.drive(rig.requested_twist(now, world))
         for rig in world.rigs.values():
             rig.move(dt)
         world.walk(dt)
@@ -113,7 +113,7 @@ def test_agii_passes_a_person_whom_only_agi_sees(scenario: str) -> None:
         hidden = [p for p in close if not greenhouse.in_sight(pose.x, pose.y, p.x, p.y)]
         seen_by_agi = [
             detection
-            for detection in world.rigs["AGI"].look(now, world).detections
+            for detection in world.rigs["AGI"].detect(now, world).detections
             if detection.class_id == PERSON
         ]
         unseen += bool(hidden and seen_by_agi)
@@ -128,7 +128,7 @@ def test_agii_of_the_field_test_never_looks_at_the_grower() -> None:
 
     for now in run(world, 60.0):
         passed += nearest_person(world, "AGII") <= 2.0
-        assert PERSON not in {d.class_id for d in rig.look(now, world).detections}
+        assert PERSON not in {d.class_id for d in rig.detect(now, world).detections}
 
     assert passed > 20
 
@@ -144,7 +144,7 @@ def test_one_lap_of_viewpoints_shows_the_person_from_south_and_north() -> None:
 
     for now in run(world, 40.0):
         rig = world.rigs["AGI"]
-        if any(d.class_id == PERSON for d in rig.look(now, world).detections):
+        if any(d.class_id == PERSON for d in rig.detect(now, world).detections):
             seen_from.add(rig.vehicle.pose.y > world.people[0].y)
 
     assert seen_from == {False, True}
@@ -157,7 +157,7 @@ def test_agi_and_agii_of_peers_come_within_two_metres_and_see_each_other() -> No
     for now in run(world, 120.0):
         agi, agii = (world.rigs[robot_id].vehicle.pose for robot_id in FLEET)
         near += agi.distance_to(agii.x, agii.y) <= 2.0
-        found = world.rigs["AGI"].look(now, world).detections
+        found = world.rigs["AGI"].detect(now, world).detections
         named |= {detection.class_id for detection in found}
 
     assert near > 5
@@ -168,7 +168,7 @@ def test_a_person_and_agii_are_in_one_frame_of_together() -> None:
     world = world_of("together")
 
     frames = [
-        {d.class_id for d in world.rigs["AGI"].look(now, world).detections}
+        {d.class_id for d in world.rigs["AGI"].detect(now, world).detections}
         for now in run(world, 60.0)
     ]
 
@@ -180,7 +180,7 @@ def test_the_person_of_occluded_is_seen_in_part() -> None:
     sure = [
         detection.probability
         for now in run(world, 100.0)
-        for detection in world.rigs["AGI"].look(now, world).detections
+        for detection in world.rigs["AGI"].detect(now, world).detections
         if detection.class_id == PERSON
     ]
 
@@ -215,10 +215,10 @@ def test_hidden_and_false_people_are_what_the_camera_is_told() -> None:
     rig = world.rigs["AGI"]
 
     rig.hides_people = True
-    assert rig.look(0.0, world).detections == ()
+    assert rig.detect(0.0, world).detections == ()
 
     rig.false_person = (12.0, 3.8)
-    (ghost,) = rig.look(10.0, world).detections
+    (ghost,) = rig.detect(10.0, world).detections
     assert ghost.class_id == PERSON
     assert ghost.box.centre[:2] == pytest.approx((0.0, -2.0), abs=1e-6)
 

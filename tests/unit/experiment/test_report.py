@@ -10,11 +10,11 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.experiment.compare import write_comparison
 from iveg.experiment.files import directory_of, read_json, write_json
-from iveg.experiment.notebook import Notebook
 from iveg.experiment.outcome import outcome_of, read_truth, result_of
 from iveg.experiment.plan import FAMILIES, PLANS, PlannedRun
 from iveg.experiment.progress import expected_s
 from iveg.experiment.report import write_report
+from iveg.experiment.run_store import RunStore
 from iveg.experiment.scoring import Tally
 
 CHOSEN = {"fiware": "embedded", "confidence_threshold": 0.8}
@@ -205,13 +205,13 @@ def finished(step: PlannedRun) -> Any:
 def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
     tmp_path: Path,
 ) -> None:
-    first = Notebook(PLANS["quick"], tmp_path)
+    first = RunStore(PLANS["quick"], tmp_path)
     steps = first.steps_left()
     for step in steps[:2]:
         first.keep(step, finished(step))
     first.finish(CHOSEN, "iveg: did not answer")
 
-    second = Notebook(PLANS["quick"], tmp_path)
+    second = RunStore(PLANS["quick"], tmp_path)
 
     partial = read_json(tmp_path / "partial.json")
     assert partial["completion"] == {"runs": 2, "completed": 2, "planned": 5}
@@ -221,7 +221,7 @@ def test_an_experiment_that_broke_off_keeps_what_it_has_and_goes_on(
 
 
 def test_a_run_that_a_crash_left_half_written_is_run_again(tmp_path: Path) -> None:
-    notebook = Notebook(PLANS["quick"], tmp_path)
+    notebook = RunStore(PLANS["quick"], tmp_path)
     steps = notebook.steps_left()
     notebook.keep(steps[0], finished(steps[0]))
     (tmp_path / f"{steps[0].name}.json").write_text('{"family": "view')
@@ -232,7 +232,7 @@ def test_a_run_that_a_crash_left_half_written_is_run_again(tmp_path: Path) -> No
 def test_an_experiment_that_is_whole_leaves_nothing_of_its_breaks(
     tmp_path: Path,
 ) -> None:
-    notebook = Notebook(PLANS["minimal"], tmp_path)
+    notebook = RunStore(PLANS["minimal"], tmp_path)
     notebook.finish(CHOSEN, "interrupted")
     [step] = notebook.steps_left()
     notebook.keep(step, finished(step))
@@ -250,9 +250,9 @@ def test_the_same_command_takes_up_what_broke_off_and_else_begins_anew(
 ) -> None:
     plan = PLANS["quick"]
     first = directory_of(tmp_path, plan)
-    Notebook(plan, first).finish(CHOSEN, "interrupted")
+    RunStore(plan, first).finish(CHOSEN, "interrupted")
     again = directory_of(tmp_path, plan)
-    Notebook(plan, again).finish(CHOSEN, "")
+    RunStore(plan, again).finish(CHOSEN, "")
 
     assert first == again == tmp_path / "quick-001"
     assert directory_of(tmp_path, plan) == tmp_path / "quick-002"
@@ -261,8 +261,8 @@ def test_the_same_command_takes_up_what_broke_off_and_else_begins_anew(
 def test_runs_of_two_plans_are_never_one_experiment(tmp_path: Path) -> None:
     plan, other = PLANS["quick"], replace(PLANS["quick"], seed=7)
     first = directory_of(tmp_path, plan)
-    Notebook(plan, first).finish(CHOSEN, "interrupted")
+    RunStore(plan, first).finish(CHOSEN, "interrupted")
 
     assert directory_of(tmp_path, other) == tmp_path / "quick-002"
     with pytest.raises(DataFileError, match="another plan"):
-        Notebook(other, first)
+        RunStore(other, first)

@@ -480,7 +480,7 @@ def test_looks_at_ever_new_things_do_not_fill_the_memory() -> None:
 
     desk.loop.step([], desk.clock())
 
-    assert desk.evaluator.looks.subjects == 0
+    assert desk.evaluator.tracking.subjects == 0
 
 
 # --- what counts ------------------------------------------------------------------

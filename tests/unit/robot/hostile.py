@@ -136,7 +136,7 @@ class World(Rig):
             self.watched(lambda: machine.tick(self.now))
         else:
             self.note_wish(wished)
-            self.watched(lambda: machine.wish(wished, self.now))
+            self.watched(lambda: machine.request_twist(wished, self.now))
 
     def note_wish(self, wished: Twist2D | None) -> None:
         """Since when upstream has been at rest, kept apart from the gate's own view."""

@@ -104,7 +104,7 @@ class Rig:
         if self.wished is None:
             self.perform(self.machine.tick(self.now))
         else:
-            self.perform(self.machine.wish(self.wished, self.now))
+            self.perform(self.machine.request_twist(self.wished, self.now))
 
     def perform(self, effects: tuple[Effect, ...]) -> tuple[Effect, ...]:
         for effect in effects:

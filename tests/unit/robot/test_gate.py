@@ -23,7 +23,7 @@ def reach(gate: Gate, wish: Twist2D, factor: float, until: float) -> Twist2D:
     out, now = REST, 1.0
     while now < until:
         now += 0.05
-        gate.wish(wish, now)
+        gate.request_twist(wish, now)
         out = gate.output(factor, True, now)
     return out
 
@@ -44,7 +44,7 @@ def test_a_lower_factor_counts_at_once_forward_reverse_and_turning() -> None:
 def test_a_change_of_direction_starts_from_rest() -> None:
     gate = open_gate()
     reach(gate, Twist2D(1.0, 0.0), 1.0, 4.0)
-    gate.wish(Twist2D(-1.0, 0.0), 4.05)
+    gate.request_twist(Twist2D(-1.0, 0.0), 4.05)
     assert -0.06 < gate.output(1.0, True, 4.05).linear_x < 0.0
 
 
@@ -52,7 +52,7 @@ def test_a_turn_on_the_spot_is_capped_and_ramped() -> None:
     gate = open_gate()
     out = reach(gate, Twist2D(0.0, 1.0), 0.5, 1.1)
     assert 0.0 < out.angular_z < 0.5
-    gate.wish(Twist2D(0.0, 1.0), 2.0)
+    gate.request_twist(Twist2D(0.0, 1.0), 2.0)
     for number in range(10):
         out = gate.output(0.5, True, 2.0 + number / 20)
     assert out.angular_z == 0.5
@@ -78,14 +78,14 @@ def test_a_wish_is_forgotten_after_half_a_second() -> None:
 
 def test_a_pause_of_the_program_does_not_make_the_robot_jump() -> None:
     gate = open_gate()
-    gate.wish(FORWARD, 60.0)
+    gate.request_twist(FORWARD, 60.0)
     assert gate.output(1.0, True, 60.0).linear_x <= 0.05
 
 
 def test_the_neutral_interlock_starts_anew_with_every_wish_to_move() -> None:
     gate = Gate(1.0, 1.0)
     for now, wish in ((0.0, REST), (0.4, FORWARD), (0.45, REST), (0.9, REST)):
-        gate.wish(wish, now)
+        gate.request_twist(wish, now)
         assert gate.output(1.0, True, now) == REST
     assert gate.neutral_needed
     gate.output(1.0, True, 0.96)
@@ -103,5 +103,5 @@ def test_rest_while_held_does_not_count_for_the_interlock() -> None:
 def test_a_held_gate_gives_zero_whatever_is_wished() -> None:
     gate = open_gate()
     reach(gate, FORWARD, 1.0, 4.0)
-    gate.wish(FORWARD, 4.05)
+    gate.request_twist(FORWARD, 4.05)
     assert gate.output(1.0, False, 4.05) == REST

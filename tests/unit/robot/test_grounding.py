@@ -21,7 +21,7 @@ from iveg.robot.grounding.locate import (
     Segment,
     Ungrounded,
     ground,
-    look,
+    ground_frame,
     to_detection,
 )
 from iveg.robot.grounding.mask import (
@@ -350,7 +350,7 @@ def test_a_look_reports_the_placed_and_counts_the_sure_that_have_no_place() -> N
         replace(segment(), bits=b""),
     ]
 
-    frame = look(
+    frame = ground_frame(
         "AGI", Origin(seq=3), segments, DepthPicture(LENS, depth), MOUNT, AS_IS
     )
 

@@ -93,7 +93,7 @@ def test_everything_that_happens_tells_the_drive_first() -> None:
     rig = moving().run(1.0)
     for effects in (
         rig.machine.tick(rig.now),
-        rig.machine.wish(AHEAD, rig.now),
+        rig.machine.request_twist(AHEAD, rig.now),
         rig.machine.odometry(rig.pose, REST, rig.now),
         rig.machine.feedback("AGII", rig.feedback(), rig.now),
         rig.machine.command(b"junk", rig.now),

@@ -28,8 +28,8 @@ ONE = Experiment(
 )
 
 
-class FakeBench:
-    """Implements ``web.experiments.Bench``; ``asked`` is what was asked of it."""
+class FakeRunner:
+    """Implements ``web.experiments.ExperimentRunner``; ``asked`` is what came."""
 
     def __init__(self, place: Path, refused: str | None = None) -> None:
         self.asked: list[str] = []
@@ -53,7 +53,7 @@ class FakeBench:
         return file if file.exists() else None
 
 
-def desk_with(bench: FakeBench) -> WebDesk:
+def desk_with(bench: FakeRunner) -> WebDesk:
     desk = WebDesk()
     desk.app.include_router(experiments.router(bench))
     drawn = routes.Pages(Site("field", ("AGI", "AGII"), "1", demo=True))
@@ -67,7 +67,7 @@ async def order(desk: WebDesk, role: Role, path: str, body: Any) -> Any:
 
 
 async def test_an_operator_starts_and_ends_one(tmp_path: Path) -> None:
-    bench = FakeBench(tmp_path)
+    bench = FakeRunner(tmp_path)
     desk = desk_with(bench)
 
     begun = await order(desk, "operator", "experiments", {"size": "full"})
@@ -80,7 +80,7 @@ async def test_an_operator_starts_and_ends_one(tmp_path: Path) -> None:
 
 
 async def test_viewers_and_programs_only_watch(tmp_path: Path) -> None:
-    bench = FakeBench(tmp_path)
+    bench = FakeRunner(tmp_path)
     desk = desk_with(bench)
 
     refused = [
@@ -97,7 +97,7 @@ async def test_viewers_and_programs_only_watch(tmp_path: Path) -> None:
 
 
 async def test_another_sites_page_starts_none(tmp_path: Path) -> None:
-    bench = FakeBench(tmp_path)
+    bench = FakeRunner(tmp_path)
     desk = desk_with(bench)
     async with desk.browser() as browser:
         foreign = {"Sec-Fetch-Site": "cross-site"}
@@ -109,7 +109,7 @@ async def test_another_sites_page_starts_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("why", ["running", "live_robot"])
 async def test_a_refusal_says_why(tmp_path: Path, why: str) -> None:
-    desk = desk_with(FakeBench(tmp_path, why))
+    desk = desk_with(FakeRunner(tmp_path, why))
 
     answer = await order(desk, "operator", "experiments", {"size": "quick"})
 
@@ -121,7 +121,7 @@ async def test_a_refusal_says_why(tmp_path: Path, why: str) -> None:
 async def test_only_the_sizes_that_there_are_can_be_asked_for(
     tmp_path: Path, body: Any
 ) -> None:
-    answer = await order(desk_with(FakeBench(tmp_path)), "admin", "experiments", body)
+    answer = await order(desk_with(FakeRunner(tmp_path)), "admin", "experiments", body)
 
     assert answer.status_code == 422
 
@@ -131,7 +131,7 @@ async def test_a_report_is_shown_where_it_can_neither_call_us_nor_be_framed(
 ) -> None:
     (tmp_path / "quick-001.html").write_text("<h1>whole</h1>")
     (tmp_path / "quick-001.json").write_text("{}")
-    async with desk_with(FakeBench(tmp_path)).browser("viewer") as browser:
+    async with desk_with(FakeRunner(tmp_path)).browser("viewer") as browser:
         report = await browser.get("/api/v1/experiments/quick-001/report")
         result = await browser.get("/api/v1/experiments/quick-001/result")
 
@@ -147,7 +147,7 @@ async def test_a_report_is_shown_where_it_can_neither_call_us_nor_be_framed(
 @pytest.mark.parametrize("name", ["full-001", "..%2Fquick-001", "quick-1", "secrets"])
 async def test_no_other_file_is_reached(tmp_path: Path, name: str) -> None:
     (tmp_path / "quick-001.html").write_text("")
-    async with desk_with(FakeBench(tmp_path)).browser() as browser:
+    async with desk_with(FakeRunner(tmp_path)).browser() as browser:
         answer = await browser.get(f"/api/v1/experiments/{name}/report")
 
     assert answer.status_code in (404, 422)
@@ -161,7 +161,7 @@ async def test_the_page_is_in_the_readers_language(
     tmp_path: Path, language: str, title: str
 ) -> None:
     headers = {"Accept-Language": language}
-    async with desk_with(FakeBench(tmp_path)).browser("viewer") as browser:
+    async with desk_with(FakeRunner(tmp_path)).browser("viewer") as browser:
         answer = await browser.get("/experiments", headers=headers)
 
     assert answer.status_code == 200

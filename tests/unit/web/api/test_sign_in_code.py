@@ -4,7 +4,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from iveg.cli.running import reached_at
+from iveg.cli.running import reachable_host
 from iveg.web import problems
 from iveg.web.api import sign_in_code
 from iveg.web.security.authentication import Authenticator, Role
@@ -52,9 +52,9 @@ async def test_nobody_but_an_operator_is_given_the_way_in(role: Role) -> None:
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "greenhouse.coop.es", "::1"])
 def test_the_terminal_names_the_address_of_the_settings(host: str) -> None:
-    assert reached_at(host) == host
+    assert reachable_host(host) == host
 
 
 @pytest.mark.parametrize("every", ["0.0.0.0", "::"])  # noqa: S104 - nobody listens
 def test_a_server_at_every_address_is_named_by_one_that_leads_there(every: str) -> None:
-    assert reached_at(every) not in (every, "")
+    assert reachable_host(every) not in (every, "")

@@ -167,7 +167,7 @@ def test_a_role_that_nobody_signs_in_with_is_not_remembered(
     path: Path, clock: FakeClock, store: FileSessions, role: str
 ) -> None:
     now = clock().wall
-    store.keep([Session("ab" * 32, "Ana", role, now, now)])
+    store.save([Session("ab" * 32, "Ana", role, now, now)])
     store.close()
 
     assert len(restarted(path, clock)) == 0

@@ -10,7 +10,7 @@ _LEAP: Final = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Lately:
+class RecentLoss:
     """The last three seconds: messages passed, missing, out of order."""
 
     passed: int
@@ -67,12 +67,12 @@ class SequenceLoss:
         self._past.append((self.passed, self.missing, self.reordered))
 
     @property
-    def lately(self) -> Lately:
+    def lately(self) -> RecentLoss:
         """What happened in the last three seconds."""
         if not self._past:
-            return Lately(0, 0, 0)
+            return RecentLoss(0, 0, 0)
         passed, missing, reordered = self._past[0]
-        return Lately(
+        return RecentLoss(
             self.passed - passed,
             max(0, self.missing - missing),
             self.reordered - reordered,

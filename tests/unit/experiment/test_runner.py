@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
-from iveg.experiment.bench import Bench
 from iveg.experiment.files import read_json, write_json
+from iveg.experiment.runner import ExperimentRunner
 from iveg.models.experiment import Experiment
 from tests.processes import is_alive
 
@@ -42,17 +42,21 @@ DIES = PROGRAM + 'sys.exit("iveg: the sky has fallen")'
 @asynccontextmanager
 async def bench_of(
     place: Path, program: str, is_robot_there: Callable[[], bool] = lambda: False
-) -> AsyncIterator[Bench]:
+) -> AsyncIterator[ExperimentRunner]:
     script = place / "program.py"
     script.write_text(program)
-    bench = Bench(place / "experiments", is_robot_there, (sys.executable, str(script)))
+    bench = ExperimentRunner(
+        place / "experiments", is_robot_there, (sys.executable, str(script))
+    )
     try:
         yield bench
     finally:
         await bench.close()
 
 
-async def until(bench: Bench, found: Callable[[Experiment], bool]) -> Experiment:
+async def until(
+    bench: ExperimentRunner, found: Callable[[Experiment], bool]
+) -> Experiment:
     async with asyncio.timeout(15):
         while not found(bench.list().items[0]):  # noqa: ASYNC110 - files tell nobody
             await asyncio.sleep(0.02)

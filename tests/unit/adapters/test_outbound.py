@@ -12,10 +12,10 @@ from cryptography.hazmat.primitives.asymmetric import ec, utils
 
 from iveg.adapters import web_push
 from iveg.adapters.mail import MailSender
-from iveg.adapters.outside import Outside, is_public, is_public_target
+from iveg.adapters.outbound import OutboundHttp, is_public, is_public_target
 from iveg.adapters.web_push import PushSender, decode, encode, encrypted, new_key
 from iveg.adapters.webhook import WebhookSender
-from iveg.domain.errors import OutsideError
+from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
     Contacts,
     Device,
@@ -114,7 +114,7 @@ def test_an_address_of_the_internet_is_kept() -> None:
 async def test_a_name_that_leads_home_is_refused_before_anything_is_sent() -> None:
     stand = HttpsStand()
     async with standing(stand):
-        sender = WebhookSender(Outside())
+        sender = WebhookSender(OutboundHttp())
         told = await sender.send(hooked(stand.url()), ALERT, START)
 
     assert [one.failed for one in told] == ["not_public"]
@@ -170,7 +170,7 @@ async def test_a_server_that_hangs_is_given_up() -> None:
 async def test_a_certificate_of_another_name_is_not_believed() -> None:
     stand = HttpsStand()
     async with standing(stand):
-        with pytest.raises(OutsideError, match="certificate"):
+        with pytest.raises(OutboundError, match="certificate"):
             await loopback().post(stand.url(host="127.0.0.1"), b"", {})
 
     assert stand.asked == []
@@ -210,7 +210,7 @@ async def test_a_wrong_password_is_said_to_be_that() -> None:
 async def test_a_mail_server_at_home_is_refused() -> None:
     stand = MailStand()
     async with standing(stand):
-        told = await MailSender(Outside(), write).send(
+        told = await MailSender(OutboundHttp(), write).send(
             mailed(stand, "ana"), ALERT, START
         )
 
@@ -277,7 +277,7 @@ async def test_a_browser_that_its_service_forgot_is_gone() -> None:
 
 
 async def test_a_name_server_that_hangs_takes_no_thread_of_others() -> None:
-    outside = Outside()
+    outside = OutboundHttp()
     await asyncio.gather(
         *(outside.resolve("127.0.0.1", 443) for _ in range(20)), return_exceptions=True
     )

@@ -21,7 +21,7 @@ from iveg.experiment.plan import Plan, PlannedRun
 from iveg.experiment.report import write_report
 
 
-class Notebook:
+class RunStore:
     """Stored results of one experiment.
 
     Raises:

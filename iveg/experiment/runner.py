@@ -42,7 +42,7 @@ _UNKNOWN: Final[Mapping[str, Any]] = {
 }
 
 
-class Bench:
+class ExperimentRunner:
     """Starts, supervises and lists experiments.
 
     Args:
@@ -231,8 +231,8 @@ def _close(directory: Path, code: int, why: str | None, said: str) -> None:
 
 def _write_partial(directory: Path, why: str) -> None:
     # The report writer imports the emulator, so it is imported only when needed.
-    from iveg.experiment.notebook import Notebook
+    from iveg.experiment.run_store import RunStore
 
     size = directory.name.partition("-")[0]
     with contextlib.suppress(DataFileError):
-        Notebook(PLANS[size], directory).finish({}, why)  # type: ignore[index]
+        RunStore(PLANS[size], directory).finish({}, why)  # type: ignore[index]

@@ -12,7 +12,7 @@ from statistics import median
 from typing import Final, Literal
 
 from iveg.domain.latency.hops import Hop
-from iveg.domain.latency.order import SequenceLoss
+from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.stream import Stream
 
 BEHIND_S: Final = 1.0
@@ -58,7 +58,7 @@ class Overloads:
         self._lags: dict[tuple[Hop, str], deque[float]] = {}
         self._behind: set[tuple[Hop, str]] = set()
 
-    def look(self, streams: Sequence[Stream], now: float) -> None:
+    def update(self, streams: Sequence[Stream], now: float) -> None:
         """Judge the hops by their newest messages (``now`` monotonic, s)."""
         found: list[Remark] = []
         robots = sorted({one.robot_id for one in streams})

@@ -5,7 +5,7 @@ from typing import Any
 from iveg.domain.detection_rule import DetectionRule
 from iveg.experiment.outcome import counted_of
 from iveg.experiment.plan import ROBOTS, PlannedRun
-from iveg.experiment.rehearsal import Rehearsal
+from iveg.experiment.virtual_run import VirtualRun
 
 RULE = DetectionRule()
 
@@ -16,7 +16,7 @@ async def counted(
     profile: str = "field",
     seconds: float = 5.0,
 ) -> Any:
-    rehearsal = Rehearsal(PlannedRun(family, 1, 6.0, seed), profile, RULE, "AGII")
+    rehearsal = VirtualRun(PlannedRun(family, 1, 6.0, seed), profile, RULE, "AGII")
     return counted_of(await rehearsal.play(seconds), "AGII")
 
 

@@ -24,8 +24,8 @@ from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import Layout, lay_out
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.truth import in_view
-from iveg.emulator.world import Rig, SimulatedWorld
-from iveg.experiment.believing import Belief, belief_of
+from iveg.emulator.world import RobotHardware, SimulatedWorld
+from iveg.experiment.beliefs import Belief, belief_of
 from iveg.experiment.plan import ROBOTS, PlannedRun
 from iveg.experiment.scoring import Pair, Picture, SeenObject
 from iveg.experiment.stage import STEP_S, Stage, heard
@@ -40,7 +40,7 @@ _SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
 
 
 @dataclass(slots=True)
-class Rehearsed:
+class VirtualRunResult:
     """Result of a run.
 
     Attributes:
@@ -88,7 +88,7 @@ class _Outside:
     ) -> None:
         """Ignore; no robot is stopped here."""
 
-    async def wanted(
+    async def log_desired(
         self,
         robot_id: str,
         desired: Literal["stopped", "run"],
@@ -98,7 +98,7 @@ class _Outside:
     ) -> None:
         """Ignore; no robot is stopped here."""
 
-    async def named(
+    async def log_release(
         self,
         robot_id: str,
         hold_id: str,
@@ -110,7 +110,7 @@ class _Outside:
         """Ignore; no robot is released here."""
 
 
-class Rehearsal:
+class VirtualRun:
     """One scenario in a pipeline of its own.
 
     Args:
@@ -126,7 +126,7 @@ class Rehearsal:
         self._now = _EPOCH
         self._outside = _Outside()
         self._watched = watched
-        self._result = Rehearsed()
+        self._result = VirtualRunResult()
         self._detections: list[Picture] = []
         self._wire(greenhouse, rule)
         self._world = _world_of(greenhouse, layout, profile, step.seed)
@@ -165,7 +165,7 @@ class Rehearsal:
             Counter,
         )
 
-    async def play(self, seconds: float) -> Rehearsed:
+    async def play(self, seconds: float) -> VirtualRunResult:
         """Run from the start; yields to other tasks once a virtual second."""
         for number in range(round(seconds / STEP_S)):
             self._stage.step()
@@ -189,7 +189,7 @@ class Rehearsal:
         for received in heard(topic, payload, self._now):
             self._parts.ingest.offer(received)
 
-    def _looked(self, rig: Rig) -> None:
+    def _looked(self, rig: RobotHardware) -> None:
         """Targets in view at the moment of the picture."""
         seen = (
             SeenObject(one.key, one.class_id, one.body.pose.x, one.body.pose.y)

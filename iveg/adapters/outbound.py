@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 import httpx
 
-from iveg.domain.errors import OutsideError
+from iveg.domain.errors import OutboundError
 
 Address = IPv4Address | IPv6Address
 _NAT64: Final = IPv6Network("64:ff9b::/96")
@@ -47,7 +47,7 @@ def _carried(address: Address) -> IPv4Address | None:
     return address.ipv4_mapped or address.sixtofour or (teredo and teredo[1])
 
 
-class Outside:
+class OutboundHttp:
     """Resolves names and posts to them.
 
     Args:
@@ -82,7 +82,7 @@ class Outside:
         """The address that a name has.
 
         Raises:
-            OutsideError: ``no_address``, or ``not_public`` when one of them is not.
+            OutboundError: ``no_address``, or ``not_public`` when one of them is not.
         """
         try:
             async with asyncio.timeout(self.timeout_s):
@@ -90,16 +90,16 @@ class Outside:
                     self._threads, _look_up, host, port
                 )
         except (TimeoutError, OSError, UnicodeError):
-            raise OutsideError("no_address") from None
+            raise OutboundError("no_address") from None
         if not all(self._allowed(ip_address(one)) for one in found):
-            raise OutsideError("not_public")
+            raise OutboundError("not_public")
         return found[0]
 
     async def connect(self, host: str, port: int) -> socket.socket:
         """A connection to a name's own address.
 
         Raises:
-            OutsideError: it has none, it is not public, or nobody answers there.
+            OutboundError: it has none, it is not public, or nobody answers there.
         """
         address = await self.resolve(host, port)
         family = socket.AF_INET6 if ":" in address else socket.AF_INET
@@ -111,7 +111,7 @@ class Outside:
                 await loop.sock_connect(connection, (address, port))
         except (TimeoutError, OSError):
             connection.close()
-            raise OutsideError("no_answer") from None
+            raise OutboundError("no_answer") from None
         except BaseException:
             connection.close()
             raise
@@ -121,7 +121,7 @@ class Outside:
         """POST and return the status; follows nothing, reads no body.
 
         Raises:
-            OutsideError: the address is no https one, not public, or did not answer.
+            OutboundError: the address is no https one, not public, or did not answer.
         """
         host, port = https_target(url)
         target = httpx.URL(url)
@@ -143,7 +143,7 @@ class Outside:
                 answer = await client.send(request, stream=True)
                 await answer.aclose()
         except (TimeoutError, httpx.HTTPError) as error:
-            raise OutsideError(_why(error)) from None
+            raise OutboundError(_why(error)) from None
         return answer.status_code
 
 
@@ -151,16 +151,16 @@ def https_target(url: str) -> tuple[str, int]:
     """Host and port of an https address.
 
     Raises:
-        OutsideError: it is not one that may be used.
+        OutboundError: it is not one that may be used.
     """
     try:
         parts = urlsplit(url)
         host, port = parts.hostname or "", parts.port or 443
         httpx.URL(url)
     except (ValueError, httpx.InvalidURL):
-        raise OutsideError("not_https") from None
+        raise OutboundError("not_https") from None
     if parts.scheme != "https" or not host or parts.username is not None:
-        raise OutsideError("not_https")
+        raise OutboundError("not_https")
     return host, port
 
 
@@ -168,7 +168,7 @@ def is_public_target(url: str) -> bool:
     """Whether an https address may be used by its looks; names are not resolved."""
     try:
         host, _ = https_target(url)
-    except OutsideError:
+    except OutboundError:
         return False
     try:
         return is_public(ip_address(host))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from iveg.domain.costmap import Costmap, Grid
-from iveg.experiment.believing import Belief, belief_in, belief_of, injections
+from iveg.experiment.beliefs import Belief, belief_in, belief_of, injections
 from iveg.experiment.observer import picture_of, slowdowns_of
 from iveg.experiment.scoring import Picture, SeenObject
 

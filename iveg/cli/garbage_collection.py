@@ -10,7 +10,7 @@ import gc
 _YOUNG, _MIDDLE, _OLD = 20_000, 20, 50
 
 
-def settle_memory() -> None:
+def tune_garbage_collection() -> None:
     """Exclude all present objects from collection; call it when everything is built."""
     gc.collect()
     gc.freeze()

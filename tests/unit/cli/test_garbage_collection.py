@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from iveg.cli.memory import settle_memory
+from iveg.cli.garbage_collection import tune_garbage_collection
 
 _PYTHONS = 700, 10, 10
 """Its own thresholds; the suite has settled, too (tests/conftest.py)."""
@@ -24,14 +24,14 @@ def as_it_was() -> Iterator[None]:
 def test_what_was_built_by_then_is_looked_at_no_more() -> None:
     often, _, _ = gc.get_threshold()
     built = [[number] for number in range(100)]
-    settle_memory()
+    tune_garbage_collection()
 
     assert gc.get_freeze_count() >= len(built)
     assert gc.get_threshold()[0] > 10 * often
 
 
 def test_what_comes_later_is_still_found() -> None:
-    settle_memory()
+    tune_garbage_collection()
     ring: list[object] = []
     ring.append(ring)
     del ring
