@@ -34,7 +34,6 @@ LARGE_FUNCTIONS = {
     "iveg/emulator/fleet.py run_emulator": LIST,
     "iveg/emulator/replay.py run_replay": LIST,
     "iveg/robot/node.py RobotNode.__init__": LIST,
-    "iveg/static/js/core/i18n.js createI18n": STATE,
     "iveg/static/js/panels/stop.js createStopPanel": STATE,
     "iveg/static/js/core/socket.js connect": STATE,
     "iveg/static/js/core/store.js createStore": STATE,

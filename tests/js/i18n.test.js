@@ -42,6 +42,17 @@ test("numbers are written as the English do after a switch", async () => {
   equal(loaded.t("d", { distance: 1.43 }), "1.4 m");
 });
 
+test("listeners are called after a switch, and no more once they have ended", async () => {
+  const loaded = await words("es");
+  /** @type {string[]} */
+  const heard = [];
+  const end = loaded.onChange(() => heard.push(loaded.t("nav.live")));
+  await loaded.use("en");
+  end();
+  await loaded.use("es");
+  equal([heard, loaded.language()], [["Live"], "es"]);
+});
+
 test("summer time is Madrid's", async () => {
   const { time } = await words("es");
   equal(time("2026-07-01T10:00:00Z"), "12:00:00");

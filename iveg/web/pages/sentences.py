@@ -1,7 +1,7 @@
 """Sentences for files and paper, as the page writes them: templates, slots, formats.
 
-The formats are those of ``static/js/i18n.js``; a missing template shows its key, so
-that a row of an older version is never lost.
+The formats are those of ``static/js/core/messages.js``; a missing template shows its
+key, so that a row of an older version is never lost.
 """
 
 import re

@@ -7,7 +7,7 @@
  * @typedef {import("./picture.js").Picture} Picture
  */
 
-import { i18nOf } from "../core/i18n.js";
+import { languageOf, Messages } from "../core/messages.js";
 import { createLabels } from "./layers/labels.js";
 import { createTrails } from "./layers/trail.js";
 import { createUnpacker } from "./parcel.js";
@@ -26,7 +26,7 @@ let isAsked = false;
 function take({ data }) {
   if ("canvas" in data) canvas = createPicture(data.canvas, trails);
   if ("trails" in data) for (const order of data.trails) follow(order);
-  if ("vocabulary" in data && data.vocabulary) void speak(data.vocabulary);
+  if ("vocabulary" in data && data.vocabulary) speak(data.vocabulary);
   if ("parcel" in data) newest = { n: data.n, picture: unpacker.open(data.parcel) };
   askForFrame();
 }
@@ -42,10 +42,8 @@ function follow([act, ...facts]) {
 }
 
 /** @param {import("./layers/labels.js").Vocabulary} vocabulary */
-async function speak({ language, blocks }) {
-  const { t } = await i18nOf(language, blocks);
-  labels = createLabels(t, language);
-  askForFrame();
+function speak({ language, blocks }) {
+  labels = createLabels(new Messages(languageOf(language), blocks).say, language);
 }
 
 function askForFrame() {

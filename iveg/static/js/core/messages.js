@@ -1,0 +1,170 @@
+/**
+ * The messages of one language: templates with named placeholders, and how values are
+ * written into them.
+ *
+ * Templates stand in nested blocks.  `nav.live` walks down them; a block answers for its
+ * own name, and for names it lacks, with its `default`.  Placeholders are `{name}`,
+ * `{name:2}` (decimals) or `{name:format}` with one of `FORMATS`.
+ *
+ * @typedef {"es" | "en"} Language
+ * @typedef {string | number | boolean | null | undefined} Slot value of a placeholder
+ * @typedef {Record<string, Slot | object>} Slots
+ * @typedef {{[name: string]: string | Blocks}} Blocks
+ */
+
+import { laneName } from "./lanes.js";
+
+const LOCALES = { es: "es-ES", en: "en-GB" };
+/** Greenhouses live by the clock on their wall; data stay in UTC. */
+const TIME_ZONE = "Europe/Madrid";
+const NOTHING = "—";
+const PERCENT = { style: /** @type {const} */ ("percent"), maximumFractionDigits: 0 };
+
+/** @type {Record<string, (value: any, messages: Messages, slots: Slots) => string>} */
+const FORMATS = {
+  // Rounded down: a share below a threshold is never written as the threshold.
+  percent: (value, messages) =>
+    messages.formatted(Math.floor(value * 100 + 1e-6) / 100, PERCENT),
+  span: spanOf,
+  time: (value, messages) => messages.time(value),
+  class: (value, messages) => messages.named("class", value),
+  a: (value, messages) => messages.named("class.a", value),
+  why: (value, messages) => messages.named("why", value),
+  hop: (value, messages) => messages.named("hop", value),
+  data: (value, messages) => messages.named("stream", value),
+  drive: (value, messages) => messages.named("drive", value),
+  lane: (value, messages) => laneName(String(value), messages.say),
+  person: trackOf,
+  sentence: sentenceOf,
+};
+
+/** The language of a tag such as `en-GB`; Spanish where there is no other.
+ * @param {string} tag @returns {Language} */
+export const languageOf = (tag) => (tag.startsWith("en") ? "en" : "es");
+
+export class Messages {
+  #blocks;
+  #locale;
+  #clock;
+  /** @type {Map<string, Intl.NumberFormat>} */
+  #numbers = new Map();
+
+  /** @param {Language} language @param {Blocks} blocks */
+  constructor(language, blocks) {
+    this.language = language;
+    this.#blocks = blocks;
+    this.#locale = LOCALES[language];
+    this.#clock = clockOf(this.#locale);
+  }
+
+  /**
+   * A message with its placeholders filled; an unknown key shows itself.
+   *
+   * @param {string} key
+   * @param {Slots} [slots]
+   */
+  say = (key, slots = {}) => {
+    const template = this.find(key);
+    if (template === null) return key;
+    return template
+      .replace(/\{(\w+)(?::(\w+))?\}/g, (_, name, form) =>
+        this.#write(slots[name], form, slots),
+      )
+      .trim();
+  };
+
+  /** @param {string} key @returns {string | null} */
+  find(key) {
+    /** @type {string | Blocks | undefined} */
+    let found = this.#blocks;
+    for (const name of key.split(".")) {
+      found = typeof found === "object" ? (found[name] ?? found.default) : undefined;
+    }
+    if (typeof found === "object") found = found.default;
+    return typeof found === "string" ? found : null;
+  }
+
+  /** The name of a value in a block; the value itself where the block has none.
+   * @param {string} block @param {unknown} value */
+  named(block, value) {
+    return this.find(`${block}.${value}`) ?? String(value);
+  }
+
+  /** Templates of some blocks, for a worker. @param {string[]} names */
+  blocks(names) {
+    return Object.fromEntries(names.map((name) => [name, this.#blocks[name]]));
+  }
+
+  /** @param {number} value @param {Intl.NumberFormatOptions} options */
+  formatted(value, options) {
+    const name = JSON.stringify(options);
+    const known = this.#numbers.get(name);
+    const format = known ?? new Intl.NumberFormat(this.#locale, options);
+    this.#numbers.set(name, format);
+    return format.format(value);
+  }
+
+  /** @param {number} value @param {number} decimals */
+  number(value, decimals) {
+    if (!Number.isFinite(value)) return NOTHING;
+    // "-0,0" of a robot at rest says nothing that "0,0" does not.
+    const rounded = Math.abs(value) < 0.5 * 10 ** -decimals ? 0 : value;
+    return this.formatted(rounded, {
+      minimumFractionDigits: decimals,
+      maximumFractionDigits: decimals,
+      useGrouping: false,
+    });
+  }
+
+  /** @param {string | number | Date} at ISO-8601, Unix seconds or a date */
+  time(at) {
+    const date = typeof at === "number" ? new Date(at * 1000) : new Date(at);
+    return Number.isNaN(date.getTime()) ? NOTHING : this.#clock.format(date);
+  }
+
+  /** @param {Slot | object} value @param {string | undefined} form @param {Slots} slots */
+  #write(value, form, slots) {
+    if (value === null || value === undefined || value === "") return NOTHING;
+    if (form && form in FORMATS) return FORMATS[form](value, this, slots);
+    if (typeof value !== "number") return String(value);
+    return form ? this.number(value, Number(form)) : this.formatted(value, {});
+  }
+}
+
+/** `P3` is a person's number in the greenhouse; on a page it would read as a priority.
+ * @param {unknown} value @param {Messages} messages */
+function trackOf(value, messages) {
+  const [, kind, n] = /^([PR])(\d+)$/.exec(String(value)) ?? [];
+  return kind
+    ? messages.say(`class.track.${kind}`, { n })
+    : messages.named("class", value);
+}
+
+/** @param {any} value a key, or `{key, slots}`
+ * @param {Messages} messages @param {Slots} slots */
+function sentenceOf(value, messages, slots) {
+  const { key = value, slots: own = slots } =
+    typeof value === "object" ? value : { key: value };
+  return messages.say(String(key).startsWith("alert.") ? key : `alert.${key}`, own);
+}
+
+/** A duration for people: `42 s`, `3 min 42 s`. @param {number} seconds */
+function spanOf(seconds) {
+  const whole = Math.round(seconds);
+  const [minutes, rest] = [Math.floor(whole / 60), whole % 60];
+  if (!minutes) return `${whole} s`;
+  return minutes < 60
+    ? `${minutes} min ${rest} s`
+    : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+/** A format costs a hundred times what its use does. @param {string} locale */
+function clockOf(locale) {
+  return new Intl.DateTimeFormat(locale, {
+    timeZone: TIME_ZONE,
+    hourCycle: "h23",
+    hour: "2-digit",
+    minute: "2-digit",
+    second: "2-digit",
+  });
+}
