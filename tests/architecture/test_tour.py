@@ -25,7 +25,7 @@ def _names(path: Path) -> set[str]:
     """Functions and classes of a file, methods with their class."""
     text = path.read_text()
     if path.suffix == ".js":
-        return set(re.findall(r"\bfunction (\w+)\(", text))
+        return set(re.findall(r"\b(?:function|class) (\w+)\b", text))
     found = set()
     for node in ast.parse(text).body:
         match node:

@@ -27,7 +27,7 @@ _WATCH = """([robot]) => {
   const control = document.querySelector(`#stops [data-stop="${robot}"]`);
   const said = [];
   const look = () => {
-    const words = control.querySelector('.stop__words').textContent;
+    const words = control.querySelector('.stop__label').textContent;
     const outline = getComputedStyle(control, '::after').display;
     said.push([control.dataset.state, words, control.innerText, outline]);
   };

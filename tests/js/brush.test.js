@@ -1,6 +1,6 @@
 import { installPaintHook } from "../../iveg/static/js/core/painthook.js";
 import { createPainting } from "../../iveg/static/js/core/painting.js";
-import { createStore } from "../../iveg/static/js/core/store.js";
+import { Store } from "../../iveg/static/js/core/store.js";
 import { createBrush } from "../../iveg/static/js/map/brush.js";
 import { createFrames } from "../../iveg/static/js/map/frames.js";
 import { createMap } from "../../iveg/static/js/map/map.js";
@@ -23,7 +23,7 @@ function canvasOnPage() {
 
 /** A greenhouse with somebody in it, and who looks, has looked, and has driven. */
 function storeOfAGreenhouse() {
-  const store = createStore();
+  const store = new Store();
   const navigation = { task: "", goal: { x: 8, y: 8 }, path: /** @type {any} */ ([]) };
   store.apply(
     "snapshot",
@@ -34,7 +34,7 @@ function storeOfAGreenhouse() {
   return store;
 }
 
-/** Drives the robot of the greenhouse a metre. @param {ReturnType<typeof createStore>} store */
+/** Drives the robot of the greenhouse a metre. @param {Store} store */
 function drive(store) {
   for (const x of [1.2, 1.4, 1.6, 1.8, 2]) {
     store.apply("robots/AGI", robot({ pose: { x, y: 2, yaw: 0 } }));

@@ -1,5 +1,5 @@
 import { installPaintHook } from "../../iveg/static/js/core/painthook.js";
-import { createStore } from "../../iveg/static/js/core/store.js";
+import { Store } from "../../iveg/static/js/core/store.js";
 import { coverOf } from "../../iveg/static/js/map/layers/scalebar.js";
 import { createMap } from "../../iveg/static/js/map/map.js";
 import { screenX, screenY } from "../../iveg/static/js/map/viewport.js";
@@ -12,7 +12,7 @@ function mapOnPage(options = {}) {
   canvas.style.width = "600px";
   canvas.style.height = "400px";
   document.body.replaceChildren(canvas);
-  const store = createStore();
+  const store = new Store();
   const map = createMap(canvas, store, { storage: null, ...options });
   installPaintHook(store, map);
   /** @type {{robot: string, kind: string, stamp: string}[]} */

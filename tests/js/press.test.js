@@ -1,5 +1,5 @@
 import { createPresser } from "../../iveg/static/js/panels/press.js";
-import { onPress } from "../../iveg/static/js/panels/stop.js";
+import { onPress } from "../../iveg/static/js/panels/stop_gesture.js";
 import { equal, test } from "./harness.js";
 import { memory } from "./memory.js";
 

@@ -1,10 +1,14 @@
 import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
 import {
+  certaintySaid,
+  gaugeSaid,
   marginSaid,
   modeSaid,
+  readoutsSaid,
   taskSaid,
   whySaid,
 } from "../../iveg/static/js/panels/robot_texts.js";
+import { detection } from "./builders.js";
 import { equal, test } from "./harness.js";
 
 const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
@@ -12,6 +16,8 @@ const words = /** @type {import("../../iveg/static/js/core/i18n.js").I18n} */ (
     t: (/** @type {string} */ key, /** @type {object} */ slots = {}) =>
       [key, ...Object.values(slots)].join(" "),
     has: (/** @type {string} */ key) => key === "task.hauling",
+    number: (/** @type {number} */ value, /** @type {number} */ decimals) =>
+      value.toFixed(decimals),
   })
 );
 
@@ -89,4 +95,31 @@ test("13.19 what is forbidden ends where what is filled could be", () => {
   }
   gauge.draw({ speed: null, max: 1, factor: null, ...said });
   equal(gauge.svg.querySelector(".gauge__limit")?.getAttribute("visibility"), "hidden");
+});
+
+test("a read-out without a value is a dash, a zero is a zero", () => {
+  const still = robot({ pose: { x: 0, y: 1, yaw: Math.PI / 2 }, twist: null });
+  equal(readoutsSaid(still, words), [
+    ["x", "0.00 robot.unit.m"],
+    ["y", "1.00 robot.unit.m"],
+    ["yaw", "90.0 robot.unit.deg"],
+    ["v", "—"],
+    ["w", "—"],
+  ]);
+});
+
+test("a gauge says no limit and no speed of a robot without a message", () => {
+  const { said, limitSaid, speedSaid } = gaugeSaid(undefined, "AGI", words);
+  equal([said, limitSaid, speedSaid], ["robot.speed_unknown", "", "—"]);
+  equal(gaugeSaid(robot(), "AGI", words).said, "robot.gauge_value 0.5 2 2");
+});
+
+test("the most certain detection of a fresh frame is told, an old frame says nothing", () => {
+  const items = [0.3, 0.9, 0.6].map((probability) => detection({ probability }));
+  const frame = { robot_id: "AGI", stamp: "s", age_s: 0, road: "mqtt", items };
+  const fresh = { ...frame, receivedAtMs: performance.now() };
+  const old = { ...frame, receivedAtMs: performance.now() - 3500 };
+  equal(certaintySaid(fresh, words), "robot.certainty_value person 0.9");
+  equal(certaintySaid({ ...fresh, items: [] }, words), "robot.certainty_none");
+  equal(certaintySaid(old, words), "robot.certainty_old");
 });

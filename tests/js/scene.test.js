@@ -1,4 +1,4 @@
-import { createStore } from "../../iveg/static/js/core/store.js";
+import { Store } from "../../iveg/static/js/core/store.js";
 import { isSeenHeld } from "../../iveg/static/js/map/layers/robot.js";
 import { marked, readPerson, readScene } from "../../iveg/static/js/map/scene.js";
 import { command, detection, person, robot, snapshot } from "./builders.js";
@@ -6,7 +6,7 @@ import { equal, near, test } from "./harness.js";
 
 /** @param {Partial<import("./builders.js").Snapshot>} [changes] */
 function storeOf(changes) {
-  const store = createStore({ now: () => 0, schedule: () => {} });
+  const store = new Store({ now: () => 0, schedule: () => {} });
   store.apply("snapshot", snapshot(changes), 0);
   store.setConnection("open", 0);
   return store;
@@ -122,10 +122,10 @@ test("a box in the robot's frame turns with the robot, one in the map does not",
   near(turned.length, 0.4);
 });
 
-test("a look older than a second shows nothing: nobody looks there now", () => {
+test("a detection frame older than a second shows nothing", () => {
   const store = storeOf();
-  const look = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [detection()] };
-  store.apply("detections/AGI", look, 0);
+  const frame = { robot_id: "AGI", stamp: "s", road: "mqtt", items: [detection()] };
+  store.apply("detections/AGI", frame, 0);
   equal(readScene(store, 1100).detections, []);
 });
 

@@ -1,4 +1,5 @@
-import { createPresses, retryDelay } from "../../iveg/static/js/core/socket.js";
+import { UnreadPresses } from "../../iveg/static/js/core/presses.js";
+import { retryDelay } from "../../iveg/static/js/core/socket.js";
 import { equal, test } from "./harness.js";
 
 const PRESS = { robotId: null, pressId: "a", pressedAt: 1 };
@@ -10,20 +11,20 @@ test("tries come quickly at first and never less often than every two seconds", 
 });
 
 test("a press is kept until a ping sent after it is answered", () => {
-  const presses = createPresses();
+  const presses = new UnreadPresses();
   presses.add(PRESS);
   presses.confirm(1000);
-  equal(presses.size(), 1);
-  presses.sent(PRESS, 2000);
+  equal(presses.size, 1);
+  presses.add(PRESS, 2000);
   presses.confirm(1999);
-  equal(presses.size(), 1);
+  equal(presses.size, 1);
   presses.confirm(2000);
-  equal(presses.size(), 0);
+  equal(presses.size, 0);
 });
 
 test("a press repeated is one press", () => {
-  const presses = createPresses();
+  const presses = new UnreadPresses();
   presses.add(PRESS);
   presses.add(PRESS);
-  equal(presses.size(), 1);
+  equal(presses.size, 1);
 });

@@ -1,10 +1,6 @@
 import { ageOf } from "../../iveg/static/js/core/clock.js";
 import { matches } from "../../iveg/static/js/core/hub.js";
-import {
-  COMMANDS_SIZE,
-  createStore,
-  LOG_SIZE,
-} from "../../iveg/static/js/core/store.js";
+import { COMMANDS_SIZE, LOG_SIZE, Store } from "../../iveg/static/js/core/store.js";
 import { command, entry, person, robot, snapshot } from "./builders.js";
 import { equal, near, test } from "./harness.js";
 
@@ -12,7 +8,7 @@ import { equal, near, test } from "./harness.js";
 function storeByHand() {
   /** @type {(() => void)[]} */
   const frames = [];
-  const store = createStore({ now: () => 0, schedule: (flush) => frames.push(flush) });
+  const store = new Store({ now: () => 0, schedule: (flush) => frames.push(flush) });
   const frame = () => {
     for (const flush of frames.splice(0)) flush();
   };
@@ -130,7 +126,7 @@ test("a state is told once a frame, with its newest value", () => {
 });
 
 test("telemetry is told as often as it can be read, other state in the next frame", async () => {
-  const store = createStore();
+  const store = new Store();
   /** @type {string[]} */
   const told = [];
   for (const topic of ["robots/AGI", "alerts"]) {

@@ -1,4 +1,4 @@
-import { createStore } from "../../iveg/static/js/core/store.js";
+import { Store } from "../../iveg/static/js/core/store.js";
 import { createWakeLock } from "../../iveg/static/js/core/wakelock.js";
 import { believedBy, hears } from "../../iveg/static/js/map/layers/belief.js";
 import { laidTo, lengthOf } from "../../iveg/static/js/map/layers/measure.js";
@@ -363,7 +363,7 @@ function bell() {
   );
   /** @type {(() => void)[]} */
   const frames = [];
-  const store = createStore({ schedule: (flush) => frames.push(flush) });
+  const store = new Store({ schedule: (flush) => frames.push(flush) });
   const tell = (/** @type {object[]} */ alerts) => {
     store.apply("alerts", alerts);
     for (const flush of frames.splice(0)) flush();

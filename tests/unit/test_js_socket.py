@@ -33,11 +33,11 @@ _PATIENCE_MS = 30_000
 """Ends a test in which nothing comes any more; nothing is measured by it."""
 _CONNECT = """async ([url]) => {
     const {snapshot} = await import('/tests/js/builders.js');
-    const {connect} = await import('/iveg/static/js/core/socket.js');
-    const {createStore} = await import('/iveg/static/js/core/store.js');
-    const store = createStore();
+    const {LiveLine} = await import('/iveg/static/js/core/socket.js');
+    const {Store} = await import('/iveg/static/js/core/store.js');
+    const store = new Store();
     const sight = Object.assign(new EventTarget(), {hidden: false});
-    const line = connect({url, store, page: sight});
+    const line = new LiveLine({url, store, page: sight});
     Object.assign(window, {store, line, sight});
 }"""
 _WATCH = """() => {
@@ -185,7 +185,9 @@ def page(browser: Browser, files: str, live: LiveServer) -> Iterator[Page]:
 
 def _wait_for_state(page: Page, state: str, within_ms: float = _PATIENCE_MS) -> None:
     page.wait_for_function(
-        "state => window.line.state() === state", arg=state, timeout=within_ms
+        "state => window.store.connection.state === state",
+        arg=state,
+        timeout=within_ms,
     )
 
 
@@ -242,7 +244,7 @@ def test_a_page_seen_again_starts_from_a_fresh_snapshot_without_an_alert(
     page.evaluate("() => window.show(true)")
 
     page.wait_for_function("() => window.store.get('snapshot') !== window.first")
-    assert page.evaluate("() => window.line.state()") == "open"
+    assert page.evaluate("() => window.store.connection.state") == "open"
     assert "lost" not in page.evaluate("() => window.states")
     assert live.attempts == 2
 

@@ -1,30 +1,30 @@
 /**
- * Entry of every page: words, line, STOP first; whatever the route shows after it.
+ * Entry of every page: messages, connection and STOP first, then the route's panels.
  *
- * What only one route needs is loaded afterwards, so that its failure cannot take the
+ * The panels of one route are loaded afterwards, so that their failure cannot take the
  * STOP controls along.
  */
 
 import { loadI18n, switchLanguage } from "./core/i18n.js";
 import { createPainting } from "./core/painting.js";
-import { connect } from "./core/socket.js";
-import { createStore } from "./core/store.js";
+import { LiveLine } from "./core/socket.js";
+import { Store } from "./core/store.js";
 import { createBanner } from "./panels/banner.js";
 import { createDialogs } from "./panels/dialogs.js";
 import { all, setAttribute } from "./panels/dom.js";
-import { createStopPanel } from "./panels/stop.js";
+import { StopPanel } from "./panels/stop.js";
 import { createThemePanel } from "./panels/theme.js";
 
 /**
- * What panels are given.
+ * The parts of the page that every panel is given.
  *
  * @typedef {{
  *   store: import("./core/store.js").Store,
  *   i18n: import("./core/i18n.js").I18n,
- *   line: ReturnType<typeof connect>,
+ *   line: LiveLine,
  *   painting: ReturnType<typeof createPainting>,
  *   dialogs: import("./panels/dialogs.js").Dialogs,
- *   stops: ReturnType<typeof createStopPanel>,
+ *   stops: StopPanel,
  * }} App
  */
 
@@ -34,12 +34,13 @@ async function start() {
   wireLanguage();
   const i18n = await loadI18n();
   if (!document.querySelector("#stops")) return;
-  const store = createStore();
+  const store = new Store();
   const draws = document.querySelector("#map") !== null;
   const painting = createPainting();
-  const line = connect({ url: liveUrl(), store, draws, whenPainted: painting.when });
+  const { when: whenPainted } = painting;
+  const line = new LiveLine({ url: liveUrl(), store, draws, whenPainted });
   const app = /** @type {App} */ ({ store, i18n, line, painting, dialogs });
-  app.stops = createStopPanel(app);
+  app.stops = new StopPanel(app);
   createBanner(app);
   const { startPage } = await import("./core/page.js");
   await startPage(app);

@@ -16,7 +16,7 @@
  * @typedef {Aged & import("../types.js").Robot} Robot
  * @typedef {Aged & import("../types.js").Person} Person
  * @typedef {import("../types.js").Detection} Detection
- * @typedef {Aged & import("../types.js").DetectionFrame} Look
+ * @typedef {Aged & import("../types.js").DetectionFrame} DetectionFrame
  * @typedef {Aged & import("../types.js").Command} Command
  * @typedef {import("../types.js").Occurrence} Occurrence
  * @typedef {import("../types.js").Alert} Alert

@@ -1,35 +1,27 @@
 /**
- * The browser's line to the server: opens `/live`, notices its loss, comes back.
+ * The page's line to the server: opens `/live`, notices its loss, comes back.
  *
  *     connecting ──> open ──> lost ──┐
  *         │           ^   └──────────┤   probe, then a new socket
  *         │           └──────────────┘
  *         └──> signed-out                4401: the session is over, no retry
  *
- * A TCP connection can be dead for minutes before anybody is told, so silence counts as
- * loss: nothing heard for two seconds although we ping every second.  While lost, plain
- * HTTP probes look for the server and a WebSocket is opened only when one is answered,
- * because browsers delay WebSocket connections more and more after failed ones.
+ * A TCP connection can be dead for minutes before the browser learns of it, so silence
+ * counts as loss: no message for two seconds although a ping goes out every second.
+ * While lost, plain HTTP probes look for the server and a WebSocket is opened only when
+ * one is answered, because browsers delay WebSocket connections more and more after
+ * failed ones.
  */
 
 import { createServerClock } from "./clock.js";
-import { createPace, withWait } from "./pace.js";
+import { LiveSocket } from "./live_socket.js";
 import { createPainting } from "./painting.js";
-import {
-  ProtocolError,
-  readFrame,
-  writePainted,
-  writePing,
-  writeStop,
-} from "./protocol.js";
+import { UnreadPresses } from "./presses.js";
 
 /** @typedef {import("./store.js").Store} Store */
-/** @typedef {import("./store.js").ConnectionState} ConnectionState */
-/** @typedef {EventTarget & {readonly hidden: boolean}} PageSight what `document` tells */
-/** @typedef {{robotId: string | null, pressId: string, pressedAt: number}} Press */
+/** @typedef {import("./presses.js").Press} Press */
+/** @typedef {EventTarget & {readonly hidden: boolean}} Visibility what `document` tells */
 
-/** Asks for telemetry as fast as this page paints, and no faster. */
-const SUBPROTOCOL = "iveg.2";
 const PING_EVERY_MS = 1000;
 const SILENCE_IS_LOSS_MS = 2000;
 const WATCH_EVERY_MS = 250;
@@ -40,8 +32,6 @@ const PROBE_LIMIT_MS = 900;
 /** A page hidden longer than this starts again from a fresh snapshot. */
 const HIDDEN_LIMIT_MS = 1000;
 const CLOSED_SIGNED_OUT = 4401;
-/** Presses that wait for a line; more than any person makes before looking up. */
-const PRESSES_KEPT = 64;
 
 /**
  * How long to wait before the nth try (ms): doubling, with jitter downwards so that
@@ -55,271 +45,161 @@ export function retryDelay(tries, luck) {
   return full * (0.6 + 0.4 * luck);
 }
 
-/**
- * Connects, and stays connected until `close()`.
- *
- * @param {{
- *   url: string,
- *   store: Store,
- *   onState?: (state: ConnectionState) => void,
- *   onCommandFallback?: (press: Press) => void,
- *   probe?: () => Promise<boolean>,
- *   page?: PageSight,
- *   draws?: boolean,
- *   whenPainted?: (fn: () => void) => void,
- * }} options `draws`: this page shows telemetry, so when it paints (`whenPainted`) is worth telling;
- *   `onCommandFallback` is told of a STOP that could not be sent at once: the
- *   page tries its other transport, this one keeps the press and sends it when it can.
- */
-export function connect(options) {
-  const { url, store, onState, onCommandFallback, page = document } = options;
-  const { draws = true, whenPainted = createPainting().when } = options;
-  const isServerThere = options.probe ?? (() => probeHealth(url));
-  const clock = createServerClock();
-  const presses = createPresses();
-  /** @type {WebSocket | null} */
-  let socket = null;
-  let heardAtMs = performance.now();
-  let pingedAtMs = 0;
-  let watchedAtMs = performance.now();
-  let hiddenAtMs = 0;
-  let tries = 0;
-  let isFirstPong = true;
-  let pace = createPace(() => {}, whenPainted);
-  let malformed = 0;
-  let ended = false;
+/** Connects, and stays connected until the session is over. */
+export class LiveLine {
+  #url;
+  #store;
+  #page;
+  #painting;
+  #clock = createServerClock();
+  #presses = new UnreadPresses();
+  /** @type {LiveSocket | null} */
+  #socket = null;
+  #tries = 0;
+  #isOver = false;
+  #watchedAtMs = performance.now();
+  #hiddenAtMs = 0;
   /** @type {ReturnType<typeof setTimeout> | undefined} */
-  let retry;
-
-  /** @param {ConnectionState} state */
-  function become(state) {
-    if (state === store.connection.state) return;
-    store.setConnection(state, performance.now());
-    onState?.(state);
-  }
-
-  function open() {
-    if (ended) return;
-    drop();
-    heardAtMs = performance.now();
-    isFirstPong = true;
-    const opened = new WebSocket(url, [SUBPROTOCOL]);
-    opened.binaryType = "arraybuffer";
-    pace = createPace((frame, nextMs) => {
-      if (opened.readyState !== WebSocket.OPEN) return;
-      const isDrawn = draws && nextMs !== null;
-      const drawn = isDrawn ? clock.serverOf(performance.now()) : null;
-      opened.send(writePainted(frame, drawn && withWait(drawn, nextMs ?? 0)));
-    }, whenPainted);
-    opened.addEventListener("open", ping);
-    opened.addEventListener("message", (event) => hear(opened, event.data));
-    opened.addEventListener("close", (event) => onClose(opened, event.code));
-    socket = opened;
-  }
+  #retry;
 
   /**
-   * @param {WebSocket} from
-   * @param {unknown} frame
+   * @param {{
+   *   url: string,
+   *   store: Store,
+   *   page?: Visibility,
+   *   draws?: boolean,
+   *   whenPainted?: (fn: () => void) => void,
+   * }} options `draws` and `whenPainted` as for `LiveSocket`
    */
-  function hear(from, frame) {
-    if (from !== socket) return;
-    heardAtMs = performance.now();
-    try {
-      take(readFrame(frame));
-    } catch (error) {
-      if (!(error instanceof ProtocolError)) throw error;
-      malformed += 1;
-    }
-  }
-
-  /** @param {import("./protocol.js").Message} message */
-  function take({ topic, data, at }) {
-    if (topic === "pong") return takePong(/** @type {any} */ (data), at);
-    if (topic === "telemetry") return takeTelemetry(/** @type {any} */ (data));
-    if (topic === "snapshot") {
-      tries = 0;
-      become("open");
-      presses.each(sendPress);
-    }
-    store.apply(topic, data, momentOf(at));
-  }
-
-  /** @param {import("./telemetry.js").Telemetry} telemetry */
-  function takeTelemetry({ frame, told }) {
-    try {
-      for (const { topic, at, data } of told) store.apply(topic, data, momentOf(at));
-    } finally {
-      // Whatever became of it: without a word no more would ever come.
-      pace.took(frame);
-    }
+  constructor(options) {
+    const { url, store, page = document } = options;
+    const { draws = true, whenPainted = createPainting().when } = options;
+    this.#url = url;
+    this.#store = store;
+    this.#page = page;
+    this.#painting = { draws, whenPainted };
+    setInterval(() => this.#watch(), WATCH_EVERY_MS);
+    page.addEventListener("visibilitychange", () => this.#onVisibility());
+    addEventListener("online", () => this.#refresh());
+    this.#open();
   }
 
   /**
-   * When what was heard just now was true (ms): the way here makes it older, and a line
-   * that is full shows itself by that.
+   * Sends a STOP over this line; keeps and repeats it (same `pressId`) until the server
+   * has provably read it.  A STOP has no expiry: stopping late is safe.
    *
-   * @param {number} [at] the server's monotonic clock (s)
+   * @param {string | null} robotId null = the whole fleet
+   * @param {string} pressId
+   * @param {number} [pressedAt] Unix time (s), offset-corrected
+   * @returns {boolean} whether it went out at once
    */
-  function momentOf(at) {
-    const said = at === undefined || isFirstPong ? null : clock.localOf(at);
-    return said === null ? heardAtMs : Math.min(heardAtMs, said);
+  sendStop(robotId, pressId, pressedAt = this.serverNow()) {
+    const press = { robotId, pressId, pressedAt };
+    this.#presses.add(press);
+    return this.#sendPress(press);
   }
 
-  /** @param {{t: number, server: number}} pong @param {number} [at] */
-  function takePong({ t, server }, at) {
-    if (isFirstPong) clock.reset();
-    isFirstPong = false;
-    clock.note(t, heardAtMs, server, at);
-    presses.confirm(t);
+  /** Unix time of the server (s). */
+  serverNow() {
+    return this.#clock.serverNow(performance.now());
   }
 
-  /**
-   * @param {WebSocket} from
-   * @param {number} code
-   */
-  function onClose(from, code) {
-    if (from !== socket) return;
-    socket = null;
-    if (code === CLOSED_SIGNED_OUT) {
-      ended = true;
-      become("signed-out");
-    } else {
-      lose();
-    }
+  /** Newest round trip (ms); null before the first. */
+  roundTripMs() {
+    return this.#clock.roundTripMs();
   }
 
-  function lose() {
-    drop();
-    become("lost");
-    clearTimeout(retry);
-    retry = setTimeout(seek, retryDelay(tries, Math.random()));
-    tries += 1;
+  /** How many presses of STOP the server has not provably read. */
+  pressesWaiting() {
+    return this.#presses.size;
   }
 
-  async function seek() {
-    const there = await isServerThere();
-    if (ended || socket) return;
-    if (there) open();
-    else lose();
+  #open() {
+    this.#drop();
+    this.#socket = new LiveSocket(
+      this.#url,
+      this.#clock,
+      this.#receiver,
+      this.#painting,
+    );
   }
 
-  function drop() {
-    const old = socket;
-    socket = null;
-    old?.close();
-  }
+  /** @type {import("./live_socket.js").Receiver} */
+  #receiver = {
+    apply: (topic, data, receivedAtMs) => {
+      if (topic === "snapshot") this.#opened();
+      this.#store.apply(topic, data, receivedAtMs);
+    },
+    confirm: (pingMs) => this.#presses.confirm(pingMs),
+    closed: (code) => {
+      this.#socket = null;
+      if (code !== CLOSED_SIGNED_OUT) return this.#lose();
+      this.#isOver = true;
+      this.#store.setConnection("signed-out", performance.now());
+    },
+  };
 
-  function ping() {
-    if (socket?.readyState !== WebSocket.OPEN) return;
-    pingedAtMs = performance.now();
-    socket.send(writePing(pingedAtMs));
-  }
-
-  function watch() {
-    const nowMs = performance.now();
-    const wasAsleep = nowMs - watchedAtMs > 4 * WATCH_EVERY_MS;
-    watchedAtMs = nowMs;
-    // After a pause of this page itself, what waited in its queue is heard first.
-    if (!socket || wasAsleep) return;
-    if (nowMs - heardAtMs > SILENCE_IS_LOSS_MS) lose();
-    else if (nowMs - pingedAtMs >= PING_EVERY_MS - WATCH_EVERY_MS / 2) ping();
-  }
-
-  function refresh() {
-    if (ended) return;
-    clearTimeout(retry);
-    tries = 0;
-    if (store.connection.state === "open") become("connecting");
-    open();
-  }
-
-  function onVisibility() {
-    const nowMs = performance.now();
-    if (page.hidden) hiddenAtMs = nowMs;
-    else if (nowMs - hiddenAtMs > HIDDEN_LIMIT_MS) refresh();
+  #opened() {
+    this.#tries = 0;
+    this.#store.setConnection("open", performance.now());
+    for (const press of this.#presses.all()) this.#sendPress(press);
   }
 
   /** @param {Press} press */
-  function sendPress(press) {
-    if (socket?.readyState !== WebSocket.OPEN) return false;
-    socket.send(writeStop(press.robotId, press.pressId, press.pressedAt));
-    ping();
-    presses.sent(press, pingedAtMs);
+  #sendPress(press) {
+    if (!this.#socket?.isOpen) return false;
+    this.#socket.sendStop(press);
+    this.#presses.add(press, this.#socket.pingedAtMs);
     return true;
   }
 
-  const timer = setInterval(watch, WATCH_EVERY_MS);
-  page.addEventListener("visibilitychange", onVisibility);
-  addEventListener("online", refresh);
-  open();
+  #lose() {
+    this.#drop();
+    this.#store.setConnection("lost", performance.now());
+    clearTimeout(this.#retry);
+    const delayMs = retryDelay(this.#tries, Math.random());
+    this.#retry = setTimeout(() => this.#seek(), delayMs);
+    this.#tries += 1;
+  }
 
-  return {
-    /**
-     * Sends a STOP over this line; keeps and repeats it (same `pressId`) until the line
-     * proves that the server read it.  A STOP has no expiry: stopping late is safe.
-     *
-     * @param {string | null} robotId null = the whole fleet
-     * @param {string} pressId
-     * @param {number} [pressedAt] Unix time (s), offset-corrected
-     * @returns {boolean} whether it went out at once
-     */
-    sendStop(robotId, pressId, pressedAt = clock.serverNow(performance.now())) {
-      const press = { robotId, pressId, pressedAt };
-      presses.add(press);
-      const sent = sendPress(press);
-      if (!sent) onCommandFallback?.(press);
-      return sent;
-    },
-    state: () => store.connection.state,
-    /** Unix time of the server (s). */
-    serverNow: () => clock.serverNow(performance.now()),
-    /** Newest round trip (ms); null before the first. */
-    roundTripMs: () => clock.roundTripMs(),
-    /** STOP presses that the server has not provably read. */
-    pressesWaiting: () => presses.size(),
-    /** Frames that could not be read. */
-    malformed: () => malformed,
-    close() {
-      ended = true;
-      clearInterval(timer);
-      clearTimeout(retry);
-      page.removeEventListener("visibilitychange", onVisibility);
-      removeEventListener("online", refresh);
-      drop();
-    },
-  };
-}
+  async #seek() {
+    const isThere = await probeHealth(this.#url);
+    if (this.#isOver || this.#socket) return;
+    if (isThere) this.#open();
+    else this.#lose();
+  }
 
-/**
- * STOP presses that the server has not provably read.
- *
- * The server reads a line in order, so the answer to a ping that was sent after a press
- * proves that the press was read; without it the press goes out again on the next line.
- */
-export function createPresses() {
-  /** @type {Map<string, {press: Press, pingMs: number}>} */
-  const waiting = new Map();
-  return {
-    /** @param {Press} press */
-    add(press) {
-      waiting.set(press.pressId, { press, pingMs: Number.POSITIVE_INFINITY });
-      const [oldest] = waiting.keys();
-      if (waiting.size > PRESSES_KEPT) waiting.delete(oldest);
-    },
-    /** @param {Press} press @param {number} pingMs the ping sent right after it */
-    sent(press, pingMs) {
-      waiting.set(press.pressId, { press, pingMs });
-    },
-    /** @param {number} t the ping that was answered */
-    confirm(t) {
-      for (const [id, { pingMs }] of waiting) if (pingMs <= t) waiting.delete(id);
-    },
-    /** @param {(press: Press) => unknown} fn */
-    each(fn) {
-      for (const { press } of [...waiting.values()]) fn(press);
-    },
-    size: () => waiting.size,
-  };
+  #drop() {
+    this.#socket?.drop();
+    this.#socket = null;
+  }
+
+  #watch() {
+    const nowMs = performance.now();
+    const wasAsleep = nowMs - this.#watchedAtMs > 4 * WATCH_EVERY_MS;
+    this.#watchedAtMs = nowMs;
+    // After a pause of this page itself, the messages in its queue are read first.
+    if (!this.#socket || wasAsleep) return;
+    const { heardAtMs, pingedAtMs } = this.#socket;
+    if (nowMs - heardAtMs > SILENCE_IS_LOSS_MS) this.#lose();
+    else if (nowMs - pingedAtMs >= PING_EVERY_MS - WATCH_EVERY_MS / 2)
+      this.#socket.ping();
+  }
+
+  #refresh() {
+    if (this.#isOver) return;
+    clearTimeout(this.#retry);
+    this.#tries = 0;
+    if (this.#store.connection.state === "open")
+      this.#store.setConnection("connecting", performance.now());
+    this.#open();
+  }
+
+  #onVisibility() {
+    const nowMs = performance.now();
+    if (this.#page.hidden) this.#hiddenAtMs = nowMs;
+    else if (nowMs - this.#hiddenAtMs > HIDDEN_LIMIT_MS) this.#refresh();
+  }
 }
 
 /**

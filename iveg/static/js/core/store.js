@@ -1,18 +1,18 @@
 /**
- * What the browser knows: the newest value of every live topic, and who wants to hear.
+ * The newest value of every live topic, as the browser knows it, and its subscribers.
  *
- * A snapshot replaces everything; after it the newest wins per topic, so memory is
- * bounded by the fleet and not by time.  Panels hear of a topic at most once per
- * animation frame, of telemetry with the page's beat; `log` and `commands/{id}` are told one by one, because each of them
- * is a fact and not a state.
+ * A snapshot replaces everything; after it the newest value of each topic wins, so memory
+ * is bounded by the fleet and not by time.  Subscribers hear of a topic at most once per
+ * animation frame, of telemetry with the page's beat; `log` and `commands/{id}` are
+ * delivered one by one, because each of them is a fact and not a state.
  *
- * On a snapshot `snapshot` is told first and every topic it brought after it, except the
- * log's entries: who shows the log rebuilds it from `log()` when `snapshot` is told.
+ * A snapshot is delivered as `snapshot` first and every topic in it after that, except
+ * the entries of the log: a panel that shows the log rebuilds it from `log()` then.
  *
  * @typedef {import("./protocol.js").Robot} Robot
  * @typedef {import("./protocol.js").Person} Person
  * @typedef {import("./protocol.js").Scan} Scan
- * @typedef {import("./protocol.js").Look} Look
+ * @typedef {import("./protocol.js").DetectionFrame} DetectionFrame
  * @typedef {import("./protocol.js").Entry} Entry
  * @typedef {import("./protocol.js").Snapshot} Snapshot
  * @typedef {import("./protocol.js").GreenhouseMap} GreenhouseMap
@@ -20,10 +20,10 @@
  * @typedef {{state: ConnectionState, since: number}} Connection `since` (ms,
  *   `performance.now()`)
  * @typedef {import("./hub.js").Listener} Listener
- * @typedef {ReturnType<typeof createStore>} Store
  */
 
 import { onBeat } from "./beat.js";
+import { changed, isOlder, moved, received, topicsOf } from "./changes.js";
 import { createHub, onNextFrame } from "./hub.js";
 
 /** Entries of the log that a browser keeps. */
@@ -35,104 +35,160 @@ export const COMMANDS_SIZE = 200;
 /** Hues that the design has for robots (`--robot-1` … `--robot-8`). */
 const ROBOT_HUES = 8;
 
-/**
- * @param {{now?: () => number, schedule?: (flush: () => void) => void}} [options]
- *   `now` (ms) and the next animation frame; tests hand in their own
- */
-export function createStore(options = {}) {
-  const { now = () => performance.now(), schedule } = options;
-  const hub = createHub(schedule ?? onNextFrame, schedule ?? onBeat);
-  /** @type {Map<string, any>} */
-  let values = new Map();
+/** What the newest snapshot and the messages since then have brought. */
+class Known {
+  /** @type {Map<string, any>} newest value by topic */
+  values = new Map();
   /** @type {Map<string, Robot>} */
-  let robots = new Map();
+  robots = new Map();
   /** @type {Map<string, Person>} */
-  let people = new Map();
+  people = new Map();
   /** @type {Map<string, Scan>} */
-  let scans = new Map();
-  /** @type {Map<string, Look>} */
-  let looks = new Map();
-  /** @type {Set<string>} topics, least recently heard first */
-  let commands = new Set();
-  /** @type {Entry[]} */
-  let log = [];
+  scans = new Map();
+  /** @type {Map<string, DetectionFrame>} */
+  detections = new Map();
+  /** @type {Set<string>} topics of commands, least recently heard first */
+  commands = new Set();
+  /** @type {Entry[]} oldest first */
+  log = [];
+}
+
+export class Store {
+  #now;
+  #hub;
+  #known = new Known();
   /** @type {Map<string, number>} */
-  const slots = new Map();
+  #slots = new Map();
   /** @type {Connection} */
-  let connection = { state: "connecting", since: now() };
-
-  /** @param {Robot} robot */
-  function keepRobot(robot) {
-    const known = robots.get(robot.robot_id);
-    if (known && isOlder(robot, known)) return false;
-    robots.set(robot.robot_id, robot);
-    values.set(`robots/${robot.robot_id}`, robot);
-    slotOf(robot.robot_id);
-    return true;
-  }
+  #connection;
 
   /**
-   * Keeps what has changed of a robot, and tells of all of it.
-   *
-   * @param {string} id
-   * @param {(known: Robot) => Robot} change
+   * @param {{now?: () => number, schedule?: (flush: () => void) => void}} [options]
+   *   `now` (ms) and the next animation frame; tests pass their own
    */
-  function changeRobot(id, change) {
-    const known = robots.get(id);
-    if (!known) return;
-    const robot = change(known);
-    robots.set(id, robot);
-    values.set(`robots/${id}`, robot);
-    hub.tell(`robots/${id}`, robot);
-  }
-
-  /** @param {Person[]} all */
-  function keepPeople(all) {
-    people = new Map(all.map((person) => [person.person_id, person]));
-  }
-
-  /** @param {Entry} entry */
-  function keepEntry(entry) {
-    if (log.length && entry.id <= log[log.length - 1].id) return false;
-    log.push(entry);
-    if (log.length > LOG_SIZE) log.splice(0, log.length - LOG_SIZE);
-    return true;
-  }
-
-  /** Lines of before the server's restart. @param {Entry[]} entries oldest first */
-  function keepEarlier(entries) {
-    const first = log.length ? log[0].id : Infinity;
-    const before = entries.filter(({ id }) => id < first);
-    log = [...before, ...log].slice(-LOG_SIZE);
-    return before.length > 0;
-  }
-
-  /** Makes room, so that months of commands cost no more than the last ones. */
-  function keepCommand(/** @type {string} */ topic) {
-    commands.delete(topic);
-    commands.add(topic);
-    const [oldest] = commands;
-    if (commands.size <= COMMANDS_SIZE) return;
-    commands.delete(oldest);
-    values.delete(oldest);
+  constructor({ now = () => performance.now(), schedule } = {}) {
+    this.#now = now;
+    this.#hub = createHub(schedule ?? onNextFrame, schedule ?? onBeat);
+    this.#connection = { state: "connecting", since: now() };
   }
 
   /**
-   * Keeps who has changed until it is told who there is; who has not grows older.
+   * Applies one message.  `robots/{id}/move` and `robots/{id}/state` carry a part of a
+   * robot, `people/{id}` a person that has changed and `people/ids` all that there are;
+   * robots and people are kept and delivered whole.
    *
-   * @param {string} id
+   * @param {string} topic
    * @param {any} data
+   * @param {number} [receivedAtMs] `performance.now()` when it arrived
    */
-  function changePeople(id, data) {
-    if (id !== "ids") return void people.set(id, data);
-    const known = people;
-    people = new Map();
-    for (const one of data) {
-      const person = known.get(one);
-      if (person) people.set(one, person);
-    }
-    values.set("people", [...people.values()]);
-    hub.tell("people", values.get("people"));
+  apply(topic, data, receivedAtMs = this.#now()) {
+    const [head, id, leaf] = topic.split("/");
+    if (topic === "snapshot") this.#applySnapshot(data, receivedAtMs);
+    else if (head === "people" && id)
+      this.#changePeople(id, received(data, receivedAtMs));
+    else if (leaf === "move") this.#changeRobot(id, moved, data, receivedAtMs);
+    else if (leaf === "state") this.#changeRobot(id, changed, data, receivedAtMs);
+    else if (this.#keep(topic, received(data, receivedAtMs)))
+      this.#hub.tell(topic, data);
+  }
+
+  /** The newest value of a topic. @param {string} topic @returns {any} */
+  get(topic) {
+    return this.#known.values.get(topic);
+  }
+
+  /**
+   * Calls `fn(data, topic)` for a topic, or for every topic one level below a prefix:
+   * `people`, `robots/AGI`, `robots/` (each robot, not its scan), `robots/+/scan`.
+   *
+   * @param {string} pattern
+   * @param {Listener} fn
+   * @returns {() => void} ends the subscription
+   */
+  subscribe(pattern, fn) {
+    return this.#hub.subscribe(pattern, fn);
+  }
+
+  /**
+   * Calls `fn` for every message at once, before the next frame: the map asks for its
+   * frame the moment a message comes.
+   *
+   * @param {Listener} fn
+   * @returns {() => void}
+   */
+  watch(fn) {
+    return this.#hub.watch(fn);
+  }
+
+  /** @returns {ReadonlyMap<string, Robot>} in the server's order */
+  robots() {
+    return this.#known.robots;
+  }
+
+  /** @returns {ReadonlyMap<string, Scan>} newest sweep per robot */
+  scans() {
+    return this.#known.scans;
+  }
+
+  /** @returns {ReadonlyMap<string, DetectionFrame>} newest per robot */
+  detections() {
+    return this.#known.detections;
+  }
+
+  /** @returns {Person[]} */
+  people() {
+    return this.get("people") ?? [];
+  }
+
+  /** @returns {GreenhouseMap | null} */
+  map() {
+    return this.get("map") ?? null;
+  }
+
+  /** @returns {readonly Entry[]} oldest first, at most LOG_SIZE */
+  log() {
+    return this.#known.log;
+  }
+
+  /**
+   * Which `--robot-n` is a robot's own (1–8), the same on map and cards.
+   *
+   * @param {string} robotId
+   * @returns {number}
+   */
+  slotOf(robotId) {
+    const slot = this.#slots.get(robotId) ?? this.#slots.size;
+    this.#slots.set(robotId, slot);
+    return (slot % ROBOT_HUES) + 1;
+  }
+
+  /** @returns {Connection} */
+  get connection() {
+    return this.#connection;
+  }
+
+  /**
+   * Set by the socket; delivered under the topic `connection`.
+   *
+   * @param {ConnectionState} state
+   * @param {number} [sinceMs]
+   */
+  setConnection(state, sinceMs = this.#now()) {
+    if (state === this.#connection.state) return;
+    this.#connection = { state, since: sinceMs };
+    this.#hub.tell("connection", this.#connection);
+  }
+
+  /** @param {Snapshot} snapshot @param {number} atMs */
+  #applySnapshot(snapshot, atMs) {
+    this.#known = new Known();
+    this.#known.log = (snapshot.log ?? []).slice(-LOG_SIZE);
+    this.#known.values.set("snapshot", snapshot);
+    const brought = topicsOf(snapshot);
+    for (const [topic, data] of brought) this.#keep(topic, received(data, atMs));
+    // Delivered only when all of it is here, so nobody sees half of a snapshot.
+    this.#hub.tell("snapshot", snapshot);
+    for (const [topic, data] of brought) this.#hub.tell(topic, data);
   }
 
   /**
@@ -141,203 +197,99 @@ export function createStore(options = {}) {
    * @param {string} topic
    * @param {any} data
    */
-  function keep(topic, data) {
+  #keep(topic, data) {
+    const { values, scans, detections } = this.#known;
     const [head, id, leaf] = topic.split("/");
-    if (topic === "log") return keepEntry(data);
-    if (topic === "log/earlier") return keepEarlier(data);
-    if (head === "commands") keepCommand(topic);
-    if (head === "robots" && !leaf) return keepRobot(data);
+    if (topic === "log") return this.#keepEntry(data);
+    if (topic === "log/earlier") return this.#keepEarlier(data);
+    if (head === "robots" && !leaf) return this.#keepRobot(data);
     if (head === "robots") scans.set(id, data);
-    else if (head === "detections") looks.set(id, data);
-    else if (topic === "people") keepPeople(data);
+    else if (head === "detections") detections.set(id, data);
+    else if (head === "commands") this.#keepCommand(topic);
+    else if (topic === "people") this.#keepPeople(data);
     values.set(topic, data);
     return true;
   }
 
+  /** @param {Robot} robot */
+  #keepRobot(robot) {
+    const known = this.#known.robots.get(robot.robot_id);
+    if (known && isOlder(robot, known)) return false;
+    this.#setRobot(robot.robot_id, robot);
+    this.slotOf(robot.robot_id);
+    return true;
+  }
+
   /**
-   * @param {Snapshot} snapshot
+   * Keeps what has changed of a robot, and delivers the whole robot.
+   *
+   * @param {string} id
+   * @param {typeof moved | typeof changed} change
+   * @param {any} data
    * @param {number} atMs
    */
-  function applySnapshot(snapshot, atMs) {
-    values = new Map();
-    robots = new Map();
-    people = new Map();
-    scans = new Map();
-    looks = new Map();
-    commands = new Set();
-    log = (snapshot.log ?? []).slice(-LOG_SIZE);
-    values.set("snapshot", snapshot);
-    const brought = topicsOf(snapshot);
-    for (const [topic, data] of brought) keep(topic, received(data, atMs));
-    // Told only when all of it is here, so nobody sees half of a snapshot.
-    hub.tell("snapshot", snapshot);
-    for (const [topic, data] of brought) hub.tell(topic, data);
+  #changeRobot(id, change, data, atMs) {
+    const known = this.#known.robots.get(id);
+    if (!known) return;
+    const robot = change(known, data, atMs);
+    this.#setRobot(id, robot);
+    this.#hub.tell(`robots/${id}`, robot);
   }
 
-  /** @param {string} robotId @returns {number} */
-  function slotOf(robotId) {
-    const slot = slots.get(robotId) ?? slots.size;
-    slots.set(robotId, slot);
-    return (slot % ROBOT_HUES) + 1;
+  /** @param {string} id @param {Robot} robot */
+  #setRobot(id, robot) {
+    this.#known.robots.set(id, robot);
+    this.#known.values.set(`robots/${id}`, robot);
   }
 
-  return {
-    /**
-     * Takes one message in.  `robots/{id}/move` and `robots/{id}/state` tell a part of a
-     * robot, `people/{id}` and then `people/ids` who has changed and who there is; they
-     * are kept and told whole.
-     *
-     * @param {string} topic
-     * @param {any} data
-     * @param {number} [receivedAtMs] `performance.now()` when it arrived
-     */
-    apply(topic, data, receivedAtMs = now()) {
-      const [, id, leaf] = topic.split("/");
-      if (topic === "snapshot") applySnapshot(data, receivedAtMs);
-      else if (topic.startsWith("people/"))
-        changePeople(id, received(data, receivedAtMs));
-      else if (leaf === "move") changeRobot(id, moved(data, receivedAtMs));
-      else if (leaf === "state") changeRobot(id, changed(data, receivedAtMs));
-      else if (keep(topic, received(data, receivedAtMs))) hub.tell(topic, data);
-    },
-    /** The newest value of a topic. @param {string} topic @returns {any} */
-    get: (topic) => values.get(topic),
-    /**
-     * Calls `fn(data, topic)` for a topic, or for every topic one level below a prefix:
-     * `people`, `robots/AGI`, `robots/` (each robot, not its scan), `robots/+/scan`.
-     *
-     * @param {string} pattern
-     * @param {Listener} fn
-     * @returns {() => void} ends the subscription
-     */
-    subscribe: (pattern, fn) => hub.subscribe(pattern, fn),
-    /**
-     * Calls `fn` for every message at once, before the next frame: for the map, that
-     * must ask for its frame the moment a message comes.
-     *
-     * @param {Listener} fn
-     * @returns {() => void}
-     */
-    watch: (fn) => hub.watch(fn),
-    /** @returns {ReadonlyMap<string, Robot>} in the server's order */
-    robots: () => robots,
-    /** @returns {ReadonlyMap<string, Scan>} newest sweep per robot */
-    scans: () => scans,
-    /** @returns {ReadonlyMap<string, Look>} newest look per robot */
-    looks: () => looks,
-    /** @returns {Person[]} */
-    people: () => values.get("people") ?? [],
-    /** @returns {GreenhouseMap | null} */
-    map: () => values.get("map") ?? null,
-    /** @returns {readonly Entry[]} oldest first, at most LOG_SIZE */
-    log: () => log,
-    /** Which `--robot-n` is a robot's own (1–8), the same on map and cards. */
-    slotOf,
-    /** @returns {Connection} */
-    get connection() {
-      return connection;
-    },
-    /**
-     * Told by the socket; heard under the topic `connection`.
-     *
-     * @param {ConnectionState} state
-     * @param {number} [sinceMs]
-     */
-    setConnection(state, sinceMs = now()) {
-      if (state === connection.state) return;
-      connection = { state, since: sinceMs };
-      hub.tell("connection", connection);
-    },
-  };
-}
-
-/**
- * Notes on a value, and on each value of a list, when it arrived.
- *
- * @template T
- * @param {T} data
- * @param {number} atMs
- * @returns {T}
- */
-function received(data, atMs) {
-  const values = Array.isArray(data) ? data : [data];
-  for (const value of values) {
-    if (value && typeof value === "object") value.receivedAtMs = atMs;
+  /** @param {Person[]} all */
+  #keepPeople(all) {
+    this.#known.people = new Map(all.map((person) => [person.person_id, person]));
   }
-  return data;
-}
 
-/**
- * Whether a robot's state was taken in before the one that is known.  Times of one
- * server in one format compare as text.
- *
- * @param {Robot} robot
- * @param {Robot} known
- */
-function isOlder(robot, known) {
-  if (!robot.received_at || !known.received_at) return false;
-  return robot.received_at < known.received_at;
-}
+  /**
+   * Keeps a person that has changed until `ids` names all that there are; a person that
+   * has not changed grows older.
+   *
+   * @param {string} id
+   * @param {any} data
+   */
+  #changePeople(id, data) {
+    const { people, values } = this.#known;
+    if (id !== "ids") return void people.set(id, data);
+    const present = data.flatMap((/** @type {string} */ one) => people.get(one) ?? []);
+    this.#keepPeople(present);
+    values.set("people", present);
+    this.#hub.tell("people", present);
+  }
 
-/**
- * A robot that has moved.  Ages within its state count from when that was told, so the
- * age of the pose, which is younger, is written as of then, too.
- *
- * @param {Robot} move `age_s`, `pose`, `twist`, `stamp`
- * @param {number} atMs
- * @returns {(known: Robot) => Robot}
- */
-function moved(move, atMs) {
-  return (known) => {
-    const sinceS = (atMs - (known.receivedAtMs ?? atMs)) / 1000;
-    const age_s = typeof move.age_s === "number" ? move.age_s - sinceS : null;
-    return { ...known, ...move, age_s };
-  };
-}
+  /** @param {Entry} entry */
+  #keepEntry(entry) {
+    const { log } = this.#known;
+    if (log.length && entry.id <= log[log.length - 1].id) return false;
+    log.push(entry);
+    if (log.length > LOG_SIZE) log.splice(0, log.length - LOG_SIZE);
+    return true;
+  }
 
-/**
- * A robot of which something else has changed; its pose grows older meanwhile.
- *
- * @param {Partial<Robot>} changes
- * @param {number} atMs
- * @returns {(known: Robot) => Robot}
- */
-function changed(changes, atMs) {
-  return (known) => {
-    const sinceS = (atMs - (known.receivedAtMs ?? atMs)) / 1000;
-    const age_s = typeof known.age_s === "number" ? known.age_s + sinceS : null;
-    return { ...known, ...changes, age_s, receivedAtMs: atMs };
-  };
-}
+  /** Entries of before the server's restart. @param {Entry[]} entries oldest first */
+  #keepEarlier(entries) {
+    const { log } = this.#known;
+    const first = log.length ? log[0].id : Infinity;
+    const before = entries.filter(({ id }) => id < first);
+    this.#known.log = [...before, ...log].slice(-LOG_SIZE);
+    return before.length > 0;
+  }
 
-/**
- * A snapshot, as the messages that would have brought the same.
- *
- * @param {Snapshot} snapshot
- * @returns {[string, unknown][]}
- */
-function topicsOf(snapshot) {
-  return [
-    ["map", snapshot.map],
-    ...(snapshot.robots ?? []).map(under("robots", "robot_id")),
-    ["people", snapshot.people ?? []],
-    ...Object.entries(snapshot.detections ?? {}).map(
-      ([id, look]) => /** @type {[string, unknown]} */ ([`detections/${id}`, look]),
-    ),
-    ...(snapshot.commands ?? []).map(under("commands", "command_id")),
-    ["alerts", snapshot.alerts ?? []],
-    ["flood", snapshot.flood ?? null],
-    ["rule", snapshot.rule],
-    ["health", snapshot.health],
-    ["climate", snapshot.climate],
-  ];
-}
-
-/**
- * @param {string} head
- * @param {string} key
- * @returns {(value: any) => [string, unknown]}
- */
-function under(head, key) {
-  return (value) => [`${head}/${value[key]}`, value];
+  /** Makes room: months of commands cost no more than the last ones.
+   * @param {string} topic */
+  #keepCommand(topic) {
+    const { commands, values } = this.#known;
+    commands.delete(topic);
+    commands.add(topic);
+    const [oldest] = commands;
+    if (commands.size <= COMMANDS_SIZE) return;
+    commands.delete(oldest);
+    values.delete(oldest);
+  }
 }

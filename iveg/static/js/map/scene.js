@@ -215,11 +215,11 @@ function stageAt({ stage, radius_m }, ageS) {
 function readDetections(store, nowMs) {
   /** @type {SceneDetection[]} */
   const detections = [];
-  for (const [robotId, look] of store.looks()) {
-    if (ageOf(look, nowMs) > LIMITS.live_s) continue;
+  for (const [robotId, frame] of store.detections()) {
+    if (ageOf(frame, nowMs) > LIMITS.live_s) continue;
     const yaw = store.robots().get(robotId)?.pose?.yaw ?? 0;
     const slot = store.slotOf(robotId);
-    look.items.forEach((item, i) => {
+    frame.items.forEach((item, i) => {
       detections.push(readDetection(item, `${robotId}/${i}`, slot, yaw));
     });
   }

@@ -4,7 +4,15 @@
 
 import { readApi } from "../core/api.js";
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
-import { all, make, need, setAttribute, setHidden, setText } from "../panels/dom.js";
+import {
+  all,
+  fill,
+  make,
+  need,
+  setAttribute,
+  setHidden,
+  setText,
+} from "../panels/dom.js";
 import { readingsOf } from "../panels/readings.js";
 import { isHeard, modeSaid, taskSaid } from "../panels/robot_texts.js";
 import { judgeChain } from "./health_sentence.js";
@@ -31,12 +39,12 @@ export function start(page) {
     setHidden(need("#machines-empty"), robots.length > 0);
     const isKnown = Boolean(store.get("snapshot"));
     setText(need("#machines-empty"), i18n.t(isKnown ? "robot.none" : "rows.loading"));
-    fill(
+    fillRows(
       "#machines tbody",
       robots.map((robot) => machineCells(robot, i18n)),
     );
     hideEmptyColumns(need("#machines"));
-    fill(
+    fillRows(
       "#devices tbody",
       devices.items.map((device) => deviceCells(device, devices.readMs, i18n)),
     );
@@ -171,16 +179,17 @@ function readingsSaid(robot, i18n) {
  * @param {string} selector
  * @param {(string | Node)[][]} rows
  */
-function fill(selector, rows) {
-  const body = need(selector);
-  while (body.children.length > rows.length) body.lastElementChild?.remove();
-  while (body.children.length < rows.length) body.append(make("tr"));
-  rows.forEach((cells, i) => {
-    const row = body.children[i];
-    while (row.children.length < cells.length) row.append(make("td"));
-    cells.forEach((cell, j) => {
-      const said = typeof cell === "string" ? cell : (cell.textContent ?? "");
-      if (row.children[j].textContent !== said) row.children[j].replaceChildren(cell);
-    });
-  });
+function fillRows(selector, rows) {
+  fill(
+    need(selector),
+    rows,
+    () => make("tr"),
+    (row, cells) => fill(row, cells, () => make("td"), writeCell),
+  );
+}
+
+/** @param {Element} place @param {string | Node} cell */
+function writeCell(place, cell) {
+  const said = typeof cell === "string" ? cell : (cell.textContent ?? "");
+  if (place.textContent !== said) place.replaceChildren(cell);
 }

@@ -2,7 +2,7 @@
  * An alert that repeats, one occurrence after the other, behind a line that opens it.
  */
 
-import { make, setHidden, setText } from "./dom.js";
+import { fill, make, setHidden, setText } from "./dom.js";
 import { toldSaid } from "./told.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
@@ -22,11 +22,12 @@ export function createMembers(i18n) {
     const key = kept < count ? "alert.members_newest" : "alert.members";
     setText(summary, i18n.t(key, { count, kept }));
     const newest = [...members].reverse();
-    while (list.children.length > newest.length) list.lastElementChild?.remove();
-    while (list.children.length < newest.length) list.append(make("li"));
-    newest.forEach((member, i) => {
-      setText(list.children[i], lineOf(member, i18n));
-    });
+    fill(
+      list,
+      newest,
+      () => make("li"),
+      (item, member) => setText(item, lineOf(member, i18n)),
+    );
   }
 
   return { element, draw };

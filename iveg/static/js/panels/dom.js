@@ -52,6 +52,23 @@ export function setHidden(element, hidden) {
 }
 
 /**
+ * One child for each value, made where it is missing, then written anew.
+ *
+ * @template T
+ * @param {Element} place
+ * @param {readonly T[]} values
+ * @param {() => Element} makeChild
+ * @param {(child: Element, value: T) => void} write
+ */
+export function fill(place, values, makeChild, write) {
+  while (place.children.length > values.length) place.lastElementChild?.remove();
+  while (place.children.length < values.length) place.append(makeChild());
+  values.forEach((value, i) => {
+    write(place.children[i], value);
+  });
+}
+
+/**
  * The element that a template of ours promises.
  *
  * @param {string} selector

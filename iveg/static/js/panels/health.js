@@ -5,7 +5,7 @@
 import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { sentenceOf } from "../pages/health_sentence.js";
-import { make, need, setAttribute, setText } from "./dom.js";
+import { fill, make, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
 const WORST_FIRST = ["down", "late", "unknown", "ok"];
@@ -49,11 +49,7 @@ export function createHealthPanel({ store, i18n, line }) {
 
   /** @param {Hop[]} hops @param {number} waitedS since the server wrote the ages */
   function drawHops(hops, waitedS) {
-    const list = need("#hops");
-    while (list.children.length > hops.length) list.lastElementChild?.remove();
-    while (list.children.length < hops.length) list.append(makeItem());
-    hops.forEach((hop, i) => {
-      const item = list.children[i];
+    fill(need("#hops"), hops, makeItem, (item, hop) => {
       setAttribute(item, "data-state", hop.state);
       setText(need("b", item), i18n.t(`hop.${hop.hop}`));
       const age =

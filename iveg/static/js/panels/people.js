@@ -5,7 +5,7 @@
 import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
 import { readPerson } from "../map/scene.js";
-import { make, need, setHidden, setText } from "./dom.js";
+import { fill, make, need, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Person} Person */
 
@@ -19,10 +19,7 @@ export function createPeoplePanel({ store, i18n }) {
   function draw() {
     if (!(/** @type {HTMLDialogElement} */ (need("#people-panel")).open)) return;
     const people = store.people();
-    while (list.children.length > people.length) list.lastElementChild?.remove();
-    while (list.children.length < people.length) list.append(makeItem());
-    people.forEach((person, i) => {
-      const item = list.children[i];
+    fill(list, people, makeItem, (item, person) => {
       const [who, where, ...rest] = linesOf(person, i18n);
       setText(need("b", item), who);
       setText(need("small", item), where);

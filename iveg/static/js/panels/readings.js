@@ -1,6 +1,8 @@
 /**
- * What a robot's small sensors say, one row each: the card and the Fleet page show all.
+ * Readings of a robot's small sensors, a row each: the card and the Fleet page show all.
  */
+
+import { fill, make, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 /** @typedef {import("../core/i18n.js").I18n} I18n */
@@ -14,7 +16,7 @@
 /** @type {readonly Reading[]} */
 const READINGS = [{ label: "robot.battery", say: saidOfBattery }];
 
-/** Every row, a dash where nothing is known, so that cards keep their height.
+/** Every row, with a dash for an unknown value, so that cards keep their height.
  * @param {Robot | undefined} robot @param {I18n} i18n
  * @returns {{label: string, said: string}[]} */
 export function readingsOf(robot, i18n) {
@@ -22,6 +24,27 @@ export function readingsOf(robot, i18n) {
     label: i18n.t(label),
     said: (robot && say(robot, i18n)) ?? "—",
   }));
+}
+
+/**
+ * Writes the rows of a card.
+ *
+ * @param {HTMLElement} place
+ * @param {Robot | undefined} robot
+ * @param {I18n} i18n
+ */
+export function drawReadings(place, robot, i18n) {
+  fill(place, readingsOf(robot, i18n), makeRow, (row, { label, said }) => {
+    const [name, value] = row.children;
+    setText(name, label);
+    setText(value, said);
+  });
+}
+
+function makeRow() {
+  const row = make("p", "card__line");
+  row.append(make("span", "card__label"), " ", make("span"));
+  return row;
 }
 
 /** @param {Robot} robot @param {I18n} i18n */

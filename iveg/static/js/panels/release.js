@@ -7,13 +7,15 @@
  * it again; here it is explained.
  */
 
+import { sendApi } from "../core/api.js";
 import { ageOf } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
-import { make, need, needPart, setAttribute, setText } from "./dom.js";
+import { fill, make, need, needPart, setAttribute, setText } from "./dom.js";
 
 /** @typedef {import("../main.js").App} App */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 /** @typedef {import("../core/protocol.js").Command} Command */
+/** @typedef {import("../core/protocol.js").Hold} Hold */
 
 const HOLD_MS = 2000;
 const RELEASERS = new Set(["operator", "admin"]);
@@ -103,33 +105,25 @@ export function createRelease(app, card, robotId) {
 
   /** @param {Robot | undefined} robot */
   function drawHolds(robot) {
-    const list = needPart("holds", card);
-    const holds = robot?.holds ?? [];
-    const requesters = stops.commandOf(robotId)?.requesters ?? [];
-    while (list.children.length > Math.max(1, holds.length))
-      list.lastElementChild?.remove();
-    while (list.children.length < Math.max(1, holds.length)) {
-      const item = make("li");
-      item.append(make("b"), make("small"));
-      list.append(item);
-    }
-    holds.forEach((hold, i) => {
-      const by =
-        hold.source === "iveg" && requesters.length
-          ? ` · ${i18n.t("release.held_by", { who: requesters.join(", ") })}`
-          : "";
-      setText(
-        need("b", list.children[i]),
-        i18n.t(`release.hold_source.${hold.source}`),
-      );
-      const ack = i18n.t(`release.hold_ack.${hold.ack}`);
-      setText(need("small", list.children[i]), `${ack}${by}`);
-      setAttribute(list.children[i], "title", hold.id);
-    });
-    if (!holds.length) {
-      setText(need("b", list.children[0]), i18n.t("release.no_holds"));
-      setText(need("small", list.children[0]), "");
-    }
+    const holds = robot?.holds.length ? robot.holds : [null];
+    fill(needPart("holds", card), holds, makeHold, drawHold);
+  }
+
+  /** @param {Element} item @param {Hold | null} hold null: the robot has none */
+  function drawHold(item, hold) {
+    const key = hold ? `release.hold_source.${hold.source}` : "release.no_holds";
+    setText(need("b", item), i18n.t(key));
+    setText(need("small", item), hold ? ackSaid(hold) : "");
+    setAttribute(item, "title", hold?.id ?? "");
+  }
+
+  /** Who may lift a hold, and who asked for it. @param {Hold} hold */
+  function ackSaid({ ack, source }) {
+    const said = i18n.t(`release.hold_ack.${ack}`);
+    const who = stops.commandOf(robotId)?.requesters.join(", ");
+    return source === "iveg" && who
+      ? `${said} · ${i18n.t("release.held_by", { who })}`
+      : said;
   }
 
   /** @param {string} verb @param {object} body */
@@ -137,7 +131,8 @@ export function createRelease(app, card, robotId) {
     isBusy = true;
     order = undefined;
     draw(shown);
-    status = await post(`/api/v1/robots/${encodeURIComponent(robotId)}/${verb}`, body);
+    const path = `robots/${encodeURIComponent(robotId)}/${verb}`;
+    ({ status } = await sendApi("POST", path, body));
     isBusy = false;
     const isTaken = status === 202 || status === 200;
     const known = `release.failed.${status}`;
@@ -153,6 +148,12 @@ export function createRelease(app, card, robotId) {
   resumeButton.addEventListener("click", () => send("resume", {}));
   store.subscribe("commands/", take);
   return { draw, factsOf };
+}
+
+function makeHold() {
+  const item = make("li");
+  item.append(make("b"), make("small"));
+  return item;
 }
 
 /**
@@ -259,19 +260,4 @@ export function onHold(button, fn) {
     event.preventDefault();
     begin();
   });
-}
-
-/** @param {string} path @param {object} body @returns {Promise<number>} 0: no answer */
-async function post(path, body) {
-  try {
-    const headers = { "Content-Type": "application/json", "X-IVEG": "1" };
-    const answer = await fetch(path, {
-      method: "POST",
-      headers,
-      body: JSON.stringify(body),
-    });
-    return answer.status;
-  } catch {
-    return 0;
-  }
 }

@@ -1,24 +1,30 @@
 /**
- * What a robot's card says, as pure functions of what is known of the robot.
+ * The texts of a robot's card, as pure functions of the robot's state.
  *
- * What nobody knows is said to be unknown: never a clear way, a speed or a margin.
+ * An unknown value is said to be unknown: never a clear way, a speed or a margin.
  */
 
+import { ageOf } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
+import { readingOf } from "./gauge.js";
 
 /** @typedef {import("../core/i18n.js").I18n} I18n */
+/** @typedef {import("../core/protocol.js").DetectionFrame} DetectionFrame */
 /** @typedef {import("../core/protocol.js").Margin} Margin */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 
-/** What is shown as 0.00 (m/s, rad/s). */
+/** Shown as 0.00 (m/s, rad/s). */
 const STILL = 0.005;
+/** An older detection frame says nothing of now (s). */
+const CERTAIN_FOR_S = 3;
+const DEGREES = 180 / Math.PI;
 
 /**
- * What a robot does, in words; that it was told to stop is not that it stands.
+ * What a robot does; an order to stop is not yet a standstill.
  *
  * @param {Robot | undefined} robot
  * @param {I18n} i18n
- * @param {boolean} [isResuming] what is under way is a resume, and no release
+ * @param {boolean} [isResuming] the order under way is a resume, and no release
  */
 export function modeSaid(robot, i18n, isResuming = false) {
   const { mode = "UNKNOWN", stop } = robot ?? {};
@@ -34,7 +40,7 @@ export function modeSaid(robot, i18n, isResuming = false) {
 }
 
 /**
- * Why it does that; nothing of a robot that was never heard.
+ * Why it does that; empty for a robot without any message yet.
  *
  * @param {Robot | undefined} robot
  * @param {I18n} i18n
@@ -57,10 +63,10 @@ export function whySaid(robot, i18n) {
   return i18n.t(`robot.why.${reason}`, { distance });
 }
 
-/** Whether a robot has ever said where it is. @param {Robot | undefined} robot */
+/** Whether a robot has ever sent a pose or a report. @param {Robot | undefined} robot */
 export const isHeard = (robot) => Boolean(robot?.pose ?? robot?.applied);
 
-/** It could drive and does not. @param {Robot | undefined} robot */
+/** Whether a robot could drive and does not. @param {Robot | undefined} robot */
 function isWaiting(robot) {
   const { mode, twist } = robot ?? {};
   return (
@@ -71,7 +77,7 @@ function isWaiting(robot) {
 }
 
 /**
- * What a robot finds wrong with its own data, a sentence each.
+ * The faults that a robot reports of its own data, a sentence each.
  *
  * @param {Robot} robot
  * @param {I18n} i18n
@@ -92,10 +98,81 @@ export function marginSaid(margin, i18n) {
   return i18n.t("robot.margin_value", { margin_m: margin.margin_m, band });
 }
 
-/** A task in the reader's words; one of another fleet as it was sent, none as none.
+/** A task in the reader's language; a task that iVeg does not know, as it was sent.
  * @param {string | null | undefined} task @param {I18n} i18n */
 export function taskSaid(task, i18n) {
   if (!task || task === "none") return i18n.t("task.unknown");
   const key = `task.${task}`;
   return i18n.has(key) ? i18n.t(key) : task;
+}
+
+/** The age of a pose (s, finite). @param {number} ageS @param {I18n} i18n */
+export function agoSaid(ageS, i18n) {
+  return i18n.t(ageS < 10 ? "robot.ago" : "robot.ago_long", { age: ageS });
+}
+
+/**
+ * Pose and twist by the field of the card that shows them.
+ *
+ * @param {Robot | undefined} robot
+ * @param {I18n} i18n
+ * @returns {[string, string][]}
+ */
+export function readoutsSaid(robot, i18n) {
+  const { pose, twist } = robot ?? {};
+  const said = (
+    /** @type {number | null | undefined} */ value,
+    /** @type {number} */ decimals,
+    /** @type {string} */ unit,
+  ) =>
+    value === null || value === undefined
+      ? "—"
+      : `${i18n.number(value, decimals)} ${i18n.t(`robot.unit.${unit}`)}`;
+  return [
+    ["x", said(pose?.x, 2, "m")],
+    ["y", said(pose?.y, 2, "m")],
+    ["yaw", said(pose && pose.yaw * DEGREES, 1, "deg")],
+    ["v", said(twist?.linear, 2, "ms")],
+    ["w", said(twist?.angular, 2, "rads")],
+  ];
+}
+
+/**
+ * What the gauge draws and says.
+ *
+ * @param {Robot | undefined} robot
+ * @param {string} robotId
+ * @param {I18n} i18n
+ * @returns {import("./gauge.js").Reading}
+ */
+export function gaugeSaid(robot, robotId, i18n) {
+  const { speed, max, factor } = readingOf(robot);
+  const limit = (factor ?? 1) * max;
+  const isKnown = speed !== null;
+  return {
+    speed,
+    max,
+    factor,
+    name: i18n.t("robot.gauge", { robot: robotId }),
+    said: isKnown
+      ? i18n.t("robot.gauge_value", { speed, max, limit })
+      : i18n.t("robot.speed_unknown"),
+    limitSaid: factor === null ? "" : i18n.t("robot.limit", { limit }),
+    speedSaid: isKnown ? i18n.number(Math.abs(speed), 2) : "—",
+  };
+}
+
+/**
+ * How certain the detector is of its most certain detection now.
+ *
+ * @param {DetectionFrame | undefined} frame the robot's newest
+ * @param {I18n} i18n
+ */
+export function certaintySaid(frame, i18n) {
+  if (!frame || ageOf(frame) > CERTAIN_FOR_S) return i18n.t("robot.certainty_old");
+  const [best] = [...frame.items].sort((a, b) => b.probability - a.probability);
+  if (!best) return i18n.t("robot.certainty_none");
+  const key = best.confident ? "robot.certainty_value" : "robot.certainty_faint";
+  const slots = { class: best.class ?? best.class_id, confidence: best.probability };
+  return i18n.t(key, slots);
 }

@@ -5,7 +5,7 @@
  * was tried, how old the robot's last word is and how far it may have driven since.
  */
 
-import { make, need, setText } from "./dom.js";
+import { fill, make, need, setText } from "./dom.js";
 import { doubtOf, since, stateOfCommand } from "./stop_view.js";
 
 /** @typedef {import("../core/protocol.js").Command} Command */
@@ -19,7 +19,6 @@ export function createLoudLines({ i18n, line }) {
    * @param {import("./press.js").Pending[]} kept presses that wait for the link
    */
   function draw(commands, kept) {
-    const place = need("#p1");
     const loud = commands.filter((command) =>
       LOUD.has(stateOfCommand(command ?? null) ?? ""),
     );
@@ -27,11 +26,7 @@ export function createLoudLines({ i18n, line }) {
       ...kept.map(keptSaid),
       ...loud.map((command) => sentenceOf(/** @type {Command} */ (command))),
     ];
-    while (place.children.length > said.length) place.lastElementChild?.remove();
-    while (place.children.length < said.length) place.append(make("p", "p1__line"));
-    said.forEach((sentence, i) => {
-      setText(place.children[i], sentence);
-    });
+    fill(need("#p1"), said, () => make("p", "p1__line"), setText);
   }
 
   /** @param {import("./press.js").Pending} press */

@@ -4,7 +4,7 @@
  */
 
 import { onBeat } from "../core/beat.js";
-import { makeSvg, need, setAttribute, setText } from "./dom.js";
+import { fill, makeSvg, need, setAttribute, setText } from "./dom.js";
 
 const TICK_MS = 1000;
 const MINUTES = 10;
@@ -51,11 +51,12 @@ export function createTimebar({ store, i18n, line }) {
     const nowS = line.serverNow();
     setText(need("#clock"), i18n.time(nowS));
     setAttribute(strip, "aria-label", i18n.t("time.strip", { minutes: MINUTES }));
-    const marks = marksOf(nowS);
-    while (strip.childElementCount > marks.length) strip.lastElementChild?.remove();
-    while (strip.childElementCount < marks.length) strip.append(makeSvg("rect"));
-    for (const [i, { x, kind }] of marks.entries())
-      drawMark(strip.children[i], x, kind);
+    fill(
+      strip,
+      marksOf(nowS),
+      () => makeSvg("rect"),
+      (rect, { x, kind }) => drawMark(rect, x, kind),
+    );
   }
 
   /** @param {number} nowS Unix time */

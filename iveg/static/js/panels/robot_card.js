@@ -1,0 +1,160 @@
+/**
+ * The card of one robot: its pose, its speed, the age of both, and why it drives so.
+ *
+ * Ages are counted here, by the browser's clock, so that silence shows by itself.
+ */
+
+import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
+import { all, setAttribute, setHidden, setText } from "./dom.js";
+import { createDrill } from "./drill.js";
+import { createGauge } from "./gauge.js";
+import { drawReadings } from "./readings.js";
+import { createRelease } from "./release.js";
+import {
+  agoSaid,
+  certaintySaid,
+  faultsSaid,
+  gaugeSaid,
+  marginSaid,
+  modeSaid,
+  readoutsSaid,
+  taskSaid,
+  whySaid,
+} from "./robot_texts.js";
+
+/** @typedef {import("../main.js").App} App */
+/** @typedef {import("../core/protocol.js").Robot} Robot */
+
+export class RobotCard {
+  #app;
+  #card;
+  #robotId;
+  #parts;
+  #fields;
+  #ages;
+  #gauge = createGauge();
+  #release;
+  #drill;
+
+  /** @param {App} app @param {HTMLElement} card */
+  constructor(app, card) {
+    this.#app = app;
+    this.#card = card;
+    this.#robotId = String(card.dataset.robot);
+    this.#parts = byName("part", card);
+    this.#fields = byName("field", card);
+    this.#ages = all("[data-age]", card);
+    this.#release = createRelease(app, card, this.#robotId);
+    this.#drill = createDrill(app, card, this.#robotId);
+    this.#parts.gauge.append(this.#gauge.svg, this.#gauge.bar);
+    this.#parts.menu.addEventListener("click", (event) => this.#toggle(event));
+    this.#parts.follow.addEventListener("click", () => this.#follow());
+  }
+
+  /** @param {Robot | undefined} robot */
+  draw(robot) {
+    const { i18n, dialogs } = this.#app;
+    const isSmall = this.#card.parentElement?.hasAttribute("data-many") ?? false;
+    this.#drawHead(robot);
+    this.#drawMode(robot);
+    this.#drawAge(robot, isSmall);
+    this.#gauge.draw(gaugeSaid(robot, this.#robotId, i18n));
+    if (!isSmall) this.#drawDetails(robot);
+    if (dialogs.isOpen(this.#panel)) this.#drawMarginParts(robot);
+    this.#release.draw(robot);
+    this.#drill.draw(this.#release.factsOf(robot));
+  }
+
+  get #panel() {
+    return /** @type {HTMLDialogElement} */ (this.#parts.panel);
+  }
+
+  /** @param {Event} event */
+  #toggle(event) {
+    const { dialogs } = this.#app;
+    event.stopPropagation();
+    if (dialogs.isOpen(this.#panel)) dialogs.close();
+    else dialogs.open(this.#panel, this.#parts.menu);
+  }
+
+  #follow() {
+    this.#app.dialogs.close();
+    const detail = this.#robotId;
+    document.dispatchEvent(new CustomEvent("iveg:follow", { detail }));
+  }
+
+  /** @param {Robot | undefined} robot */
+  #drawHead(robot) {
+    const { store, i18n } = this.#app;
+    const { menu, shape, replay } = this.#parts;
+    const link = linkOfRobot(robot);
+    setAttribute(this.#card, "data-link", link);
+    setAttribute(this.#card, "data-mode", robot?.mode ?? "UNKNOWN");
+    setAttribute(menu, "aria-label", i18n.t("release.open", { robot: this.#robotId }));
+    setText(this.#fields.link, i18n.t(`robot.link.${link}`));
+    setAttribute(shape, "data-slot", String(store.slotOf(this.#robotId)));
+    setAttribute(shape, "data-drive", robot?.profile?.drive ?? "differential");
+    setHidden(replay, !robot?.replay);
+  }
+
+  /** @param {Robot | undefined} robot */
+  #drawMode(robot) {
+    const { i18n, stops } = this.#app;
+    const { why, faults } = this.#parts;
+    setText(this.#fields.mode, modeSaid(robot, i18n, stops.isResuming(this.#robotId)));
+    setText(why, whySaid(robot, i18n));
+    const said = robot ? faultsSaid(robot, i18n).join(" · ") : "";
+    setHidden(faults, !said);
+    setText(faults, said);
+  }
+
+  /** @param {Robot | undefined} robot @param {boolean} isSmall */
+  #drawAge(robot, isSmall) {
+    const { i18n } = this.#app;
+    const ageS = ageOf(robot);
+    const said = Number.isFinite(ageS)
+      ? aboutAge(robot, agoSaid(ageS, i18n), i18n)
+      : "";
+    if (!isSmall) for (const age of this.#ages) setText(age, said);
+    setText(this.#fields.age, said);
+  }
+
+  /** Everything that a small card has no room for. @param {Robot | undefined} robot */
+  #drawDetails(robot) {
+    const { store, i18n } = this.#app;
+    const { certainty, margin, task, readings } = this.#parts;
+    for (const [field, said] of readoutsSaid(robot, i18n))
+      setText(this.#fields[field], said);
+    setText(certainty, certaintySaid(store.detections().get(this.#robotId), i18n));
+    setAttribute(
+      this.#parts["margin-line"],
+      "data-band",
+      robot?.margin?.band ?? "none",
+    );
+    setText(margin, marginSaid(robot?.margin ?? null, i18n));
+    setText(task, taskSaid(robot?.navigation?.task, i18n));
+    drawReadings(readings, robot, i18n);
+  }
+
+  /** @param {Robot | undefined} robot */
+  #drawMarginParts(robot) {
+    const place = this.#parts["margin-parts"];
+    const margin = robot?.margin;
+    setHidden(place, !margin);
+    if (!margin) return;
+    const slots = { ...margin, ...margin.parts };
+    setText(place, this.#app.i18n.t("robot.margin_parts", slots));
+  }
+}
+
+/**
+ * The elements of a card that have a `data-part` or a `data-field`, by its value.
+ *
+ * @param {string} kind
+ * @param {HTMLElement} card
+ * @returns {Record<string, HTMLElement>}
+ */
+function byName(kind, card) {
+  const found = all(`[data-${kind}]`, card);
+  return Object.fromEntries(found.map((it) => [String(it.dataset[kind]), it]));
+}
