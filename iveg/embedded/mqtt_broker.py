@@ -12,13 +12,14 @@ import socket
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any
 
 from amqtt.broker import Broker
 
 from iveg.adapters.log_filter import quiet
 from iveg.embedded.loopback import require_loopback
-from iveg.embedded.mqtt_telemetry import BoundedWriter, TelemetryReader, publish_packet
+from iveg.embedded.mqtt_telemetry import BoundedWriter, PacketProtocol, publish_packet
 
 for _name in ("amqtt", "transitions"):
     # Both log every packet at INFO and DEBUG, which costs more than the packet.
@@ -85,10 +86,10 @@ class MqttBroker(Broker):  # type: ignore[misc]
     """amqtt's broker with five corrections.
 
     It caches the subscribers of a topic; it lets code in the process listen; it
-    receives and sends telemetry (QoS 0) without a task for each message; it delivers
-    with the lesser quality of service of publication and subscription, where amqtt uses
-    the subscription's (MQTT 3.1.1 §3.8.4); and it closes connections whose client
-    vanished, which amqtt leaves to the garbage collector.
+    receives publications and sends telemetry (QoS 0) without a task for each message;
+    it delivers with the lesser quality of service of publication and subscription,
+    where amqtt uses the subscription's (MQTT 3.1.1 §3.8.4); and it closes connections
+    whose client vanished, which amqtt leaves to the garbage collector.
     """
 
     def __init__(self, config: dict[str, object]) -> None:
@@ -115,7 +116,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self, topic: str, payload: bytes, qos: int, *, retain: bool
     ) -> None:
         """Publish a message."""
-        await self._spread(None, topic, payload, qos)
+        self._spread(topic, payload, qos)
         if retain:
             await self.retain_message(None, topic, payload, qos)
 
@@ -144,40 +145,40 @@ class MqttBroker(Broker):  # type: ignore[misc]
         data: bytes | bytearray | None,
         force_qos: int | None = None,
     ) -> None:
-        payload = bytes(data or b"")
         if force_qos is None and session is not None:
             force_qos = self._arriving.get(str(session.client_id))
+        self._take(topic, bytes(data or b""), force_qos)
+
+    def _take(self, topic: str, payload: bytes, most: int | None) -> None:
+        """Deliver a client's publication."""
         for listener in self._listeners:
             try:
                 listener(topic, payload)
             except Exception:
                 _log.exception("a message on %s could not be taken", topic)
-        await self._spread(session, topic, payload, force_qos)
+        self._spread(topic, payload, most)
 
-    async def _spread(
-        self, session: Any, topic: str, payload: bytes, most: int | None
-    ) -> None:
+    def _spread(self, topic: str, payload: bytes, most: int | None) -> None:
         """Write telemetry at once; messages to be confirmed use amqtt's queue."""
         packet, confirmed = b"", False
-        for listener, wanted in self._audience(topic):
+        for session, wanted in self._known_audience.get(topic) or self._audience(topic):
             if wanted and most != 0:
                 confirmed = True
                 continue
+            handler = self._get_handler(session)
+            if handler is None or session.transitions.state != "connected":
+                continue
             packet = packet or publish_packet(topic, payload)
-            self._write(listener, packet)
-        if confirmed:
-            await super()._broadcast_message(session, topic, payload, most)
-
-    def _write(self, session: Any, packet: bytes) -> None:
-        handler = self._get_handler(session)
-        if handler is None or session.transitions.state != "connected":
-            return
-        if isinstance(handler.writer, BoundedWriter):
             handler.writer.write_telemetry(packet)
+        if confirmed:
+            most = 2 if most is None else most
+            self._broadcast_queue.put_nowait(
+                {"session": None, "topic": topic, "data": payload, "qos": most}
+            )
 
     async def _run_broadcast(self, running_tasks: deque[asyncio.Task[Any]]) -> None:
         broadcast = await self._broadcast_queue.get()
-        topic, most = broadcast["topic"], broadcast.get("qos", 2)
+        topic, most = broadcast["topic"], broadcast["qos"]
         for session, wanted in self._audience(topic):
             handler = self._get_handler(session)
             # All clients are anonymous, so nothing is stored for absent ones.
@@ -229,22 +230,30 @@ class MqttBroker(Broker):  # type: ignore[misc]
         self._known_audience.clear()
         return int(super()._del_subscription(a_filter, session))
 
-    async def _take(self, topic: str, payload: bytes) -> None:
-        """A client published telemetry."""
-        await self._broadcast_message(None, topic, payload, 0)
-
-    async def _initialize_client_session(
-        self, reader: Any, writer: Any, remote_address: str, remote_port: int
-    ) -> Any:
-        admitted = await super()._initialize_client_session(
-            reader, writer, remote_address, remote_port
+    async def _create_server_instance(
+        self,
+        listener_name: str,
+        listener_type: object,  # noqa: ARG002 - TCP, as no other is configured
+        address: str | None,
+        port: int,
+        ssl_context: object,  # noqa: ARG002 - there is none
+    ) -> asyncio.Server:
+        connected = partial(self.stream_connected, listener_name=listener_name)
+        return await asyncio.get_running_loop().create_server(
+            lambda: PacketProtocol(connected, self._take),
+            address,
+            port,
+            reuse_address=True,
         )
-        reader.admitted = True
-        return admitted
+
+    async def _client_message_loop(self, client_session: Any, handler: Any) -> None:
+        """Admit a client that has got its CONNACK, and serve its packets."""
+        handler.writer.protocol.admit(handler.writer)
+        await super()._client_message_loop(client_session, handler)
 
     async def stream_connected(
         self,
-        reader: asyncio.StreamReader,
+        reader: asyncio.StreamReader,  # noqa: ARG002 - it gets nothing to read
         writer: asyncio.StreamWriter,
         listener_name: str,
     ) -> None:
@@ -252,11 +261,11 @@ class MqttBroker(Broker):  # type: ignore[misc]
         task = asyncio.current_task()
         assert task is not None  # noqa: S101 - asyncio starts servers' callbacks so
         self._open[task] = writer
+        protocol = writer.transport.get_protocol()
+        assert isinstance(protocol, PacketProtocol)  # noqa: S101 - made above
         try:
             await self._client_connected(
-                listener_name,
-                TelemetryReader(reader, self._take),
-                BoundedWriter(writer),
+                listener_name, protocol.packets, BoundedWriter(writer, protocol)
             )
         finally:
             writer.close()

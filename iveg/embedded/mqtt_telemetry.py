@@ -1,119 +1,198 @@
 """Fast path of telemetry through amqtt: no task, queue or lock for each message.
 
 amqtt reads and writes through two adapters, which this module replaces.  On reading, a
-plain PUBLISH of QoS 0 is handled at once; every other packet goes to amqtt.  On
-writing, a client that reads too slowly misses telemetry instead of filling the memory.
+connection is split into packets as its bytes arrive; a plain PUBLISH of QoS 0 or 1 is
+handled at once, and every other packet is queued for amqtt.  On writing, a client that
+reads too slowly misses telemetry instead of filling the memory.
 """
 
 import asyncio
 import re
 from collections.abc import Awaitable, Callable
+from functools import lru_cache
 
 from amqtt.adapters import ReaderAdapter, StreamWriterAdapter
 
-_TELEMETRY = b"\x30"
-"""PUBLISH, QoS 0, neither retained nor a duplicate."""
+_PLAIN = (0x30, 0x32)
+"""PUBLISH at QoS 0 and 1, neither retained nor a duplicate."""
 _LONGEST_LENGTH = 4
 _FORBIDDEN = re.compile("^\\$|[+#\0\ufffd]")
 MOST_UNSENT = 512 << 10
 """Limit of the data pending for one slow client (bytes): a fifth of a second of ten
 robots' scans.  Messages to be confirmed queue behind it."""
 
-Take = Callable[[str, bytes], Awaitable[None]]
+Connected = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+Take = Callable[[str, bytes, int], None]
 
 
-class TelemetryReader(ReaderAdapter):  # type: ignore[misc]
-    """Reads one client's packets; handles telemetry without amqtt.
+class PacketReader(ReaderAdapter):  # type: ignore[misc]
+    """Packets of one client that amqtt has to handle."""
 
-    The part of a packet that was read is kept while the rest is pending, because amqtt
-    cancels a wait that is longer than the client's keep-alive.
-
-    Args:
-        reader: The connection.
-        take: Called with topic and payload of each telemetry message.
-
-    Attributes:
-        admitted: Whether the client has sent CONNECT and may publish.
-    """
-
-    def __init__(self, reader: asyncio.StreamReader, take: Take) -> None:
-        self._reader = reader
-        self._take = take
-        self._head = b""
+    def __init__(self) -> None:
+        self._packets: asyncio.Queue[bytes] = asyncio.Queue()
         self._held = b""
-        self.admitted = False
 
-    async def read(self, n: int = -1) -> bytes:
-        """The next ``n`` bytes of packets that are not telemetry."""
-        if n == -1:
-            return bytes(await self._reader.read(n))
-        while n > 0 and not self._held:
-            packet = await self._packet()
-            if not await self._is_taken(packet):
-                self._held = packet
-        if n > len(self._held):
-            # The packet is shorter than stated; bytes of the next one must not fill it.
-            short, self._held = self._held, b""
-            raise asyncio.IncompleteReadError(short, n)
-        part, self._held = self._held[:n], self._held[n:]
-        return part
+    def feed(self, packet: bytes) -> None:
+        """Add a complete packet."""
+        self._packets.put_nowait(packet)
 
     def feed_eof(self) -> None:
-        """The connection ends."""
-        self._reader.feed_eof()
+        """No packet comes any more."""
+        self._packets.put_nowait(b"")
 
-    async def _packet(self) -> bytes:
-        while (length := _body_length(self._head)) is None:
-            self._head += await self._reader.readexactly(1)
-        body = await self._reader.readexactly(length)
-        packet, self._head = self._head + body, b""
-        return packet
+    async def read(self, n: int = -1) -> bytes:
+        """The next ``n`` bytes of a packet; all that is left of it for -1.
 
-    async def _is_taken(self, packet: bytes) -> bool:
-        if not self.admitted or not packet.startswith(_TELEMETRY):
-            return False
-        body = 2
-        while packet[body - 1] & 0x80:
-            body += 1
-        start = body + 2
-        end = start + int.from_bytes(packet[body:start], "big")
-        topic = packet[start:end].decode(errors="replace")
-        if end > len(packet) or not topic or _FORBIDDEN.search(topic) is not None:
-            # amqtt would lose its place in the stream; MQTT requires to disconnect.
-            raise ConnectionResetError("a PUBLISH that nobody may send")
-        await self._take(topic, packet[end:])
-        return True
+        Raises:
+            IncompleteReadError: the packet is shorter than stated, and bytes of the
+                next one must not fill it; or the connection has ended.
+        """
+        held = self._held
+        if n and not held:
+            held = await self._packets.get()
+            if not held:
+                self.feed_eof()
+        self._held = b""
+        if n > len(held):
+            raise asyncio.IncompleteReadError(held, n)
+        if n >= 0:
+            held, self._held = held[:n], held[n:]
+        return held
 
 
-def _body_length(head: bytes) -> int | None:
-    """Bytes after a fixed header; None while it is incomplete."""
-    length = head[1:]
-    if not length or (length[-1] & 0x80 and len(length) < _LONGEST_LENGTH):
-        return None
-    # A fifth length byte is an error that amqtt reports: it gets the head alone.
-    if length[-1] & 0x80:
-        return 0
-    return sum((byte & 0x7F) << (7 * place) for place, byte in enumerate(length))
+class PacketProtocol(asyncio.StreamReaderProtocol):
+    """Splits the bytes of one client into packets and handles its telemetry.
+
+    Only CONNECT is passed on until the client is admitted; later packets wait.
+
+    Args:
+        connected: Serves the client until it leaves.
+        take: Called with topic, payload and quality of service of each telemetry
+            message.
+
+    Attributes:
+        packets: All other packets.
+    """
+
+    def __init__(self, connected: Connected, take: Take) -> None:
+        super().__init__(asyncio.StreamReader(), connected)
+        self.packets = PacketReader()
+        self._take = take
+        self._line: asyncio.Transport | None = None
+        self._held = bytearray()
+        self._needed = 0
+        self._holding = False
+        self._confirming: BoundedWriter | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Start to serve a client."""
+        self._line = transport  # type: ignore[assignment]
+        super().connection_made(transport)
+
+    def admit(self, writer: "BoundedWriter") -> None:
+        """Handle what the client has sent since CONNECT; it has got its CONNACK."""
+        self._confirming = writer
+        self._holding = False
+        self.data_received(b"")
+        if self._line is not None and not self._holding:
+            self._line.resume_reading()
+
+    def data_received(self, data: bytes) -> None:
+        """Handle complete packets; keep an incomplete one."""
+        if self._held:
+            self._held += data
+            if len(self._held) < self._needed:
+                return
+            data = bytes(self._held)
+        start = needed = 0
+        while not self._holding:
+            body, end = packet_bounds(data, start)
+            if not body or end > len(data):
+                needed = end - start
+                break
+            self._pass_on(data[start:end], body - start)
+            start = end
+        self._held, self._needed = bytearray(data[start:]), needed
+
+    def eof_received(self) -> bool | None:
+        """End the packets of a client that closes its side."""
+        self.packets.feed_eof()
+        return super().eof_received()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End the packets of a lost client."""
+        self._line = None
+        self.packets.feed_eof()
+        super().connection_lost(exc)
+
+    def _pass_on(self, packet: bytes, body: int) -> None:
+        writer = self._confirming
+        if writer is None or packet[0] not in _PLAIN:
+            self.packets.feed(packet)
+            if writer is None:
+                self._hold()
+            return
+        qos = packet[0] >> 1 & 1
+        end = body + 2 + int.from_bytes(packet[body : body + 2], "big")
+        topic = _topic(packet[body + 2 : end])
+        if not topic or end + 2 * qos > len(packet):
+            # MQTT requires to disconnect; amqtt would lose its place in the stream.
+            self.packets.feed_eof()
+            self._hold()
+            return
+        self._take(topic, packet[end + 2 * qos :], qos)
+        if qos:
+            writer.write(b"\x40\x02" + packet[end : end + 2])
+
+    def _hold(self) -> None:
+        self._holding = True
+        if self._line is not None:
+            self._line.pause_reading()
+
+
+def packet_bounds(data: bytes, start: int) -> tuple[int, int]:
+    """Begin and end of the body of the packet at ``start``.
+
+    The end may be behind the data; both are 0 while the fixed header is incomplete.  A
+    fifth length byte is an error that amqtt reports: it gets the header alone.
+    """
+    length = shift = 0
+    at = start + 1
+    for byte in data[at : at + _LONGEST_LENGTH]:
+        length |= (byte & 0x7F) << shift
+        at, shift = at + 1, shift + 7
+        if byte < 0x80:
+            return at, at + length
+    return (at, at) if at == start + 1 + _LONGEST_LENGTH else (0, 0)
+
+
+@lru_cache(maxsize=2048)
+def _topic(name: bytes) -> str:
+    """Name of a topic; empty for one that no client may publish on."""
+    topic = name.decode(errors="replace")
+    return "" if _FORBIDDEN.search(topic) else topic
 
 
 class BoundedWriter(StreamWriterAdapter):  # type: ignore[misc]
     """Writes to one client.
 
     Attributes:
+        protocol: Receiver of the same connection.
         missed: Telemetry messages dropped because the client was too slow.
     """
 
-    def __init__(self, writer: asyncio.StreamWriter) -> None:
+    def __init__(self, writer: asyncio.StreamWriter, protocol: PacketProtocol) -> None:
         super().__init__(writer)
-        self._transport = writer.transport
+        self.protocol = protocol
+        self._line = writer.transport
         self.missed = 0
 
     def write_telemetry(self, packet: bytes) -> None:
         """Send a whole packet, or nothing to a client that does not read."""
-        if self._transport.get_write_buffer_size() > MOST_UNSENT:
+        if self._line.get_write_buffer_size() > MOST_UNSENT:
             self.missed += 1
-        else:
-            self.write(packet)
+        elif not self.is_closed:
+            self._line.write(packet)
 
 
 def publish_packet(topic: str, payload: bytes) -> bytes:

@@ -9,7 +9,7 @@ import pytest
 
 from iveg.embedded import mqtt_telemetry
 from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
-from iveg.embedded.mqtt_telemetry import TelemetryReader, publish_packet
+from iveg.embedded.mqtt_telemetry import PacketReader, publish_packet
 
 CONNACK = b"\x20\x02\x00\x00"
 PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"
@@ -149,30 +149,49 @@ async def test_a_slow_listener_misses_telemetry_and_costs_no_memory(
                 message = await anext(messages)
             assert bytes(message.payload).startswith(b"%d " % number)
         waiting = [
-            handler.writer._transport.get_write_buffer_size()
+            handler.writer._line.get_write_buffer_size()
             for _, handler in broker._sessions.values()
         ]
     assert max(waiting) <= 300_000
 
 
-class Taken:
-    def __init__(self) -> None:
-        self.messages: list[tuple[str, bytes]] = []
-
-    async def take(self, topic: str, payload: bytes) -> None:
-        self.messages.append((topic, payload))
-
-
 async def test_a_packet_that_says_more_than_it_holds_borrows_nothing() -> None:
-    stream, taken = asyncio.StreamReader(), Taken()
-    reader = TelemetryReader(stream, taken.take)
-    reader.admitted = True
-    stream.feed_data(b"\x82\x02\x00\x01" + publish_packet("a", b"1"))
-    assert await reader.read(4) == b"\x82\x02\x00\x01"[:4]
-    stream.feed_data(b"\x82\x01\x00" + publish_packet("b", b"2"))
+    reader = PacketReader()
+    reader.feed(b"\x82\x01\x00")
+    reader.feed(PINGREQ)
     assert await reader.read(2) == b"\x82\x01"
     with pytest.raises(asyncio.IncompleteReadError):
         await reader.read(2)
-    stream.feed_data(PINGREQ)
     assert await reader.read(1) == PINGREQ[:1]
-    assert taken.messages == [("a", b"1"), ("b", b"2")]
+
+
+async def test_who_reads_on_after_the_end_is_told_of_it_every_time() -> None:
+    reader = PacketReader()
+    reader.feed_eof()
+    for _ in range(2):
+        with pytest.raises(asyncio.IncompleteReadError):
+            await reader.read(1)
+
+
+async def test_a_measure_that_is_to_be_confirmed_is_heard_and_confirmed(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    async with line(broker) as (reader, writer):
+        writer.write(b"\x32\x08\x00\x01a\x01\x02xyz")
+        assert await answered(reader, 4) == b"\x40\x02\x01\x02"
+        assert heard.messages == [("a", b"xyz")]
+
+
+async def test_what_follows_connect_at_once_counts_after_the_welcome(
+    broker: MqttBroker,
+) -> None:
+    heard = Heard(broker)
+    reader, writer = await asyncio.open_connection("127.0.0.1", broker.port)
+    hello = b"\x10\x0e\x00\x04MQTT\x04\x02\x00\x00\x00\x02me"
+    writer.write(hello + b"\x32\x06\x00\x01a\x00\x01x" + PINGREQ)
+    welcome = CONNACK + b"\x40\x02\x00\x01" + PINGRESP
+    assert await answered(reader, len(welcome)) == welcome
+    assert heard.messages == [("a", b"x")]
+    writer.close()
+    await writer.wait_closed()
