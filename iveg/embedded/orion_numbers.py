@@ -25,12 +25,15 @@ _TO_ZERO = bytes.maketrans(b"123456789", b"000000000")
 _TEN_DECIMALS = b".0000000000"
 _EXPONENT = b"0e"
 _EXACT_DIGITS = b"0" * 16
-_OTHERS = (b'"', b"{", b"t", b"f")
-"""First bytes of every string, object, true and false."""
+_NUMERIC = {float, int, type(None)}
+_WHOLE = (b".0,", b".0]", b".0}")
+"""Ends of whole numbers in a text that also contains strings."""
 
 
 def print_value(value: Any) -> bytes:
     """JSON text that Orion would print for a value."""
+    if type(value) is list and (printed := _print_array(value)):
+        return printed
     text = orjson.dumps(value)
     digits = text.translate(_TO_ZERO)
     if (
@@ -40,30 +43,27 @@ def print_value(value: Any) -> bytes:
         or _EXACT_DIGITS in digits
         or (b"-" in text and b"-0" in text)
     ):
-        printed = _print_array(value, text) if type(value) is list else b""
-        return printed or orjson.dumps(_as_double(value))
+        return orjson.dumps(_as_double(value))
     if b".0" not in text:
         return text
-    if b'"' in text:
+    if b'"' not in text:
+        return _without_point(text)
+    if any(end in text for end in _WHOLE):
         return orjson.dumps(_as_double(value))
-    return _without_point(text)
+    return text
 
 
-def _print_array(values: list[Any], text: bytes) -> bytes:
-    """Print a long list of numbers and nulls; empty for other lists and huge numbers.
-
-    Args:
-        values: The list.
-        text: The same as JSON, which is searched at memory speed.
-    """
-    nested = text.find(b"[", 1) >= 0
-    if len(values) < _MANY or nested or any(mark in text for mark in _OTHERS):
+def _print_array(values: list[Any]) -> bytes:
+    """Print a long list of numbers and nulls; empty for all other lists."""
+    if len(values) < _MANY or not _NUMERIC.issuperset(map(type, values)):
         return b""
     given = np.array(values, dtype=np.float64)
     if np.fmax.reduce(np.abs(given)) >= _PLAIN:
         return b""
-    text = orjson.dumps(_nine_decimals(given), option=orjson.OPT_SERIALIZE_NUMPY)
-    return _without_point(text)
+    rounded = _nine_decimals(given)
+    text = orjson.dumps(rounded, option=orjson.OPT_SERIALIZE_NUMPY)
+    # A search of the text for whole numbers takes longer.
+    return _without_point(text) if (np.rint(rounded) == rounded).any() else text
 
 
 def _nine_decimals(given: Floats) -> Floats:
@@ -96,10 +96,7 @@ def _as_double(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _as_double(part) for key, part in value.items()}
     if isinstance(value, list):
-        printed = b""
-        if len(value) >= _MANY:
-            printed = _print_array(value, orjson.dumps(value))
-        if printed:
+        if printed := _print_array(value):
             return orjson.Fragment(printed)
         return [_as_double(part) for part in value]
     return value
