@@ -15,7 +15,6 @@ from iveg.embedded.entities import (
     apply,
     fresh,
     touch_all,
-    under,
 )
 from iveg.embedded.forwarding import providers
 from iveg.embedded.orion_errors import NgsiError, not_found
@@ -153,7 +152,6 @@ class ContextBroker:
         tenant = self.tenant(scope.service)
         tenant.entities.remove(entity)
         self._tell(scope, entity, touch_all(entity), "entityDelete")
-        tenant.concerned.pop(entity.key, None)
 
     def delete_attributes(
         self, scope: Scope, entity: Entity, names: Iterable[str]
@@ -246,17 +244,17 @@ class ContextBroker:
         """Store a subscription; it is notified of later changes."""
         tenant = self.tenant(subscription.service)
         tenant.subscriptions[subscription.id] = subscription
-        tenant.concerned.clear()
+        tenant.forget_concerned()
 
     def resubscribe(self, subscription: Subscription) -> None:
         """Reload a changed subscription."""
-        self.tenant(subscription.service).concerned.clear()
+        self.tenant(subscription.service).forget_concerned()
 
     def unsubscribe(self, subscription: Subscription) -> None:
         """Delete a subscription and close its connection."""
         tenant = self.tenant(subscription.service)
         del tenant.subscriptions[subscription.id]
-        tenant.concerned.clear()
+        tenant.forget_concerned()
         self.outbox.forget(subscription.id)
 
     def register(self, scope: Scope, registration: Registration) -> None:
@@ -272,14 +270,8 @@ class ContextBroker:
         self, scope: Scope, entity: Entity, touched: Touched, alteration: str
     ) -> None:
         tenant = self.tenant(scope.service)
-        concerned = tenant.concerned.get(entity.key)
-        if concerned is None:
-            concerned = tenant.concerned[entity.key] = [
-                one
-                for one in tenant.subscriptions.values()
-                if one.concerns(entity.id, entity.type) and under(one.path, entity.path)
-            ]
-        for subscription in concerned:
+        names = None if alteration == "entityDelete" else tuple(touched.now)
+        for subscription in tenant.concerned(entity, names):
             if subscription.wants(touched, alteration, scope.now):
                 self.outbox.post(
                     subscription,

@@ -1,16 +1,16 @@
 """Entities as Orion stores them, and their changes.
 
-An attribute holds JSON text, not objects: a value arrives once and is sent many times.
+A value is printed as JSON text at its first use: most values of a fleet's telemetry are
+replaced before anything uses them, the others are sent many times.
 """
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from typing import Any
 
 import orjson
 
+from iveg.embedded.orion_dates import date_json, date_text
 from iveg.embedded.orion_errors import bad_request, too_many
 from iveg.embedded.orion_numbers import print_value
 from iveg.embedded.orion_text import (
@@ -20,8 +20,29 @@ from iveg.embedded.orion_text import (
     quoted,
 )
 
-_DATE = re.compile(r"\d{4}-\d{2}-\d{2}(T\d{2}:\d{2}(:\d{2}([.,]\d+)?)?)?(Z|[+-].*)?")
 _BUILTIN = ("dateCreated", "dateModified")
+
+
+class Value:
+    """Value of an attribute, printed once at its first use.
+
+    Args:
+        given: The value as parsed JSON.
+        json: The printed value, where it is known.
+    """
+
+    __slots__ = ("_given", "_json")
+
+    def __init__(self, given: Any = None, json: bytes = b"") -> None:
+        self._given = given
+        self._json = json
+
+    @property
+    def json(self) -> bytes:
+        """JSON text that Orion would print."""
+        if not self._json:
+            self._json, self._given = print_value(self._given), None
+        return self._json
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,17 +51,22 @@ class Attribute:
 
     Attributes:
         type: NGSI type.
-        json: The value, as Orion prints it.
+        value: The value.
         metadata: Name → ``{"type": …, "value": …}`` as Orion prints it.
         created: Creation time (s, Unix time).
         modified: Last change of value or metadata (s, Unix time).
     """
 
     type: str
-    json: bytes
+    value: Value
     metadata: Mapping[str, bytes]
     created: float
     modified: float
+
+    @property
+    def json(self) -> bytes:
+        """JSON text of the value."""
+        return self.value.json
 
     def normalized(self, wanted: Iterable[str] = ()) -> bytes:
         """``{"type", "value", "metadata"}``, with the wanted metadata first."""
@@ -71,7 +97,11 @@ class Attribute:
 
 @dataclass(frozen=True, slots=True)
 class EntityChange:
-    """Requested change of one attribute; ``None`` leaves the present value."""
+    """Requested change of one attribute; ``None`` leaves the present value.
+
+    Attributes:
+        value: Parsed JSON, or a printed ``Value``.
+    """
 
     type: str | None
     value: Any
@@ -106,16 +136,24 @@ class Touched:
     """Effect of a change, for the evaluation of subscriptions.
 
     Attributes:
-        named: Attributes that the request named, in its order.
-        changed: Those whose value or metadata is different now.
-        values: Those whose value is different now.
-        before: Earlier values of the named attributes.
+        now: New state of the attributes that the request named, in its order.
+        before: Earlier state of these attributes.
+        all: Whether each of them counts as changed.
     """
 
-    named: tuple[str, ...] = ()
-    changed: frozenset[str] = frozenset()
-    values: frozenset[str] = frozenset()
+    now: Mapping[str, Attribute]
     before: Mapping[str, Attribute] = field(default_factory=dict)
+    all: bool = False
+
+    def has_changed(self, name: str, *, metadata_too: bool = True) -> bool:
+        """Whether value, or metadata or type, of an attribute differ from before."""
+        new, old = self.now.get(name), self.before.get(name)
+        if new is None or old is None or self.all:
+            return new is not None
+        # Metadata first: values must be printed to be compared.
+        return (
+            metadata_too and (old.metadata != new.metadata or old.type != new.type)
+        ) or old.json != new.json
 
 
 class EntityStore:
@@ -185,21 +223,15 @@ def apply(
         now: Seconds, Unix time.
         forced: Count every named attribute as changed (``forcedUpdate``).
     """
-    changed, values = [], []
-    before = {}
+    before, after = {}, {}
     for name, change in changes.items():
         old = entity.attributes.get(name)
         if old is not None:
             before[name] = old
-        new = _changed(old, change, now)
-        entity.attributes[name] = new
-        if old is None or forced or old.json != new.json:
-            values.append(name)
-            changed.append(name)
-        elif old.type != new.type or old.metadata != new.metadata:
-            changed.append(name)
+        after[name] = _changed(old, change, now)
+    entity.attributes.update(after)
     entity.modified = now
-    return Touched(tuple(changes), frozenset(changed), frozenset(values), before)
+    return Touched(after, before, all=forced)
 
 
 def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribute:
@@ -207,13 +239,17 @@ def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribu
     value = change.value
     if isinstance(value, dict) and any(key.startswith("$") for key in value):
         value = _operated(orjson.loads(old.json) if old else None, value)
-    json = date_text(value) if kind == "DateTime" else print_value(value)
+    kept = value if isinstance(value, Value) else _value(kind, value)
     if old is None:
-        return Attribute(kind, json, change.metadata or {}, now, now)
+        return Attribute(kind, kept, change.metadata or {}, now, now)
     metadata = old.metadata
     if change.metadata is not None:
         metadata = _merged(metadata, change.metadata)
-    return Attribute(kind, json, metadata, old.created, now)
+    return Attribute(kind, kept, metadata, old.created, now)
+
+
+def _value(kind: str, value: Any) -> Value:
+    return Value(json=date_text(value)) if kind == "DateTime" else Value(value)
 
 
 def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, bytes]:
@@ -253,8 +289,7 @@ def default_type(value: Any) -> str:
 
 def touch_all(entity: Entity) -> Touched:
     """Mark all attributes as changed, for a new or a deleted entity."""
-    names = tuple(entity.attributes)
-    return Touched(names, frozenset(names), frozenset(names))
+    return Touched(entity.attributes, all=True)
 
 
 def fresh(entity: Entity, now: float) -> None:
@@ -337,38 +372,3 @@ def metadata_json(kind: str, value: Any) -> bytes:
     """One metadata entry as Orion prints it."""
     text = date_text(value) if kind == "DateTime" else print_value(value)
     return b'{"type":%b,"value":%b}' % (quoted(kind), text)
-
-
-# --- dates --------------------------------------------------------------------------
-
-
-def date_text(value: Any) -> bytes:
-    """A ``DateTime`` as Orion prints it: UTC with milliseconds.
-
-    Raises:
-        NgsiError: 400, not a date.
-    """
-    if value is None:
-        return b"null"
-    if isinstance(value, str) and _DATE.fullmatch(value):
-        try:
-            moment = datetime.fromisoformat(value.replace(",", "."))
-        except ValueError:
-            moment = None
-        if moment is not None:
-            return date_json(moment.replace(tzinfo=moment.tzinfo or UTC).timestamp())
-    raise bad_request("date has invalid format in attribute value")
-
-
-def date_json(at: float) -> bytes:
-    """Unix seconds as JSON text with milliseconds."""
-    return b'"%b"' % date_iso(at).encode()
-
-
-def date_iso(at: float) -> str:
-    """Unix seconds as ISO-8601 with milliseconds and Z."""
-    return (
-        datetime.fromtimestamp(round(at * 1000) / 1000, UTC)
-        .isoformat(timespec="milliseconds")
-        .replace("+00:00", "Z")
-    )

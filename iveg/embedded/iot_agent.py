@@ -8,6 +8,7 @@ are listed in ``docs/fiware.md``.
 import logging
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import orjson
@@ -32,6 +33,22 @@ from iveg.embedded.registrations import read_registration
 from iveg.embedded.tenants import Scope
 
 _log = logging.getLogger(__name__)
+
+
+_Topic = tuple[str, str, str, str | None]
+"""API key, device, ``attrs`` or ``cmdexe``, attribute if the topic names one."""
+
+
+@lru_cache(maxsize=2048)
+def _read_topic(topic: str) -> _Topic | None:
+    parts = topic.split("/")
+    if parts[:2] == ["", "json"]:
+        del parts[0]
+    named = len(parts) == 5 and parts[3] == "attrs"
+    plain = len(parts) == 4 and parts[3] in ("attrs", "cmdexe")
+    if not (named or plain) or parts[0] not in ("", "json"):
+        return None
+    return parts[1], parts[2], parts[3], parts[4] if named else None
 
 
 class IotAgent:
@@ -60,29 +77,19 @@ class IotAgent:
         Topics are ``/{apikey}/{device}/attrs``, ``…/attrs/{name}`` and ``…/cmdexe``,
         the first slash or nothing also as ``/json/`` or ``json/``.
         """
-        parts = topic.split("/")
-        if parts[:2] == ["", "json"]:
-            del parts[0]
-        named = len(parts) == 5 and parts[3] == "attrs"
-        plain = len(parts) == 4 and parts[3] in ("attrs", "cmdexe")
-        if not (named or plain) or parts[0] not in ("", "json"):
+        spoken = _read_topic(topic)
+        if spoken is None:
             return
-        self._take(parts, payload)
-
-    def _take(self, parts: list[str], payload: bytes) -> None:
-        _, apikey, device_id, kind, *name = parts
         try:
-            taken = self._take_from(apikey, device_id, kind, name, payload)
+            taken = self._take_from(spoken, payload, clock.now().wall)
         except (NgsiError, AgentError) as error:
-            _log.debug("a message of %s was discarded: %s", device_id, error)
+            _log.debug("a message on %s was discarded: %s", topic, error)
             taken = False
         if not taken:
             self.discarded += 1
 
-    def _take_from(
-        self, apikey: str, device_id: str, kind: str, name: list[str], payload: bytes
-    ) -> bool:
-        now = clock.now().wall
+    def _take_from(self, spoken: _Topic, payload: bytes, now: float) -> bool:
+        apikey, device_id, kind, name = spoken
         device = self.registry.device_of(apikey, device_id)
         if device is None:
             device = self._autoprovision(apikey, device_id, now)
@@ -90,8 +97,8 @@ class IotAgent:
             return False
         if kind == "cmdexe":
             return self._take_answer(device, payload, now)
-        if name:
-            single = read_single(device, name[0], payload, now)
+        if name is not None:
+            single = read_single(device, name, payload, now)
             measures = None if single is None else [single]
         else:
             measures = read_measures(device, payload, now)

@@ -4,14 +4,18 @@ Payloads that the agent discards without an error are discarded here too: text t
 not JSON, bare numbers and strings, lists of numbers, an invalid ``TimeInstant``.
 """
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 import orjson
 
 from iveg.embedded.devices import Device
-from iveg.embedded.entities import EntityChange, date_json, date_text, default_type
+from iveg.embedded.entities import (
+    EntityChange,
+    Value,
+    default_type,
+)
+from iveg.embedded.orion_dates import date_json, date_text
 from iveg.embedded.orion_errors import NgsiError, bad_request
 from iveg.embedded.orion_text import (
     UNRESTRICTED,
@@ -23,7 +27,6 @@ from iveg.embedded.orion_text import (
 
 MAX_MEASURE = (1 << 20) - 256
 _INSTANT = "TimeInstant"
-_DATE = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
 _RENAMED = {"id": "measure_id", "type": "measure_type"}
 _NOTHING: dict[str, Any] = {"undefined": None}
 
@@ -50,8 +53,13 @@ def read_measures(
         measures = value if len(value) > 1 else [{"0": value[0]}]
     else:
         return None
-    read = [_read_one(device, one, now, clean=clean) for one in measures]
-    return None if None in read else [one for one in read if one is not None]
+    read = []
+    for one in measures:
+        changes = _read_one(device, one, now, clean=clean)
+        if changes is None:
+            return None
+        read.append(changes)
+    return read
 
 
 def read_single(
@@ -84,7 +92,7 @@ def _read_one(
     given = measure.get(_INSTANT)
     if given is None:
         instant = date_json(now)
-    elif isinstance(given, str) and _DATE.match(given):
+    elif isinstance(given, str):
         try:
             instant = date_text(given)
         except NgsiError:
@@ -93,10 +101,11 @@ def _read_one(
         return None
     metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
     changes = {}
+    mapping = device.mapping
     for key, value in measure.items():
         if key == _INSTANT:
             continue
-        name, kind = device.mapping.get(key) or (_RENAMED.get(key, key), "Text")
+        name, kind = mapping.get(key) or (_RENAMED.get(key, key), "Text")
         check_name(name, "attribute name")
         if not clean and kind != UNRESTRICTED and holds_forbidden(value):
             raise bad_request("Invalid characters in attribute value")
@@ -107,7 +116,7 @@ def _read_one(
             one.get("value"),
             metadata,
         )
-    changes[_INSTANT] = EntityChange("DateTime", instant.decode().strip('"'))
+    changes[_INSTANT] = EntityChange("DateTime", Value(json=instant))
     return changes
 
 
@@ -132,5 +141,5 @@ def status_changes(
             if holds_forbidden(answer):
                 raise bad_request("Invalid characters in attribute value")
             changes[f"{name}_info"] = EntityChange("commandResult", answer, metadata)
-    changes[_INSTANT] = EntityChange("DateTime", instant.decode().strip('"'))
+    changes[_INSTANT] = EntityChange("DateTime", Value(json=instant))
     return changes

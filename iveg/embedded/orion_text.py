@@ -13,7 +13,6 @@ import orjson
 from iveg.embedded.orion_errors import bad_request, parse_error
 
 FORBIDDEN = frozenset("<>\"'=;()")
-_SUSPECTS = tuple(bytes([code]) for code in b"<>'=;()\\")
 _ID_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
 _NAME_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
 _MAX_DEPTH = 128
@@ -52,7 +51,16 @@ def looks_clean(body: bytes) -> bool:
     A quotation mark inside a string needs a backslash, so the backslash stands for it.
     Eight searches at memory speed instead of a walk over every value.
     """
-    return not any(suspect in body for suspect in _SUSPECTS)
+    return not (
+        b"<" in body
+        or b">" in body
+        or b"'" in body
+        or b"=" in body
+        or b";" in body
+        or b"(" in body
+        or b")" in body
+        or b"\\" in body
+    )
 
 
 def holds_forbidden(value: Any) -> bool:
@@ -71,6 +79,7 @@ def holds_forbidden(value: Any) -> bool:
     return False
 
 
+@lru_cache(maxsize=4096)
 def check_name(name: str, what: str) -> None:
     """Refuse a name that Orion refuses.
 

@@ -13,10 +13,15 @@ from urllib.parse import urlsplit
 
 import orjson
 
-from iveg.embedded.entities import Attribute, EntityChange, default_type, metadata_json
+from iveg.embedded.entities import (
+    Attribute,
+    EntityChange,
+    Value,
+    default_type,
+    metadata_json,
+)
 from iveg.embedded.notifier import NotificationTarget, exchange
 from iveg.embedded.orion_errors import bad_request
-from iveg.embedded.orion_numbers import print_value
 from iveg.embedded.outbox import AGENT
 from iveg.embedded.subscriptions import new_id
 
@@ -162,7 +167,7 @@ def _read_told(one: Mapping[str, Any], now: float) -> dict[str, Attribute]:
     return {
         name: Attribute(
             raw.get("type") or default_type(raw.get("value")),
-            print_value(raw.get("value")),
+            Value(raw.get("value")),
             {
                 each: metadata_json(part.get("type", "Text"), part.get("value"))
                 for each, part in raw.get("metadata", {}).items()

@@ -2,13 +2,14 @@
 
 import re
 import secrets
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 from urllib.parse import urlsplit
 
-from iveg.embedded.entities import Touched, date_iso, date_text
+from iveg.embedded.entities import Touched
+from iveg.embedded.orion_dates import date_iso, date_text
 from iveg.embedded.orion_errors import NgsiError, bad_request
 from iveg.embedded.orion_text import FORBIDDEN
 from iveg.embedded.views import EntityView
@@ -54,6 +55,10 @@ class Subscription:
     last_failure_reason: str = ""
     fails: int = 0
     view: EntityView = field(default_factory=EntityView)
+    _throttling: float = 0.0
+    _watched: frozenset[str] = frozenset()
+    _metadata_too: bool = True
+    _any_update: bool = False
     _entities: list[tuple[re.Pattern[str] | str, re.Pattern[str] | str]] = field(
         default_factory=list
     )
@@ -70,6 +75,11 @@ class Subscription:
             tuple(notification.get("attrs", ())),
             tuple(notification.get("metadata", ())),
         )
+        condition = self.condition
+        self._throttling = self.document.get("throttling", 0)
+        self._watched = frozenset(condition.get("attrs") or ())
+        self._metadata_too = condition.get("notifyOnMetadataChange", True)
+        self._any_update = "entityUpdate" in condition.get("alterationTypes", ())
         self._entities = [_matcher(one) for one in self.document["subject"]["entities"]]
 
     @property
@@ -103,6 +113,12 @@ class Subscription:
             for name, kind in self._entities
         )
 
+    def may_want(self, names: Collection[str]) -> bool:
+        """Whether an update of these attributes can lead to a notification."""
+        return (
+            self._any_update or not self._watched or not self._watched.isdisjoint(names)
+        )
+
     def expired(self, now: float) -> bool:
         """Whether it has expired."""
         expires: str = self.document.get("expires") or ""
@@ -113,11 +129,10 @@ class Subscription:
 
         Throttling drops notifications that come too early; they are not sent later.
         """
-        if self.status == "inactive" or self.expired(now):
-            return False
-        throttling = self.document.get("throttling", 0)
         last = self.last_notification
-        if throttling and last is not None and now - last < throttling:
+        if self._throttling and last is not None and now - last < self._throttling:
+            return False
+        if self.status == "inactive" or self.expired(now):
             return False
         return self._alteration_wanted(alteration) and self._attributes_wanted(
             touched, alteration
@@ -132,23 +147,20 @@ class Subscription:
         )
 
     def _attributes_wanted(self, touched: Touched, alteration: str) -> bool:
-        condition = self.condition
-        any_update = "entityUpdate" in condition.get("alterationTypes", ())
-        if alteration == "entityDelete" or (any_update and touched.named):
+        if alteration == "entityDelete" or (self._any_update and touched.now):
             return True
-        metadata_too = condition.get("notifyOnMetadataChange", True)
-        changed = touched.changed if metadata_too else touched.values
-        watched = condition.get("attrs")
-        if not watched:
-            return bool(changed) or alteration == "entityCreate"
-        return not changed.isdisjoint(watched)
+        watched = self._watched or touched.now
+        return (not self._watched and alteration == "entityCreate") or any(
+            touched.has_changed(name, metadata_too=self._metadata_too)
+            for name in watched
+        )
 
     def shown(self, touched: Touched) -> EntityView:
         """Attributes in the notification."""
         if not self.notification.get("onlyChangedAttrs"):
             return self.view
-        names = self.view.names or touched.named
-        chosen = tuple(name for name in names if name in touched.changed)
+        names = self.view.names or touched.now
+        chosen = tuple(name for name in names if touched.has_changed(name))
         return EntityView(self.view.form, chosen or ("",), self.view.metadata)
 
     def sent(self, now: float) -> None:

@@ -3,15 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import orjson
-
 from iveg.embedded.entities import (
     Attribute,
     Entity,
     Touched,
-    date_json,
+    Value,
     metadata_json,
 )
+from iveg.embedded.orion_dates import date_json
 from iveg.embedded.orion_text import quoted
 
 _BUILTIN = ("dateCreated", "dateModified", "alterationType")
@@ -75,9 +74,9 @@ def annotated(
     previous = "previousValue" in wanted and alteration != "entityCreate"
     attributes = {}
     for name, one in entity.attributes.items():
-        old = touched.before.get(name, None if name in touched.named else one)
+        old = touched.before.get(name, None if name in touched.now else one)
         notes = {}
-        if "actionType" in wanted and name in touched.named:
+        if "actionType" in wanted and name in touched.now:
             notes["actionType"] = metadata_json("Text", "update" if old else "append")
         if previous and old is not None:
             notes["previousValue"] = b'{"type":%b,"value":%b}' % (
@@ -134,7 +133,7 @@ def _chosen(
             chosen[name] = _builtin_date(entity, name)
     if alteration and "alterationType" in view.names:
         chosen["alterationType"] = Attribute(
-            "Text", orjson.dumps(alteration), {}, entity.created, entity.modified
+            "Text", Value(alteration), {}, entity.created, entity.modified
         )
     if "*" in view.names:
         return list(chosen.items())
@@ -143,4 +142,5 @@ def _chosen(
 
 def _builtin_date(entity: Entity, name: str) -> Attribute:
     at = entity.created if name == "dateCreated" else entity.modified
-    return Attribute("DateTime", date_json(at), {}, entity.created, entity.modified)
+    value = Value(json=date_json(at))
+    return Attribute("DateTime", value, {}, entity.created, entity.modified)
