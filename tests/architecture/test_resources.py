@@ -1,4 +1,4 @@
-"""The page of resources has every key of every model, and no other."""
+"""The page of resources has every key of every model with its type, and no other."""
 
 import re
 
@@ -15,9 +15,10 @@ from tests.processes import ROOT
 PAGE = (documents.INTERFACES / "resources.md").read_text()
 _SHOWN: tuple[type[Model], ...] = (*TOLD, Day, Device)
 _, _DOCUMENT = models_json_schema([(model, "serialization") for model in _SHOWN])
+_SHAPES = _DOCUMENT["$defs"]
 MODELS = {
-    name: set(schema["properties"])
-    for name, schema in _DOCUMENT["$defs"].items()
+    name: schema["properties"]
+    for name, schema in _SHAPES.items()
     if "properties" in schema
 }
 
@@ -27,6 +28,15 @@ def test_every_key_of_a_model_has_its_row(model: str) -> None:
     rows = documents.keys(documents.section(PAGE, model))
 
     assert sorted(rows) == sorted(MODELS[model])
+
+
+@pytest.mark.parametrize("model", sorted(MODELS))
+def test_every_row_has_the_type_of_its_key(model: str) -> None:
+    told = dict(documents.types(documents.section(PAGE, model)))
+
+    assert told == {
+        key: documents.type_of(schema, _SHAPES) for key, schema in MODELS[model].items()
+    }
 
 
 def test_every_resource_of_the_page_is_a_model() -> None:
