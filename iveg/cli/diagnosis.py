@@ -231,9 +231,9 @@ def _measure(said: str, stack: Stack, findings: Findings) -> str:
     command = findings.get(Check.COMMAND)
     if command is not None and command.well:
         return first + (
-            f"it sends commands and is deaf to {stack.topics}attrs: its connection is, "
-            "or the broker's access list keeps the topic from it; restart the agent "
-            "and look at its log."
+            f"it sends commands and receives nothing on {stack.topics}attrs: its "
+            "connection is broken, or the broker's access list keeps the topic from "
+            "it; restart the agent and look at its log."
         )
     return first + (
         "look whether the agent is connected to the same broker, may read "

@@ -103,12 +103,12 @@ def test_a_broker_without_echo_points_at_the_access_list() -> None:
     assert "/iveg/iveg-doctor/#" in silent.sentence
 
 
-def test_an_agent_that_sends_and_does_not_hear_is_called_deaf() -> None:
-    deaf = row(Check.MEASURE, found(MEASURE="", ANSWER=""))
+def test_an_agent_that_sends_and_receives_nothing_is_named() -> None:
+    receives_nothing = row(Check.MEASURE, found(MEASURE="", ANSWER=""))
     cut_off = row(Check.MEASURE, found(MEASURE="", COMMAND=""))
 
-    assert "deaf" in deaf.sentence
-    assert "deaf" not in cut_off.sentence
+    assert "receives nothing" in receives_nothing.sentence
+    assert "receives nothing" not in cut_off.sentence
     assert "IVEG_IOTA_CB_URL" in cut_off.sentence
 
 
