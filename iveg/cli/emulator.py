@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.cli.addresses import broker_of
 from iveg.cli.garbage_collection import tune_garbage_collection
+from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready
+from iveg.emulator.emulated_robot import FleetSettings
 from iveg.emulator.fleet import run_emulator
 from iveg.emulator.orders import read_fault_arguments
 from iveg.emulator.truth import TruthLog
@@ -38,24 +39,21 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
     ):
         running = asyncio.create_task(
             run_emulator(
-                robots=robots,
-                address=broker_of(settings),
-                apikey=settings.apikey,
-                greenhouse=load_greenhouse(settings.greenhouse),
+                robots,
+                load_greenhouse(settings.greenhouse),
+                FleetSettings(
+                    node_settings(settings, Path(directory)),
+                    options.held,
+                    options.hz,
+                    truth,
+                ),
                 scenario=options.scenario,
                 seed=options.seed,
                 profile=options.profile,
-                uplink=settings.uplink,
-                slow_s=settings.feedback_slow_s,
-                stand_s=settings.feedback_stand_s,
-                state_directory=Path(directory),
-                held=options.held,
-                rate_hz=options.hz,
                 faults=read_fault_arguments(options.fault, robots),
                 fault_port=options.fault_port,
                 network=network,
                 description=fleet,
-                truth=truth,
                 camera=options.camera,
             ),
             name="emulator",

@@ -9,10 +9,11 @@ from iveg.adapters.bags import BagTopics
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.orion import OrionClient
 from iveg.cli.addresses import broker_of
+from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
-from iveg.emulator.replay import run_replay
+from iveg.emulator.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
 
 _LIVE_ROBOT_S = 10.0
@@ -26,18 +27,15 @@ async def replay(options: argparse.Namespace, settings: Settings) -> None:
         await run_replay(
             options.files,
             options.robot,
-            address=broker_of(settings),
-            apikey=settings.apikey,
-            speed=options.speed,
-            loop=options.loop,
-            uplink=settings.uplink,
-            slow_s=settings.feedback_slow_s,
-            stand_s=settings.feedback_stand_s,
-            state_directory=Path(directory),
+            ReplaySettings(
+                node_settings(settings, Path(directory)),
+                options.speed,
+                options.loop,
+                options.frame,
+            ),
             fleet=fleet,
             topics=BagTopics(options.odom_topic, options.scan_topic),
             bag_time=options.bag_time,
-            frame=options.frame,
             poses=dict(options.pose),
         )
 

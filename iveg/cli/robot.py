@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
+from iveg.cli.addresses import broker_of
+from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK, report_ready, run_until_stopped
 from iveg.domain.errors import (
     DataFileError,
@@ -61,9 +63,9 @@ def run_robot(
     network = network_of(config, environment, "iveg robot")
     if options.action == "check":
         return asyncio.run(_check(options.id, config, network, settings))
-    if options.attended and _broker(settings).host not in LOOPBACK:
+    if options.attended and broker_of(settings).host not in LOOPBACK:
         raise SettingsError(
-            "--attended", _broker(settings).host, "used with a broker on loopback"
+            "--attended", broker_of(settings).host, "used with a broker on loopback"
         )
     from iveg.adapters.lease import Lease
 
@@ -109,21 +111,10 @@ def _node(
 ) -> RobotNode:
     return RobotNode(
         robot_id,
-        address=_broker(settings),
-        apikey=settings.apikey,
+        node_settings(settings, data / "robots"),
         profile=_profile(_fleet(settings).of_robot(robot_id), config),
-        hold_file=data / "robots" / f"{robot_id}.holds.json",
         drive=drive,
-        slow_s=settings.feedback_slow_s,
-        stand_s=settings.feedback_stand_s,
-        uplink=settings.uplink,
         on_feedback=on_feedback,
-    )
-
-
-def _broker(settings: Settings) -> BrokerAddress:
-    return BrokerAddress.from_url(
-        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
     )
 
 
@@ -272,7 +263,7 @@ async def _check(
             )
             for topic, (name, message) in listened(config.full_topics).items()
         }
-        link = MqttLink(_broker(settings), f"check of {robot_id}")
+        link = MqttLink(broker_of(settings), f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
         began = clock.now().mono
         while clock.now().mono - began < _CHECK_S:
@@ -302,7 +293,7 @@ async def _check(
 
 
 def _no_broker(settings: Settings) -> str:
-    address = _broker(settings)
+    address = broker_of(settings)
     return f"No MQTT broker answers at {address.host}:{address.port} (IVEG_MQTT_URL)."
 
 

@@ -6,10 +6,8 @@ A period has three slots: drive and odometry, laser, camera.
 import asyncio
 from contextlib import AsyncExitStack
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Battery, Instant, Origin
 from iveg.emulator.orders import FaultOrder
@@ -17,8 +15,7 @@ from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, in_slots
 from iveg.emulator.relay import Relay
 from iveg.emulator.truth import TruthLog
 from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
-from iveg.robot.node import RobotNode
-from iveg.robot.uplink import Form
+from iveg.robot.node import NodeSettings, RobotNode
 
 _NAVIGATION_EVERY_S = 1.0
 _BATTERY_EVERY_S = 5.0
@@ -40,21 +37,14 @@ class FleetSettings:
     """Settings shared by all robots of a run.
 
     Attributes:
-        slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
-        state_directory: Directory of the hold files.
         held: The boot hold is not released at the robots.
         rate_hz: Of odometry, laser and camera each.
         truth: Log of the targets really in view.
     """
 
-    address: BrokerAddress
-    apikey: str
-    uplink: Form
-    slow_s: float
-    stand_s: float
-    state_directory: Path
-    held: bool
-    rate_hz: float
+    node: NodeSettings
+    held: bool = False
+    rate_hz: float = 30.0
     truth: TruthLog | None = None
 
 
@@ -93,17 +83,14 @@ class EmulatedRobot:
         self._clock_offset_s = 0.0
 
     def _new_node(self, *, held: bool) -> RobotNode:
-        settings = self._settings
+        settings = self._settings.node
+        if self._relay is not None:
+            settings = replace(settings, address=self._relay.address)
         return RobotNode(
             self.robot_id,
-            address=self._relay.address if self._relay else settings.address,
-            apikey=settings.apikey,
+            settings,
             profile=self._rig.profile,
-            hold_file=settings.state_directory / f"{self.robot_id}.holds.json",
             drive=self._obey_gate,
-            slow_s=settings.slow_s,
-            stand_s=settings.stand_s,
-            uplink=settings.uplink,
             held=held,
             read_clock=self._read_clock,
         )

@@ -8,12 +8,11 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
 from iveg.adapters import clock
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
@@ -28,59 +27,47 @@ from iveg.emulator.relay import Relay
 from iveg.emulator.ros2_base import Ros2Base
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
-from iveg.emulator.truth import TruthLog
 from iveg.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import format_stamp, write_climate
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Network
-from iveg.robot.uplink import Form
 from iveg.ros2.names import namespace_of
 
 _log = logging.getLogger(__name__)
 _CLIMATE_EVERY_S = 10.0
 
 
+def _log_port(port: int) -> None:
+    _log.info("faults are taken on 127.0.0.1:%d", port)
+
+
 async def run_emulator(
-    *,
     robots: Sequence[str],
-    address: BrokerAddress,
-    apikey: str,
     greenhouse: Greenhouse,
+    settings: FleetSettings,
+    *,
     scenario: str = "demo",
     seed: int = 1,
     profile: str = "simulation",
-    uplink: Form = "per-topic",
-    slow_s: float = 1.0,
-    stand_s: float = 3.0,
-    state_directory: Path,
-    held: bool = False,
-    rate_hz: float = 30.0,
     faults: Sequence[FaultOrder] = (),
     fault_port: int | None = None,
-    on_fault_port: Callable[[int], None] | None = None,
+    on_fault_port: Callable[[int], None] = _log_port,
     network: Network | None = None,
     ros2: Mapping[str, RobotConfig] | None = None,
     description: FleetDescription | None = None,
     camera: Camera = "boxes",
-    truth: TruthLog | None = None,
 ) -> None:
     """Run a scenario until cancelled.
 
     Args:
         robots: Their ids.
-        address: The broker.
-        apikey: First part of the measure topics.
         greenhouse: Greenhouse they drive in.
+        settings: Those of all robots; the directory of the hold files is made if
+            missing.
         scenario: Name of a scenario of ``iveg.emulator.scenarios``.
         seed: The same seed gives the same people and the same noise.
         profile: Of the detector: ``field``, ``simulation`` or ``perfect``.
-        uplink: One message a topic, or Algorithm 1's single payload.
-        slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
-        stand_s: See above.
-        state_directory: Where the robots keep their hold files; made if missing.
-        held: The robots stay held until a release.
-        rate_hz: Of odometry, laser and camera each.
         faults: Faults from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
         on_fault_port: Called with the port in use.
@@ -89,7 +76,6 @@ async def run_emulator(
             case.
         description: Fleet description; None: the built-in one.
         camera: Source of the boxes: drawn about the truth, or by grounding.
-        truth: Log of the targets really in view.
 
     Raises:
         DataFileError: no such scenario or profile, or too many robots for the
@@ -102,22 +88,11 @@ async def run_emulator(
     layout = lay_out(scenario_named(scenario), robots, greenhouse, description)
     detector = DETECTORS[layout.detector or profile]
     world = SimulatedWorld(greenhouse, layout, detector, seed, camera)
-    settings = FleetSettings(
-        address,
-        apikey,
-        uplink,
-        slow_s,
-        stand_s,
-        state_directory,
-        held,
-        rate_hz,
-        truth,
-    )
     incidents = (*(Incident(0.0, order) for order in faults), *layout.incidents)
     is_radio_bad = bool(incidents) or fault_port is not None
     bases = None
     if network is not None:
-        bases = partial(_base, world, network, ros2 or {}, rate_hz)
+        bases = partial(_base, world, network, ros2 or {}, settings.rate_hz)
     radio_seed = seed if is_radio_bad and network is None else None
     fleet = SimulatedFleet(world, settings, radio_seed=radio_seed, bases=bases)
     if fault_port is None:
@@ -125,9 +100,7 @@ async def run_emulator(
         return
     server, port = await open_fault_port(fault_port, fleet.obey)
     async with server:
-        _log.info("faults are taken on 127.0.0.1:%d", port)
-        if on_fault_port is not None:
-            on_fault_port(port)
+        on_fault_port(port)
         await fleet.run(incidents)
 
 
@@ -162,7 +135,7 @@ class SimulatedFleet:
         self._world = world
         self._settings = settings
         self._started = clock.now()
-        settings.state_directory.mkdir(parents=True, exist_ok=True)
+        settings.node.directory.mkdir(parents=True, exist_ok=True)
         self._robots: Mapping[str, EmulatedRobot | Ros2Base] = {
             robot_id: EmulatedRobot(
                 rig, world, settings, _relay(settings, robot_id, place, radio_seed)
@@ -194,8 +167,8 @@ class SimulatedFleet:
         await every(period, step)
 
     async def _climate(self) -> None:
-        link = MqttLink(self._settings.address, "climate")
-        topic = names.measure_topic(self._settings.apikey, names.CLIMATE_DEVICE)
+        link = MqttLink(self._settings.node.address, "climate")
+        topic = names.measure_topic(self._settings.node.apikey, names.CLIMATE_DEVICE)
 
         def tell(_: float) -> None:
             wall = clock.now().wall
@@ -245,7 +218,7 @@ def _relay(
     if seed is None:
         return None
     devices = (f"{robot_id}_odom", robot_id)
-    topics = {names.measure_topic(settings.apikey, one) for one in devices}
+    topics = {names.measure_topic(settings.node.apikey, one) for one in devices}
     topics.add(names.direct_topic(robot_id, "_odom"))
     radio = Radio(frozenset(topics), np.random.default_rng((seed, place)))
-    return Relay(settings.address, radio)
+    return Relay(settings.node.address, radio)

@@ -14,7 +14,6 @@ from pathlib import Path
 
 from iveg.adapters import clock
 from iveg.adapters.bags import BagTopics
-from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
@@ -28,8 +27,7 @@ from iveg.domain.observations import (
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
 from iveg.emulator.recordings import open_recording
-from iveg.robot.node import RobotNode
-from iveg.robot.uplink import Form
+from iveg.robot.node import NodeSettings, RobotNode
 
 TASK = "replay"
 """Task of a replayed robot; iVeg recognises replays by the mark of their messages."""
@@ -46,35 +44,29 @@ _FASTEST = 100.0
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """Settings shared by all replayed robots of a run; see ``run_replay``."""
+    """Settings shared by all replayed robots of a run.
 
-    address: BrokerAddress
-    apikey: str
-    speed: float
-    loop: bool
-    uplink: Form
-    slow_s: float
-    stand_s: float
-    state_directory: Path
-    frame: str | None
+    Attributes:
+        speed: Pace; 2 is twice as fast as recorded.
+        loop: Starts over at the end.
+        frame: Map frame of all recordings; None: each has a frame of its own, and its
+            detections slow no other robot.
+    """
+
+    node: NodeSettings
+    speed: float = 1.0
+    loop: bool = False
+    frame: str | None = None
 
 
 async def run_replay(
     files: Sequence[Path],
     robots: Sequence[str],
+    settings: ReplaySettings,
     *,
-    address: BrokerAddress,
-    apikey: str,
-    speed: float = 1.0,
-    loop: bool = False,
-    uplink: Form = "per-topic",
-    slow_s: float = 1.0,
-    stand_s: float = 3.0,
-    state_directory: Path,
     topics: BagTopics | None = None,
     bag_time: bool = False,
     fleet: FleetDescription | None = None,
-    frame: str | None = None,
     poses: Mapping[str, Pose2D] | None = None,
 ) -> None:
     """Play recordings; returns when all have ended, never with ``loop``.
@@ -82,25 +74,17 @@ async def run_replay(
     Args:
         files: One recording a robot.
         robots: Their ids, in the order of the files.
-        address: The broker.
-        apikey: First part of the measure topics.
-        speed: Pace; 2 is twice as fast as recorded.
-        loop: Starts over at the end.
-        uplink: One message a topic, or Algorithm 1's single payload.
-        slow_s: Feedback older than this slows a robot (s); ``stand_s`` stops it.
-        stand_s: See above.
-        state_directory: Where the robots keep their hold files; made if missing.
+        settings: Those of all robots; the directory of the hold files is made if
+            missing.
         topics: Topics of a ROS bag; see ``open_recording``.
         bag_time: Bags use recording times; see ``open_recording``.
         fleet: Fleet description; None: no description.
-        frame: Map frame of all recordings; None: each has a frame of its own, and its
-            detections slow no other robot.
         poses: By robot, the fixed pose of a recording without odometry.
 
     Raises:
         DataFileError: files and robots do not match, or a file cannot be used.
     """
-    _check(files, robots, speed)
+    _check(files, robots, settings.speed)
     known, stands = fleet or NOBODY, poses or {}
     profiles = [known.of_robot(robot_id).profile for robot_id in robots]
     recordings = [
@@ -109,10 +93,7 @@ async def run_replay(
         )
         for file, robot_id, profile in zip(files, robots, profiles, strict=True)
     ]
-    playbacks = [Playback(one.entries, loop=loop) for one in recordings]
-    settings = ReplaySettings(
-        address, apikey, speed, loop, uplink, slow_s, stand_s, state_directory, frame
-    )
+    playbacks = [Playback(one.entries, loop=settings.loop) for one in recordings]
     replayed = [
         ReplayedRobot(robot_id, profile, playback, settings)
         for robot_id, profile, playback in zip(robots, profiles, playbacks, strict=True)
@@ -183,17 +164,12 @@ class ReplayedRobot:
         self._command = _REST
         self._pace = 0.0
         self._stood_s = 0.0
-        settings.state_directory.mkdir(parents=True, exist_ok=True)
+        settings.node.directory.mkdir(parents=True, exist_ok=True)
         self._node = RobotNode(
             robot_id,
-            address=settings.address,
-            apikey=settings.apikey,
+            settings.node,
             profile=self._profile,
-            hold_file=settings.state_directory / f"{robot_id}.holds.json",
             drive=self._drive,
-            slow_s=settings.slow_s,
-            stand_s=settings.stand_s,
-            uplink=settings.uplink,
             replay=settings.frame or robot_id,
         )
 

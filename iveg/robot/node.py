@@ -9,7 +9,7 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -20,6 +20,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.feedback import Feedback
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Twist2D
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
     Hold,
@@ -48,22 +49,37 @@ _SAID_WITHIN_S = 0.03
 """Odometry, upstream twist and feedback that arrive together give one drive command."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeSettings:
+    """Settings shared by the safety nodes of a run.
+
+    Attributes:
+        address: The broker.
+        apikey: First part of the measure topics.
+        directory: Where the holds of each robot survive a loss of power.
+        slow_s: Feedback older than this halves the speed (s).
+        stand_s: Feedback older than this stops the robot (s).
+        uplink: One message a topic, or Algorithm 1's single payload.
+    """
+
+    address: BrokerAddress
+    apikey: str
+    directory: Path
+    slow_s: float = LIMITS.feedback_slow_s
+    stand_s: float = LIMITS.feedback_stand_s
+    uplink: Form = "per-topic"
+
+
 class RobotNode:
     """Safety node of one robot.
 
     Args:
         robot_id: This robot.
-        address: The broker.
-        apikey: First part of the measure topics.
+        settings: Those of all robots of the run.
         profile: Speeds of the drive.
-        hold_file: Where the holds survive a loss of power.
         drive: Takes what the gate lets through; must not block.
-        slow_s: Feedback older than this halves the speed (s).
-        stand_s: Feedback older than this stops the robot (s).
-        uplink: One message a topic, or Algorithm 1's single payload.
         held: No crew is at the robot at start: ``release_locally`` has no effect
             before ``run``.
-        on_link_loss: What ``stand_s`` of silence does.
         replay: It plays a recording, which is in this map frame: its messages are
             marked, and echo no feedback, since their content was measured long ago.
         on_feedback: Called with the topic's robot and each feedback that could be read.
@@ -73,17 +89,11 @@ class RobotNode:
     def __init__(
         self,
         robot_id: str,
+        settings: NodeSettings,
         *,
-        address: BrokerAddress,
-        apikey: str,
         profile: RobotProfile,
-        hold_file: Path,
         drive: Callable[[Twist2D], None],
-        slow_s: float = 1.0,
-        stand_s: float = 3.0,
-        uplink: Form = "per-topic",
         held: bool = False,
-        on_link_loss: Literal["stop", "slow"] = "stop",
         replay: str | None = None,
         on_feedback: Callable[[str, Feedback], None] | None = None,
         read_clock: Callable[[], Instant] = clock.now,
@@ -102,35 +112,39 @@ class RobotNode:
         self._told: tuple[Twist2D, float] = REST, 0.0
         self._broken: asyncio.Future[None] | None = None
         self._next_tick: asyncio.TimerHandle | None = None
-        self._command_topic = names.command_topic(apikey, robot_id)
+        self._command_topic = names.command_topic(settings.apikey, robot_id)
         self._desired_topic = names.DESIRED_TOPIC.format(robot_id=robot_id)
         self._link = MqttLink(
-            address,
+            settings.address,
             f"robot {robot_id}",
             {self._command_topic: 1, self._desired_topic: 1, names.FEEDBACK_FILTER: 1},
             self._on_message,
         )
+        hold_file = settings.directory / f"{robot_id}.holds.json"
         self._lane = SafetyLane(
             partial(write_holds, hold_file), partial(self._link.publish, qos=1)
         )
         self._uplink = Uplink(
             robot_id,
-            apikey,
+            settings.apikey,
             self.boot,
             self._link.offer,
-            form=uplink,
+            form=settings.uplink,
             first_report=1 + secrets.randbelow(2**31),
             echo=self._echo if replay is None else None,
             replay=replay,
         )
         limits = Limits(
-            profile.max_speed, profile.max_turn, slow_s, stand_s, on_link_loss
+            profile.max_speed, profile.max_turn, settings.slow_s, settings.stand_s
         )
+        self._machine = self._new_machine(hold_file, limits)
+
+    def _new_machine(self, hold_file: Path, limits: Limits) -> SafetyMachine:
         stored = read_holds(hold_file)
         if stored is None:
-            _log.warning("%s: unreadable hold file, held: %s", robot_id, hold_file)
-        self._machine = SafetyMachine(
-            robot_id,
+            _log.warning("%s: unreadable hold file, held: %s", self._id, hold_file)
+        return SafetyMachine(
+            self._id,
             self.boot,
             self._read_clock().mono,
             stored=stored,

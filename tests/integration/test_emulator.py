@@ -31,6 +31,7 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
 from iveg.emulator.world import SimulatedWorld
+from iveg.robot.node import NodeSettings
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 
 TESTBED = load_greenhouse("mvsim-20x20")
@@ -66,6 +67,13 @@ class FaultPort:
             return await client.request(method, url, content=json.dumps(order))
 
 
+def of_run(
+    address: BrokerAddress, folder: Path, *, held: bool = False
+) -> FleetSettings:
+    node = NodeSettings(address=address, apikey="iveg", directory=folder)
+    return FleetSettings(node, held=held)
+
+
 def emulator(
     address: BrokerAddress,
     folder: Path,
@@ -78,17 +86,14 @@ def emulator(
 ) -> asyncio.Task[None]:
     return asyncio.create_task(
         run_emulator(
-            robots=robots,
-            address=address,
-            apikey="iveg",
-            greenhouse=TESTBED,
+            robots,
+            TESTBED,
+            of_run(address, folder / "state", held=held),
             scenario=scenario,
             profile="perfect",
-            state_directory=folder / "state",
-            held=held,
             faults=faults,
             fault_port=None if port is None else 0,
-            on_fault_port=None if port is None else port.opened,
+            on_fault_port=(port or FaultPort()).opened,
         )
     )
 
@@ -394,9 +399,7 @@ async def test_an_incident_of_a_scenario_happens_when_it_is_due(
 ) -> None:
     layout = lay_out(scenario_named("demo"), FLEET, TESTBED)
     world = SimulatedWorld(TESTBED, layout, DETECTORS["perfect"], seed=1)
-    settings = FleetSettings(
-        address, "iveg", "per-topic", 1.0, 3.0, tmp_path, held=False, rate_hz=30.0
-    )
+    settings = of_run(address, tmp_path)
     incidents = (
         Incident(1.0, FaultOrder(robot="AGII", mute=True)),
         Incident(0.1, FaultOrder(robot="AGV", mute=True)),
@@ -422,12 +425,7 @@ async def test_an_unknown_profile_or_scenario_is_refused_before_anything_runs(
         await emulator(address, tmp_path, scenario="party")
     with pytest.raises(DataFileError, match="is not one of field, simulation"):
         await run_emulator(
-            robots=FLEET,
-            address=address,
-            apikey="iveg",
-            greenhouse=TESTBED,
-            profile="clairvoyant",
-            state_directory=tmp_path,
+            FLEET, TESTBED, of_run(address, tmp_path), profile="clairvoyant"
         )
 
 
@@ -436,10 +434,5 @@ async def test_a_fault_port_that_is_taken_is_refused(
 ) -> None:
     with pytest.raises(SettingsError, match="that nobody listens on"):
         await run_emulator(
-            robots=FLEET,
-            address=address,
-            apikey="iveg",
-            greenhouse=TESTBED,
-            state_directory=tmp_path,
-            fault_port=address.port,
+            FLEET, TESTBED, of_run(address, tmp_path), fault_port=address.port
         )

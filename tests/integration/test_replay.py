@@ -19,7 +19,8 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.emulator.replay import run_replay
+from iveg.emulator.replay import ReplaySettings, run_replay
+from iveg.robot.node import NodeSettings
 from tests import data
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.data.recorded import emulated_logs, real_log
@@ -43,6 +44,13 @@ async def cloud(address: BrokerAddress) -> AsyncIterator[Cloud]:
         yield small
 
 
+def of_run(
+    address: BrokerAddress, folder: Path, speed: float, *, loop: bool = False
+) -> ReplaySettings:
+    node = NodeSettings(address=address, apikey="iveg", directory=folder)
+    return ReplaySettings(node, speed, loop)
+
+
 def replay(
     address: BrokerAddress,
     folder: Path,
@@ -55,11 +63,7 @@ def replay(
         run_replay(
             files or (AISLE,),
             robots,
-            address=address,
-            apikey="iveg",
-            speed=speed,
-            loop=loop,
-            state_directory=folder / "state",
+            of_run(address, folder / "state", speed, loop=loop),
         )
     )
 
@@ -182,10 +186,7 @@ async def test_what_cannot_be_played_is_refused_with_one_sentence(
         await run_replay(
             files,
             robots,
-            address=BrokerAddress("127.0.0.1", 1),
-            apikey="iveg",
-            speed=speed,
-            state_directory=tmp_path,
+            of_run(BrokerAddress("127.0.0.1", 1), tmp_path, speed),
         )
 
 

@@ -25,7 +25,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.ngsi import codec
-from iveg.robot.node import RobotNode
+from iveg.robot.node import NodeSettings, RobotNode
 from tests.brokers import broker_on
 from tests.ports import free_ports
 
@@ -128,14 +128,12 @@ class Robot:
         return self.driven[-1][1].linear_x
 
 
-def make_robot(address: BrokerAddress, hold_file: Path) -> Robot:
+def make_robot(address: BrokerAddress, folder: Path) -> Robot:
     driven = [(time.monotonic(), Twist2D(0.0, 0.0))]
     node = RobotNode(
         "AGI",
-        address=address,
-        apikey="iveg",
+        NodeSettings(address=address, apikey="iveg", directory=folder),
         profile=RobotProfile(),
-        hold_file=hold_file,
         drive=lambda twist: driven.append((time.monotonic(), twist)),
     )
     return Robot(node, driven)
@@ -173,7 +171,7 @@ async def release(cloud: Cloud, robot: Robot) -> None:
 async def test_a_robot_boots_held_and_reports_it(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     async with running(robot, cloud):
         await until(lambda: len(cloud.reports) > 3)
     assert cloud.reports[-1].holds[0].id == f"boot-{robot.node.boot}"
@@ -184,7 +182,7 @@ async def test_a_robot_boots_held_and_reports_it(
 async def test_a_held_robot_reports_past_the_agent_and_spares_it_poses_when_told(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     straight, measured = "/AGI/iveg/safety", "/iveg/AGI_safety/attrs"
     async with running(robot, cloud):
         await until(lambda: cloud.topics[straight] > 20)
@@ -198,7 +196,7 @@ async def test_a_held_robot_reports_past_the_agent_and_spares_it_poses_when_told
 async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it_at_once(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     async with running(robot, cloud):
         await release(cloud, robot)
         await until(lambda: robot.speed > 0.9)
@@ -220,19 +218,18 @@ async def test_a_released_and_resumed_robot_drives_and_a_stop_zeroes_it_at_once(
 async def test_a_stop_survives_a_restart_of_the_robot(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    hold_file = tmp_path / "holds.json"
-    cloud, robot = Cloud(broker), make_robot(broker, hold_file)
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     async with running(robot, cloud):
         await cloud.command(codec.write_command(codec.write_stop("01STOP", "opaque")))
         await until(lambda: cloud.answers)
-    again = make_robot(broker, hold_file)
+    again = make_robot(broker, tmp_path)
     assert "01STOP" in {hold.id for hold in again.node.holds}
 
 
 async def test_a_crew_at_the_robot_lets_it_drive_and_a_speed_limit_halves_it(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     robot.node.release_locally()
     async with running(robot, cloud):
         await until(lambda: robot.speed > 0.9)
@@ -245,7 +242,7 @@ async def test_a_crew_at_the_robot_lets_it_drive_and_a_speed_limit_halves_it(
 async def test_a_drive_is_told_the_same_again_and_again_but_not_twice_at_once(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     robot.node.release_locally()
     async with running(robot, cloud):
         await until(lambda: robot.speed == 1.0, within_s=20.0)
@@ -262,7 +259,7 @@ async def test_a_drive_is_told_the_same_again_and_again_but_not_twice_at_once(
 async def test_silence_slows_then_holds_and_the_link_hold_clears_itself(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     robot.node.release_locally()
     async with running(robot, cloud):
         await until(lambda: robot.speed > 0.9)
@@ -281,7 +278,7 @@ async def test_a_broker_that_goes_and_comes_back_needs_no_hand(
     port: int, tmp_path: Path
 ) -> None:
     address = BrokerAddress("127.0.0.1", port)
-    cloud, robot = Cloud(address), make_robot(address, tmp_path / "holds.json")
+    cloud, robot = Cloud(address), make_robot(address, tmp_path)
     robot.node.release_locally()
     async with contextlib.AsyncExitStack() as first:
         await first.enter_async_context(broker_on(port, tmp_path))
@@ -298,7 +295,7 @@ async def test_a_broker_that_goes_and_comes_back_needs_no_hand(
 async def test_a_retained_level_holds_a_robot_that_comes_later(
     broker: BrokerAddress, tmp_path: Path
 ) -> None:
-    cloud, robot = Cloud(broker), make_robot(broker, tmp_path / "holds.json")
+    cloud, robot = Cloud(broker), make_robot(broker, tmp_path)
     robot.node.release_locally()
     level = codec.write_desired("stopped", ["01STOP"])
     async with asyncio.TaskGroup() as tasks:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from iveg.cli import main
-from iveg.cli.arguments import add_robot_arguments
+from iveg.cli.arguments import parser
 from iveg.cli.robot import load_config, refuse_second_gate, run_robot
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.ros2 import messages as m
@@ -17,9 +17,7 @@ from tests.fakes.ros2_network import Endpoint, FakeNetwork
 
 
 def options(*words: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    add_robot_arguments(parser.add_subparsers())
-    return parser.parse_args(["robot", "--id", "AGI", *words])
+    return parser().parse_args(["robot", "--id", "AGI", *words])
 
 
 @pytest.mark.parametrize("robot_id", ["climate", "A B", "a" * 65, "AGI;"])

@@ -14,7 +14,7 @@ from iveg.adapters.mqtt import BrokerAddress
 from iveg.domain.feedback import Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
-from iveg.robot.node import RobotNode
+from iveg.robot.node import NodeSettings, RobotNode
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Ros2Robot
 from iveg.ros2 import messages as m
@@ -61,10 +61,12 @@ async def riding(folder: Path) -> AsyncIterator[Site]:
         told.append(hear)
         return RobotNode(
             "AGI",
-            address=BrokerAddress("127.0.0.1", port),
-            apikey="iveg",
+            NodeSettings(
+                address=BrokerAddress("127.0.0.1", port),
+                apikey="iveg",
+                directory=folder,
+            ),
             profile=AGI,
-            hold_file=folder / "holds.json",
             drive=drive,
             on_feedback=hear,
         )
