@@ -30,7 +30,7 @@ from iveg.app.stores import open_stores
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
-from iveg.domain.latency.hops import WINDOW_S
+from iveg.domain.latency.segments import WINDOW_S
 from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills

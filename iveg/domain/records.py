@@ -225,7 +225,8 @@ class LatencyRecord:
 
     Attributes:
         at: When the minute began.
-        data: ``odometry``, ``detections`` or ``lidar``; ``hop`` of ``latency.hops``.
+        data: ``odometry``, ``detections`` or ``lidar``.
+        hop: A segment (``domain.latency.segments``).
         count: Messages that were measured.
         total_s: Sum of their durations; ``least_s`` and ``most_s`` their extremes.
         bins: Text of ``latency.sketch.write_bins``.

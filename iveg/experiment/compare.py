@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from iveg.domain.errors import DataFileError
 from iveg.domain.latency.account import Cell
-from iveg.domain.latency.hops import DATA, Hop
+from iveg.domain.latency.segments import DATA, Segment
 from iveg.experiment.outcome import slices_of
 from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.slices import latency_changes, spreads
@@ -13,7 +13,7 @@ from iveg.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]
 FORMAT: Final = 2
-_HOPS: Final[tuple[Hop, ...]] = ("uplink", "fiware", "robot_orion", "iveg")
+_HOPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "robot_orion", "iveg")
 
 
 def write_comparison(before: Result, after: Result) -> str:

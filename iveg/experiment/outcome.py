@@ -12,7 +12,7 @@ import orjson
 
 from iveg import __version__
 from iveg.domain.latency.account import LatencySummary
-from iveg.domain.latency.hops import DATA, HOPS
+from iveg.domain.latency.segments import DATA, SEGMENTS
 from iveg.experiment.beliefs import injections
 from iveg.experiment.observer import ObservedRun, slowdowns_of
 from iveg.experiment.paper_tables import CLASSES
@@ -148,7 +148,7 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
 def _rows(slices: Sequence[Slice]) -> list[dict[str, Any]]:
     found = spreads(slices)
     return [
-        {"data": data, "hops": {hop: _told(found[data, hop]) for hop in HOPS}}
+        {"data": data, "hops": {hop: _told(found[data, hop]) for hop in SEGMENTS}}
         for data in DATA
     ]
 

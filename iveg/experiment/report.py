@@ -7,8 +7,8 @@ from typing import Any
 
 import orjson
 
-from iveg.domain.latency.hops import DATA
 from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.segments import DATA
 from iveg.experiment import tables
 from iveg.experiment.outcome import slices_of
 from iveg.experiment.paper_tables import AGAINST_ITS_TEXT

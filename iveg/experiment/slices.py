@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iveg.domain.latency.account import Cell, LatencySummary, spread_of
-from iveg.domain.latency.hops import DATA, HOPS
+from iveg.domain.latency.segments import DATA, SEGMENTS
 from iveg.domain.latency.sketch import NOTHING, Sketch, from_bins, merged
 from iveg.experiment.statistics import Interval
 
@@ -67,7 +67,7 @@ def _sketch(bins: Mapping[str, Any] | None) -> Sketch:
 
 def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
     """All slices combined."""
-    cells: list[Cell] = [(data, hop) for data in DATA for hop in HOPS]
+    cells: list[Cell] = [(data, hop) for data in DATA for hop in SEGMENTS]
     return {cell: merged(sketches_of(slices, cell)) for cell in cells}
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
 from typing import Any, Final
 
-from iveg.domain.latency.hops import DATA
 from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.segments import DATA
 from iveg.experiment.paper_tables import (
     CLASSES,
     COMPLETION,

@@ -9,7 +9,7 @@ from iveg.models.base import Model, moment, rounded
 from iveg.models.margin import Margin
 
 
-class Hop(Model):
+class HopHealth(Model):
     """One hop of the data path from robot to screen."""
 
     hop: str
@@ -133,7 +133,7 @@ class Health(Model):
     """Whether the data path is whole, what was counted, how the fleet is told."""
 
     ok: bool
-    hops: list[Hop]
+    hops: list[HopHealth]
     counters: dict[str, int]
     safety: Safety
     earlier: Literal["known", "reading", "unknown"]

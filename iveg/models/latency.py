@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from iveg.domain.latency.hops import Data, Hop, Window
+from iveg.domain.latency.segments import Data, Segment, Window
 from iveg.models.base import Model
 
 
-class HopSpread(Model):
+class SegmentSpread(Model):
     """What one hop takes; null where nothing was measured."""
 
     count: int
@@ -18,7 +18,7 @@ class HopSpread(Model):
     most_ms: float | None
 
 
-class HopBins(Model):
+class SegmentBins(Model):
     """All that was measured of one hop, within 1 %."""
 
     edges_ms: list[float]
@@ -29,18 +29,18 @@ class HopBins(Model):
     """The sum of all durations, exact."""
 
 
-class HopRow(Model):
+class LatencyRow(Model):
     """One kind of data."""
 
     data: Data
-    hops: dict[str, HopSpread]
-    sampled: list[Hop]
+    hops: dict[str, SegmentSpread]
+    sampled: list[Segment]
     """Hops of which not every message is told."""
-    bins: dict[str, HopBins] | None = None
+    bins: dict[str, SegmentBins] | None = None
     """Null unless they were asked for."""
 
 
-class HopClock(Model):
+class LatencyClock(Model):
     """A robot's clock less the server's, as far as it is proven."""
 
     robot_id: str
@@ -50,7 +50,7 @@ class HopClock(Model):
     jumps: int
 
 
-class HopOrder(Model):
+class SegmentOrder(Model):
     """What passed a hop since the start."""
 
     passed: int
@@ -59,7 +59,7 @@ class HopOrder(Model):
     repeated: int
 
 
-class HopStream(Model):
+class LatencyStream(Model):
     """One kind of data of one robot: what really comes, and how."""
 
     robot_id: str
@@ -71,13 +71,13 @@ class HopStream(Model):
     """Share (0 to 1) that the agent was not sent; null while nothing is heard."""
     throttled: bool
     orion_first: int
-    uplink: HopOrder
-    fiware: HopOrder
+    uplink: SegmentOrder
+    fiware: SegmentOrder
     excluded: dict[str, dict[str, int]]
     """By hop and reason, what is in no statistics."""
 
 
-class HopRemark(Model):
+class SegmentRemark(Model):
     """What is wrong with a hop now: a sentence's name, and what fills it."""
 
     key: str
@@ -85,24 +85,24 @@ class HopRemark(Model):
     slots: dict[str, str | float]
 
 
-class HopStep(Model):
+class SegmentStep(Model):
     """One hop of one message, since the robot's stamp, or since the broker without."""
 
-    hop: Hop
+    hop: Segment
     from_ms: float
     to_ms: float
 
 
-class HopTrace(Model):
+class LatencyTrace(Model):
     """One message, hop by hop."""
 
     robot_id: str
     data: Data
     stamp: str | None
-    steps: list[HopStep]
+    steps: list[SegmentStep]
 
 
-class HopLatency(Model):
+class LatencyTable(Model):
     """Every hop of every kind of data over one window."""
 
     at: str
@@ -112,15 +112,15 @@ class HopLatency(Model):
     """Null: all robots."""
     direct: bool
     """Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."""
-    rows: list[HopRow]
+    rows: list[LatencyRow]
     paper: dict[str, dict[str, dict[str, float]]]
     """What the paper printed, by place, kind of data and column (ms)."""
-    clocks: list[HopClock]
+    clocks: list[LatencyClock]
     pages_within_ms: float | None
     """How well pages' clocks are known; null while none has told."""
-    streams: list[HopStream]
-    remarks: list[HopRemark]
-    trace: HopTrace | None
+    streams: list[LatencyStream]
+    remarks: list[SegmentRemark]
+    trace: LatencyTrace | None
     library: str
     """Where the script lies that draws the figures."""
     style_ids: list[str]

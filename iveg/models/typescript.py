@@ -16,7 +16,7 @@ from iveg.models.climate import ClimateReading
 from iveg.models.command import Drill, FleetPressed, Latency
 from iveg.models.decision import Decision
 from iveg.models.experiment import Experiments
-from iveg.models.latency import HopLatency
+from iveg.models.latency import LatencyTable
 from iveg.models.messages import Messages, MessageTest
 from iveg.models.places import Costmap, Coverage, Scan
 from iveg.models.reading import Reading
@@ -31,7 +31,7 @@ TOLD: tuple[type[Model], ...] = (
     Decision,
     Drill,
     Latency,
-    HopLatency,
+    LatencyTable,
     Experiments,
     FleetPressed,
     AlertListing,

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.events import LogEvent
-from iveg.domain.latency.hops import DATA, HOPS, Data, Hop
 from iveg.domain.latency.overloads import Remark
+from iveg.domain.latency.segments import DATA, SEGMENTS, Data, Segment
 from iveg.domain.latency.sketch import Sketch, merged, read_bins, write_bins
 from iveg.domain.latency.watch import LatencyWatch, Measured
 from iveg.domain.observations import Instant, Received
@@ -64,7 +64,7 @@ class LatencyMonitor:
 
 def hours_of(kept: Sequence[LatencyRecord]) -> list[Measured]:
     """Minutes of the history, oldest first, as hours; pure, so any thread may do it."""
-    hours: dict[tuple[int, str, Data, Hop], list[Sketch]] = {}
+    hours: dict[tuple[int, str, Data, Segment], list[Sketch]] = {}
     for record in kept:
         for robot_id, data, hop, sketch in _minute(record):
             place = int(record.at // 3600.0), robot_id, data, hop
@@ -93,7 +93,7 @@ def _record(began_at: float, minute: Measured) -> LatencyRecord:
 def _minute(record: LatencyRecord) -> Iterable[Measured]:
     """The minute of a row; none where a later version named what this one lacks."""
     data = next((one for one in DATA if one == record.data), None)
-    hop = next((one for one in HOPS if one == record.hop), None)
+    hop = next((one for one in SEGMENTS if one == record.hop), None)
     if data is None or hop is None:
         return
     try:

@@ -26,7 +26,8 @@ from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
 from iveg.models.command import Command as CommandModel
 from iveg.models.device import Device
-from iveg.models.health import Health, Hop, Safety
+from iveg.models.health import Health, Safety
+from iveg.models.health import HopHealth as HopModel
 from iveg.models.margin import Margin
 from iveg.models.people import Acting, Detection, DetectionFrame
 from iveg.models.people import Person as PersonModel
@@ -322,8 +323,8 @@ class Views:
         return Rule.of(self._evaluator.rule)
 
 
-def _hop(hop: HopHealth) -> Hop:
-    return Hop(
+def _hop(hop: HopHealth) -> HopModel:
+    return HopModel(
         hop=hop.name.value,
         state=hop.state,
         age_s=rounded(hop.age_s, 1),

@@ -7,11 +7,11 @@ summing up need finished sketches alone and may be done in any thread.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from iveg.domain.latency.hops import DATA, HOPS, Data, Hop, Window
+from iveg.domain.latency.segments import DATA, SEGMENTS, Data, Segment, Window
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 
-Cell = tuple[Data, Hop]
+Cell = tuple[Data, Segment]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +31,12 @@ def collect(
     streams: Iterable[Stream], window: Window, robot_id: str | None = None
 ) -> dict[Cell, list[Sketch]]:
     """The finished sketches of a window, of one robot or of all; for the loop."""
-    found: dict[Cell, list[Sketch]] = {(data, hop): [] for data in DATA for hop in HOPS}
+    found: dict[Cell, list[Sketch]] = {
+        (data, hop): [] for data in DATA for hop in SEGMENTS
+    }
     for stream in streams:
         if robot_id in (None, stream.robot_id):
-            for hop, series in stream.hops.items():
+            for hop, series in stream.segments.items():
                 found[stream.data, hop] += series.parts(window)
     return found
 

@@ -19,7 +19,7 @@ narrow.
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from iveg.domain.latency.hops import LONGEST_S, STAMP_S, Exclusion
+from iveg.domain.latency.segments import LONGEST_S, STAMP_S, Exclusion
 from iveg.domain.observations import Instant
 
 AGREE: Final = 5

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Final, Literal
 
-from iveg.domain.latency.hops import Hop
+from iveg.domain.latency.segments import Segment
 from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.stream import Stream
 
@@ -35,7 +35,7 @@ class Remark:
     """
 
     what: Literal["behind", "growing", "lost", "reordered"]
-    hop: Hop
+    hop: Segment
     slots: Mapping[str, str | float]
 
     @property
@@ -54,9 +54,9 @@ class Overloads:
 
     def __init__(self) -> None:
         self.remarks: Sequence[Remark] = ()
-        self.lags: dict[tuple[Hop, str], float] = {}
-        self._lags: dict[tuple[Hop, str], deque[float]] = {}
-        self._behind: set[tuple[Hop, str]] = set()
+        self.lags: dict[tuple[Segment, str], float] = {}
+        self._lags: dict[tuple[Segment, str], deque[float]] = {}
+        self._behind: set[tuple[Segment, str]] = set()
 
     def update(self, streams: Sequence[Stream], now: float) -> None:
         """Judge the hops by their newest messages (``now`` monotonic, s)."""
@@ -74,7 +74,9 @@ class Overloads:
             found += _disorder(stream)
         self.remarks = tuple(found)
 
-    def _lag(self, hop: Hop, robot_id: str, lag_s: float | None) -> Iterable[Remark]:
+    def _lag(
+        self, hop: Segment, robot_id: str, lag_s: float | None
+    ) -> Iterable[Remark]:
         about = hop, robot_id
         if lag_s is None:
             self._lags.pop(about, None)
@@ -96,11 +98,11 @@ class Overloads:
         yield Remark("growing" if grows else "behind", hop, slots)
 
 
-def _newest(streams: Sequence[Stream], hop: Hop, now: float) -> float | None:
+def _newest(streams: Sequence[Stream], hop: Segment, now: float) -> float | None:
     """The least of what its streams took last (s): what one is late for is not all."""
     fresh = (
         series.newest
-        for series in (one.hops[hop] for one in streams)
+        for series in (one.segments[hop] for one in streams)
         if now - series.newest_at <= _FRESH_S
     )
     return min(fresh, default=None)
@@ -108,7 +110,7 @@ def _newest(streams: Sequence[Stream], hop: Hop, now: float) -> float | None:
 
 def _behind_agent(stream: Stream, now: float) -> float | None:
     """How far FIWARE is behind with one stream (s); None where nothing tells."""
-    waiting, series = stream.waiting_s(now), stream.hops["fiware"]
+    waiting, series = stream.waiting_s(now), stream.segments["fiware"]
     fresh = series.newest if now - series.newest_at <= _FRESH_S else None
     known = [one for one in (waiting, fresh) if one is not None]
     return max(known, default=None)
@@ -116,7 +118,7 @@ def _behind_agent(stream: Stream, now: float) -> float | None:
 
 def _disorder(stream: Stream) -> Iterable[Remark]:
     about = {"robot": stream.robot_id, "data": stream.data}
-    hops: tuple[tuple[Hop, SequenceLoss], ...] = (
+    hops: tuple[tuple[Segment, SequenceLoss], ...] = (
         ("uplink", stream.up),
         ("fiware", stream.fiware),
     )

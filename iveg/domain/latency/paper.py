@@ -8,7 +8,7 @@ Both are of a real FIWARE with MongoDB: the first in simulation on a local netwo
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from iveg.domain.latency.hops import Data
+from iveg.domain.latency.segments import Data
 
 Place = Literal["simulation", "field"]
 

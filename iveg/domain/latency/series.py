@@ -12,7 +12,7 @@ hours, 60 minutes and 6 slices, and never from its messages.
 from collections import deque
 from typing import Final
 
-from iveg.domain.latency.hops import Window
+from iveg.domain.latency.segments import Window
 from iveg.domain.latency.sketch import Sketch, merged, sketch_of
 
 SLICE_S: Final = 10.0

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Final
 
-from iveg.domain.latency.hops import HOPS, Data, Exclusion, Hop
 from iveg.domain.latency.offset import ClockOffset
+from iveg.domain.latency.segments import SEGMENTS, Data, Exclusion, Segment
 from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.series import Series
 from iveg.domain.latency.trace import Tracer
@@ -54,15 +54,15 @@ class Stream:
 
     def __init__(self, robot_id: str, data: Data, clock: ClockOffset) -> None:
         self.robot_id, self.data, self.clock = robot_id, data, clock
-        self.hops: dict[Hop, Series] = {hop: Series() for hop in HOPS}
-        self.excluded: Counter[tuple[Hop, Exclusion]] = Counter()
+        self.segments: dict[Segment, Series] = {hop: Series() for hop in SEGMENTS}
+        self.excluded: Counter[tuple[Segment, Exclusion]] = Counter()
         self.up, self.fiware = SequenceLoss(), SequenceLoss()
         self.tracer = Tracer()
         self.is_throttled = False
         self.orion_first = 0
         self.decided_at = float("-inf")
         self._boot: str | None = None
-        self._stamps: dict[Hop, float] = {}
+        self._stamps: dict[Segment, float] = {}
         self._seqs = array("q", [-1]) * RING
         self._seen_at = array("d", [0.0]) * RING
         self._took = array("d", [nan]) * RING
@@ -123,20 +123,20 @@ class Stream:
             return
         self._state[place] = _BOTH
         took = at.mono - self._seen_at[place]
-        self.hops["fiware"].add(took, at.mono)
+        self.segments["fiware"].add(took, at.mono)
         if not isnan(self._took[place]):
-            self.hops["robot_orion"].add(self._took[place] + took, at.mono)
+            self.segments["robot_orion"].add(self._took[place] + took, at.mono)
         self.tracer.notified(seq, at.mono)
 
     def decided(self, origin: Origin, at: Instant, now: float) -> None:
         """It arrived then and has just been decided on (``now`` monotonic, s)."""
-        self.hops["iveg"].add(now - at.mono, now)
+        self.segments["iveg"].add(now - at.mono, now)
         self.decided_at = now
         self.tracer.decided(origin.seq, now)
 
     def painted(self, took_s: float, now: float) -> None:
         """A page has drawn it so long after the decision (s)."""
-        self.hops["screen"].add(took_s, now)
+        self.segments["screen"].add(took_s, now)
         self.tracer.painted(now)
 
     # --- what can be read off ---------------------------------------------------------
@@ -196,12 +196,12 @@ class Stream:
         """
         self.orion_first += 1
         self._state[place] = _BOTH
-        self.hops["fiware"].add(0.0, now)
+        self.segments["fiware"].add(0.0, now)
         if not isnan(self._took[place]):
-            self.hops["uplink"].add(self._took[place], now)
+            self.segments["uplink"].add(self._took[place], now)
 
     def _transit(
-        self, hop: Hop, origin: Origin, at: Instant, composed_at: float | None
+        self, hop: Segment, origin: Origin, at: Instant, composed_at: float | None
     ) -> float:
         """What it took from the robot's stamp (s); ``nan`` where it does not count."""
         if origin.stamp_s is None:
@@ -212,10 +212,10 @@ class Stream:
         took = self.clock.take(origin.stamp_s, at, composed_at)
         if isinstance(took, str):
             return self._exclude(hop, took)
-        self.hops[hop].add(took, at.mono)
+        self.segments[hop].add(took, at.mono)
         return took
 
-    def _exclude(self, hop: Hop, why: Exclusion) -> float:
+    def _exclude(self, hop: Segment, why: Exclusion) -> float:
         self.excluded[hop, why] += 1
         return nan
 

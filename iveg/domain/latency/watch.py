@@ -8,17 +8,17 @@ message, it gets its place in a ring.
 from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
-from iveg.domain.latency.hops import (
+from iveg.domain.latency.offset import ClockOffset
+from iveg.domain.latency.overloads import Overloads
+from iveg.domain.latency.segments import (
     DATA,
     LONGEST_S,
     Data,
     Exclusion,
-    Hop,
+    Segment,
     data_of,
     data_of_kind,
 )
-from iveg.domain.latency.offset import ClockOffset
-from iveg.domain.latency.overloads import Overloads
 from iveg.domain.latency.series import SLICE_S, Series
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
@@ -30,7 +30,7 @@ _SERIES_A_TICK: Final = 40
 """So many end their slice in one tick: the others wait for the next (0.05 s)."""
 _MOST_ROBOTS: Final = 256
 
-Measured = tuple[str, Data, Hop, Sketch]
+Measured = tuple[str, Data, Segment, Sketch]
 """Robot, data, hop and what it took."""
 
 
@@ -60,7 +60,7 @@ class LatencyWatch:
         self.pages_within_s: float | None = None
         self._second_at = self._slice_at = float("-inf")
         self._slices = 0
-        self._ending: Iterator[tuple[Stream, Hop, Series]] = iter(())
+        self._ending: Iterator[tuple[Stream, Segment, Series]] = iter(())
         for robot_id in robots:
             self._add(robot_id)
 
@@ -143,7 +143,7 @@ class LatencyWatch:
         for robot_id, data, hop, sketch in hours:
             stream = self._streams.get((robot_id, data))
             if stream is not None:
-                stream.hops[hop].remember(sketch)
+                stream.segments[hop].remember(sketch)
 
     def _begin_slice(self, now: Instant) -> None:
         if self._slice_at == float("-inf"):
@@ -155,7 +155,7 @@ class LatencyWatch:
             [
                 (stream, hop, series)
                 for stream in self._streams.values()
-                for hop, series in stream.hops.items()
+                for hop, series in stream.segments.items()
             ]
         )
 

@@ -362,7 +362,7 @@ export type GreenhouseMap = {
 /** Whether the data path is whole, what was counted, how the fleet is told. */
 export type Health = {
   ok: boolean;
-  hops: Hop[];
+  hops: HopHealth[];
   counters: Record<string, number>;
   safety: Safety;
   /** What an earlier run left open. */
@@ -377,7 +377,7 @@ export type Hold = {
 };
 
 /** One hop of the data path from robot to screen. */
-export type Hop = {
+export type HopHealth = {
   hop: string;
   state: "ok" | "late" | "down" | "unknown";
   age_s: number | null;
@@ -386,118 +386,6 @@ export type Hop = {
   /** How late measures pass it, at least. */
   lag_s: number | null;
   growing: boolean;
-};
-
-/** All that was measured of one hop, within 1 %. */
-export type HopBins = {
-  /** Upper ends of the bins that are not empty, rising. */
-  edges_ms: number[];
-  /** How many messages fell into each. */
-  counts: number[];
-  /** The sum of all durations, exact. */
-  total_ms: number;
-};
-
-/** A robot's clock less the server's, as far as it is proven. */
-export type HopClock = {
-  robot_id: string;
-  state: string;
-  offset_ms: number | null;
-  uncertainty_ms: number | null;
-  jumps: number;
-};
-
-/** Every hop of every kind of data over one window. */
-export type HopLatency = {
-  at: string;
-  window: "1min" | "15min" | "24h";
-  window_s: number;
-  /** Null: all robots. */
-  robot: string | null;
-  /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */
-  direct: boolean;
-  rows: HopRow[];
-  /** What the paper printed, by place, kind of data and column (ms). */
-  paper: Record<string, Record<string, Record<string, number>>>;
-  clocks: HopClock[];
-  /** How well pages' clocks are known; null while none has told. */
-  pages_within_ms: number | null;
-  streams: HopStream[];
-  remarks: HopRemark[];
-  trace: HopTrace | null;
-  /** Where the script lies that draws the figures. */
-  library: string;
-  style_ids: string[];
-  /** ``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted. */
-  figures: Record<string, unknown>;
-};
-
-/** What passed a hop since the start. */
-export type HopOrder = {
-  passed: number;
-  missing: number;
-  reordered: number;
-  repeated: number;
-};
-
-/** What is wrong with a hop now: a sentence's name, and what fills it. */
-export type HopRemark = {
-  key: string;
-  hop: string;
-  slots: Record<string, string | number>;
-};
-
-/** One kind of data. */
-export type HopRow = {
-  data: "odometry" | "detections" | "lidar";
-  hops: Record<string, HopSpread>;
-  /** Hops of which not every message is told. */
-  sampled: ("uplink" | "fiware" | "robot_orion" | "iveg" | "screen")[];
-  /** Null unless they were asked for. */
-  bins: Record<string, HopBins> | null;
-};
-
-/** What one hop takes; null where nothing was measured. */
-export type HopSpread = {
-  count: number;
-  mean_ms: number | null;
-  p50_ms: number | null;
-  p95_ms: number | null;
-  p99_ms: number | null;
-  least_ms: number | null;
-  most_ms: number | null;
-};
-
-/** One hop of one message, since the robot's stamp, or since the broker without. */
-export type HopStep = {
-  hop: "uplink" | "fiware" | "robot_orion" | "iveg" | "screen";
-  from_ms: number;
-  to_ms: number;
-};
-
-/** One kind of data of one robot: what really comes, and how. */
-export type HopStream = {
-  robot_id: string;
-  data: "odometry" | "detections" | "lidar";
-  heard_hz: number;
-  agent_hz: number;
-  orion_hz: number;
-  /** Share (0 to 1) that the agent was not sent; null while nothing is heard. */
-  kept_back: number | null;
-  throttled: boolean;
-  orion_first: number;
-  uplink: HopOrder;
-  fiware: HopOrder;
-  /** By hop and reason, what is in no statistics. */
-  excluded: Record<string, Record<string, number>>;
-};
-
-/** One message, hop by hop. */
-export type HopTrace = {
-  robot_id: string;
-  data: "odometry" | "detections" | "lidar";
-  stamp: string | null;
-  steps: HopStep[];
 };
 
 export type JsonValue = unknown;
@@ -531,12 +419,81 @@ export type Latency = {
   robots: RobotLatency[];
 };
 
+/** A robot's clock less the server's, as far as it is proven. */
+export type LatencyClock = {
+  robot_id: string;
+  state: string;
+  offset_ms: number | null;
+  uncertainty_ms: number | null;
+  jumps: number;
+};
+
+/** One kind of data. */
+export type LatencyRow = {
+  data: "odometry" | "detections" | "lidar";
+  hops: Record<string, SegmentSpread>;
+  /** Hops of which not every message is told. */
+  sampled: ("uplink" | "fiware" | "robot_orion" | "iveg" | "screen")[];
+  /** Null unless they were asked for. */
+  bins: Record<string, SegmentBins> | null;
+};
+
 /** Times of one step (ms); null where nothing was measured. */
 export type LatencySpread = {
   count: number;
   p50_ms: number | null;
   p95_ms: number | null;
   max_ms: number | null;
+};
+
+/** One kind of data of one robot: what really comes, and how. */
+export type LatencyStream = {
+  robot_id: string;
+  data: "odometry" | "detections" | "lidar";
+  heard_hz: number;
+  agent_hz: number;
+  orion_hz: number;
+  /** Share (0 to 1) that the agent was not sent; null while nothing is heard. */
+  kept_back: number | null;
+  throttled: boolean;
+  orion_first: number;
+  uplink: SegmentOrder;
+  fiware: SegmentOrder;
+  /** By hop and reason, what is in no statistics. */
+  excluded: Record<string, Record<string, number>>;
+};
+
+/** Every hop of every kind of data over one window. */
+export type LatencyTable = {
+  at: string;
+  window: "1min" | "15min" | "24h";
+  window_s: number;
+  /** Null: all robots. */
+  robot: string | null;
+  /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */
+  direct: boolean;
+  rows: LatencyRow[];
+  /** What the paper printed, by place, kind of data and column (ms). */
+  paper: Record<string, Record<string, Record<string, number>>>;
+  clocks: LatencyClock[];
+  /** How well pages' clocks are known; null while none has told. */
+  pages_within_ms: number | null;
+  streams: LatencyStream[];
+  remarks: SegmentRemark[];
+  trace: LatencyTrace | null;
+  /** Where the script lies that draws the figures. */
+  library: string;
+  style_ids: string[];
+  /** ``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted. */
+  figures: Record<string, unknown>;
+};
+
+/** One message, hop by hop. */
+export type LatencyTrace = {
+  robot_id: string;
+  data: "odometry" | "detections" | "lidar";
+  stamp: string | null;
+  steps: SegmentStep[];
 };
 
 /** One line of the action and inference log. */
@@ -821,6 +778,49 @@ export type Scan = {
   stamp: string | null;
   frame_id: string;
   points: [number, number][];
+};
+
+/** All that was measured of one hop, within 1 %. */
+export type SegmentBins = {
+  /** Upper ends of the bins that are not empty, rising. */
+  edges_ms: number[];
+  /** How many messages fell into each. */
+  counts: number[];
+  /** The sum of all durations, exact. */
+  total_ms: number;
+};
+
+/** What passed a hop since the start. */
+export type SegmentOrder = {
+  passed: number;
+  missing: number;
+  reordered: number;
+  repeated: number;
+};
+
+/** What is wrong with a hop now: a sentence's name, and what fills it. */
+export type SegmentRemark = {
+  key: string;
+  hop: string;
+  slots: Record<string, string | number>;
+};
+
+/** What one hop takes; null where nothing was measured. */
+export type SegmentSpread = {
+  count: number;
+  mean_ms: number | null;
+  p50_ms: number | null;
+  p95_ms: number | null;
+  p99_ms: number | null;
+  least_ms: number | null;
+  most_ms: number | null;
+};
+
+/** One hop of one message, since the robot's stamp, or since the broker without. */
+export type SegmentStep = {
+  hop: "uplink" | "fiware" | "robot_orion" | "iveg" | "screen";
+  from_ms: number;
+  to_ms: number;
 };
 
 /** The name of a template and what fills its holes. */

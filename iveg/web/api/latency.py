@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from iveg.domain.latency.account import Cell, LatencySummary, collect, merge, spread_of
-from iveg.domain.latency.hops import DATA, HOPS, WINDOW_S, Data, Hop, Window
 from iveg.domain.latency.offset import ClockOffset
 from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.segments import DATA, SEGMENTS, WINDOW_S, Data, Segment, Window
 from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
@@ -24,15 +24,15 @@ from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.models.base import write_json
 from iveg.models.latency import (
-    HopBins,
-    HopClock,
-    HopLatency,
-    HopOrder,
-    HopRemark,
-    HopRow,
-    HopSpread,
-    HopStream,
-    HopTrace,
+    LatencyClock,
+    LatencyRow,
+    LatencyStream,
+    LatencyTable,
+    LatencyTrace,
+    SegmentBins,
+    SegmentOrder,
+    SegmentRemark,
+    SegmentSpread,
 )
 from iveg.ngsi.codec import format_stamp
 from iveg.web.api.exports import form_of
@@ -68,7 +68,7 @@ def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
     )
 
-    @routes.get("/latency", response_model=HopLatency)
+    @routes.get("/latency", response_model=LatencyTable)
     async def latency(request: Request, asked: Annotated[Asked, Query()]) -> Response:
         """Mean and quantiles of each hop, clocks, rates, loss, and the figures."""
         parts = collect(watch.streams, asked.window, asked.robot)
@@ -115,7 +115,7 @@ def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
         "streams": [_stream(one) for one in streams],
         "sampled": _sampled(streams),
         "remarks": [
-            HopRemark(key=one.key, hop=one.hop, slots=dict(one.slots))
+            SegmentRemark(key=one.key, hop=one.hop, slots=dict(one.slots))
             for one in watch.overloads.remarks
         ],
         "traced": None if traced is None else (traced.robot_id, traced.data),
@@ -139,7 +139,7 @@ def _finished(
             "trace": trace_figure(newest),
         }
     library = charts.library()
-    answer = HopLatency(
+    answer = LatencyTable(
         **told,
         direct=any(spreads[data, "uplink"].count for data in DATA),
         rows=[
@@ -155,9 +155,9 @@ def _finished(
     return write_json(vars(answer))
 
 
-def _trace(of: tuple[str, Data], newest: Trace) -> HopTrace:
+def _trace(of: tuple[str, Data], newest: Trace) -> LatencyTrace:
     robot_id, data = of
-    return HopTrace(
+    return LatencyTrace(
         robot_id=robot_id, data=data, stamp=newest.stamp, steps=steps_of(newest)
     )
 
@@ -165,29 +165,29 @@ def _trace(of: tuple[str, Data], newest: Trace) -> HopTrace:
 def _row(
     data: Data,
     spreads: Mapping[Cell, LatencySummary],
-    sampled: list[Hop],
+    sampled: list[Segment],
     sketches: Mapping[Cell, Sketch] | None,
-) -> HopRow:
-    return HopRow(
+) -> LatencyRow:
+    return LatencyRow(
         data=data,
-        hops={hop: _spread(spreads[data, hop]) for hop in HOPS},
+        hops={hop: _spread(spreads[data, hop]) for hop in SEGMENTS},
         sampled=list(sampled),
         bins=None
         if sketches is None
-        else {hop: _bins(sketches[data, hop]) for hop in HOPS},
+        else {hop: _bins(sketches[data, hop]) for hop in SEGMENTS},
     )
 
 
-def _bins(of: Sketch) -> HopBins:
+def _bins(of: Sketch) -> SegmentBins:
     edges, counts = of.bins()
-    return HopBins(
+    return SegmentBins(
         edges_ms=[float(f"{1000.0 * edge:.6g}") for edge in edges],
         counts=counts,
         total_ms=round(1000.0 * of.total, 3),
     )
 
 
-def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
+def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Segment]]:
     """Hops that measure only some messages: Orion is throttled, pages are paced."""
     throttled = {one.data for one in streams if one.is_throttled}
     return {
@@ -196,8 +196,8 @@ def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Hop]]:
     }
 
 
-def _spread(of: LatencySummary) -> HopSpread:
-    return HopSpread(
+def _spread(of: LatencySummary) -> SegmentSpread:
+    return SegmentSpread(
         count=of.count,
         mean_ms=_ms(of.mean),
         p50_ms=_ms(of.p50),
@@ -208,8 +208,8 @@ def _spread(of: LatencySummary) -> HopSpread:
     )
 
 
-def _clock(robot_id: str, of: ClockOffset) -> HopClock:
-    return HopClock(
+def _clock(robot_id: str, of: ClockOffset) -> LatencyClock:
+    return LatencyClock(
         robot_id=robot_id,
         state=of.state,
         offset_ms=_ms(of.offset_s),
@@ -218,12 +218,12 @@ def _clock(robot_id: str, of: ClockOffset) -> HopClock:
     )
 
 
-def _stream(of: Stream) -> HopStream:
+def _stream(of: Stream) -> LatencyStream:
     rates = of.rates
     excluded: dict[str, dict[str, int]] = {}
     for (hop, why), count in of.excluded.items():
         excluded.setdefault(hop, {})[why] = count
-    return HopStream(
+    return LatencyStream(
         robot_id=of.robot_id,
         data=of.data,
         heard_hz=round(rates.heard, 1),
@@ -238,8 +238,8 @@ def _stream(of: Stream) -> HopStream:
     )
 
 
-def _order(of: SequenceLoss) -> HopOrder:
-    return HopOrder(
+def _order(of: SequenceLoss) -> SegmentOrder:
+    return SegmentOrder(
         passed=of.passed,
         missing=of.missing,
         reordered=of.reordered,
@@ -251,7 +251,7 @@ def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
     """One line a kind of data and hop (RFC 4180)."""
     text = io.StringIO()
     lines = csv.writer(text)
-    names = list(HopSpread.model_fields)
+    names = list(SegmentSpread.model_fields)
     lines.writerow(["data", "hop", *names])
     for (data, hop), sketch in sketches.items():
         told = vars(_spread(spread_of(sketch)))

@@ -11,16 +11,15 @@ from typing import Final
 from fastapi import APIRouter, Depends
 from starlette.responses import PlainTextResponse, Response
 
-from iveg.domain.latency.hops import HOPS, Data, Hop
+from iveg.domain.latency.segments import SEGMENTS, Data, Segment
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
-from iveg.models.health import Health, Safety
-from iveg.models.health import Hop as HealthHop
+from iveg.models.health import Health, HopHealth, Safety
 from iveg.web.security.authentication import require
 
 _SHARES: Final = (0.5, 0.95, 0.99)
-_Parts = list[tuple[str, Data, Hop, int, float, list[Sketch]]]
+_Parts = list[tuple[str, Data, Segment, int, float, list[Sketch]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +90,7 @@ def _events(counters: Mapping[str, int]) -> Iterator[str]:
     yield from _family("events_total", "counter", "Everything counted.", samples)
 
 
-def _hops(hops: Iterable[HealthHop]) -> Iterator[str]:
+def _hops(hops: Iterable[HopHealth]) -> Iterator[str]:
     known = [(_labels(hop=hop.hop), hop) for hop in hops]
     up = ((labels, hop.state == "ok") for labels, hop in known)
     yield from _family("hop_up", "gauge", "Whether a hop is well.", up)
@@ -108,7 +107,7 @@ def _parts(watch: LatencyWatch) -> _Parts:
     return [
         (one.robot_id, one.data, hop, series.count, series.total, series.parts("1min"))
         for one in watch.streams
-        for hop, series in one.hops.items()
+        for hop, series in one.segments.items()
         if series.count
     ]
 
@@ -166,7 +165,7 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
     lags = (
         (_labels(hop=hop, robot=robot), lag)
         for (hop, robot), lag in watch.overloads.lags.items()
-        if hop in HOPS
+        if hop in SEGMENTS
     )
     yield from _family("behind_seconds", "gauge", "How far a hop is behind.", lags)
 

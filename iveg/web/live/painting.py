@@ -8,7 +8,7 @@ from collections import deque
 from math import isfinite
 from typing import Final, TypeGuard
 
-from iveg.domain.latency.hops import Data
+from iveg.domain.latency.segments import Data
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.web.live.pacing import FRAMES
 

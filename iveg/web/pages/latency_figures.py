@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from iveg.domain.latency.account import Cell, LatencySummary
-from iveg.domain.latency.hops import DATA, Hop
+from iveg.domain.latency.segments import DATA, Segment
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.trace import Trace
-from iveg.models.latency import HopStep
+from iveg.models.latency import SegmentStep
 from iveg.web.pages.charts import figure_of
 
-STEPS: Final[tuple[Hop, ...]] = ("uplink", "fiware", "iveg", "screen")
+STEPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "iveg", "screen")
 _Trace = Mapping[str, object]
 _MOST_POINTS = 200
 
@@ -53,7 +53,7 @@ def trace_figure(trace: Trace | None) -> bytes:
     return figure_of(bars, ("ms", "hop"), {"showlegend": False})
 
 
-def steps_of(trace: Trace | None) -> list[HopStep]:
+def steps_of(trace: Trace | None) -> list[SegmentStep]:
     """The hops that a message has passed, in their order.
 
     The decision may come before Orion's copy: iVeg acts on whichever copy is first.
@@ -61,14 +61,14 @@ def steps_of(trace: Trace | None) -> list[HopStep]:
     if trace is None:
         return []
     start = trace.heard_at - (trace.uplink_s or 0.0)
-    spans: list[tuple[Hop, float, float | None]] = [
+    spans: list[tuple[Segment, float, float | None]] = [
         ("uplink", start, None if trace.uplink_s is None else trace.heard_at),
         ("fiware", trace.heard_at, trace.notified_at),
         ("iveg", trace.heard_at, trace.decided_at),
         ("screen", trace.decided_at or 0.0, trace.painted_at),
     ]
     return [
-        HopStep(
+        SegmentStep(
             hop=hop,
             from_ms=round(1000.0 * (begin - start), 2),
             to_ms=round(1000.0 * (end - start), 2),
@@ -78,7 +78,7 @@ def steps_of(trace: Trace | None) -> list[HopStep]:
     ]
 
 
-def _bars(spreads: Mapping[Cell, LatencySummary], hop: Hop) -> Iterator[_Trace]:
+def _bars(spreads: Mapping[Cell, LatencySummary], hop: Segment) -> Iterator[_Trace]:
     found = {data: spreads[data, hop] for data in DATA}
     measured = {data: one for data, one in found.items() if one.mean is not None}
     if not measured:

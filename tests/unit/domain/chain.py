@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import count
 
 from iveg.domain.age import FeedbackLedger
-from iveg.domain.latency.hops import DATA, Data, Hop
+from iveg.domain.latency.segments import DATA, Data, Segment
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
@@ -93,9 +93,11 @@ class Chain:
         streams = {(one.robot_id, one.data): one for one in self.watch.streams}
         return streams[robot_id, data]
 
-    def took(self, hop: Hop, data: Data = "odometry", robot_id: str = "AGI") -> Sketch:
+    def took(
+        self, hop: Segment, data: Data = "odometry", robot_id: str = "AGI"
+    ) -> Sketch:
         """The last minute of a hop."""
-        return merged(self.stream(data, robot_id).hops[hop].parts("1min"))
+        return merged(self.stream(data, robot_id).segments[hop].parts("1min"))
 
     def last(self, transport: TransportId) -> Received:
         """What came last on a transport."""

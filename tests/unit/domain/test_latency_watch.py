@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.latency.hops import DATA, HOPS, Hop
+from iveg.domain.latency.segments import DATA, SEGMENTS, Segment
 from iveg.domain.latency.sketch import sketch_of
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Odometry, Origin
@@ -12,7 +12,7 @@ from iveg.domain.transports import DIRECT, FIWARE
 from tests.builders import odometry, origin, received
 from tests.unit.domain.chain import Chain, jittered, still
 
-CALM: dict[Hop, float] = {
+CALM: dict[Segment, float] = {
     "uplink": 0.004,
     "fiware": 0.020,
     "robot_orion": 0.024,
@@ -31,7 +31,7 @@ def test_every_message_is_measured_at_every_hop() -> None:
 
     chain.run(10.0)
 
-    took = {(hop, data): chain.took(hop, data) for hop in HOPS for data in DATA}
+    took = {(hop, data): chain.took(hop, data) for hop in SEGMENTS for data in DATA}
     assert {place: one.count for place, one in took.items()} == {
         place: pytest.approx(199, abs=1) for place in took
     }
@@ -50,14 +50,14 @@ def test_every_message_is_measured_at_every_hop() -> None:
     ],
 )
 def test_a_delay_that_is_put_in_is_found_in_its_hop_alone(
-    chain: Chain, hop: Hop, seconds: float
+    chain: Chain, hop: Segment, seconds: float
 ) -> None:
     chain.run(10.0)
 
     expected = CALM | {hop: seconds}
     expected["robot_orion"] = expected["uplink"] + expected["fiware"]
-    assert {one: chain.took(one).mean for one in HOPS} == {
-        one: close(expected[one]) for one in HOPS
+    assert {one: chain.took(one).mean for one in SEGMENTS} == {
+        one: close(expected[one]) for one in SEGMENTS
     }
 
 
@@ -198,7 +198,7 @@ def test_a_minute_that_is_over_is_handed_on_for_the_history() -> None:
     chain.run(75.0)
 
     ended = {(data, hop): sketch for _, (_, data, hop, sketch) in chain.watch.ended}
-    assert set(ended) == {(data, hop) for data in DATA for hop in HOPS}
+    assert set(ended) == {(data, hop) for data in DATA for hop in SEGMENTS}
     assert ended["lidar", "fiware"].count == pytest.approx(1200, abs=25)
 
 
@@ -207,7 +207,7 @@ def test_an_earlier_runs_hours_are_part_of_the_day() -> None:
 
     chain.watch.remember([("AGI", "lidar", "fiware", sketch_of([0.5] * 7))])
 
-    parts = chain.stream("lidar").hops["fiware"].parts("24h")
+    parts = chain.stream("lidar").segments["fiware"].parts("24h")
     assert sum(one.count for one in parts) == 7
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from iveg.domain.latency.hops import Hop
+from iveg.domain.latency.segments import Segment
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.observations import Received
 from iveg.domain.records import LatencyRecord
@@ -24,9 +24,9 @@ def say(desk: Desk, *transports: TransportId, after_s: float = 0.0) -> None:
         desk.loop.step(desk.ingest.drain(), desk.clock())
 
 
-def took(desk: Desk, hop: Hop) -> Sketch:
+def took(desk: Desk, hop: Segment) -> Sketch:
     stream = desk.latency.watch.streams[0]
-    return merged(stream.hops[hop].parts("1min"))
+    return merged(stream.segments[hop].parts("1min"))
 
 
 def test_both_copies_of_a_message_are_timed_and_it_is_decided_on_once() -> None:
@@ -70,7 +70,7 @@ async def test_a_minute_goes_to_the_history_and_comes_back_from_it() -> None:
     later.latency.remember(hours_of(kept))
 
     assert {one.hop for one in kept} == {"uplink", "fiware", "robot_orion", "iveg"}
-    day = later.latency.watch.streams[0].hops["fiware"].parts("24h")
+    day = later.latency.watch.streams[0].segments["fiware"].parts("24h")
     assert merged(day).mean == pytest.approx(0.020)
 
 

@@ -11,7 +11,7 @@ from statistics import mean, quantiles
 import numpy as np
 import pytest
 
-from iveg.domain.latency.hops import Hop
+from iveg.domain.latency.segments import Segment
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
@@ -68,11 +68,11 @@ class Air(Stage):
             number = next(self._numbers)
             heapq.heappush(self._on_way, (when, number, transport, device, payload))
 
-    def took(self, robot_id: str, hop: Hop) -> Sketch:
+    def took(self, robot_id: str, hop: Segment) -> Sketch:
         """What a hop took for a robot's odometry in the last minute."""
         streams = self._desk.latency.watch.streams
         one = next(s for s in streams if (s.robot_id, s.data) == (robot_id, "odometry"))
-        return merged(one.hops[hop].parts("1min"))
+        return merged(one.segments[hop].parts("1min"))
 
 
 async def play(air: Air, seconds: float) -> None:

@@ -10,7 +10,7 @@ from iveg.models.climate import Climate
 from iveg.models.command import Command, Drill, Latency
 from iveg.models.decision import Decision
 from iveg.models.health import Health
-from iveg.models.latency import HopLatency
+from iveg.models.latency import LatencyTable
 from iveg.models.people import Detection, Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
@@ -36,7 +36,7 @@ PROMISED: dict[str, Any] = {
     "REST drills": Listing[Drill],
     "REST alerts": AlertListing,
     "REST log": Listing[LogEntry],
-    "REST latency": HopLatency,
+    "REST latency": LatencyTable,
     "NDJSON decisions": list[Decision],
     "NDJSON detections": list[Detection],
     "NDJSON commands": list[Command],

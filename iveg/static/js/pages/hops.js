@@ -1,10 +1,10 @@
 /**
  * The Latency page: the paper's table and figure as they are now, beside what it printed.
  *
- * @typedef {import("../types.js").HopSpread} Spread
- * @typedef {import("../types.js").HopStream} Stream
- * @typedef {import("../types.js").HopRow["sampled"][number]} Hop
- * @typedef {import("../types.js").HopLatency & {
+ * @typedef {import("../types.js").SegmentSpread} Spread
+ * @typedef {import("../types.js").LatencyStream} Stream
+ * @typedef {import("../types.js").LatencyRow["sampled"][number]} Hop
+ * @typedef {import("../types.js").LatencyTable & {
  *   figures: Record<string, import("./hop_figures.js").Figure>,
  * }} Latency
  */

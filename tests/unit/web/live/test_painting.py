@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from iveg.domain.latency.hops import Exclusion
+from iveg.domain.latency.segments import Exclusion
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
@@ -28,7 +28,7 @@ def stream(watch: LatencyWatch) -> Stream:
 
 
 def took(watch: LatencyWatch) -> Sketch:
-    return merged(stream(watch).hops["screen"].parts("1min"))
+    return merged(stream(watch).segments["screen"].parts("1min"))
 
 
 def send(painting: Painting, number: int, now: float) -> None:
@@ -117,4 +117,4 @@ def test_what_was_never_decided_on_is_not_sampled(topic: str) -> None:
 
     painting.painted(1, START + 1.04, 0.001, START + 1.05)
 
-    assert all(not one.hops["screen"].parts("1min") for one in watch.streams)
+    assert all(not one.segments["screen"].parts("1min") for one in watch.streams)

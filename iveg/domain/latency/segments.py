@@ -1,4 +1,8 @@
-"""Names of the latency table: hops, kinds of data, windows, reasons."""
+"""Names of the latency table: segments of the data path, data, windows, reasons.
+
+A segment lies between two places where a message is timed; JSON and columns call it
+``hop`` (``domain.hops`` has what is judged healthy or not).
+"""
 
 from typing import Final, Literal, get_args
 
@@ -10,12 +14,12 @@ from iveg.domain.observations import (
     kind_of,
 )
 
-Hop = Literal["uplink", "fiware", "robot_orion", "iveg", "screen"]
+Segment = Literal["uplink", "fiware", "robot_orion", "iveg", "screen"]
 """``uplink`` Δt₁: the robot's stamp to iVeg's own reading of the broker; ``fiware``
 Δt₂: from there to Orion's notification at the boundary; ``robot_orion`` both as one
 number; ``iveg`` Δt₃: whichever copy was first, to the decision; ``screen`` Δt₄: from
 there to the frame that a page has drawn."""
-HOPS: Final[tuple[Hop, ...]] = get_args(Hop)
+SEGMENTS: Final[tuple[Segment, ...]] = get_args(Segment)
 
 Data = Literal["odometry", "detections", "lidar"]
 """The paper's three rows; its "YOLOx" is ``detections``."""
