@@ -1,10 +1,10 @@
 /**
- * The installed page without a connection: one sentence in place of the browser's error;
- * and what the server has people told while no page is open.
+ * The service worker: one sentence in place of the browser's error when there is no
+ * connection, and push messages of the server while no page is open.
  *
- * Navigation fallback and nothing else: API, live line, sign-in and whatever an open page
- * asks for go to the network as if this were not here.  Where the browser can be told so
- * beforehand, this need not even be awake for them: a STOP waits for nobody.
+ * A fallback for navigation and nothing else: API, live line, sign-in and all requests of
+ * an open page go to the network.  Where the browser supports static routes, the worker
+ * need not even be awake for them: a STOP waits for nothing.
  */
 
 const CACHE = "iveg-offline-1";
@@ -12,7 +12,7 @@ const OFFLINE = "/static/offline.html";
 const NEVER = ["/api/", "/live", "/signin", "/signout", "/ngsi/", "/static/", "/docs"];
 const NOT_NAVIGATIONS = ["cors", "no-cors", "same-origin"];
 
-/** Whether a request may be answered by the sentence. @param {Request} request */
+/** Whether a request may be answered by the offline page. @param {Request} request */
 function isFallback({ mode, method, url }) {
   const { origin, pathname, searchParams } = new URL(url);
   return (
@@ -66,7 +66,7 @@ self.addEventListener("notificationclick", (event) => {
   event.waitUntil(openAlerts());
 });
 
-/** A page that is open comes forward as it is: somebody may be at its STOP. */
+/** An open page comes to the front as it is: a person may be at its STOP. */
 async function openAlerts() {
   const pages = await self.clients.matchAll({ type: "window" });
   return pages.length ? pages[0].focus() : self.clients.openWindow("/alerts");

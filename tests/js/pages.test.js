@@ -1,5 +1,5 @@
 import {
-  judgeChain,
+  judgeDataPath,
   ORDER,
   sentenceOf,
 } from "../../iveg/static/js/pages/health_sentence.js";
@@ -41,11 +41,11 @@ const order = (differs = {}) =>
   });
 
 test("a whole chain is said to work", () => {
-  equal(judgeChain(hops({}), [], true).key, "fleet.whole");
+  equal(judgeDataPath(hops({}), [], true).key, "fleet.whole");
 });
 
 test("of several broken hops the one nearest to the robots is named", () => {
-  const found = judgeChain(
+  const found = judgeDataPath(
     hops({ notifications: "down", iot_agent: "down" }),
     [],
     true,
@@ -55,12 +55,12 @@ test("of several broken hops the one nearest to the robots is named", () => {
 });
 
 test("a hop that is down is worse news than a late one before it", () => {
-  const found = judgeChain(hops({ mqtt: "late", orion: "down" }), [], true);
+  const found = judgeDataPath(hops({ mqtt: "late", orion: "down" }), [], true);
   equal(found.hop, "orion");
 });
 
 test("an agent that falls behind is said to be late by its seconds", () => {
-  const found = judgeChain(
+  const found = judgeDataPath(
     [{ hop: "iot_agent", state: "late", lag_s: 23.4, growing: true }],
     [],
     true,
@@ -79,16 +79,16 @@ test("what is late for another reason than its lag keeps its sentence", () => {
 });
 
 test("a silent robot before a merely late chain is named with its id", () => {
-  const found = judgeChain(hops({ mqtt: "late" }), ["AGI", "AGII"], true);
+  const found = judgeDataPath(hops({ mqtt: "late" }), ["AGI", "AGII"], true);
   equal([found.key, found.slots.robots], ["fleet.silent_robots", "AGI, AGII"]);
 });
 
 test("a dead broker explains silent robots", () => {
-  equal(judgeChain(hops({ mqtt: "down" }), ["AGI"], true).hop, "mqtt");
+  equal(judgeDataPath(hops({ mqtt: "down" }), ["AGI"], true).hop, "mqtt");
 });
 
 test("without the server nothing else is known", () => {
-  equal(judgeChain(hops({}), [], false).key, "fleet.silent_server");
+  equal(judgeDataPath(hops({}), [], false).key, "fleet.silent_server");
 });
 
 test("each road is measured from the press on, and silence is no number", () => {
@@ -138,9 +138,9 @@ test("the median is a number that was measured", () => {
 });
 
 test("13.5 a chain that nobody has heard of, or without robots, is not said to work", () => {
-  equal(judgeChain([], [], true).key, "fleet.unknown");
-  const silent = judgeChain(hops({}), ["AGI"], true, 3);
+  equal(judgeDataPath([], [], true).key, "fleet.unknown");
+  const silent = judgeDataPath(hops({}), ["AGI"], true, 3);
   equal([silent.key, silent.slots.robots], ["fleet.silent_robots", "AGI"]);
-  const none = judgeChain(hops({}), [], true, 0);
+  const none = judgeDataPath(hops({}), [], true, 0);
   equal([none.key, none.state], ["fleet.no_robots", "unknown"]);
 });

@@ -119,7 +119,9 @@ def test_the_fleet_page_draws_the_whole_chain_and_each_device(
     for hop in ("robots", "mqtt", "iot_agent", "orion", "notifications", "screen"):
         box = page.locator(f'.hop-box[data-hop="{hop}"]')
         expect(box).to_have_attribute("data-state", "ok", timeout=30_000)
-    expect(page.locator("#chain-sentence")).to_have_text(re.compile("Todo funciona"))
+    expect(page.locator("#data-path-sentence")).to_have_text(
+        re.compile("Todo funciona")
+    )
     expect(page.locator("#machines tbody tr")).to_have_count(2)
     lidar = page.locator("#devices tr", has_text="AGI_lidar2D")
     expect(lidar).to_contain_text("hace 0,")

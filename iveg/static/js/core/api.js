@@ -1,7 +1,7 @@
 /**
- * Asking the server over HTTP: an answer or its status, never an exception.
+ * Requests to the server over HTTP: an answer or its status, never an exception.
  *
- * @typedef {{status: number, body: any}} Answer `status` 0: nobody answered; `body` null
+ * @typedef {{status: number, body: any}} Answer `status` 0: no answer; `body` null
  *   where it was not JSON
  */
 
@@ -14,7 +14,7 @@ export function readApi(path) {
 }
 
 /**
- * Sends JSON with the sign by which the server tells its own page from others.
+ * Sends JSON with the header by which the server tells its own page from others.
  *
  * @param {"POST" | "PUT" | "DELETE"} method
  * @param {string} path

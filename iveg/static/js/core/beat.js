@@ -1,8 +1,8 @@
 /**
- * The page's beat: what is written again and again is written together, in few frames.
+ * The page's beat: panels write their texts together, in few frames.
  *
- * Each frame in which any text changes costs style, layout, paint and a hand-over of the
- * whole page, whether one word is new or a hundred; a dozen panels with clocks of their
+ * Each frame in which any text changes costs style, layout, paint and compositing of the
+ * whole page, whether one word is new or a hundred; a dozen panels with timers of their
  * own would make thirty such frames a second.
  */
 

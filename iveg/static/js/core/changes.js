@@ -1,5 +1,5 @@
 /**
- * What a message changes of the values that the store knows, as pure functions.
+ * How a message changes a value that the store knows, as pure functions.
  *
  * @typedef {import("./protocol.js").Robot} Robot
  * @typedef {import("./protocol.js").Snapshot} Snapshot

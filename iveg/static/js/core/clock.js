@@ -1,5 +1,5 @@
 /**
- * How old a value is now, and what that makes of a robot's link.
+ * The age of a value now, and the link of a robot that follows from it.
  *
  * The server says how old a value was when it sent it (`age_s`); from then on the
  * browser's own monotonic clock counts.  No wall clock enters, so a tablet with a wrong
@@ -11,13 +11,13 @@ import { LIMITS } from "./limits.js";
 /**
  * @typedef {"LIVE" | "LATE" | "LOST" | "UNKNOWN"} Link
  *
- * What every stored value carries: `age_s` (s) at the server when sent, null for a value
- * never heard; `receivedAtMs` (ms, `performance.now()`) when the browser got it.
+ * Fields of every stored value: `age_s` (s) at the server when sent, null for a value
+ * never received; `receivedAtMs` (ms, `performance.now()`) when the browser got it.
  * @typedef {{age_s?: number | null, receivedAtMs?: number}} Aged
  */
 
 /**
- * Age of a value now (s); Infinity for one that was never heard.
+ * Age of a value now (s); Infinity for a value that was never received.
  *
  * @param {Aged | null | undefined} data
  * @param {number} [nowMs] `performance.now()` (ms)
@@ -53,7 +53,7 @@ export function linkOfRobot(robot, nowMs = performance.now()) {
 }
 
 /**
- * An age in words, marked where the robot proves nothing and it is only estimated.
+ * The text of an age, marked where it is an estimate without proof from the robot.
  *
  * @param {{age_estimated?: boolean} | null | undefined} robot
  * @param {string} said
@@ -71,8 +71,8 @@ export function aboutAge(robot, said, i18n) {
  * waiting somewhere, so half of it is the best guess of the way back (Cristian 1989).
  *
  * `at` is the server's monotonic clock (s), which no correction of the date moves:
- * `localOf(at)` is that moment by `performance.now()` (ms), null before an answer told;
- * `serverOf(nowMs)` the other way, with how wrong it may be (s).
+ * `localOf(at)` is that moment by `performance.now()` (ms), null before the first answer;
+ * `serverOf(nowMs)` is the inverse, with its uncertainty (s).
  *
  * @typedef {{
  *   note: (sentMs: number, receivedMs: number, serverS: number, at?: number) => void,

@@ -1,6 +1,6 @@
 /**
- * Who listens to what: facts are told at once, state once per frame and topic, telemetry
- * as often as it can be read.
+ * Subscriptions: facts are delivered at once, state once per frame and topic, telemetry
+ * with the page's beat.
  *
  * @typedef {(data: any, topic: string) => void} Listener
  */
@@ -87,7 +87,7 @@ function guarded(fn, data, topic) {
 }
 
 /**
- * Whether a pattern means a topic: itself, or one level below it.
+ * Whether a pattern matches a topic: the topic itself, or one level below it.
  *
  * @param {string} pattern `people`, `robots/AGI`, `robots/`, `robots/+/scan`
  * @param {string} topic

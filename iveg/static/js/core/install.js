@@ -1,6 +1,6 @@
 /**
- * iVeg as an installed app: registers the offline sentence, and keeps the browser's offer
- * to install until somebody asks for it.  Both take HTTPS or the computer itself.
+ * iVeg as an installed app: registers the offline page, and keeps the browser's offer to
+ * install until a person asks for it.  Both need HTTPS or localhost.
  *
  * @typedef {Event & {prompt: () => Promise<unknown>}} Offer
  * @typedef {"ready" | "installed" | "none" | "insecure"} InstallState
@@ -10,7 +10,7 @@ import { scriptUrl } from "./scripturl.js";
 
 const WORKER = "/sw.js";
 
-/** Keeps what a browser tells of installing; one for the life of a page. */
+/** The browser's events about installing; one object for the life of a page. */
 export function createInstalling() {
   /** @type {Offer | null} */
   let offer = null;
@@ -47,12 +47,12 @@ export function createInstalling() {
   };
 }
 
-/** Registers the worker; without one a page is as it always was. */
+/** Registers the service worker; a page works the same without it. */
 export async function registerWorker() {
   if (!isSecureContext || !navigator.serviceWorker) return;
   try {
     await navigator.serviceWorker.register(scriptUrl(WORKER));
   } catch {
-    // The offline sentence is a comfort, and its lack no fault of this page.
+    // The offline page is a comfort; its failure is no fault of this page.
   }
 }

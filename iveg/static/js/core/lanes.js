@@ -1,9 +1,9 @@
 /**
- * Names of lanes in the reader's words, where they are those that greenhouses of iVeg
- * come with; a name that a grower gave is a name, and stays as it is.
+ * Names of lanes in the reader's language, for the names in iVeg's own greenhouse files;
+ * a name that a grower chose stays as it is.
  */
 
-/** What the greenhouse files of iVeg call their lanes, and the sentence for it. */
+/** Names of lanes in iVeg's greenhouse files, and the key of the message for each. */
 const GIVEN = /** @type {const} */ ([
   [/^(?:Pasillo )?(\d+)$/, "lane.number"],
   [/^Pasillo (\d+) norte$/, "lane.number_north"],

@@ -1,6 +1,6 @@
 /**
  * The server's safety numbers: it writes its table (`iveg/domain/limits.py`) into every
- * page, so that no number stands here a second time.
+ * page, so that no number is written here a second time.
  *
  * @typedef {{
  *   live_s: number, late_s: number, seen_s: number, ring_lasts_s: number,
@@ -10,7 +10,7 @@
  * }} Limits those that pages use; names carry the unit
  */
 
-/** A worker has no page to read them from; it is called by them (`remotebrush.js`). */
+/** A worker has no page to read them from; its name carries them (`remotebrush.js`). */
 const written =
   typeof document === "undefined" ? self.name : document.body.dataset.limits;
 
@@ -18,10 +18,10 @@ const written =
 export const LIMITS = Object.freeze(JSON.parse(written ?? ""));
 
 /**
- * How wide a ring is that was `radiusM` wide at an age of `thenS`, at an older age (m).
+ * Radius of a ring at an age (m), when it was `radiusM` at the younger age `thenS`.
  *
- * It keeps its size for as long as a healthy way takes, grows as fast as a person
- * walks, and never shrinks.
+ * It keeps its size for as long as a healthy data path takes, grows at walking speed,
+ * and never shrinks.
  *
  * @param {number} radiusM
  * @param {number} ageS

@@ -1,10 +1,11 @@
 /**
  * One WebSocket to `/live`, from its opening to its end: pings, the age of what arrives,
- * and the word to the server of what was painted.
+ * and the report to the server of painted frames.
  *
  * @typedef {import("./presses.js").Press} Press
  * @typedef {import("./clock.js").ServerClock} ServerClock
- * @typedef {{draws: boolean, whenPainted: (fn: () => void) => void}} Painting `draws`:
+ * @typedef {import("./painting.js").WhenPainted} WhenPainted
+ * @typedef {{draws: boolean, whenPainted: (fn: WhenPainted) => void}} Painting `draws`:
  *   this page shows telemetry, so the moment when it paints is worth telling
  * @typedef {{
  *   apply: (topic: string, data: any, receivedAtMs: number) => void,
@@ -123,7 +124,7 @@ export class LiveSocket {
     return told === null ? this.heardAtMs : Math.min(this.heardAtMs, told);
   }
 
-  /** @param {number} frame @param {number | null} nextMs null: nothing was drawn */
+  /** @param {number} frame @param {number | null} nextMs as for `createPace` */
   #painted(frame, nextMs) {
     if (!this.isOpen) return;
     const isDrawn = this.#draws && nextMs !== null;

@@ -2,24 +2,24 @@
  * Tells the server which frame of telemetry has been painted; only then does it send more
  * than a small window of them.  So a page that paints slowly skips, and never lags.
  *
- * It also says how long the next one may wait: one that comes just before the screen's
- * next frame has the newest of everything, and spares both sides those in between.
+ * It also says how long the next one may wait: a frame that arrives just before the
+ * screen's next one has the newest values, and spares both sides those in between.
  */
 
-/** From the server's word until it is drawn, beside the way here (ms). */
+/** From the arrival of a frame until it is drawn (ms). */
 const LEAD_MS = 5;
-/** Frames of the screen that its rate is known from. */
+/** Frames of the screen from which its rate is estimated. */
 const FRAMES_KEPT = 16;
-/** Of a usual screen (ms): what is much longer were several, and nothing new to draw. */
+/** Period of a usual screen (ms): a much longer gap was several frames without news. */
 const USUAL_FRAME_MS = 1000 / 60;
-/** Nearer to each other is the same frame (ms). */
+/** A shorter gap is within the same frame (ms). */
 const QUICKEST_FRAME_MS = 2;
 
 /**
  * @param {(frame: number, nextMs: number | null) => void} say `nextMs`: until the screen's
- *   next frame, 0 where that is not known; null: nothing is drawn
+ *   next frame, 0 where it is unknown; null: nothing is drawn
  * @param {(fn: import("./painting.js").WhenPainted) => void} whenPainted after the map has
- *   drawn what has come
+ *   drawn the newest values
  */
 export function createPace(say, whenPainted) {
   const screen = createScreen();
@@ -29,29 +29,29 @@ export function createPace(say, whenPainted) {
   /** @param {number} [beganMs] */
   function tell(beganMs) {
     told = newest;
-    // Where nobody looks nothing is drawn, and the moment says nothing of the screen.
+    // A hidden page draws nothing, so this moment says nothing of the screen.
     say(newest, document.hidden ? null : screen.nextMs(performance.now(), beganMs));
   }
 
   return {
-    /** Call it when everything that a frame brought was handed on. @param {number} frame */
+    /** To be called when everything in a frame has been delivered. @param {number} frame */
     took(frame) {
       const isAsked = newest > told;
       newest = frame;
-      // Asked for after the map has asked for its own frame: painting comes first.
+      // Requested after the map's own frame: painting comes first.
       if (!isAsked) whenPainted(tell);
     },
   };
 }
 
-/** When the frames of this page's screen begin, as far as its pictures show it. */
+/** The phase and period of the screen's frames, estimated from the pictures drawn. */
 export function createScreen() {
   /** @type {number[]} */
   let gaps = [];
   let lastMs = Number.NEGATIVE_INFINITY;
   return {
     /**
-     * How long until the next frame begins (ms); 0 while that is not known.
+     * Time until the next frame begins (ms); 0 while it is unknown.
      *
      * @param {number} nowMs @param {number} [beganMs] the frame that was just drawn
      */
@@ -68,8 +68,8 @@ export function createScreen() {
 }
 
 /**
- * A report of what was drawn, with how long the next frame may wait (s): its way here and
- * a little to draw it before the screen's next frame.
+ * The report of a picture, with the time that the next frame may wait (s), so that it
+ * arrives and is drawn before the screen's next frame.
  *
  * @param {{at: number, within: number}} drawn `within`: half the shortest round trip (s)
  * @param {number} nextMs until the screen's next frame

@@ -1,7 +1,7 @@
 /**
- * What stands on a page besides STOP: the shell's panels everywhere, the route's own after.
+ * The panels of a page besides STOP: those of the shell everywhere, then the route's own.
  *
- * Each part starts on its own: one that fails is reported and the others go on.
+ * Each panel starts on its own: a failure is reported and the others go on.
  */
 
 import { createAlertsPanel } from "../panels/alerts.js";
@@ -19,7 +19,7 @@ import { createWakeLock } from "./wakelock.js";
  *   tone: import("../panels/tone.js").Tone,
  *   wake: import("./wakelock.js").WakeLock,
  *   installing: ReturnType<typeof createInstalling>,
- * }} Page what the page of a route is given
+ * }} Page the parts that the page of a route is given
  */
 
 /** @type {Record<string, () => Promise<{start: (page: Page) => unknown}>>} */

@@ -1,9 +1,9 @@
 /**
- * Tells a measuring script which messages the frame just drawn has brought to the eye.
+ * Tells a measuring script which messages are visible since the frame just drawn.
  *
- * `window.__onPaint({robot, kind, stamp})`, if somebody defined it; `stamp` exactly as
- * the robot sent it.  Messages that a newer one replaced before a frame came were never
- * drawn and are not told.
+ * `window.__onPaint({robot, kind, stamp})`, if a script defined it; `stamp` exactly as
+ * the robot sent it.  A message that a newer one replaced before a frame came was never
+ * drawn and is not reported.
  *
  * @typedef {{robot: string, kind: "odom" | "lidar" | "detection", stamp: string}} Painted
  */
@@ -12,7 +12,7 @@
 
 /**
  * Listens for a script that defines `window.__onPaint`, now or later.  Until there is
- * one nobody watches the store or the map for it.
+ * one, neither store nor map are watched for it.
  *
  * @param {Pick<import("./store.js").Store, "watch">} store
  * @param {{onPicture: (watch: () => Seen) => () => void}} map
@@ -73,7 +73,7 @@ function createPaintHook(tell) {
       const kind = kindOf(topic);
       if (!kind || !data?.stamp) return;
       const name = `${kind}/${data.robot_id}`;
-      // The same pose comes again when only a speed limit changed; it was drawn already.
+      // The same pose comes again when only a speed limit changed; it is drawn already.
       if (told.get(name) === data.stamp) return;
       arrived.set(name, { robot: data.robot_id, kind, stamp: data.stamp });
     },

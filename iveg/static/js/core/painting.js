@@ -1,5 +1,5 @@
 /**
- * When this page has painted what it has just heard: the map knows where there is one.
+ * The moment when this page has painted the newest messages; the map knows it, if any.
  *
  * @typedef {(beganMs?: number) => void} WhenPainted `beganMs`: when the frame of the
  *   screen began (`performance.now()`), where something was drawn
@@ -8,7 +8,7 @@
 
 import { onNextFrame } from "./hub.js";
 
-/** A page that is not painted says seldom that it has heard (ms). */
+/** A page that is not painted answers this seldom (ms). */
 const HIDDEN_MS = 1000;
 
 export function createPainting() {
@@ -20,7 +20,7 @@ export function createPainting() {
       painter = map;
     },
     /**
-     * Calls `fn` once what is known now has been painted, or a second later.
+     * Calls `fn` once the present values have been painted, or a second later.
      *
      * @param {WhenPainted} fn
      */

@@ -1,8 +1,8 @@
 /**
- * The words of `/live`: what a frame says, and nothing about what is done with it.
+ * The frames of `/live`: how they are read and written (docs/interfaces/live.md).
  *
- * Shapes come from the models of the server (`types.d.ts`); here they get what the page
- * adds: when a value arrived.  Lengths are metres, angles radians, frames `map`.
+ * Shapes come from the models of the server (`types.d.ts`); here they get the
+ * page's own field: when a value arrived.  Lengths are metres, angles radians, frames `map`.
  *
  * @typedef {import("./clock.js").Aged} Aged
  * @typedef {import("../types.js").Point} Point
@@ -42,7 +42,7 @@ import { ProtocolError, parse, readHead } from "./wire.js";
 export { ProtocolError };
 
 /**
- * Reads one frame as the socket hands it over (`binaryType` "arraybuffer").
+ * Reads one frame as the socket delivers it (`binaryType` "arraybuffer").
  *
  * @param {unknown} frame
  * @returns {Message}
@@ -109,8 +109,8 @@ export function writePing(t) {
 /**
  * @param {number} frame the newest that was painted
  * @param {{at: number, within: number, wait?: number} | null} [drawn] when, on the
- *   server's monotonic clock, and how wrong that may be (s); how long the next frame may
- *   wait (s); null where nothing was drawn or nobody knows
+ *   server's monotonic clock, its uncertainty, and how long the next frame may wait (s);
+ *   null if nothing was drawn or the moment is unknown
  * @returns {string} as the server's counters know it: nothing before `type`, no spaces
  */
 export function writePainted(frame, drawn = null) {

@@ -1,6 +1,7 @@
 /**
- * The map's keys: F fits, 1…9 follow a robot, 0 shows the fleet, + and − zoom, M measures, ? explains;
- * while the map has the focus the arrows pan and Enter marks its centre.
+ * The map's keys: F fits, 1…9 follow a robot, 0 shows the fleet, + and − zoom, M measures,
+ * ? opens the legend; while the map has the focus the arrows pan and Enter marks its
+ * centre.
  *
  * Single keys can be switched off (WCAG 2.1.4), and never fire while somebody types.
  *

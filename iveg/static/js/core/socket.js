@@ -68,7 +68,7 @@ export class LiveLine {
    *   store: Store,
    *   page?: Visibility,
    *   draws?: boolean,
-   *   whenPainted?: (fn: () => void) => void,
+   *   whenPainted?: import("./live_socket.js").Painting["whenPainted"],
    * }} options `draws` and `whenPainted` as for `LiveSocket`
    */
   constructor(options) {

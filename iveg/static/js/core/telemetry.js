@@ -1,5 +1,5 @@
 /**
- * A frame of telemetry: the newest of everything that has changed, in one message.
+ * A frame of telemetry: the newest value of everything that has changed, in one message.
  *
  * docs/interfaces/live.md.  A move is an array, because it comes most often; a
  * scan's ranges follow the head as integers.
@@ -45,8 +45,8 @@ export function readTelemetry(head, bytes, start) {
 }
 
 /**
- * A robot's part tells what has changed of it; that of people who there is, and each who
- * has changed; all others are whole.
+ * A part about a robot has its changed fields; the part about people has all ids and each
+ * person that has changed; every other part is whole.
  *
  * @param {Told} part
  * @returns {Told[]}
@@ -108,7 +108,7 @@ export function pointsOf(sweep, units) {
 }
 
 /**
- * The directions of a scanner's rays, worked out once: cosine, sine, cosine …
+ * The directions of a scanner's rays, computed once: cosine, sine, cosine …
  *
  * @param {Pick<Sweep, "angle_min" | "angle_increment">} sweep
  * @param {number} count

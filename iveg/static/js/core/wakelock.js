@@ -1,8 +1,8 @@
 /**
- * Keeps the screen on while somebody supervises: a dark screen warns nobody.
+ * Keeps the screen on while a person supervises: a dark screen warns nobody.
  *
- * The browser lets go whenever the page is hidden; it is asked again when the page comes
- * back.  Browsers grant it to HTTPS and to the computer itself alone.
+ * The browser releases the lock whenever the page is hidden; it is requested again when
+ * the page comes back.  Browsers grant it over HTTPS and on localhost alone.
  *
  * @typedef {ReturnType<typeof createWakeLock>} WakeLock
  * @typedef {{released: boolean, release: () => Promise<void>}} Sentinel
@@ -15,7 +15,7 @@ const KEY = "iveg.wake";
 
 /**
  * @param {{locker?: Locker | null, page?: Document, storage?: Storage | null}} [options]
- *   tests hand in their own
+ *   tests pass their own
  */
 export function createWakeLock(options = {}) {
   const { page = document, storage = browserStorage() } = options;
@@ -32,7 +32,7 @@ export function createWakeLock(options = {}) {
     try {
       held = await locker.request("screen");
     } catch {
-      // A nearly empty battery refuses; the page is asked again when it comes back.
+      // A nearly empty battery refuses; the request is repeated when the page comes back.
       held = null;
     }
   }
@@ -49,7 +49,7 @@ export function createWakeLock(options = {}) {
     isPossible: () => locker !== null,
     isWanted: () => isWanted,
     isHeld: () => held !== null && !held.released,
-    /** This page is one that somebody watches. */
+    /** To be called by a page for supervision. */
     supervise() {
       isSupervising = true;
       return settle();
@@ -60,7 +60,7 @@ export function createWakeLock(options = {}) {
       try {
         storage?.setItem(KEY, wanted ? "on" : "off");
       } catch {
-        // A full or forbidden store costs the memory of a switch, never the switch.
+        // A full or forbidden storage costs the memory of a switch, never the switch.
       }
       return settle();
     },

@@ -1,4 +1,4 @@
-/** How a frame lies in its bytes, before anybody asks what it says. */
+/** The layout of a frame in bytes, below the meaning of its fields. */
 
 /** A frame that does not follow the contract; the connection goes on without it. */
 export class ProtocolError extends Error {

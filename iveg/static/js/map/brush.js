@@ -1,9 +1,9 @@
 /**
- * Who draws the pictures of a map: this thread, or a worker that has nothing else to do.
+ * The drawing of a map's pictures: on this thread, or by a worker of its own.
  *
- * A canvas that is drawn here costs the page's thread its rasterising and its handing
- * over in every frame (half of all it did with ten robots), so a worker draws wherever
- * it can be given the canvas.
+ * A canvas that is drawn here costs the page's thread its rasterising and compositing in
+ * every frame (half of its load with ten robots), so a worker draws wherever the browser
+ * can transfer the canvas.
  *
  * @typedef {import("./picture.js").Picture} Picture
  * @typedef {import("./layers/trail.js").Trails} Trails
@@ -15,8 +15,8 @@
  *   soon: (compose: () => void) => void,
  *   draw: (picture: Picture, whenDrawn: WhenDrawn) => void,
  *   end: () => void,
- * }} Brush `soon`: calls back when the next picture may be composed; `draw`: of pictures
- *   that a newer one overtook nothing is said
+ * }} Brush `soon`: calls back when the next picture may be composed; `draw`: no
+ *   `whenDrawn` for a picture that a newer one has replaced
  */
 
 import { createTrails } from "./layers/trail.js";
@@ -41,8 +41,8 @@ export function createLocalBrush(canvas) {
 }
 
 /**
- * The worker's, and this thread's where no worker comes up: a map that costs more is
- * better than none.
+ * The worker's brush, or this thread's where no worker starts: a slower map is better
+ * than none.
  *
  * @param {HTMLCanvasElement} canvas
  * @returns {Brush}

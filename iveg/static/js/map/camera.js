@@ -1,5 +1,5 @@
 /**
- * Where the eye is: fitted to the greenhouse, moved by hand, or following a robot.
+ * The view of the map: fitted to the greenhouse, moved by hand, or following a robot.
  *
  *     fitted ──(pan, zoom)──> moved ──(F)──> fitted
  *        └──(1…9, double tap)──> following ──(pan, F, 0)──> moved or fitted
@@ -16,7 +16,7 @@
 import { hasArea } from "./layers/greenhouse.js";
 import * as viewport from "./viewport.js";
 
-/** An open field is fitted to what is seen in its first second. */
+/** An open field is fitted to the detections and scans of its first second. */
 const OPENING_MS = 1000;
 const FOLLOW_FROM_SCALE = 24;
 const STEP_ZOOM = 1.4;
@@ -25,7 +25,7 @@ const PADDING_PX = 28;
 const NOTHING = { now: () => [], forget: () => undefined };
 const FLEET_MARGIN_M = 3;
 const FIELD_MARGIN_M = 2;
-/** Every so many-eth laser point is enough to know how far a field reaches. */
+/** One laser point of so many is enough to know how far a field reaches. */
 const POINT_STRIDE = 8;
 
 /**
@@ -56,7 +56,7 @@ export function createCamera(sceneNow, onFollow, covers = NOTHING) {
     if (box) view = fitted(box);
   }
 
-  /** Fits the first sight of a greenhouse; never again once a person has moved the map. */
+  /** Fits the first scene of a greenhouse; never again once a person has moved the map. */
   function open() {
     const { map, nowMs } = sceneNow();
     if (!map || isMoved) return;
@@ -123,7 +123,7 @@ export function createCamera(sceneNow, onFollow, covers = NOTHING) {
     /** @param {number} steps positive = closer */
     zoomBy: (steps) => zoom(view.width / 2, view.height / 2, STEP_ZOOM ** steps),
     /**
-     * A pinch on a followed robot means its size: fingers never move quite evenly.
+     * A pinch on a followed robot zooms and does not pan: fingers never move quite evenly.
      *
      * @param {number} dx
      * @param {number} dy
@@ -139,7 +139,7 @@ export function createCamera(sceneNow, onFollow, covers = NOTHING) {
 }
 
 /**
- * The greenhouse, or in an open field what robots are and see (m); null for nothing at all.
+ * Bounds of the greenhouse, in an open field of robots and scans (m); null without any.
  *
  * @param {Scene} scene
  */

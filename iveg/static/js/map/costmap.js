@@ -1,8 +1,9 @@
 /**
- * Brings to the store what is asked for every two seconds and not told on the live line:
- * the shared costmap while the map shows it, and where cameras have looked.
+ * Polls the shared costmap, while the map shows it, and the coverage by cameras into the
+ * store, every two seconds.
  *
- * Both are large or slow to change, and nobody stops for them.
+ * Both are large or slow to change, and no robot stops for them, so they are not sent on
+ * the live line.
  *
  * @typedef {import("../core/store.js").Store} Store
  */
@@ -39,7 +40,7 @@ export function followCoverage(store) {
  * @param {string} topic
  * @param {() => boolean} isWanted
  * @param {() => {path: string, isStill: () => boolean}} ask below `/api/v1/`, and whether
- *   that is still what is wanted when the answer comes
+ *   it is still wanted when the answer comes
  */
 function follow(store, topic, isWanted, ask) {
   const timer = setInterval(bring, EVERY_MS);
@@ -52,7 +53,7 @@ function follow(store, topic, isWanted, ask) {
       const answer = await fetch(`/api/v1/${path}`, { headers });
       if (isStill() && answer.ok) store.apply(topic, await answer.json());
     } catch {
-      // The line's own banner tells that the server is gone; the next round asks again.
+      // The banner says that the server is unreachable; the next round asks again.
     }
   }
 

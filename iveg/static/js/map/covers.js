@@ -1,10 +1,10 @@
-/** What lies over the map, measured, so that a fitted greenhouse can keep clear of it. */
+/** Sizes of the elements over the map, so that a fitted greenhouse keeps clear of them. */
 
 import { coverOf } from "./layers/scalebar.js";
 
 /**
- * What lies over the map (`data-over-map` beside it, and the bar of its scale), each at
- * its largest since the greenhouse was fitted: counts come and go, and a greenhouse that moved
+ * The elements over the map (`data-over-map` beside it, and the scale bar), each at its
+ * largest since the greenhouse was fitted: counts come and go, and a greenhouse that moved
  * with them could not be watched.
  *
  * @param {HTMLCanvasElement} canvas
@@ -48,7 +48,7 @@ export function createCovers(canvas, onGrowth) {
 /** @param {Element} element */
 const asElement = (element) => /** @type {HTMLElement} */ (element);
 
-/** Sizes as they change. @param {HTMLElement[]} elements @param {() => void} fn */
+/** Reports changes of size. @param {HTMLElement[]} elements @param {() => void} fn */
 export function onResize(elements, fn) {
   const observer = new ResizeObserver(fn);
   for (const element of elements) observer.observe(element);

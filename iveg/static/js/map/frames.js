@@ -1,8 +1,8 @@
 /**
  * The map's frame loop, which runs only when there is something new.
  *
- * A message asks for the very next picture the moment it arrives; however many arrive
- * before it, that picture has the newest of each, so there is no queue to grow.
+ * A message requests the next picture the moment it arrives; however many arrive before
+ * it, that picture has the newest of each, so no queue can grow.
  *
  * @typedef {import("./brush.js").Brush} Brush
  * @typedef {import("./picture.js").Picture} Picture
@@ -46,8 +46,8 @@ export function createFrames(brush, compose) {
     /** At once: a resized canvas is blank until it is drawn. */
     draw,
     /**
-     * Calls `watch` as a picture is composed, and what it gives back when that picture,
-     * or a newer one with all that it had, is on the canvas.
+     * Calls `watch` when a picture is composed, and its result when that picture, or a
+     * newer one with all of its values, is on the canvas.
      *
      * @param {() => Seen} watch
      * @returns {() => void} ends it
@@ -57,8 +57,8 @@ export function createFrames(brush, compose) {
       return () => void watchers.delete(watch);
     },
     /**
-     * Calls `fn` once what is known now is on the canvas, with when the frame of the
-     * screen began that it is in (`performance.now()`).
+     * Calls `fn` once the present values are on the canvas, with the beginning of that
+     * frame of the screen (`performance.now()`).
      *
      * @param {(beganMs: number) => void} fn
      */

@@ -1,5 +1,5 @@
 /**
- * Fingers, mouse and wheel on the map, turned into what a person means by them.
+ * Pointer and wheel events on the map, turned into gestures.
  *
  * @typedef {{
  *   pan: (dx: number, dy: number) => void,
@@ -8,7 +8,7 @@
  *   tap: (px: number, py: number) => void,
  *   doubleTap: (px: number, py: number) => void,
  *   hover: (px: number, py: number) => void,
- * }} Gestures all in CSS pixels of the element; `pinch` moves and zooms in one
+ * }} Gestures all in CSS pixels of the element; `pinch` moves and zooms at once
  * @typedef {{x: number, y: number}} Point
  */
 
@@ -70,7 +70,7 @@ export function listen(element, gestures) {
 }
 
 /**
- * Keeps a drag that leaves the element.
+ * Captures a drag that leaves the element.
  *
  * @param {HTMLElement} element
  * @param {number} pointerId
@@ -84,7 +84,7 @@ function capture(element, pointerId) {
 }
 
 /**
- * How much closer one turn of the wheel comes.
+ * Zoom factor of one turn of the wheel.
  *
  * @param {{deltaY: number, deltaMode: number, ctrlKey: boolean}} wheel
  */
@@ -95,8 +95,8 @@ export function wheelFactor({ deltaY, deltaMode, ctrlKey }) {
 }
 
 /**
- * One finger drags or taps, two pinch.  A tap is told after the time in which it could
- * still become a double tap, so that following a robot does not open its record as well.
+ * One finger drags or taps, two pinch.  A tap is reported after the time in which it
+ * could still become a double tap, so that following a robot does not open its record.
  *
  * @param {Gestures} gestures
  */

@@ -1,5 +1,5 @@
 /**
- * The live map: what is to be seen, put together here and drawn by a brush.
+ * The live map: composes the picture and hands it to a brush, which draws it.
  *
  * @typedef {import("../core/store.js").Store} Store
  * @typedef {import("./camera.js").Camera} Camera
@@ -126,13 +126,13 @@ export function createMap(canvas, store, options = {}) {
   };
 }
 
-/** What a person may switch. @param {ReturnType<typeof createChoices>} choices */
+/** The switches of the map. @param {ReturnType<typeof createChoices>} choices */
 function choicesOf(choices) {
   return {
     setLayer: choices.setLayer,
     /** @returns {{name: string, on: boolean}[]} from the ground up */
     layers: () => LAYERS.map((name) => ({ name, on: choices.isOn(name) })),
-    /** Whose belief is drawn; null draws what all robots know together. */
+    /** The robot whose knowledge is drawn; null draws that of all robots together. */
     setBeliever: choices.setBeliever,
     believer: choices.believer,
     setTrail: choices.setTrail,
@@ -143,7 +143,7 @@ function choicesOf(choices) {
 }
 
 /**
- * The colours and the words that the map is drawn with.
+ * The colours and labels of the map.
  *
  * @param {HTMLCanvasElement} canvas
  * @param {() => void} onChange
@@ -195,7 +195,7 @@ function createPicking(at) {
 }
 
 /**
- * The scene as one robot believes it, where somebody has chosen one.
+ * The scene as the chosen robot knows it; the whole scene where none is chosen.
  *
  * @param {import("./scene.js").Scene} whole
  * @param {Store} store
@@ -207,7 +207,7 @@ function believed(whole, store, believer) {
 }
 
 /**
- * The same camera, whose every movement asks for a frame.
+ * The same camera, with a new frame for every movement.
  *
  * @param {Camera} camera
  * @param {() => void} invalidate

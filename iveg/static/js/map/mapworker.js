@@ -1,6 +1,6 @@
 /**
  * The worker that draws the map: takes parcels, draws the newest in the next frame of
- * the screen, and says which that was.
+ * the screen, and reports its number.
  *
  * @typedef {import("./remotebrush.js").ToWorker} ToWorker
  * @typedef {import("./remotebrush.js").TrailOrder} TrailOrder

@@ -1,4 +1,4 @@
-/** A tape that is laid between two taps, while somebody measures. */
+/** The tape measure between two taps, while measuring is on. */
 
 import { laidTo, lengthOf } from "./layers/measure.js";
 

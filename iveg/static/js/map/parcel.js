@@ -1,8 +1,8 @@
 /**
- * A picture as it goes to the worker that draws it: what changes with every frame is in
- * every parcel; what is large and seldom another is in it once, until it is another.
+ * A picture as it is sent to the worker: values that change with every frame are in every
+ * parcel; large values that seldom change are in one parcel each time that they change.
  *
- * A thing is the same while it is the same object, on either side; so layers that are
+ * A value is unchanged while it is the same object, on either side, so layers that are
  * cached for a greenhouse or a sweep stay cached.
  *
  * @typedef {import("./picture.js").Picture} Picture
@@ -48,7 +48,7 @@ export function createPacker() {
   };
 }
 
-/** Layers write no more of a detection than its class. @param {Scene["detections"][0]} it */
+/** Layers need no more of a detection than its class. @param {Scene["detections"][0]} it */
 function seenOnly({ item, ...detection }) {
   return { ...detection, item: { class_id: item.class_id } };
 }
@@ -58,7 +58,7 @@ export function createUnpacker() {
   /** @type {Map<string, any>} */
   const known = new Map();
   return {
-    /** Every parcel in its order: a later one leaves out what an earlier one told. */
+    /** Opens parcels in their order: a later one leaves out values of an earlier one. */
     open({ news, scene, ...picture }) {
       for (const [name, value] of Object.entries(news)) known.set(name, value);
       const greenhouse = Object.fromEntries(

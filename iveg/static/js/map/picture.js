@@ -1,13 +1,13 @@
 /**
- * The layers put on one canvas, from the ground up.
+ * All layers on one canvas, from the ground up.
  *
- * What does not move is drawn once per viewport and theme, what lies under the machines
- * when it changes; both are copied in between.
+ * The static layers are drawn once per viewport and theme, the layers under the robots
+ * when they change; both are copied in between.
  *
  * @typedef {import("./layers/paint.js").Paint} Paint
  * @typedef {import("./layers/trail.js").Trails} Trails
  * @typedef {Omit<Paint, "ctx" | "places"> & {ratio: number, off: readonly string[],
- *   trailS: number}} Picture what is to be seen: `ratio` device pixels per CSS pixel,
+ *   trailS: number}} Picture `ratio` device pixels per CSS pixel,
  *   `off` the layers that are not drawn, `trailS` how much of the trails (s)
  */
 
@@ -29,7 +29,7 @@ import { createStaticImage } from "./layers/static.js";
 import * as trail from "./layers/trail.js";
 import { drawVeil } from "./layers/veil.js";
 
-/** From the ground up: nothing ever hides a person. */
+/** From the ground up: no layer ever hides a person. */
 export const LAYERS = [
   "grid",
   "greenhouse",
@@ -90,7 +90,7 @@ export function createPicture(canvas, trails) {
   const broken = new Set();
 
   /**
-   * One layer's bad datum must not take the robots off the map; told once a layer.
+   * Bad data in one layer must not take the robots off the map; reported once a layer.
    *
    * @param {string} layer
    * @param {Paint} paint
@@ -141,7 +141,7 @@ function matchPixels(canvas, { view, ratio }) {
 }
 
 /**
- * Brings a context back from wherever a layer left it, without clearing the picture.
+ * Restores a context after a layer that failed, without clearing the picture.
  *
  * @param {Paint} paint
  */

@@ -1,5 +1,5 @@
 /**
- * Pictures drawn by a worker, on a canvas that the page has handed to it.
+ * Pictures drawn by a worker, on a canvas that the page has transferred to it.
  *
  * At most a few pictures are under way: a worker that is slow draws fewer of them, the
  * newest, and is never behind by more.
@@ -20,11 +20,11 @@
 import { scriptUrl } from "../core/scripturl.js";
 import { createPacker } from "./parcel.js";
 
-/** Pictures that may be under way: one that is drawn, one that waits, one to spare. */
+/** Pictures under way at most: one being drawn, one waiting, one to spare. */
 const UNDER_WAY = 3;
 /** Steps of robots that are kept until the next picture takes them along. */
 const STEPS_KEPT = 256;
-/** As long as a step of a trail; smaller ones need not be told. */
+/** The length of a step of a trail; smaller steps need not be sent. */
 const STEP_M = 0.05;
 
 /**
@@ -98,7 +98,7 @@ function startWorker() {
 }
 
 /**
- * What happens to trails, noted for the worker that keeps them.
+ * Records the changes of trails for the worker that keeps them.
  *
  * @param {(orders: TrailOrder[]) => void} tell
  */

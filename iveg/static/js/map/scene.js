@@ -1,8 +1,8 @@
 /**
- * What the map has to say at one instant: the store read with the eyes of a clock.
+ * The scene on the map at one instant, from the store and a time.
  *
  * Layers only paint; whether a robot is a ghost, how far a ring has grown, whether a
- * sweep is too old to show is decided here, purely, from values and `nowMs`.
+ * sweep is too old to show is decided here, by pure functions of values and `nowMs`.
  *
  * @typedef {import("../core/store.js").Store} Store
  * @typedef {import("../core/protocol.js").Robot} Robot
@@ -18,8 +18,8 @@
  *   drive: string, length: number, width: number,
  *   task: string | null, goal: Point | null, path: [number, number][],
  *   unsureM: number,
- * }} SceneRobot `slot` 1–8 its hue; `unsureM` how far it may have driven since a STOP
- *   that nobody confirmed (m), 0 when that is not the case
+ * }} SceneRobot `slot` 1–8 its hue; `unsureM` how far it may have driven since an
+ *   unconfirmed STOP (m), 0 without one
  *
  * @typedef {{
  *   id: string, peer: boolean, stage: "seen" | "remembered" | "last_seen",
@@ -49,13 +49,13 @@ import { LIMITS, ringRadius } from "../core/limits.js";
 
 /** The server is silent for two seconds when the line is called lost; one more. */
 const VEIL_AFTER_MS = 1000;
-/** Commands whose robot may still be driving without anybody knowing. */
+/** Commands whose robot may still be driving unnoticed. */
 const UNSURE_STATES = new Set(["UNCONFIRMED", "STILL_MOVING"]);
-/** A mark of somebody who was lost goes then (s): nobody knows where the person is. */
+/** Age at which the mark of a lost person is removed (s): the place is unknown by then. */
 export const MARK_LIMIT_S = 60;
 /** Marks nearer to each other than this are one (m). */
 const ONE_MARK_M = 1;
-/** A body for a robot that nobody described (m). */
+/** Body of a robot without a description (m). */
 const PLAIN = { drive: "differential", length: 1, width: 0.6 };
 const BOX_WITHOUT_SIZE_M = 0.5;
 
@@ -119,8 +119,8 @@ function readRobot(robot, pose, store, nowMs) {
 }
 
 /**
- * How far a robot may have gone since a STOP that it has not obeyed as far as anybody
- * knows: what the server says, and from then on its last speed times the silence.
+ * How far a robot may have driven since a STOP that is unconfirmed: the server's figure,
+ * and from then on its last speed times the silence.
  *
  * @param {Robot} robot
  * @param {Store} store
@@ -162,8 +162,8 @@ export function readPerson(person, nowMs) {
 }
 
 /**
- * Whom the map shows: a mark of somebody who was lost goes after a minute, and of marks
- * that lie on each other, or on somebody who has a ring, only the newest stays.
+ * The people that the map shows: the mark of a lost person is removed after a minute, and
+ * of marks that overlap each other, or a person with a ring, only the newest stays.
  *
  * @param {ScenePerson[]} people
  */
@@ -198,7 +198,7 @@ function ringNow(person, stage, ageS) {
 /**
  * A person never gets fresher here than the server said, only older.
  *
- * Without a ring (the place was seen to be empty) nobody is remembered there.
+ * Without a ring (the place was seen to be empty) no person is remembered there.
  *
  * @param {Person} person
  * @param {number} ageS
@@ -264,7 +264,7 @@ function readScans(store, nowMs) {
 }
 
 /**
- * Old laser points say where things were; they fade while LATE and go when LOST.
+ * Old laser points show the past; they fade while LATE and go when LOST.
  *
  * @param {number} ageS
  */

@@ -14,9 +14,9 @@
 /** From a greenhouse of a kilometre to the teeth of a wheel (px/m). */
 export const MIN_SCALE = 1;
 export const MAX_SCALE = 400;
-/** Between the greenhouse and what lies over the map (px). */
+/** Between the greenhouse and the elements over the map (px). */
 const GAP_PX = 8;
-/** What covers more is looked through: the greenhouse keeps a third of the canvas each way. */
+/** Larger covers are ignored: the greenhouse keeps a third of the canvas each way. */
 const MOST_OF_A_SIDE = 1 / 3;
 
 /**
@@ -59,14 +59,14 @@ export function visible(view) {
 }
 
 /**
- * Shows a whole rectangle, in the middle of what nothing covers.
+ * Shows a whole rectangle, in the middle of the uncovered part.
  *
- * What lies over a corner can be passed beside or above it: the larger picture wins.
+ * A cover at a corner can be avoided beside or above it: the larger picture wins.
  *
  * @param {Viewport} view
  * @param {Box2D} box (m)
  * @param {number} [padding] kept free on every side (px)
- * @param {readonly Rect[]} [covers] what lies over the canvas, at its edges
+ * @param {readonly Rect[]} [covers] elements over the canvas, at its edges
  * @returns {Viewport}
  */
 export function fitTo(view, box, padding = 28, covers = []) {

@@ -1,5 +1,5 @@
 /**
- * The page about iVeg: what it says of the rule is what is in force now.
+ * The page about iVeg, with the numbers of the rule in force.
  */
 
 import { translate } from "../core/i18n.js";

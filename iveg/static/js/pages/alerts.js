@@ -1,5 +1,5 @@
 /**
- * The Alerts page: all that is active, whatever the window of time; the sound; the past.
+ * The Alerts page: all active alerts, whatever the window of time; the sound; the past.
  */
 
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
@@ -84,13 +84,13 @@ function timesOf({ raised_at, last_raised_at, count }, i18n) {
   return count === 1 ? first : `${first} – ${i18n.time(last_raised_at)}`;
 }
 
-/** What it says, and each time that it said so. @param {Alert} alert
+/** The text of an alert, and each of its occurrences. @param {Alert} alert
  * @param {import("../core/i18n.js").I18n} i18n @param {Set<string>} opened */
 function whatOf(alert, i18n, opened) {
   const cell = make("td", "what", sentenceOf(alert, i18n));
   const { element, draw } = createMembers(i18n);
   draw(alert);
-  // The table is written anew while somebody reads it.
+  // The table is rewritten while a person reads it.
   element.open = opened.has(alert.alert_id);
   element.addEventListener("toggle", () => {
     if (element.open) opened.add(alert.alert_id);
@@ -102,7 +102,7 @@ function whatOf(alert, i18n, opened) {
   return cell;
 }
 
-/** Who, when and what they said. @param {Alert} alert
+/** Who acknowledged it, when, and with which note. @param {Alert} alert
  * @param {import("../core/i18n.js").I18n} i18n */
 function seenBy({ acknowledged_at, acknowledged_by, note }, i18n) {
   if (!acknowledged_at) return "—";

@@ -1,8 +1,8 @@
 /**
- * The words of detectors: what each stands for, and how certain each class must be.
+ * Class names of detectors: the class of each, and the threshold of each class.
  *
- * A change is a new version of the rule.  Whoever is at the form keeps what they typed
- * when somebody else is faster, and is told.
+ * A change is a new version of the rule.  A person at the form keeps the typed values
+ * when another person is faster, and is told.
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {"person" | "robot"} Class
@@ -52,13 +52,13 @@ export function createClassForm(store, i18n, guard) {
     draw();
   }
 
-  /** Whether somebody has typed what is not saved. */
+  /** Whether the form has values that are not saved. */
   function isDirty() {
     if (!seen) return false;
     return JSON.stringify(typed()) !== JSON.stringify(writtenOf(seen));
   }
 
-  /** What stands in the form, as the API takes it. */
+  /** The values of the form, as the API takes them. */
   function typed() {
     const thresholds = CLASSES.flatMap((name) => {
       const share = thresholdOf(name).valueAsNumber;
@@ -79,7 +79,7 @@ export function createClassForm(store, i18n, guard) {
       fill(answer.body);
       say("rule.saved", { version: answer.body.version });
     } else if (answer.status === 409) {
-      // Told once; whoever presses again means it.
+      // Told once; a second press confirms it.
       seen = store.get("rule") ?? seen;
       say("rule.stale");
     } else if (answer.status === 0) say("rows.offline");
@@ -141,7 +141,7 @@ export function createClassForm(store, i18n, guard) {
   need("#alias-add").addEventListener("click", add);
   word.addEventListener("keydown", (event) => {
     if (event.key !== "Enter") return;
-    // Enter in this field means this word, not the whole form.
+    // Enter in this field adds this name; it does not send the form.
     event.preventDefault();
     add();
   });
@@ -161,7 +161,7 @@ function thresholdOf(name) {
 }
 
 /**
- * What of a rule stands in the form; the classes' own names always mean themselves.
+ * The values of a rule in the form; a class's own name always means that class.
  *
  * @param {Rule} rule
  */

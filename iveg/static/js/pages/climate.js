@@ -1,5 +1,5 @@
 /**
- * The Climate page: three numbers to read from afar, how old they are, and their day.
+ * The Climate page: three readings, their age, and their last 24 hours.
  *
  * @typedef {"temperature" | "humidity" | "co2"} Part
  * @typedef {import("./history/charts.js").Source & {since: string, until: string,
@@ -71,7 +71,7 @@ function ago(age, i18n) {
 }
 
 /**
- * The last 24 hours, asked for again each minute while somebody can see them.
+ * The last 24 hours, asked for again each minute while the page is visible.
  *
  * @param {import("../core/i18n.js").I18n} i18n
  */
@@ -85,7 +85,7 @@ function createDay(i18n) {
     if (document.hidden) return;
     const answer = await readApi("history/climate");
     status = answer.status;
-    // What was drawn stays when the server is gone: it is the past, and stays true.
+    // The figures stay when the server is gone: the past stays true.
     if (status === 200) day = answer.body;
     await draw();
   }
@@ -128,7 +128,7 @@ function createDay(i18n) {
   }
 
   /**
-   * Least and most of the day: what the line is for who cannot see it.
+   * Least and greatest of the day: the text alternative of the line.
    *
    * @param {Part} part @param {import("./history/charts.js").Figure} figure
    */

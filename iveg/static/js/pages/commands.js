@@ -1,5 +1,5 @@
 /**
- * The Commands page: every order with what each of its roads took, to study and print.
+ * The Commands page: every order with the time on each transport, to study and print.
  */
 
 import { all, make, need, needPart, setText } from "../panels/dom.js";
@@ -36,7 +36,7 @@ export function start({ store, i18n }) {
 }
 
 /**
- * Each robot's last drill, for the sheet that somebody signs.
+ * Each robot's last drill, for the sheet to sign.
  *
  * @param {import("../core/store.js").Store} store
  * @param {I18n} i18n
@@ -67,7 +67,7 @@ function createDrills(store, i18n) {
     await Promise.all(
       lines.map(async (line) => {
         const found = await readLast(String(line.dataset.drillsOf));
-        // What was read stays when the server is gone: it is the past, and stays true.
+        // The table stays when the server is gone: the past stays true.
         if (found.status === 200 || !read.has(line)) read.set(line, found);
       }),
     );
@@ -113,7 +113,7 @@ function endOf(command, i18n, opened) {
   const cell = make("td", "what", endSaid(command, i18n));
   if (!command.steps?.length) return cell;
   const steps = make("details", "members");
-  // The table is written anew while somebody reads it.
+  // The table is rewritten while a person reads it.
   steps.open = opened.has(command.command_id);
   steps.addEventListener("toggle", () => {
     if (steps.open) opened.add(command.command_id);
@@ -137,10 +137,10 @@ function orderSaid({ kind, drill }, i18n) {
 
 /** @param {import("./latency.js").Order[]} items @param {I18n} i18n */
 function drawSummary(items, i18n) {
-  const { count, unconfirmed, ...roads } = summaryOf(items);
+  const { count, unconfirmed, ...times } = summaryOf(items);
   setText(need("#took-count"), i18n.number(count, 0));
   setText(need("#took-unconfirmed"), i18n.number(unconfirmed, 0));
-  for (const [road, stat] of Object.entries(roads)) {
-    setText(need(`#took-${road}`), stat ? i18n.t("commandspage.stat", stat) : "—");
+  for (const [name, stat] of Object.entries(times)) {
+    setText(need(`#took-${name}`), stat ? i18n.t("commandspage.stat", stat) : "—");
   }
 }

@@ -1,5 +1,5 @@
 /**
- * The evening sheet: the server wrote it; here its times and aisles become the reader's.
+ * The evening sheet of the server, with times and lanes in the reader's language.
  */
 
 import { laneName } from "../core/lanes.js";

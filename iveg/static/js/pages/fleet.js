@@ -1,5 +1,5 @@
 /**
- * The Fleet page: the chain as a diagram, each robot, and each of its devices.
+ * The Fleet page: the data path as a diagram, each robot, and each of its devices.
  */
 
 import { readApi } from "../core/api.js";
@@ -15,7 +15,7 @@ import {
 } from "../panels/dom.js";
 import { readingsOf } from "../panels/readings.js";
 import { isHeard, modeSaid, taskSaid } from "../panels/robot_texts.js";
-import { judgeChain } from "./health_sentence.js";
+import { judgeDataPath } from "./health_sentence.js";
 import { createTiles } from "./tiles.js";
 
 /** @typedef {import("../core/protocol.js").Robot} Robot */
@@ -35,7 +35,7 @@ export function start(page) {
 
   function draw() {
     const robots = [...store.robots().values()];
-    drawChain(robots);
+    drawDataPath(robots);
     setHidden(need("#machines-empty"), robots.length > 0);
     const isKnown = Boolean(store.get("snapshot"));
     setText(need("#machines-empty"), i18n.t(isKnown ? "robot.none" : "rows.loading"));
@@ -50,7 +50,7 @@ export function start(page) {
     );
   }
 
-  /** What the server has heard of each device, since it knows longer than this page. */
+  /** Messages of each device as the server counts them, from before this page was opened. */
   async function load() {
     const { status, body } = await readApi("devices");
     if (status === 200) devices = { items: body.items, readMs: performance.now() };
@@ -58,20 +58,20 @@ export function start(page) {
   }
 
   /** @param {Robot[]} robots */
-  function drawChain(robots) {
+  function drawDataPath(robots) {
     const isOpen = store.connection.state === "open";
     /** @type {import("../core/protocol.js").Health | null} */
     const health = store.get("health") ?? null;
     const silent = robots.filter((robot) => SILENT.has(linkOfRobot(robot)));
     const hops = health?.hops ?? [];
-    const found = judgeChain(
+    const found = judgeDataPath(
       hops,
       silent.map(({ robot_id }) => robot_id),
       isOpen || store.connection.state === "connecting",
       robots.length,
     );
-    setAttribute(need("#chain-says"), "data-state", found.state);
-    setText(need("#chain-sentence"), i18n.t(found.key, found.slots));
+    setAttribute(need("#data-path-status"), "data-state", found.state);
+    setText(need("#data-path-sentence"), i18n.t(found.key, found.slots));
     for (const box of all(".hop-box")) drawBox(box, hops, robots, silent.length);
   }
 
@@ -92,7 +92,7 @@ export function start(page) {
     } else {
       const hop = hops.find((it) => it.hop === name);
       setHidden(box, !hop && Boolean(box.closest(".hop-row--beside")));
-      // What the server said last is no news once it is silent.
+      // The server's last ages are out of date once it is silent.
       drawState(box, hop && isOpen ? hop.state : "unknown");
     }
   }
@@ -129,7 +129,7 @@ function deviceCells({ device, kind, age_s }, readMs, i18n) {
   ];
 }
 
-/** A column in which no robot has anything says nothing. @param {HTMLElement} table */
+/** Hides columns in which no robot has a value. @param {HTMLElement} table */
 function hideEmptyColumns(table) {
   const rows = [...table.querySelectorAll("tbody tr")];
   table.querySelectorAll("th").forEach((head, j) => {
@@ -174,7 +174,7 @@ function readingsSaid(robot, i18n) {
 }
 
 /**
- * Writes a table's cells in place: whoever reads it keeps the place.
+ * Writes a table's cells in place, so that a reader keeps the place.
  *
  * @param {string} selector
  * @param {(string | Node)[][]} rows

@@ -1,6 +1,6 @@
 /**
- * Between a form and the rule: a change that lowers protection says what it means, waits
- * for a second word, and can be undone for ten minutes.
+ * Guards the rule against a careless form: a change that lowers protection is explained,
+ * waits for a confirmation, and can be undone for ten minutes.
  */
 
 import { readApi, sendApi } from "../core/api.js";
@@ -14,7 +14,7 @@ import { loweringsOf, personShare, sightingsLost } from "./lowering.js";
 const UNDO_MS = 600_000;
 const KEPT = "iveg_rule_before";
 const TICK_MS = 1000;
-/** As many of today's sightings are asked for. */
+/** So many of today's sightings are requested. */
 const SIGHTINGS = 1000;
 
 /**
@@ -62,7 +62,7 @@ export function createGuard(store, i18n) {
   }
 
   /**
-   * Makes a change, if it is meant.
+   * Makes a change, after a confirmation where it lowers protection.
    *
    * @param {Change & {version: number}} change
    * @returns {Promise<Answer | null>} null: it is not, and what was typed stays

@@ -1,8 +1,8 @@
 /**
- * Where the chain from robot to screen is broken, in one sentence: pure judgement.
+ * The broken hop of the data path, in one sentence: pure functions.
  *
- * What lies behind a broken hop is silent because of it, so of several that are equally
- * bad the one nearest to the robots is named.
+ * The hops behind a broken hop are silent because of it, so of several equally bad hops
+ * the one nearest to the robots is named.
  *
  * @typedef {"ok" | "late" | "down" | "unknown"} State
  * @typedef {{hop: string, state: State, lag_s?: number | null, growing?: boolean}} Hop
@@ -10,7 +10,7 @@
  * @typedef {Sentence & {state: State, hop: string | null}} Verdict
  */
 
-/** In the order in which a datum travels; then what stands beside. */
+/** In the order of the data path; then the hops beside it. */
 export const ORDER = [
   "mqtt",
   "iot_agent",
@@ -19,7 +19,7 @@ export const ORDER = [
   "database",
   "emulator",
 ];
-/** From this lag on (s), the lag itself is what is wrong. */
+/** From this lag on (s), the lag itself is the fault. */
 const LATE_S = 1;
 /** @type {State[]} */
 const WORST_FIRST = ["down", "late", "unknown"];
@@ -31,14 +31,14 @@ const WORST_FIRST = ["down", "late", "unknown"];
  * @param {number} [heard] how many robots anything is known of
  * @returns {Verdict}
  */
-export function judgeChain(hops, lost, isOpen, heard = 1) {
+export function judgeDataPath(hops, lost, isOpen, heard = 1) {
   if (!isOpen) return verdict("fleet.silent_server", "down", "server");
   if (!hops.length) return verdict("fleet.unknown", "unknown", null);
   for (const state of WORST_FIRST) {
     const broken = hops
       .filter((hop) => hop.state === state)
       .sort((a, b) => ORDER.indexOf(a.hop) - ORDER.indexOf(b.hop))[0];
-    // Robots that are silent while the chain is only late are the worse news.
+    // Silent robots are worse than a data path that is only late.
     if (state === "late" && lost.length) break;
     if (broken) return { ...sentenceOf(broken), state, hop: broken.hop };
   }
@@ -49,7 +49,7 @@ export function judgeChain(hops, lost, isOpen, heard = 1) {
 }
 
 /**
- * What is said of one hop: how late it is where that is known, else its state.
+ * The sentence about one hop: its lag where that is known, else its state.
  *
  * @param {Hop} hop
  * @returns {Sentence}

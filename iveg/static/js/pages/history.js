@@ -1,5 +1,5 @@
 /**
- * The History page: asks for a range, draws it, and says plainly when it cannot.
+ * The History page: reads a range, draws it, and says when it cannot.
  */
 
 import { loadI18n } from "../core/i18n.js";
@@ -15,7 +15,7 @@ import { commandCells, createTable, decisionCells } from "./history/tables.js";
 
 const ROWS = 20;
 
-/** An answer that is not what was asked for; `status` 0 is no answer at all. */
+/** An answer without the requested data; `status` 0 is no answer at all. */
 class AnswerError extends Error {
   /** @param {number} status */
   constructor(status) {
@@ -177,7 +177,7 @@ function linkExports(asked, language) {
 }
 
 /**
- * Opens the decision's panel beside those that `main.js` looks after, by their rules:
+ * Opens the decision's panel beside those of `main.js`, by the same rules:
  * never modal, `Esc` or a press elsewhere closes it, the focus goes back.
  */
 function besideOthers() {

@@ -1,6 +1,6 @@
 /**
- * Figures of latency in this page's words and colours: transport blue, FIWARE orange, as
- * the paper has them; what comes after in two greys.
+ * Figures of latency in this page's language and colours: transport blue, FIWARE orange,
+ * as in the paper; the later hops in two greys.
  *
  * @typedef {{type: string, name: string, x: (number | string)[], y: (number | string)[],
  *   meta: {hop: string, data?: string}, error_y?: object, line?: object}} Trace
@@ -33,7 +33,7 @@ export async function drawHopFigure(place, { data, layout }, source, i18n) {
   const traces = data.map((trace) => dressed(trace, layout.meta, i18n));
   const laid = styled(layout, { since: 0, until: 0 }, i18n);
   if (layout.meta.y === "hop") {
-    // First hop on top, and room for its words.
+    // First hop on top, and room for its label.
     laid.yaxis = { ...laid.yaxis, autorange: "reversed", title: { text: "" } };
     laid.margin = { ...laid.margin, l: 150 };
   }

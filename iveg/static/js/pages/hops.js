@@ -1,5 +1,5 @@
 /**
- * The Latency page: the paper's table and figure as they are now, beside what it printed.
+ * The Latency page: the paper's table and figure with live values, beside the printed ones.
  *
  * @typedef {import("../types.js").SegmentSpread} Spread
  * @typedef {import("../types.js").LatencyStream} Stream
@@ -26,7 +26,7 @@ const HOPS = /** @type {Hop[]} */ ([
 ]);
 const FIGURES = ["bars", "cdf", "trace"];
 const NOTHING = "—";
-/** The paper's name of each of our hops; it has none for what comes after Orion. */
+/** The paper's name of each hop; it has none for the hops after Orion. */
 const PRINTED = /** @type {Record<string, string>} */ ({
   uplink: "uplink",
   fiware: "fiware",
@@ -111,7 +111,7 @@ function drawRemarks({ remarks }, i18n) {
 }
 
 /**
- * One line of what is measured and two of what was printed, for each kind of data.
+ * One row of measured and two of printed values, for each kind of data.
  *
  * @param {Latency} told @param {import("../core/i18n.js").I18n} i18n
  */
@@ -251,7 +251,7 @@ async function drawFigures(told, i18n) {
 }
 
 /**
- * What a figure shows, for who cannot see it.
+ * The text alternative of a figure.
  *
  * @param {string} name @param {Latency} told @param {import("../core/i18n.js").I18n} i18n
  */
@@ -266,7 +266,7 @@ function noteOf(name, told, i18n) {
 /** @param {HTMLElement} list @param {string[]} sentences */
 function fill(list, sentences) {
   const said = [...list.children].map(({ textContent }) => textContent);
-  // A list that is read out aloud is left alone while it says the same.
+  // A list that is read out aloud is left alone while it is unchanged.
   if (said.join("\n") === sentences.join("\n")) return;
   list.replaceChildren(...sentences.map((sentence) => make("li", "", sentence)));
 }

@@ -1,5 +1,5 @@
 /**
- * What a STOP took on each road, from the press on: pure arithmetic on its times.
+ * Times of a STOP on each transport, from the press on: pure arithmetic.
  *
  * @typedef {import("../types.js").Command} Order
  * @typedef {{median: number, worst: number}} Stat (ms)
@@ -8,7 +8,7 @@
 const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
 
 /**
- * The one zero of an order's times: the press, or the server's yes where no page told.
+ * The zero of an order's times: the press, or its acceptance where no press is known.
  *
  * @param {Order["times"]} times
  */
@@ -19,7 +19,7 @@ export function zeroOf({ pressed, requested }) {
 /**
  * @param {Order} order
  * @returns {Record<"accepted" | "sentDirect" | "direct" | "sentFiware" | "fiware" |
- *   "standing", number | null>} (ms) from the press on; null where nothing came
+ *   "standing", number | null>} (ms) from the press on; null where no answer came
  */
 export function tookOf({ times, standstill_ms }) {
   const zero = Date.parse(zeroOf(times));
@@ -36,7 +36,7 @@ export function tookOf({ times, standstill_ms }) {
 }
 
 /**
- * What became of an order, never what its robot does now.
+ * The outcome of an order, never the present state of its robot.
  *
  * @param {Order} order
  * @param {import("../core/i18n.js").I18n} i18n

@@ -1,5 +1,5 @@
 /**
- * What a change of the rule takes away from people: pure judgement, before it is made.
+ * How a change of the rule lowers protection: pure functions, before it is made.
  *
  * @typedef {import("../core/protocol.js").Rule} Rule
  * @typedef {Partial<Pick<Rule, "confidence_threshold" | "radius_m" | "class_thresholds" |
@@ -37,7 +37,7 @@ export function personShare({ class_thresholds, confidence_threshold }) {
 }
 
 /**
- * Of what was seen today, how much would no longer count.
+ * How many of today's sightings would no longer count.
  *
  * @param {{probability: number}[]} seen
  * @param {number} from the threshold in force (0–1)

@@ -1,8 +1,8 @@
 /**
- * Who is told outside the page: three forms, each saved and tried by itself.
+ * Notifications outside of the page: three forms, each saved and tried by itself.
  *
- * What the server keeps secret is never here: an empty password or address keeps the one
- * that it has.
+ * Secrets of the server are never here: an empty password or address keeps the stored
+ * one.
  *
  * @typedef {import("../types").Messages} Messages
  * @typedef {"push" | "email" | "webhook"} Channel
@@ -25,7 +25,7 @@ const input = (id) => /** @type {HTMLInputElement} */ (need(`#${id}`));
 export function createMessagesForm(i18n) {
   /** @type {Messages | null} */
   let known = null;
-  /** What the fields of a channel held when they were filled. */
+  /** The values of a channel's fields when they were filled. */
   const filled = new Map();
 
   async function load() {
@@ -189,7 +189,7 @@ const READ = {
 };
 
 /**
- * One a line: a name, then an address; an address alone is its own name.
+ * One recipient a line: a name, then an address; an address alone is its own name.
  *
  * @param {string} text
  */

@@ -1,5 +1,5 @@
 /**
- * A list of the API as a table that says when it is loading, empty or out of reach.
+ * A list of the API as a table that says when it is loading, empty or unreachable.
  *
  * @typedef {{items: any[], next: string | null}} Listing
  */
@@ -58,7 +58,7 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
 
   async function load() {
     const page = await read("");
-    // What was read stays when the server is gone: it is the past, and stays true.
+    // The rows stay when the server is gone: the past stays true.
     if (page) ({ items, next } = page);
     draw();
   }
@@ -81,9 +81,9 @@ export function createRows({ name, path, i18n, cells, admits = () => true, onIte
 }
 
 /**
- * Calls `fn` a while after an event, and once for all that come in between: the history
- * is written in batches, so what has just happened is in it a moment later.  Events that
- * never end do not put it off.
+ * Calls `fn` a while after an event, and once for all events in between: the history is
+ * written in batches, so an event is in it a moment later.  Endless events do not defer
+ * the call.
  *
  * @param {() => void} fn
  * @param {number} [afterMs]

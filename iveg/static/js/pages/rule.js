@@ -1,5 +1,5 @@
 /**
- * Changing the rule, where the server lets somebody: read, write, say what came of it.
+ * The form of the rule, where the server allows changes: read, write, show the outcome.
  */
 
 import { need, setHidden, setText } from "../panels/dom.js";
@@ -27,7 +27,7 @@ export function createRuleForm(store, i18n, guard) {
   /** @param {Rule | null | undefined} rule */
   function take(rule) {
     if (!rule) return;
-    // Whoever is typing keeps what they typed, and hears that it was overtaken.
+    // A person who is typing keeps the typed values, and is told of the newer version.
     if (!seen || shows(seen) || shows(rule)) fill(rule);
     else if (rule.version !== seen.version) say("rule.stale");
     draw();
@@ -65,7 +65,7 @@ export function createRuleForm(store, i18n, guard) {
     const answer = await guard.put({
       confidence_threshold: threshold.valueAsNumber / 100,
       radius_m: radius.valueAsNumber,
-      // Numbers: the server tells a version that was overtaken by this one.
+      // Numbers: the server detects an outdated version by this one.
       version: Number(seen?.version),
     });
     if (!answer) return say("lowering.kept");
@@ -74,7 +74,7 @@ export function createRuleForm(store, i18n, guard) {
       fill(body);
       say("rule.saved", { version: body.version });
     } else if (status === 409) {
-      // Told once; whoever presses again means it.
+      // Told once; a second press confirms it.
       seen = store.get("rule") ?? seen;
       say("rule.stale");
     } else if (status === 0) say("rows.offline");

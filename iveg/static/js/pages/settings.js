@@ -1,5 +1,5 @@
 /**
- * The Settings page: the rule in force, and what this device remembers.
+ * The Settings page: the rule in force, and the settings of this device.
  */
 
 import { readApi } from "../core/api.js";
@@ -26,7 +26,7 @@ export function start({ store, i18n, tone, wake, installing }) {
   const messages = createMessagesForm(i18n);
   createSignInCode(i18n);
   addEventListener("beforeunload", (event) => {
-    // The browser asks, in its own words, before what was typed is lost.
+    // The browser asks, with its own text, before typed values are lost.
     if ([...forms, messages].some((form) => form.isDirty())) event.preventDefault();
   });
 
@@ -54,7 +54,7 @@ function drawRule(rule, i18n) {
 }
 
 /**
- * Which verbs this server knows for the rule, from its own document.
+ * HTTP methods of this server for the rule, from its OpenAPI document.
  *
  * @returns {Promise<Set<string>>} `get`, `put`
  */

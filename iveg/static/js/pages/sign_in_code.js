@@ -1,5 +1,5 @@
 /**
- * The sign-in link as a QR code, shown while somebody holds another device before it.
+ * The sign-in link as a QR code, shown for scanning with another device.
  */
 
 import { readApi } from "../core/api.js";

@@ -1,5 +1,5 @@
 /**
- * Asking this browser for a subscription to push messages (Push API).
+ * A subscription of this browser to push messages (Push API).
  */
 
 /** @returns {"ready" | "insecure" | "denied"} */

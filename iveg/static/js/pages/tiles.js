@@ -1,7 +1,6 @@
 /**
- * Four numbers for whoever studies the fleet (safety 6.3): how soon a robot obeys, who did
- * not answer, how long margins were negative, and the worst of them; each with its age
- * and of how many.
+ * Four safety figures of the fleet: how soon robots obey, missing answers, time with a
+ * negative margin, and the worst margin; each with its age and its number of values.
  */
 
 import { ageOf } from "../core/clock.js";
@@ -13,7 +12,7 @@ import { need, setText } from "../panels/dom.js";
 /** @typedef {{value: string, of: string}} Tile */
 
 const TICK_MS = 1000;
-/** Of fewer values a quantile would be one of them by chance. */
+/** With fewer values a quantile would be one of them by chance. */
 const FEWEST = 20;
 
 /** @param {import("../main.js").App} app */

@@ -1,5 +1,5 @@
 /**
- * A list of alerts that can be acknowledged: shape, colour and words say how urgent.
+ * A list of alerts that can be acknowledged: shape, colour and text show the urgency.
  *
  * The bell's panel and the Alerts page show the same list; a note that is being written
  * keeps its focus while alerts come and go around it.
@@ -14,13 +14,13 @@ import { toldSaid } from "./told.js";
 
 /** Roles that may acknowledge (safety: the table of roles). */
 const ACKNOWLEDGERS = new Set(["operator", "admin"]);
-/** How long nothing moves under a finger that has acknowledged. */
+/** How long no row moves under a finger that has acknowledged. */
 const STILL_MS = 3000;
 
 /**
  * @param {HTMLElement} list
  * @param {import("../core/i18n.js").I18n} i18n
- * @param {(alertId: string, note: string) => Promise<number>} [send] tests hand in
+ * @param {(alertId: string, note: string) => Promise<number>} [send] tests pass
  *   their own
  * @param {number} [stillMs] how long nothing moves after somebody acknowledged
  */
@@ -35,7 +35,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
   const drawn = new Map();
   /** @type {Alert[]} */
   let shown = [];
-  /** Until then nothing moves: a finger has just been here (`performance.now()`). */
+  /** Until then no row moves: a finger has just been here (`performance.now()`). */
   let stillUntilMs = 0;
 
   /** @param {Alert[]} alerts */
@@ -55,7 +55,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     });
   }
 
-  /** Writes what has changed; what is new or gone waits for the finger to leave. */
+  /** Writes changed rows; new and removed rows wait for the finger to leave. */
   function drawStill() {
     for (const alert of shown) {
       const item = items.get(alert.alert_id);
@@ -101,7 +101,7 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     const role = document.body.dataset.role ?? "";
     const failure = failures.get(alert.alert_id);
     const source = JSON.stringify([alert, i18n.language(), role, failure]);
-    // Each change of one alert tells them all again.
+    // Each change of one alert brings the whole list again.
     if (drawn.get(alert.alert_id) === source) return;
     drawn.set(alert.alert_id, source);
     setAttribute(item, "data-priority", alert.priority);
@@ -169,7 +169,7 @@ function makeItem(onAcknowledge) {
 }
 
 /**
- * The gravest first, of these the oldest: what comes later moves none of those above.
+ * The gravest first, of these the oldest: later alerts move none of those above.
  *
  * @param {Alert} a
  * @param {Alert} b

@@ -1,5 +1,5 @@
 /**
- * An alert that repeats, one occurrence after the other, behind a line that opens it.
+ * The occurrences of an alert that repeats, behind a line that opens them.
  */
 
 import { fill, make, setHidden, setText } from "./dom.js";
@@ -53,7 +53,7 @@ function lineOf(member, i18n) {
 }
 
 /**
- * How fast alerts come, in a sentence; empty while nothing is known.
+ * The rate of alerts, in a sentence; empty while it is unknown.
  *
  * @param {import("../core/protocol.js").Flood | null | undefined} flood
  * @param {import("../core/i18n.js").I18n} i18n

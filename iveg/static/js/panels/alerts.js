@@ -2,7 +2,7 @@
  * Alerts on every page: a bell with the worst and the number, a list, and the sound.
  *
  * P1 sounds until somebody acknowledges it (ISA-18.2); the others chime once when they
- * come.  The server groups repetitions and keeps who, when and the note.
+ * come.  The server groups repetitions and keeps person, time and note.
  */
 
 import { onBeat } from "../core/beat.js";
@@ -12,7 +12,7 @@ import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
-/** How often a list that is closed is written anew (ms). */
+/** How often a closed list is rewritten (ms). */
 const CLOSED_MS = 1000;
 
 /**
@@ -36,7 +36,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const isUnknown = earlierUnknown(store);
     setText(need("#alerts-count"), isUnknown ? `${open.length}?` : String(open.length));
     setHidden(need("#alerts-earlier"), !isUnknown);
-    // What is over and unseen may be graver than what goes on.
+    // A past and unseen alert may be graver than the active ones.
     const [worst] = alerts.map(({ priority }) => priority).sort();
     setAttribute(button, "data-worst", worst ?? "none");
     /** @type {import("../core/protocol.js").Flood | null | undefined} */
@@ -51,7 +51,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
     drawList();
   }
 
-  /** A list that is closed is not written with each change: nobody reads it. */
+  /** A closed list is not rewritten with each change: nobody reads it. */
   function drawList() {
     clearTimeout(later);
     const isClosed = panel !== null && !panel.hasAttribute("open");
@@ -68,7 +68,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
     /** @type {Alert[]} */
     const alerts = store.get("alerts") ?? [];
     tone.sound(alerts.some(isLoud));
-    // A group that was there sounds again with each of its occurrences.
+    // A known group sounds again with each of its occurrences.
     const news = alerts.filter(
       ({ alert_id, count }) => known && known.get(alert_id) !== count,
     );
@@ -88,7 +88,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
 }
 
 /**
- * Whether the server cannot tell what earlier runs left unseen.
+ * Whether the server does not know the unseen alerts of earlier runs.
  *
  * @param {import("../core/store.js").Store} store
  */
@@ -96,7 +96,7 @@ export function earlierUnknown(store) {
   return store.get("health")?.earlier === "unknown";
 }
 
-/** That there is no alert is known only from a server that is heard, and knows its past.
+/** The absence of alerts is known only from a connected server that knows its past.
  * @param {import("../core/store.js").Store} store */
 export function isKnown(store) {
   const isHeard = store.connection.state === "open" && Boolean(store.get("snapshot"));

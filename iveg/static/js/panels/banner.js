@@ -1,5 +1,5 @@
 /**
- * Says that the browser's own line is down: old data must never look like new ones.
+ * The banner of a lost connection: old data must never look like new data.
  */
 
 import { onBeat } from "../core/beat.js";
@@ -7,7 +7,7 @@ import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 const TICK_MS = 250;
 const BACK_SHOWN_MS = 3000;
-/** A first connection quicker than this needs no word (ms). */
+/** A first connection quicker than this needs no banner (ms). */
 const PATIENCE_MS = 1500;
 
 /** @param {import("../main.js").App} app */
@@ -59,7 +59,7 @@ export function createBanner({ store, i18n }) {
 
   const messages = need(".messages");
   new ResizeObserver(() => {
-    // Panels and the drawer open below what must not be covered.
+    // Panels and the drawer open below the messages, which must not be covered.
     const height = `${messages.offsetHeight}px`;
     document.documentElement.style.setProperty("--messages", height);
   }).observe(messages);

@@ -1,6 +1,6 @@
 /**
- * One decision from sighting to slower wheels, link by link (docs/dashboard.md): in a
- * panel over any page, and on a page of its own that can be shared and printed.
+ * One decision from detection to observed slow-down, link by link (docs/dashboard.md): in
+ * a panel over any page, and on a page of its own that can be shared and printed.
  */
 
 import { readApi } from "../core/api.js";
@@ -106,7 +106,7 @@ function dateOf({ started_at }) {
 }
 
 /**
- * Who saw what where, and the rule with its numbers as they were.
+ * The observation, and the rule with its numbers at that time.
  *
  * @param {Decision} decision
  * @param {import("../core/i18n.js").I18n} i18n
@@ -134,7 +134,7 @@ function sightOf({ in_sight }) {
 }
 
 /**
- * How long each link took after the one before it that is known (ms); the first none.
+ * How long each link took after the one before it that is known (ms); null for the first.
  *
  * @param {Link[]} links
  * @returns {(number | null)[]}
@@ -160,7 +160,7 @@ function makeShare(decisionId, i18n) {
   link.setAttribute("href", new URL(path, location.href).href);
   const copy = make("button", "button no-print", i18n.t("decision.copy"));
   copy.type = "button";
-  // A clipboard takes HTTPS or the computer itself; the link can be copied by hand.
+  // The clipboard needs HTTPS or localhost; the link can be copied by hand.
   copy.hidden = !navigator.clipboard;
   copy.addEventListener("click", async () => {
     await navigator.clipboard.writeText(link.href);

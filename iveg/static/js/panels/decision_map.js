@@ -1,6 +1,6 @@
 /**
  * A small picture of one decision, drawn from its record by the layers of the live map:
- * who was where when it began.  Always on the light palette, so that it prints.
+ * people and robots at its beginning.  Always on the light palette, so that it prints.
  *
  * @typedef {{position: {x: number, y: number} | null, class?: string | null,
  *   observer: string | null, robot_id: string | null, in_sight: boolean | null,
@@ -26,7 +26,7 @@ const ROUND_M = 1.5;
 const BODY = { drive: "differential", length: 1, width: 0.6 };
 
 /**
- * What the map would have shown when it began; null where nobody knows where.
+ * The scene at its beginning; null where the place is unknown.
  *
  * @param {Drawn} decision
  * @param {GreenhouseMap | null} map

@@ -85,7 +85,7 @@ export function createDialogs() {
 }
 
 /**
- * STOP controls on cards have to get out from under a panel.
+ * Announces it: STOP controls on cards must not stay under a panel.
  *
  * @param {boolean} isOpen
  */

@@ -1,5 +1,5 @@
 /**
- * The few DOM verbs that all panels use; text goes in as text, never as markup.
+ * DOM helpers of all panels; text is set as text, never as markup.
  */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -32,7 +32,7 @@ export function makeSvg(tag, attributes = {}) {
 }
 
 /**
- * Writes only what differs: most values of most frames are those of the frame before.
+ * Writes only a different text: most values of most frames are unchanged.
  *
  * @param {Element} element
  * @param {string} text
@@ -69,7 +69,7 @@ export function fill(place, values, makeChild, write) {
 }
 
 /**
- * The element that a template of ours promises.
+ * An element that the page's template must have.
  *
  * @param {string} selector
  * @param {ParentNode} [root]

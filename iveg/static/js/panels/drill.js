@@ -1,8 +1,8 @@
 /**
  * A drill: STOP pressed on a robot that stands or creeps, to prove that STOP works.
  *
- * One tap, because it can only make a robot stand.  What it shows is the life of that
- * very STOP, and what the history keeps of the last one.
+ * One tap, because it can only make a robot stand.  It shows the steps of that very STOP,
+ * and the last drill in the history.
  */
 
 import { readApi, sendApi } from "../core/api.js";
@@ -17,9 +17,9 @@ import { since } from "./stop_view.js";
 /** @typedef {import("./release.js").Facts} Facts */
 /** @typedef {import("../types.js").Drill} Drill one of GET /drills */
 
-/** At most this fast a robot may be stopped for a drill (m/s), as the server has it. */
+/** Greatest speed of a robot at the start of a drill (m/s), the server's number. */
 const CREEP_M_S = 0.2;
-/** Press to standing (safety 2.4). */
+/** From press to standstill (docs/safety.md). */
 const DEADLINE_MS = 5000;
 const READ_AGAIN_MS = 1000;
 const LOUD = new Set(["UNCONFIRMED", "STILL_MOVING"]);
@@ -37,7 +37,7 @@ export function createDrill({ store, i18n, line }, card, robotId) {
   let readStatus = 0;
   let refused = 0;
   let isBusy = false;
-  /** What the history held when it was read last. @type {string | null} */
+  /** State of the STOP when the history was read last. @type {string | null} */
   let readFor = null;
   let readAtMs = 0;
 
@@ -51,7 +51,7 @@ export function createDrill({ store, i18n, line }, card, robotId) {
     const why = isBusy ? "busy" : whyNotDrill(facts);
     button.disabled = why !== "ok";
     setText(needPart("drill-why", card), i18n.t(`drill.why.${why}`));
-    setText(needPart("drill-words", card), i18n.t("drill.button", { robot: robotId }));
+    setText(needPart("drill-label", card), i18n.t("drill.button", { robot: robotId }));
     const command = facts.command?.drill ? facts.command : undefined;
     setText(needPart("drill-result", card), resultSaid(command));
     setText(needPart("drill-last", card), lastSaid());
@@ -90,7 +90,7 @@ export function createDrill({ store, i18n, line }, card, robotId) {
   async function readOnce(command) {
     const nowMs = performance.now();
     const isNow = command ? `${command.command_id} ${command.state}` : "";
-    // The history is written in batches, so what has just ended is in it a moment later.
+    // The history is written in batches, so a new drill is in it a moment later.
     const isBehind = last?.passed === null || (command && !isOf(last, command));
     const isDue = isBehind && nowMs - readAtMs > READ_AGAIN_MS;
     if (readFor === isNow && !isDue) return;
@@ -111,7 +111,7 @@ export function createDrill({ store, i18n, line }, card, robotId) {
 }
 
 /**
- * Says so when a robot's last drill is too long ago: the server's own reminder.
+ * Shows the server's reminder when a robot's last drill is too long ago.
  *
  * @param {HTMLElement} place
  * @param {string} robotId
@@ -153,7 +153,7 @@ export function whyNotDrill(facts) {
 }
 
 /**
- * Key of what a drill that is going on has come to.
+ * Key of the progress of a drill.
  *
  * @param {Command} command
  * @param {number} ageMs since it was asked for
@@ -164,7 +164,7 @@ export function progressOf({ state, standstill_ms: ms }, ageMs) {
   return isOver ? "drill.failed" : "drill.running";
 }
 
-/** What the history says of a drill. @param {Drill} drill @param {I18n} i18n */
+/** The verdict of a drill in the history. @param {Drill} drill @param {I18n} i18n */
 export function verdictSaid({ passed, standstill_ms: ms }, i18n) {
   if (passed === null) return i18n.t("drill.unknown");
   if (passed) return i18n.t("drill.passed", { ms });

@@ -2,8 +2,8 @@
  * Speed on a half circle: the needle is what was observed, the mark outside the scale
  * is the limit that iVeg asks for, on the same scale (docs/dashboard.md).
  *
- * Fleets drive backwards, too; the needle shows how fast, the read-out beside it which
- * way.  A small card has the same on a straight line.
+ * Robots drive backwards, too; the needle shows the amount, the read-out beside it the
+ * sign.  A small card has the same on a straight line.
  */
 
 import { makeSvg, setAttribute, setText } from "./dom.js";
@@ -21,12 +21,12 @@ const DEFAULT_MAX = 1;
  *   speed: number | null, max: number, factor: number | null,
  *   name: string, said: string, limitSaid: string, speedSaid: string,
  * }} Reading `speed` (m/s, signed), `max` full scale (m/s), `factor` asked for 0–1; the
- *   rest is written already
+ *   others are texts
  */
 
 /**
- * What a gauge shows of a robot: the stricter of what it was told and what it says it
- * applies; nothing of what nobody knows.
+ * The values of a gauge: the stricter of the robot's speed limit and the factor that it
+ * reports to apply; null for unknown values.
  *
  * @param {import("../core/protocol.js").Robot | undefined} robot
  * @returns {{speed: number | null, max: number, factor: number | null}}
@@ -90,7 +90,7 @@ export function createGauge() {
   };
 }
 
-/** The same on a straight line, with its words beside it. */
+/** The same on a straight line, with its text beside it. */
 function createBar() {
   const svg = makeSvg("svg", { class: "gauge__bar", viewBox: "0 0 240 18" });
   const track = makeSvg("path", { class: "gauge__track" });
@@ -130,7 +130,7 @@ function sharesOf({ speed, max, factor }) {
   return { share: clamp(Math.abs(speed ?? 0) / max), allowed: clamp(factor ?? 1) };
 }
 
-/** For whoever hears it. @param {SVGElement} svg @param {Reading} reading */
+/** For screen readers. @param {SVGElement} svg @param {Reading} reading */
 function describe(svg, { name, max, speed, said }) {
   setAttribute(svg, "role", "meter");
   setAttribute(svg, "aria-valuemin", "0");

@@ -1,5 +1,5 @@
 /**
- * The chain from robot to screen: a chip with the worst hop, a list with a sentence each.
+ * The health of the data path: a chip with the worst hop, a list with a sentence each.
  */
 
 import { onBeat } from "../core/beat.js";
@@ -55,7 +55,7 @@ export function createHealthPanel({ store, i18n, line }) {
       const age =
         hop.age_s === null ? "" : i18n.t("health.age", { age: hop.age_s + waitedS });
       setText(need("small", item), `${i18n.t(`health.state.${hop.state}`)} ${age}`);
-      // The lag says it all, and in the reader's language.
+      // The sentence about the lag is enough, and in the reader's language.
       const isTold = sentenceOf(hop).key.startsWith("health.lag.");
       const detail =
         hop.detail && hop.state !== "ok" && !isTold ? ` (${hop.detail})` : "";

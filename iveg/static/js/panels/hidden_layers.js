@@ -1,5 +1,5 @@
 /**
- * What is switched off on the map is said on the map: an empty one must not look calm.
+ * Names hidden layers on the map: a map without them must not look calm.
  */
 
 import { need, setHidden, setText } from "./dom.js";

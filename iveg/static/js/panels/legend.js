@@ -1,5 +1,5 @@
 /**
- * What every sign on the map means: each drawn by the layer that draws it on the map.
+ * The legend: every sign of the map, drawn by the layer that draws it on the map.
  */
 
 import { createCostmapLayer } from "../map/layers/costmap.js";

@@ -125,7 +125,7 @@ export function createLogPanel(app, decision) {
     chosen.clear();
     chips.draw();
     rebuild();
-    // The button goes away; the focus must not go with it.
+    // The button is removed; the focus must not go with it.
     list.focus();
   });
   store.subscribe("log", add);
@@ -139,7 +139,7 @@ export function createLogPanel(app, decision) {
 }
 
 /**
- * What an entry says; of a slow-down far from anybody, why: the ring had grown.
+ * The text of an entry; for a slow-down far from any person, the reason: a grown ring.
  *
  * @param {Pick<Entry, "key" | "slots">} entry
  * @param {import("../core/i18n.js").I18n} i18n
@@ -150,7 +150,7 @@ export function sentenceOf({ key, slots }, i18n) {
   return isGrown ? `${said} ${i18n.t("log.grown", slots)}` : said;
 }
 
-/** A robot may slow down for what iVeg does not know yet.
+/** A robot may slow down for a cause that iVeg does not know yet.
  * @param {Pick<Entry, "key" | "slots">} entry */
 function keyOf({ key, slots }) {
   const isBare = key.startsWith("log.speed_down.") && slots.distance === undefined;

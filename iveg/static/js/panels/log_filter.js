@@ -1,9 +1,9 @@
 /**
- * Which entries of the log somebody wants to see.
+ * The filter of the log.
  *
  * Within one kind of chip any may match, across kinds all must; no chip pressed shows
- * everything.  What is pressed is remembered, and always in sight: a filter that nobody
- * sees would hide the news.
+ * everything.  The chosen chips are remembered, and always visible: a hidden filter would
+ * hide new entries.
  *
  * @typedef {import("../core/protocol.js").Entry} Entry
  * @typedef {"kind" | "robot" | "class" | "rule" | "priority"} Group
@@ -14,7 +14,7 @@ import { browserStorage } from "../map/layers/memory.js";
 import { make, setAttribute } from "./dom.js";
 
 const KEY = "iveg.log";
-/** What can be asked of an entry; which robots there are is learnt. */
+/** The groups of chips; those of the robots are learnt. */
 const NAMES = /** @type {const} */ ({
   kind: ["detection", "speed", "command", "link", "alert", "system"],
   robot: [],
@@ -23,11 +23,11 @@ const NAMES = /** @type {const} */ ({
   priority: ["P1", "P2", "P3"],
 });
 const GROUPS = /** @type {Group[]} */ (Object.keys(NAMES));
-/** Chips that are there at once; the others after a press. */
+/** Chips that are visible at once; the others after a press. */
 const FIRST = new Set(["kind", "robot"]);
 
 /**
- * What an entry is, by group; null where it says nothing of it.
+ * The chips that an entry matches, by group; null where a group does not apply.
  *
  * @param {Entry} entry
  * @returns {Record<Group, string | null>}
@@ -99,7 +99,7 @@ function write(storage, pressed) {
   try {
     storage?.setItem(KEY, JSON.stringify(kept));
   } catch {
-    // A full or forbidden store costs the memory of a filter, never the filter.
+    // A full or forbidden storage costs the memory of a filter, never the filter.
   }
 }
 
@@ -160,7 +160,7 @@ export function createLogChips({ place, i18n, chosen, robots, onChange }) {
   draw();
   return {
     draw,
-    /** What is pressed, for people. */
+    /** The pressed chips as a text. */
     said: () => chosen.all().map(({ group, name }) => nameOf(group, name)),
   };
 }

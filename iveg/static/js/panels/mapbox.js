@@ -1,5 +1,5 @@
 /**
- * What stands around the map: its tools, its layers, and the counts over it.
+ * The surroundings of the map: its tools, its layers, and the counts over it.
  *
  * Picking a person opens the decision behind its ring; picking a robot goes to its card.
  */
@@ -23,7 +23,7 @@ import { onThemeChange } from "./theme.js";
 /** @typedef {ReturnType<typeof createMap>} LiveMap */
 
 const AGE_MS = 1000;
-/** An answer is asked for every two seconds. */
+/** The coverage is polled every two seconds. */
 const COVERAGE_OLD_S = 6;
 
 /**
@@ -75,7 +75,7 @@ export function createMapbox(app, decision) {
   }
 
   /**
-   * What was decided because of somebody: what holds now, else the last that was.
+   * The decision because of a person: the open one, else the last one.
    *
    * @param {string} personId
    */
@@ -136,7 +136,7 @@ export function createMapbox(app, decision) {
 
   const showHidden = () => drawHidden(map.layers(), i18n);
 
-  function drawWords() {
+  function drawTexts() {
     map.setLanguage(i18n.t, i18n.blocks(...SAID_ON_MAPS));
     drawLayers(app, map, showBeliever);
     showHidden();
@@ -169,13 +169,13 @@ export function createMapbox(app, decision) {
   setInterval(onBeat, AGE_MS, drawCostmapAge);
   onThemeChange(() => map.setTheme());
   store.subscribe("robots/", showBeliever);
-  store.subscribe("snapshot", drawWords);
+  store.subscribe("snapshot", drawTexts);
   store.subscribe("people", drawFacts);
   store.subscribe("coverage", drawFacts);
   store.subscribe("costmap", drawCostmapAge);
   store.subscribe("climate", drawClimate);
-  i18n.onChange(drawWords);
-  drawWords();
+  i18n.onChange(drawTexts);
+  drawTexts();
   for (const tool of all(".map-tools [disabled]")) tool.removeAttribute("disabled");
 }
 
@@ -187,7 +187,7 @@ function wireZoom(map) {
 }
 
 /**
- * How much of the aisles cameras see, in words; blind when none looks.
+ * The share of the lanes within sight of cameras, as a text; blind when there is none.
  *
  * @param {import("../core/protocol.js").Coverage | undefined} coverage
  * @param {import("../core/i18n.js").I18n} i18n

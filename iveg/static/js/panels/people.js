@@ -1,5 +1,5 @@
 /**
- * Who is on the map, in words: for readers of the screen, and for whoever asks why.
+ * The people on the map as a list: for screen readers, and with the reasons.
  */
 
 import { onBeat } from "../core/beat.js";

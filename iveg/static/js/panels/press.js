@@ -1,10 +1,10 @@
 /**
- * Carries a press of STOP to the server by every transport there is, until it is taken.
+ * Sends a press of STOP to the server by HTTP and by the live line, until it is accepted.
  *
  * HTTP first; when it fails or is silent for half a second the live line sends the same
- * press too.  All repetitions carry one `press_id`, so the server makes one STOP of
- * them.  A STOP that comes late still stops, so nothing here gives up: what nobody has
- * taken is kept in this tab, through a reload too, and is never sent as anything else.
+ * press, too.  All repetitions carry one `press_id`, so the server makes one STOP of
+ * them.  A late STOP still stops, so there is no last try: a press that is not accepted is
+ * kept in this tab, through a reload, too, and is never sent as anything else.
  *
  * @typedef {{robotId: string | null, pressId: string, atMs: number, tries: number,
  *   accepted: boolean}} Pending `atMs` is `performance.now()` of the press
@@ -16,15 +16,15 @@ import { TAKEN_LIMIT_MS } from "./stop_view.js";
 
 const RETRY_MS = 1000;
 const HTTP_LIMIT_MS = 3000;
-/** Answers that more HTTP will not change; the line goes on trying. */
+/** Statuses that a repetition will not change; the live line goes on trying. */
 const HOPELESS = new Set([401, 403, 404]);
 const KEPT = "iveg_kept_stops";
 
 /**
  * @param {Line} line
  * @param {() => void} onChange
- * @param {(press: Pending, pressedAt: number) => Promise<number>} [send] HTTP; tests hand
- *   in their own
+ * @param {(press: Pending, pressedAt: number) => Promise<number>} [send] HTTP; tests pass
+ *   their own
  * @param {Storage | null} [kept] of this tab alone
  */
 export function createPresser(line, onChange, send = post, kept = tabStorage()) {
@@ -33,7 +33,7 @@ export function createPresser(line, onChange, send = post, kept = tabStorage()) 
   /** @type {Map<string | null, number>} when that was, by the server's clock (s) */
   const pressed = new Map();
 
-  /** Writes down what nobody has taken yet. */
+  /** Stores the presses that are not accepted yet. */
   function keep() {
     const open = [...pending.values()].filter(({ accepted }) => !accepted);
     const rows = open.map(({ robotId, pressId, atMs }) => ({
@@ -99,7 +99,7 @@ export function createPresser(line, onChange, send = post, kept = tabStorage()) 
       const press = { robotId, pressId: pressId(), atMs, tries: 0, accepted: false };
       return begin(press, line.serverNow());
     },
-    /** Goes on with what was kept when the page was left. */
+    /** Goes on with the presses that were kept when the page was left. */
     goOn,
     /** The newest press that no command has answered. @param {string | null} robotId */
     pending: (robotId) => pending.get(robotId) ?? null,
@@ -143,7 +143,7 @@ async function post(press, pressedAt) {
 }
 
 /**
- * What was kept; what cannot be read as a press of STOP is none.
+ * The presses that were kept; anything else in the storage is left out.
  *
  * @param {Storage | null} kept
  * @returns {{robotId: string | null, pressId: string, pressedAt: number, wallMs: number}[]}
@@ -163,7 +163,7 @@ function readKept(kept) {
   }
 }
 
-/** A browser may forbid it; then a press lives as long as its page. */
+/** A browser may forbid it; then a press lasts as long as its page. */
 function tabStorage() {
   try {
     return sessionStorage;

@@ -1,10 +1,10 @@
 /**
- * Releasing a robot and letting it drive again: two steps, never one, and never a STOP
- * turned around.
+ * Releasing a robot and letting it drive again: two steps, never one, and never the
+ * STOP control pressed again.
  *
- * Release names every hold that the person saw, takes two seconds of holding, and only
- * works on a robot that is proven to stand by a fresh report.  The server checks all of
- * it again; here it is explained.
+ * A release names every hold on the screen, takes two seconds of pressing, and needs a
+ * fresh report that proves a standstill.  The server checks all of it again; this page
+ * explains it.
  */
 
 import { sendApi } from "../core/api.js";
@@ -55,11 +55,11 @@ export function createRelease(app, card, robotId) {
       i18n.t(`release.why.${isBusy ? "busy" : why}`),
     );
     setText(
-      needPart("release-words", card),
+      needPart("release-label", card),
       i18n.t("release.button", { robot: robotId }),
     );
     setText(
-      needPart("resume-words", card),
+      needPart("resume-label", card),
       i18n.t("release.resume", { robot: robotId }),
     );
     setText(result, outcomeSaid());
@@ -142,7 +142,7 @@ export function createRelease(app, card, robotId) {
   }
 
   onHold(releaseButton, () => {
-    // Exactly what was on the screen: a hold that came since makes the server refuse.
+    // Exactly the holds on the screen: a later hold makes the server refuse.
     send("release", { holds: (shown?.holds ?? []).map(({ id }) => id) });
   });
   resumeButton.addEventListener("click", () => send("resume", {}));
@@ -162,7 +162,7 @@ function makeHold() {
  */
 
 /**
- * What became of a release or resume, and what a late IoT Agent had to do with it.
+ * The outcome of a release or resume, with a note on a late IoT Agent.
  *
  * @param {Command} order
  * @returns {import("../types.js").Sentence[]}
@@ -207,7 +207,7 @@ export function whyNotResume(facts) {
   return robot.mode === "STOPPED" ? "ok" : "not_ready";
 }
 
-/** What keeps anybody from asking for anything, or null. @param {Facts} facts */
+/** Key of a reason against release and resume alike, or null. @param {Facts} facts */
 export function whyNotAtAll({ connection, role, ageS }) {
   if (connection === "signed-out") return "signed_out";
   if (connection !== "open") return "no_link";

@@ -1,5 +1,5 @@
 /**
- * Leaving: ends the session on the server, then shows the way in.
+ * Sign-out: ends the session on the server, then shows the sign-in page.
  */
 
 import { need, setText } from "./dom.js";
@@ -16,7 +16,7 @@ export function createSignOut({ i18n }) {
 
 async function signOut() {
   try {
-    // The answer sends the browser to a page that it may no longer see.
+    // The answer redirects to a page that needs a session.
     const answer = await fetch("/signout", {
       method: "POST",
       headers: { "X-IVEG": "1" },

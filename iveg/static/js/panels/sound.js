@@ -1,5 +1,5 @@
 /**
- * The switches of the sound: hear it before it matters, and quiet what may be quiet.
+ * The controls of the sound: a test of it, and the switch of the single chime.
  */
 
 import { need, setText } from "./dom.js";

@@ -1,8 +1,8 @@
 /**
- * The full-width lines for a STOP that must not be overlooked, one a robot.
+ * The full-width lines for a STOP that must not be overlooked, one for each robot.
  *
- * Each says what a person at the greenhouse needs: who pressed and when, how often it
- * was tried, how old the robot's last word is and how far it may have driven since.
+ * Each says who pressed and when, the number of tries, the age of the robot's last report
+ * and how far it may have driven since.
  */
 
 import { fill, make, need, setText } from "./dom.js";
@@ -60,7 +60,7 @@ export function createLoudLines({ i18n, line }) {
 }
 
 /**
- * Every transport that the table of the server has, with how far the order came on it.
+ * Every transport of the server's table, with the state of the order on it.
  *
  * @param {Record<string, string>} transports by id
  * @param {{t: (key: string) => string}} i18n

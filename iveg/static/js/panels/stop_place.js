@@ -1,8 +1,8 @@
 /**
- * Where each STOP control stands: in the strip of every page, or on its robot's card.
+ * The place of each STOP control: in the strip of every page, or on its robot's card.
  */
 
-/** More robots than this have their controls on their cards: what the strip has room for. */
+/** Controls that the strip has room for; those of a larger fleet are on the cards. */
 const STRIP_HOLDS = 4;
 const NARROW_STRIP_HOLDS = 3;
 const LOW_STRIP_HOLDS = 2;

@@ -1,8 +1,8 @@
 /**
- * What a STOP control says, as a pure function of what is known (docs/dashboard.md).
+ * State and text of a STOP control, as pure functions of the facts (docs/dashboard.md).
  *
- * A wish is never shown as a result: *asked*, *acknowledged* and *standing* are three
- * different words, and a control without a line does not look like one that works.
+ * A request is never shown as a result: *asked*, *acknowledged* and *standing* are three
+ * different states, and a control without a connection looks unlike one that works.
  *
  * @typedef {import("../core/protocol.js").Command} Command
  * @typedef {import("../core/clock.js").Link} Link
@@ -24,7 +24,9 @@
  *   press: Pending | null,
  *   nowMs: number,
  *   serverNowS: number,
- * }} RobotFacts `isBlind`: the session is over and may still stop; `isResuming`: what is under way is a resume; `nowMs` is `performance.now()`, `serverNowS` Unix time
+ * }} RobotFacts `isBlind`: the session is over and may still stop;
+ *   `isResuming`: the order under way is a resume; `nowMs` is `performance.now()`,
+ *   `serverNowS` Unix time
  */
 
 import { LIMITS } from "../core/limits.js";
@@ -45,10 +47,10 @@ const BY_COMMAND = {
 /** Reason of a command that was made because a held robot moved. */
 const MOVED = "moved";
 
-/** Until it stands again, that it moved is more than that it was told to stop. */
+/** Until it stands again, its movement is graver news than the order to stop. */
 const MOVED_UNTIL = new Set(["asked", "acknowledged"]);
 
-/** States in which a new press is news and has to be seen. */
+/** States in which a new press is news and must be visible. */
 const GIVES_WAY = new Set(["standing", "stale", "releasing", "rearmed"]);
 
 /** From the loudest to the quietest; the fleet's control shows the loudest. */
@@ -65,7 +67,7 @@ const LOUDEST_FIRST = /** @type {StopState[]} */ ([
   "standing",
 ]);
 
-/** Presses older than this without an answer are said to be so (ms). */
+/** Age from which a press without an answer is shown as such (ms). */
 export const TAKEN_LIMIT_MS = 500;
 
 /**
@@ -145,7 +147,7 @@ export function stateOfCommand(command) {
 }
 
 /**
- * A standstill is shown for as long as the robot's word of it is young: the browser
+ * A standstill is shown for as long as the robot's report of it is fresh: the browser
  * counts by itself, for a server may hang as well as a robot.
  *
  * @param {RobotFacts} facts
@@ -207,7 +209,7 @@ function viewOfPress(press, nowMs) {
  * @returns {View}
  */
 function lost(press, nowMs) {
-  // A press must be seen to have happened, and not to have arrived.
+  // The press must be visible, and visibly without an answer.
   if (press && !press.accepted) {
     const seconds = Math.max(0, (nowMs - press.atMs) / 1000);
     return { state: "lost", key: "stop.kept", slots: { seconds } };
@@ -216,7 +218,7 @@ function lost(press, nowMs) {
 }
 
 /**
- * A session that is over: STOP is still taken, and nothing of what it does is seen.
+ * A session that is over: STOP is still accepted, but its effect is not visible.
  *
  * @param {Pending | null} press
  * @param {number} nowMs
@@ -233,12 +235,12 @@ function blind(press, nowMs, slots) {
 /** @param {ConnectionState} connection */
 const isCut = (connection) => connection === "lost" || connection === "signed-out";
 
-/** Age of the robot's last word about itself (s). @param {Command} command @param {number} nowMs */
+/** Age of the robot's last report (s). @param {Command} command @param {number} nowMs */
 const reportAge = (command, nowMs) => doubtOf(command, nowMs)?.ageS ?? 0;
 
 /**
- * How long a robot has said nothing, and how far it may have driven in that time: as the
- * server knew it, and from then on the browser counts.
+ * Age of a robot's last report, and how far it may have driven since: the server's
+ * figures, which the browser continues.
  *
  * @param {Command} command
  * @param {number} nowMs `performance.now()`

@@ -1,6 +1,6 @@
 /**
- * Tables on a phone are cards: each cell carries the head of its column, which the style
- * writes before it where there is no room for columns.
+ * Tables as cards on a phone: each cell carries the head of its column, which the style
+ * sheet writes before it where there is no room for columns.
  */
 
 import { all } from "./dom.js";

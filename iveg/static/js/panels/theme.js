@@ -1,6 +1,6 @@
 /**
- * Light, dark, sunlight, and the paper's colours; remembered where the server reads it,
- * so that the next page comes in the right colours at once.
+ * Light, dark, sunlight, and the paper's colours; kept in a cookie that the
+ * server reads, so that the next page comes in the right colours at once.
  */
 
 import { all, need } from "./dom.js";

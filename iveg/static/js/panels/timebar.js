@@ -19,7 +19,7 @@ const STEPS = {
   End: -MINUTES,
 };
 const MARK_WIDTH = 2;
-/** Detections come by the dozen; they draw low, what changed something draws high. */
+/** Detections come by the dozen: their marks are low, those of changes are high. */
 const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
 
 /** @param {import("../main.js").App} app */

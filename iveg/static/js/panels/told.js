@@ -1,5 +1,5 @@
 /**
- * Who was told of an alert outside iVeg, in a sentence.
+ * The notifications of an alert outside iVeg, in a sentence.
  *
  * @typedef {import("../types").Told} Told
  */

@@ -1,7 +1,7 @@
 /**
  * The sound of alerts: a P1 again and again until acknowledged, the others once.
  *
- * Browsers are mute until somebody has touched the page; the tone then begins by itself.
+ * Browsers are mute until the page was touched; the tone then begins by itself.
  * Only the single chime can be switched off, and that is remembered; a P1 cannot.
  *
  * @typedef {ReturnType<typeof createTone>} Tone
@@ -19,7 +19,7 @@ const KEY = "iveg.chime";
 
 /**
  * @param {{beep?: Beep, canSound?: () => boolean, storage?: Storage | null}} [options]
- *   tests hand in their own
+ *   tests pass their own
  */
 export function createTone(options = {}) {
   const { canSound = wasTouched, storage = browserStorage() } = options;
@@ -38,7 +38,7 @@ export function createTone(options = {}) {
   }
 
   return {
-    /** Whether a P1 waits for somebody. @param {boolean} isOn */
+    /** Whether a P1 waits for its acknowledgement. @param {boolean} isOn */
     sound(isOn) {
       if (isOn && timer === undefined) {
         play(TONES_HZ);
@@ -51,7 +51,7 @@ export function createTone(options = {}) {
     isSounding: () => timer !== undefined,
     /** One alert of lower priority has come. */
     chime: () => chimes && play(CHIME_HZ),
-    /** As a P1 sounds, once; tells whether the browser let it. */
+    /** Sounds like a P1, once; returns whether the browser allows it. */
     test: () => play(TONES_HZ),
     canSound,
     hasChimes: () => chimes,
@@ -61,7 +61,7 @@ export function createTone(options = {}) {
       try {
         storage?.setItem(KEY, isOn ? "on" : "off");
       } catch {
-        // A full or forbidden store costs the memory of a switch, never the switch.
+        // A full or forbidden storage costs the memory of a switch, never the switch.
       }
     },
   };

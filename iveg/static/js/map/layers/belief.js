@@ -1,9 +1,9 @@
 /**
- * The greenhouse as one robot knows it: its own eyes, and what the server has told it.
+ * The greenhouse as one robot knows it: its own detections, and the server's feedback.
  *
- * A robot hears the shared people and the poses of the others by the feedback
- * (Algorithm 2); their laser scans and raw detections it never gets.  One whose newest
- * feedback is too old counts on its own eyes alone, and so does this picture.
+ * A robot receives the shared people and the poses of its peers in the feedback
+ * (Algorithm 2), but never their laser scans or raw detections.  A robot whose newest
+ * feedback is too old relies on its own detections alone, and so does this picture.
  *
  * @typedef {import("../scene.js").Scene} Scene
  * @typedef {import("../../core/protocol.js").Robot} Robot
@@ -13,7 +13,7 @@
 const DEAF_AFTER_S = 3;
 
 /**
- * Whether a robot says that it still hears the server.
+ * Whether a robot reports that it still receives feedback.
  *
  * @param {Robot | undefined} robot
  */

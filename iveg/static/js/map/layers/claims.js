@@ -1,20 +1,20 @@
 /**
- * Places of words in a frame: the names of aisles, people and bodies stand where they are,
- * so that whatever else is written gives way to them.
+ * Places of labels in a frame: names of lanes, people and bodies stay in place, and every
+ * other label gives way to them.
  *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {import("../viewport.js").Rect} Rect
  */
 
 import { screenX, screenY } from "../viewport.js";
-import { laneWords } from "./greenhouse.js";
+import { laneNames } from "./greenhouse.js";
 
 /** Half a figure, and half the shortest body (px). */
 const FIGURE_PX = 10;
-/** Of a letter's height: how wide it is at most. */
+/** Greatest width of a letter, as a share of its height. */
 const LETTER = 0.6;
 
-/** Frames in which the standing signs have their places. */
+/** Frames in which the fixed labels have their places. */
 const settled = new WeakSet();
 
 /**
@@ -35,7 +35,7 @@ export function claim(paint, wished) {
 }
 
 /**
- * Whether a word may stand there; it has the place then.
+ * Whether a label fits there; the place is taken then.
  *
  * @param {Paint} paint
  * @param {string} text
@@ -57,7 +57,7 @@ export function mayStand(paint, text, x, y, size) {
 /** @param {Paint} paint @returns {Iterable<Rect>} */
 function* standing(paint) {
   const { scene, view } = paint;
-  for (const { text, size, x, y, isTall } of laneWords(paint)) {
+  for (const { text, size, x, y, isTall } of laneNames(paint)) {
     const half = (text.length * size * LETTER) / 2;
     yield isTall ? around(x, y, size / 2, half) : around(x, y, half, size / 2);
   }

@@ -1,5 +1,5 @@
 /**
- * The costmap that all robots share: the dearer a cell, the darker.
+ * The shared costmap: the higher the cost of a cell, the darker.
  *
  * One pixel a cell, painted once per grid and stretched by the canvas: a hundred
  * thousand cells cost one image a frame.
@@ -10,7 +10,7 @@
 import { screenX, screenY } from "../viewport.js";
 import { isolated } from "./paint.js";
 
-/** Of a cell that costs 100; below that in proportion. */
+/** Opacity of a cell with cost 100; lower costs in proportion. */
 const DARKEST = 0.2;
 
 /** Draws grids, keeping the image of the newest. */

@@ -1,6 +1,6 @@
 /**
- * What nobody sees: the longer no camera has looked at a spot of an aisle, the more it is
- * hatched.  That nobody is drawn in a hatched spot says nothing.
+ * Areas without coverage: the longer no camera has seen a spot of a lane, the denser its
+ * hatching.  A hatched spot without a person drawn in it may have one.
  *
  * @typedef {import("../../core/protocol.js").Coverage} Coverage
  * @typedef {import("./paint.js").Paint} Paint
@@ -9,7 +9,7 @@
 import { screenX, screenY } from "../viewport.js";
 import { isolated } from "./paint.js";
 
-/** Hatched from this age on (s), and how strongly; never looked at is the last. */
+/** Age from which a cell is hatched (s), and how strongly; the last is for never seen. */
 const STEPS = [
   { fromS: 10, alpha: 0.2 },
   { fromS: 60, alpha: 0.38 },
@@ -18,9 +18,9 @@ const STEPS = [
 const HATCH_PX = 7;
 
 /**
- * How strongly a cell is hatched, 0–1.
+ * Strength of a cell's hatching, 0–1.
  *
- * @param {number | null} ageS null: never looked at
+ * @param {number | null} ageS null: never seen
  */
 export function hatchAt(ageS) {
   if (ageS === null) return STEPS[STEPS.length - 1].alpha;

@@ -1,4 +1,4 @@
-/** What a camera says it saw just now: footprints, faint below the threshold. */
+/** Detections of the newest frames: footprints, faint below the threshold. */
 
 import { screenX, screenY } from "../viewport.js";
 import { mayStand } from "./claims.js";
@@ -9,7 +9,7 @@ import { isolated, label } from "./paint.js";
  * @typedef {import("../scene.js").SceneDetection} SceneDetection
  */
 
-/** Smaller boxes than this (px) could not be seen. */
+/** Smaller boxes than this (px) would be invisible. */
 const SMALLEST_PX = 10;
 const WORDS_FROM_SCALE = 22;
 

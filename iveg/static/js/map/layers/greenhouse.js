@@ -8,7 +8,7 @@ import { circle, isolated, label } from "./paint.js";
  * @typedef {import("../../core/protocol.js").Box2D} Box2D
  */
 
-/** A plant every so many metres, in lines so far apart; drawn where it can be told. */
+/** Distance of plants and of their lines (m); drawn where they can be told apart. */
 const PLANT_EVERY_M = 0.5;
 const PLANT_LINE_M = 0.8;
 const PLANT_FROM_SCALE = 14;
@@ -26,12 +26,12 @@ export function draw(paint) {
     for (const row of map.rows) drawRow(paint, row);
     for (const thing of map.obstacles) drawObstacle(paint, thing);
     for (const post of map.posts) drawPost(paint, post);
-    drawLaneWords(paint);
+    drawLaneNames(paint);
   });
 }
 
 /**
- * Whether a map has walls; an open field has none, or none that anybody could see.
+ * Whether a map has walls; an open field has none, or none within sight.
  *
  * @param {Box2D | null | undefined} bounds
  * @returns {bounds is Box2D}
@@ -150,12 +150,12 @@ function drawObstacle(paint, thing) {
 }
 
 /**
- * Where the names of lanes stand: at the near end, turned along a lane that is taller than
- * wide; none where a lane is too small for its name.
+ * Places of lane names: at the near end, turned along a lane that is taller than wide;
+ * none where a lane is too small for its name.
  *
  * @param {Paint} paint
  */
-export function* laneWords(paint) {
+export function* laneNames(paint) {
   const { view, labels } = paint;
   for (const lane of paint.scene.map?.lanes ?? []) {
     const [x, y, width, height] = rectOf(paint, lane);
@@ -176,10 +176,10 @@ export function* laneWords(paint) {
 }
 
 /** @param {Paint} paint */
-function drawLaneWords(paint) {
+function drawLaneNames(paint) {
   const { ctx, theme } = paint;
   const onLanes = { ...paint, theme: { ...theme, bg: theme.lane } };
-  for (const { text, size, isTall, x, y } of laneWords(paint)) {
+  for (const { text, size, isTall, x, y } of laneNames(paint)) {
     ctx.save();
     ctx.globalAlpha = 0.72;
     ctx.translate(x, y);

@@ -1,4 +1,4 @@
-/** The metre grid under everything: what an open field has instead of walls. */
+/** The metre grid under everything, for an open field without walls. */
 
 import { screenX, screenY, visible } from "../viewport.js";
 import { isolated } from "./paint.js";

@@ -1,8 +1,8 @@
 /**
- * What lies under the machines, drawn when it has changed and copied in between: the
+ * The layers under the robots, drawn when they have changed and copied in between: the
  * greenhouse, the costmap, trails and scans.
  *
- * Robots move in every frame; what their scanners saw comes fifteen times a second.  A
+ * Robots move in every frame; scans come fifteen times a second.  A
  * fleet's scans are thousands of points, so they are drawn together no more often than
  * that; those of a few robots in the very next frame.
  *
@@ -18,9 +18,9 @@ const FADING_MS = 250;
 
 /**
  * @param {{image: (paint: Paint, ratio: number, isOn: (layer: string) => boolean) =>
- *   OffscreenCanvas}} still what lies under it and never moves
+ *   OffscreenCanvas}} still the static layers under it
  * @param {Layer[]} layers from the ground up
- * @param {() => unknown[]} look what else decides how they look
+ * @param {() => unknown[]} look the other values that decide how they look
  */
 export function createGround(still, layers, look) {
   const canvas = new OffscreenCanvas(1, 1);

@@ -1,4 +1,4 @@
-/** What a robot means to do: its path, its goal and the name of its task. */
+/** The plan of a robot: its path, its goal and the name of its task. */
 
 import { screenX, screenY } from "../viewport.js";
 import { mayStand } from "./claims.js";

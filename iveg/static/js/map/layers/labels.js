@@ -1,5 +1,5 @@
 /**
- * The few words that stand on the map itself, in the reader's language and numbers.
+ * The labels on the map itself, in the reader's language and number format.
  *
  * @typedef {(key: string, slots?: Record<string, string | number>) => string} Translate
  * @typedef {ReturnType<typeof createLabels>} Labels
@@ -8,34 +8,34 @@
 
 import { laneName } from "../../core/lanes.js";
 
-/** Blocks of sentences that are said on a map. */
+/** Blocks of messages that a map uses. */
 export const SAID_ON_MAPS = ["lane", "map", "task"];
 
 /**
  * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
  *   `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
- * @param {Vocabulary["blocks"] | null} [blocks] what `t` says, for a worker to say it
+ * @param {Vocabulary["blocks"] | null} [blocks] templates behind `t`, for a worker
  */
 export function createLabels(
-  t = wordless,
+  t = untranslated,
   locale = document.documentElement.lang,
   blocks = null,
 ) {
-  const tongue = locale || "es";
-  const plain = new Intl.NumberFormat(tongue, { maximumFractionDigits: 1 });
-  const tenths = new Intl.NumberFormat(tongue, {
+  const language = locale || "es";
+  const plain = new Intl.NumberFormat(language, { maximumFractionDigits: 1 });
+  const tenths = new Intl.NumberFormat(language, {
     minimumFractionDigits: 1,
     maximumFractionDigits: 1,
   });
-  const hundredths = new Intl.NumberFormat(tongue, {
+  const hundredths = new Intl.NumberFormat(language, {
     minimumFractionDigits: 2,
     maximumFractionDigits: 2,
   });
-  const percents = new Intl.NumberFormat(tongue, { style: "percent" });
+  const percents = new Intl.NumberFormat(language, { style: "percent" });
   return {
     /** @type {Vocabulary | null} for a worker */
-    vocabulary: blocks && { language: tongue, blocks },
+    vocabulary: blocks && { language, blocks },
     /** @param {string} lane */
     lane: (lane) => laneName(lane, t),
     /** A length of the scale bar. @param {number} m */
@@ -44,7 +44,7 @@ export function createLabels(
     distance: (m) => `${tenths.format(m)} m`,
     /** A length that a person measured. @param {number} m */
     measured: (m) => `${hundredths.format(m)} m`,
-    /** A task in the reader's words; one of another fleet as it was sent.
+    /** A task in the reader's language; a task that iVeg does not know, as it was sent.
      * @param {string} task */
     task: (task) => {
       const key = `task.${task}`;
@@ -64,7 +64,7 @@ export function createLabels(
 }
 
 /** @type {Translate} */
-function wordless(key, slots = {}) {
+function untranslated(key, slots = {}) {
   const values = Object.values(slots);
   return values.length ? values.join(" ") : (key.split(".").pop() ?? "").toUpperCase();
 }

@@ -1,5 +1,5 @@
 /**
- * Who sees whom, and who acts on what it cannot see.
+ * Lines from observers to people, and from people to robots that act on them unseen.
  *
  * Solid from an observer to the person; dashed from the person to a robot that slows for
  * it without a line of sight: the point of sharing detections, made visible.
@@ -15,7 +15,7 @@ import { isolated, label } from "./paint.js";
  * @typedef {import("../scene.js").SceneRobot} SceneRobot
  */
 
-/** On a shorter link a distance would cover what it is about. */
+/** On a shorter link the text of the distance would cover person and robot. */
 const WORDS_FROM_PX = 48;
 const BESIDE_PX = 13;
 

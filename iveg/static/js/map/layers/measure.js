@@ -1,5 +1,5 @@
 /**
- * A distance between two points that a person tapped, like a tape laid on the floor.
+ * The distance between two tapped points, like a tape measure on the floor.
  *
  * The points are in `map`, so the tape stays where it lies while the map moves.
  *
@@ -11,7 +11,7 @@ import { screenX, screenY } from "../viewport.js";
 import { circle, isolated, label } from "./paint.js";
 
 /**
- * The tape after a tap: the third begins anew.
+ * The tape after a tap; a third tap begins a new tape.
  *
  * @param {Tape} tape
  * @param {Point} point (m)

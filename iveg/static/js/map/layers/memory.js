@@ -1,9 +1,9 @@
 /**
- * What a person chose for the map (layers, length of trails, keys), kept by the browser.
+ * A person's choices for the map (layers, length of trails, keys), kept by the browser.
  *
  * @typedef {{off: string[], trailS: number, shortcuts: boolean,
- *   believer: string | null}} Kept `believer`: whose belief the map shows; null is
- *   everybody's
+ *   believer: string | null}} Kept `believer`: the robot whose knowledge the map shows;
+ *   null shows all
  */
 
 import { TRAIL_SPANS_S } from "./trail.js";
@@ -91,6 +91,6 @@ function write(storage, choices) {
   try {
     storage?.setItem(KEY, JSON.stringify(choices));
   } catch {
-    // A full or forbidden store costs the memory of a switch, never the switch.
+    // A full or forbidden storage costs the memory of a switch, never the switch.
   }
 }

@@ -1,5 +1,5 @@
 /**
- * What every layer is given, and the few strokes that several of them share.
+ * The argument of every layer, and the strokes that several of them share.
  *
  * A layer is a module with `draw(paint)`: it reads the scene, paints in CSS pixels, keeps
  * nothing between frames and leaves the context's state as it found it (`isolated`).
@@ -14,7 +14,7 @@
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, labels: Labels,
  *   followed: string | null, tape: import("./measure.js").Tape,
  *   places?: import("./places.js").Places, ratio?: number,
- * }} Paint `places`: of the words of this frame; `ratio`: device pixels per CSS pixel
+ * }} Paint `places`: of the labels of this frame; `ratio`: device pixels per CSS pixel
  */
 
 /**
@@ -52,7 +52,7 @@ export function label({ ctx, theme }, text, x, y, style = {}) {
 }
 
 /**
- * A word in a filled capsule; tells how wide it became.
+ * A text in a filled capsule; returns its width.
  *
  * @param {Paint} paint
  * @param {string} text

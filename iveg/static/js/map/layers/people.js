@@ -2,8 +2,8 @@
  * People, and peers seen by robots, with the ring that the rule keeps around them.
  *
  * *Seen* is solid; *remembered* is dashed and grows at walking speed; *last seen* is a
- * marker alone, which fades and is gone after a minute: nobody knows where the person is
- * now, and the marks of a morning would hide who is there.
+ * marker alone, which fades and is removed after a minute: the person's place is unknown by
+ * then, and the marks of a morning would hide people who are there.
  */
 
 import { MARK_LIMIT_S } from "../scene.js";
@@ -18,7 +18,7 @@ import { circle, isolated, label } from "./paint.js";
 
 const WORDS_FROM_SCALE = 24;
 
-/** A mark is never fainter than this: what can hardly be seen is dirt. */
+/** A mark is never fainter than this, or it would look like dirt. */
 const FAINTEST = 0.3;
 
 /** Labels nearer to each other than this would be read as one (px). */
@@ -31,16 +31,16 @@ export function draw(paint) {
     isolated(paint.ctx, () => drawPerson(paint, person));
   }
   isolated(paint.ctx, () => {
-    for (const person of worded(paint)) drawAge(paint, person);
+    for (const person of labelled(paint)) drawAge(paint, person);
   });
 }
 
 /**
- * Who gets words: of several whose words would lie on each other the newest.
+ * People with a label: of several whose labels would overlap, the newest.
  *
  * @param {Paint} paint
  */
-export function worded({ scene, view }) {
+export function labelled({ scene, view }) {
   const unseen = scene.people.filter(({ stage }) => stage !== "seen");
   /** @type {ScenePerson[]} */
   const chosen = [];
@@ -64,17 +64,17 @@ function drawPerson(paint, person) {
   else drawFigure(paint, person);
 }
 
-/** How much of a figure is left. @param {ScenePerson} person */
+/** Opacity of a figure. @param {ScenePerson} person */
 function strengthOf({ stage, ageS }) {
   if (stage !== "last_seen") return 1;
   return Math.max(FAINTEST, 0.8 * (1 - ageS / MARK_LIMIT_S));
 }
 
-/** How long ago somebody was seen. @param {Paint} paint @param {ScenePerson} person */
+/** Time since a person was last seen. @param {Paint} paint @param {ScenePerson} person */
 function drawAge(paint, person) {
   const { view, labels } = paint;
   const isGone = person.stage === "last_seen";
-  // From afar, sentences of several people would lie on each other.
+  // At a small scale, the labels of several people would overlap.
   const isNear = view.scale >= WORDS_FROM_SCALE;
   const said = isGone ? labels.lastSeen(person.ageS) : labels.ago(person.ageS);
   const text = isNear ? said : labels.age(person.ageS);
@@ -85,7 +85,7 @@ function drawAge(paint, person) {
 }
 
 /**
- * Below the sign, else above; null where other words stand in both places.
+ * Below the sign, else above; null where other labels are in both places.
  *
  * @param {Paint} paint @param {string} text @param {number} x @param {number} y
  */
@@ -135,7 +135,7 @@ function drawFigure({ ctx, theme }, person) {
   ctx.globalAlpha = 1;
 }
 
-/** A diamond: a machine, but one that nobody steers from here. @param {Paint} paint
+/** A diamond: a machine that is not controlled from here. @param {Paint} paint
  * @param {ScenePerson} person */
 function drawPeer({ ctx, theme }, person) {
   ctx.globalAlpha = strengthOf(person);

@@ -1,5 +1,5 @@
 /**
- * What lies under a finger: the robot before the person, the person before its ring.
+ * The object under a finger: a robot before a person, a person before its ring.
  *
  * @typedef {import("../scene.js").Scene} Scene
  * @typedef {import("../viewport.js").Viewport} Viewport
@@ -9,7 +9,7 @@
 import { screenX, screenY } from "../viewport.js";
 import { bodySize } from "./robot.js";
 
-/** Half of the smallest target that a finger can be asked to hit (44 px). */
+/** Half of the smallest target for a finger (44 px). */
 const FINGER_PX = 22;
 
 /**

@@ -1,11 +1,11 @@
 /**
- * Where words stand in a frame, so that no others are written over them.
+ * Places of the labels in a frame, so that none overlap.
  *
  * @typedef {import("../viewport.js").Rect} Rect
  * @typedef {ReturnType<typeof createPlaces>} Places
  */
 
-/** Between two words (px). */
+/** Between two labels (px). */
 const GAP_PX = 2;
 
 export function createPlaces() {

@@ -1,5 +1,5 @@
 /**
- * The machines: to scale, heading first, and never fresher than they are.
+ * Robots: to scale, with their heading, and never shown as fresher than they are.
  *
  * Live is filled; late has an amber outline and its age; lost is a dashed ghost at its
  * last pose.  Each kind of drive has its own body, so hue never carries identity alone.
@@ -16,10 +16,10 @@ import { circle, isolated, label, pill } from "./paint.js";
  * @typedef {import("../scene.js").SceneRobot} SceneRobot
  */
 
-/** A body is never drawn shorter than this (px), however far away the eye is. */
+/** A body is never drawn shorter than this (px), however small the scale. */
 const SHORTEST_PX = 20;
 const PADLOCK_PX = 12;
-/** From one line of words to the next. */
+/** From one line of text to the next. */
 const WORDS_PX = 28;
 
 /** @param {Paint} paint */
@@ -52,11 +52,11 @@ function drawRobot(paint, robot) {
   ctx.rotate(-robot.pose.yaw);
   drawBody(paint, robot, length, width);
   ctx.restore();
-  drawWords(paint, robot, length);
+  drawTag(paint, robot, length);
 }
 
 /**
- * A STOP that nobody confirmed: the disc in which the robot may be by now.
+ * An unconfirmed STOP: the disc in which the robot may be by now.
  *
  * @param {Paint} paint
  * @param {SceneRobot} robot
@@ -209,7 +209,7 @@ function drawHeading(ctx, length, width, hue, ink) {
 }
 
 /**
- * Whether a padlock is true: the robot has said that it is held, and that was just now.
+ * Whether a padlock is true: a fresh report of the robot says that it is held.
  *
  * @param {Pick<SceneRobot, "mode" | "ageS">} robot
  */
@@ -248,15 +248,15 @@ function drawPadlock({ ctx, theme }, x, y) {
 }
 
 /**
- * Name above; beside it what a person must know: age, half speed, recording.
+ * Name above, and beside it age, half speed and recording.
  *
  * @param {Paint} paint
  * @param {SceneRobot} robot
  * @param {number} length
  */
-function drawWords(paint, robot, length) {
+function drawTag(paint, robot, length) {
   const { ctx, theme } = paint;
-  const y = heightOfWords(paint, robot, length);
+  const y = heightOfTag(paint, robot, length);
   const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
   label(paint, robot.id, 0, y, {
     size: 13,
@@ -271,14 +271,14 @@ function drawWords(paint, robot, length) {
 }
 
 /**
- * Above the robot, else below, else farther away: where no other words stand.
+ * Above the robot, else below, else farther away: where no other label is.
  *
  * @param {Paint} paint
  * @param {SceneRobot} robot
  * @param {number} length
  * @returns {number} middle of the labels, from the robot's (px)
  */
-function heightOfWords(paint, robot, length) {
+function heightOfTag(paint, robot, length) {
   const { ctx, view, theme, places } = paint;
   const near = length / 2 + 20;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];

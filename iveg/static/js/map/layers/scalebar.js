@@ -1,4 +1,4 @@
-/** How long a metre is on this screen. */
+/** The scale bar: the length of a metre on this screen. */
 
 import { isolated, label } from "./paint.js";
 

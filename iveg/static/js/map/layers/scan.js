@@ -1,4 +1,4 @@
-/** LiDAR points, each robot's in its own hue: what the machines themselves see. */
+/** Laser scans, the points of each robot in its own hue. */
 
 import { isolated } from "./paint.js";
 

@@ -1,4 +1,4 @@
-/** What does not move, drawn once per viewport, theme, greenhouse and language. */
+/** The static layers, drawn once per viewport, theme, greenhouse and language. */
 
 /**
  * @typedef {import("./paint.js").Paint} Paint

@@ -1,5 +1,5 @@
 /**
- * The page's colours as a canvas can use them: CSS custom properties, read once a theme.
+ * The page's colours for a canvas: CSS custom properties, read once for each theme.
  *
  * @typedef {{
  *   bg: string, lane: string, crop: string, post: string, text: string, grid: string,

@@ -1,5 +1,5 @@
 /**
- * Where robots have been, for ten seconds, a minute or ten.
+ * Trails of the robots, for ten seconds, one minute or ten.
  *
  * A trail keeps a point when the robot has moved on by a step, and long steps in its
  * older part, so that ten minutes cost no more than a few hundred points a robot.
@@ -24,7 +24,7 @@ const FINE_MS = 60_000;
 const COARSE_STEP_M = 0.5;
 /** A jump this long is a new start (or another boot), not a drive. */
 const JUMP_M = 3;
-/** Whatever a robot does, its trail has no more points than this. */
+/** A trail never has more points than this. */
 const CRUMBS_MAX = 2000;
 
 export function createTrails() {
@@ -48,7 +48,7 @@ export function createTrails() {
     },
     /** @param {string} robotId @returns {readonly Crumb[]} oldest first */
     of: (robotId) => trails.get(robotId) ?? [],
-    /** Forgets robots that are no more. @param {ReadonlyMap<string, unknown>} robots */
+    /** Removes trails of robots that are gone. @param {ReadonlyMap<string, unknown>} robots */
     keepOnly(robots) {
       for (const id of trails.keys()) if (!robots.has(id)) trails.delete(id);
     },
@@ -56,7 +56,7 @@ export function createTrails() {
       trails.clear();
       changes += 1;
     },
-    /** How often a trail has become another. */
+    /** Number of changes of any trail. */
     changes: () => changes,
   };
 }

@@ -1,4 +1,4 @@
-/** Over everything when the server is gone: what is below was, and need not be. */
+/** A veil over everything when the server is unreachable: the map below is of the past. */
 
 import { isolated } from "./paint.js";
 

@@ -1,6 +1,6 @@
 /**
- * What the reader wants to see: a range and a robot, remembered in the address so that
- * a link or the back button shows the same.
+ * The range and the robot that the reader has chosen, kept in the address so that a link
+ * or the back button shows the same.
  *
  * @typedef {{since: number, until: number, robot: string}} Asked Unix milliseconds
  */
@@ -21,7 +21,7 @@ export function createAsked(onChange) {
   const until = /** @type {HTMLInputElement} */ (need("#history-until"));
   let { range, robot } = fromAddress();
 
-  /** The range and robot as they are now; null where they make no range. */
+  /** The range and robot as they are now; null where the range is invalid. */
   function read() {
     /** @type {Asked} */
     const asked = { ...spanOf(range), robot };
@@ -82,7 +82,7 @@ export function createAsked(onChange) {
     const target = /** @type {Element} */ (event.target);
     const chip = /** @type {HTMLElement | null} */ (target.closest(".chip"));
     if (chip?.dataset.range) {
-      // One's own range begins as what was on show.
+      // A custom range begins as the range on show.
       if (chip.dataset.range === "own" && range !== "own") fill(spanOf(range));
       range = chip.dataset.range;
       changed();

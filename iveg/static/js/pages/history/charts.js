@@ -1,10 +1,10 @@
 /**
- * Figures that the server made and checked, in this page's colours and language.
+ * The server's figures, in this page's colours and language.
  *
  * The library is large and comes from this server; it is asked for with the first
  * figure.  It styles a plot by sheets that a strict policy refuses, so an element of
- * each sheet's name keeps it from trying, and the style sheet of pages with figures holds
- * what a plot needs.  A figure's `meta` says what its traces and axes are.
+ * each sheet's name keeps it from trying, and the style sheet of pages with figures has
+ * the rules for a plot.  A figure's `meta` describes its traces and axes.
  *
  * @typedef {{type: string, mode?: string, name: string, x: (number | null)[],
  *   y: (number | null)[], meta: Record<string, any>, line?: object,
@@ -111,7 +111,7 @@ function dressed(trace, index, i18n) {
   if (kind === "mandated") Object.assign(line, { width: 1.5, dash: "6px,3px" });
   const symbol = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (kind)];
   const marker = { size: 9, symbol, ...trace.marker, color: colour };
-  // What is newest lies on the edge, and would be cut in half there.
+  // The newest point lies on the edge, and would be cut in half there.
   return { ...trace, x, name, line, marker, cliponaxis: false };
 }
 
@@ -141,7 +141,7 @@ export function styled(layout, asked, i18n) {
     ...layout[`${name}axis`],
     title: { text: i18n.t(`history.axis.${layout.meta[name]}`), standoff: 8 },
     gridcolor: token("--line"),
-    // Where lines are black for the sun, whole ones would outshout what was measured.
+    // Where all lines are black for sunlight, solid limits would hide the measured line.
     griddash: "1px,4px",
     zerolinecolor: token("--line-strong"),
     linecolor: token("--line-strong"),
@@ -191,7 +191,7 @@ function shaded(shape) {
 }
 
 /**
- * What a figure shows, in one sentence; also what it is for who cannot see it.
+ * A figure in one sentence, which is its text alternative, too.
  *
  * @param {ChartName} name @param {Trace[]} data
  * @param {import("../../core/i18n.js").I18n} i18n

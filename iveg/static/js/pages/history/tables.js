@@ -1,5 +1,5 @@
 /**
- * Rows of the past, newest first, page after page.
+ * Rows of the history, newest first, page after page.
  *
  * @typedef {{items: any[], next: string | null}} Page
  */
@@ -8,7 +8,7 @@ import { make, need, setHidden } from "../../panels/dom.js";
 import { endSaid, tookOf, zeroOf } from "../latency.js";
 import { dayAndTime } from "./local_time.js";
 
-/** Worst first: a chain is as good as its worst link. */
+/** Worst first: a decision is as good as its worst link. */
 const VERDICTS = ["missing", "late", "ok", "n/a"];
 
 /**
@@ -48,7 +48,7 @@ export function createTable(name, i18n, cells, readMore) {
       next = page.next;
       draw();
     } catch {
-      // What went wrong is on the page already; the button stays to try again.
+      // The error is on the page already; the button stays for another try.
     } finally {
       more.disabled = false;
     }
@@ -102,7 +102,7 @@ export function commandCells(item, i18n) {
   ];
 }
 
-/** The verdict as shape and word; pressing it opens the whole chain. */
+/** The verdict as shape and text; a press opens the whole decision. */
 function chainCell(
   /** @type {any} */ item,
   /** @type {import("../../core/i18n.js").I18n} */ i18n,
