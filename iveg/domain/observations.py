@@ -349,6 +349,6 @@ class Received:
     sparse: bool = True
 
     @property
-    def road(self) -> str:
-        """The transport as the JSON key ``road`` has it, for one version."""
+    def alias(self) -> str:
+        """The transport's name in counters, such as ``orion.odometry``."""
         return alias_of(self.transport)

@@ -74,7 +74,7 @@ class DetectionRecord:
         stamp: The robot's clock, exactly as sent.
         class_: Canonical; None for a class that the alias table does not know.
         confident: Whether it reached the threshold.
-        road: ``orion`` or ``mqtt``, whichever was first.
+        transport: Id of the transport whose copy was first.
         box: The box with its ``frame_id``; None when it was not kept.
     """
 
@@ -86,7 +86,7 @@ class DetectionRecord:
     y: float
     z: float
     confident: bool
-    road: str
+    transport: str
     stamp: str | None = None
     class_: str | None = None
     person_id: str | None = None
@@ -189,7 +189,7 @@ class OdometryRecord:
 
     Attributes:
         linear: (m/s); ``angular`` (rad/s).
-        mandated_factor: What iVeg asked for; ``applied_factor`` what was reported.
+        limit_factor: iVeg's speed limit; ``applied_factor`` the robot's report.
         link: ``LIVE``, ``LATE`` or ``LOST``.
     """
 
@@ -200,7 +200,7 @@ class OdometryRecord:
     yaw: float
     linear: float
     angular: float
-    mandated_factor: float
+    limit_factor: float
     applied_factor: float | None = None
     link: str | None = None
 

@@ -8,6 +8,7 @@ from iveg.domain.records import DetectionRecord, Json
 from iveg.domain.stamps import format_stamp
 from iveg.domain.tracking.people import Placed
 from iveg.domain.tracking.person import Stage
+from iveg.domain.transports import TransportId, alias_of
 from iveg.models.base import Model
 from iveg.models.margin import Margin
 from iveg.models.places import Position
@@ -89,11 +90,14 @@ class Detection(Model):
     person_id: str | None
     peer: str | None = None
     """The robot of the fleet that was seen."""
+    transport: TransportId
+    """Of the copy that was first."""
     road: str
+    """The same in the words of an earlier version."""
 
     @classmethod
     def of(
-        cls, one: Placed, robot_id: str, stamp: str | None, road: str
+        cls, one: Placed, robot_id: str, stamp: str | None, transport: TransportId
     ) -> "Detection":
         """One detection of a robot's newest frame."""
         x, y, z = one.position
@@ -108,7 +112,8 @@ class Detection(Model):
             confident=one.kind != "faint",
             person_id=None if one.person is None else one.person.person_id,
             peer=one.peer,
-            road=road,
+            transport=transport,
+            road=alias_of(transport),
         )
 
     @classmethod
@@ -125,7 +130,8 @@ class Detection(Model):
             box=_box(record.box),
             confident=record.confident,
             person_id=record.person_id,
-            road=record.road,
+            transport=TransportId(record.transport),
+            road=alias_of(TransportId(record.transport)),
         )
 
 
@@ -142,6 +148,8 @@ class DetectionFrame(Model):
 
     robot_id: str
     stamp: str | None
+    transport: TransportId
     road: str
+    """The same in the words of an earlier version."""
     age_s: float
     items: list[Detection]

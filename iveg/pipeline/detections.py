@@ -118,7 +118,9 @@ class DetectionTracking:
             # Keep the first moment, so that a long sighting gets a row every so often.
             self._told[robot_id, subject] = last
             return
-        self._event_log.detection(one, robot_id, frame.origin.stamp, at, received.road)
+        self._event_log.detection(
+            one, robot_id, frame.origin.stamp, at, received.transport
+        )
         if last is None or at.mono - last >= 2 * _LOGGED_S:
             self._event_log.log(_line(one, robot_id, subject), at)
 

@@ -99,7 +99,7 @@ class EventLog:
             self._sink.offer(cleared_behind(alert, now.wall))
 
     def detection(
-        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, road: str
+        self, one: Placed, robot_id: str, stamp: str | None, at: Instant, transport: str
     ) -> None:
         """Record one detection."""
         x, y, z = one.position
@@ -113,7 +113,7 @@ class EventLog:
                 y=y,
                 z=z,
                 confident=one.kind != "faint",
-                road=road,
+                transport=transport,
                 stamp=stamp,
                 class_=one.class_,
                 person_id=None if one.person is None else one.person.person_id,
@@ -124,9 +124,7 @@ class EventLog:
             )
         )
 
-    def odometry(
-        self, robot: RobotState, mandated: float, link: str, at: Instant
-    ) -> None:
+    def odometry(self, robot: RobotState, limit: float, link: str, at: Instant) -> None:
         """Record a pose, if it is one of the two a second that are kept."""
         if robot.odometry is None:
             return
@@ -140,7 +138,7 @@ class EventLog:
                 yaw=pose.yaw,
                 linear=twist.linear_x,
                 angular=twist.angular_z,
-                mandated_factor=mandated,
+                limit_factor=limit,
                 applied_factor=None
                 if robot.safety is None
                 else robot.safety.speed_factor,

@@ -65,7 +65,7 @@ class Ingest:
             return
         name = kind_of(received.observation).__name__
         # What we asked for is no message: it would hide that one was lost.
-        way = "asked" if received.asked else received.road
+        way = "asked" if received.asked else received.alias
         self.counters[f"{way}.{name}"] += 1
         self._passed(received)
         if _is_twin_of_a_picture(received.observation):

@@ -45,8 +45,8 @@ class OdometryThinner:
         return record
 
     def _tells_more(self, last: OdometryRecord, record: OdometryRecord) -> bool:
-        said = (last.mandated_factor, last.applied_factor, last.link)
-        if said != (record.mandated_factor, record.applied_factor, record.link):
+        said = (last.limit_factor, last.applied_factor, last.link)
+        if said != (record.limit_factor, record.applied_factor, record.link):
             return True
         # Robots tick at 10 or 20 Hz: half a tick early must not wait a whole tick more.
         return not 0.0 <= record.at - last.at < 0.95 * self._period_s

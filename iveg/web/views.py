@@ -237,14 +237,15 @@ class Views:
         robot = self._world.robot(robot_id)
         if robot.frame is None or robot.detections_at is None:
             return None
-        stamp, road = robot.frame.origin.stamp, alias_of(robot.frame_transport)
+        stamp, transport = robot.frame.origin.stamp, robot.frame_transport
         return DetectionFrame(
             robot_id=robot_id,
             stamp=stamp,
-            road=road,
+            transport=transport,
+            road=alias_of(transport),
             age_s=round(now.mono - robot.detections_at, 3),
             items=[
-                Detection.of(one, robot_id, stamp, road)
+                Detection.of(one, robot_id, stamp, transport)
                 for one in self._evaluator.placed.get(robot_id, [])
             ],
         )

@@ -136,7 +136,7 @@ def _history() -> Iterator[Record]:
                 at=NOW - 900 + n,
                 robot_id=robot,
                 linear=speed * slow,
-                mandated_factor=slow,
+                limit_factor=slow,
             )
     for n in range(1440):
         at = NOW - 60 * (1440 - n)

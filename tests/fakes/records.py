@@ -28,7 +28,7 @@ def odometry_record(**fields: Any) -> OdometryRecord:
         "yaw": 0.5,
         "linear": 0.5,
         "angular": 0.0,
-        "mandated_factor": 1.0,
+        "limit_factor": 1.0,
         "applied_factor": 1.0,
         "link": "LIVE",
     }
@@ -57,7 +57,7 @@ def detection_record(**fields: Any) -> DetectionRecord:
         "y": 2.0,
         "z": 0.9,
         "confident": True,
-        "road": "mqtt",
+        "transport": "direct",
         "box": {
             "xmin": -4.0,
             "xmax": -3.0,

@@ -104,6 +104,7 @@ export function detection(changes = {}) {
     person_id: "p1",
     received_at: null,
     peer: null,
+    transport: "direct",
     road: "mqtt",
     ...changes,
   };

@@ -116,7 +116,8 @@ test("a gauge says no limit and no speed of a robot without a message", () => {
 
 test("the most certain detection of a fresh frame is told, an old frame says nothing", () => {
   const items = [0.3, 0.9, 0.6].map((probability) => detection({ probability }));
-  const frame = { robot_id: "AGI", stamp: "s", age_s: 0, road: "mqtt", items };
+  const way = { transport: "direct", road: "mqtt" };
+  const frame = { robot_id: "AGI", stamp: "s", age_s: 0, ...way, items };
   const fresh = { ...frame, receivedAtMs: performance.now() };
   const old = { ...frame, receivedAtMs: performance.now() - 3500 };
   equal(certaintySaid(fresh, words), "robot.certainty_value person 0.9");

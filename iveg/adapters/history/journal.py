@@ -17,12 +17,16 @@ import orjson
 
 from iveg.domain.errors import HopError
 from iveg.domain.records import RECORD_TYPES, Record
+from iveg.domain.transports import TRANSPORTS
 from iveg.pipeline.record import Waiting
 
 _log = logging.getLogger(__name__)
 _KINDS: dict[str, type[Record]] = {kind.__name__: kind for kind in RECORD_TYPES}
 _ONCE_TEXT = frozenset({"rule_parameters", "links", "slots", "members", "box"})
 """What the version before wrote as JSON in a text."""
+_ONCE_NAMED = {"road": "transport", "mandated_factor": "limit_factor"}
+"""Fields that the version before called by another name."""
+_ONCE_VALUED = {one.alias: one.id for one in TRANSPORTS}
 _RESERVE_BYTES = 10 * 2**20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 
@@ -193,6 +197,9 @@ def _as_now(told: dict[str, Any]) -> dict[str, Any]:
     for name in _ONCE_TEXT & told.keys():
         if isinstance(told[name], str):
             told[name] = orjson.loads(told[name])
+    for before in _ONCE_NAMED.keys() & told.keys():
+        value = told.pop(before)
+        told[_ONCE_NAMED[before]] = _ONCE_VALUED.get(value, value)
     for what in ("sent", "answer"):
         for transport in ("direct", "fiware"):
             at = told.pop(f"{what}_{transport}_at", None)

@@ -45,7 +45,7 @@ class SpeedSeries:
     robot_id: str
     at: tuple[float, ...]
     linear: tuple[float, ...]
-    mandated: tuple[float, ...]
+    limit: tuple[float, ...]
     applied: tuple[float | None, ...]
     slice_s: float = 0.0
 
@@ -259,7 +259,7 @@ def _one(
         select(func.min(o.at), func.max(o.at), func.count()).where(*asked)
     ).one()
     if count <= most:
-        columns = (o.at, o.linear, o.mandated_factor, o.applied_factor)
+        columns = (o.at, o.linear, o.limit_factor, o.applied_factor)
         rows = select(*columns).where(*asked).order_by(o.at)
         return _series(robot, _points(connection, rows), 0.0)
     # One slice fewer than asked for: the last row may stand on the last edge.
@@ -269,7 +269,7 @@ def _one(
         select(
             func.min(o.at),
             func.avg(o.linear),
-            func.min(o.mandated_factor),
+            func.min(o.limit_factor),
             func.min(o.applied_factor),
         )
         .where(*asked)
@@ -284,8 +284,8 @@ def _points(connection: Connection, statement: Select[Any]) -> list[_Point]:
 
 
 def _series(robot: str, rows: list[_Point], slice_s: float) -> SpeedSeries:
-    at, linear, mandated, applied = zip(*rows, strict=True) if rows else ((),) * 4
-    return SpeedSeries(robot, at, linear, mandated, applied, slice_s)
+    at, linear, limit, applied = zip(*rows, strict=True) if rows else ((),) * 4
+    return SpeedSeries(robot, at, linear, limit, applied, slice_s)
 
 
 def _whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:

@@ -252,6 +252,9 @@ export type Detection = {
   person_id: string | null;
   /** The robot of the fleet that was seen. */
   peer: string | null;
+  /** Of the copy that was first. */
+  transport: string;
+  /** The same in the words of an earlier version. */
   road: string;
 };
 
@@ -270,6 +273,8 @@ export type DetectionBox = {
 export type DetectionFrame = {
   robot_id: string;
   stamp: string | null;
+  transport: string;
+  /** The same in the words of an earlier version. */
   road: string;
   age_s: number;
   items: Detection[];

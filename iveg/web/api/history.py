@@ -102,7 +102,7 @@ def router(
     @routes.get(
         "/api/v1/history/charts",
         summary="Plotly figures of a range",
-        description="Speed with the mandated limit, detections by class and "
+        description="Speed with the speed limit, detections by class and "
         "confidence, how long each STOP took; the last 15 minutes unless told.",
         response_class=Response,
         responses={200: {"content": {"application/json": {}}}},

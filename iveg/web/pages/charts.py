@@ -68,7 +68,7 @@ def _strip(n: int, of: int) -> list[float]:
 def _slow_downs(series: SpeedSeries, axis: str) -> Iterator[_Trace]:
     """A shade for each time with a speed limit below full speed."""
     since: float | None = None
-    for at, factor in zip(series.at, series.mandated, strict=True):
+    for at, factor in zip(series.at, series.limit, strict=True):
         if factor < FULL_SPEED and since is None:
             since = at
         elif factor >= FULL_SPEED and since is not None:
@@ -190,7 +190,7 @@ def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Tra
     at = [_ms(moment) for moment in series.at]
     lines: tuple[tuple[str, Sequence[float | None], _Trace], ...] = (
         ("speed", [round(v, 3) for v in series.linear], {}),
-        ("mandated", [fastest * f for f in series.mandated], {"shape": "hv"}),
+        ("mandated", [fastest * f for f in series.limit], {"shape": "hv"}),
     )
     gaps = _gaps(series.at, max(_SILENCE_S, 3 * series.slice_s))
     for kind, values, line in lines:

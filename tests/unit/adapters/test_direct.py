@@ -83,7 +83,7 @@ def test_looks_reports_and_answers_come_in_on_the_direct_transport() -> None:
 
     kinds = [type(one.observation) for one in bench.offered]
     assert kinds == [DetectionFrame, SafetyReport, CommandAnswer]
-    assert {one.road for one in bench.offered} == {"mqtt"}
+    assert {one.transport for one in bench.offered} == {"direct"}
 
 
 @pytest.mark.parametrize("topic", ["/iveg/AGI_odom/attrs", "/AGI/iveg/odom"])
@@ -93,7 +93,7 @@ def test_poses_come_straight_from_either_topic(topic: str) -> None:
     bench.reader.read(topic, codec.write_odometry(odometry()))
 
     (read,) = bench.offered
-    assert (type(read.observation), read.road) == (Odometry, "mqtt")
+    assert (type(read.observation), read.transport) == (Odometry, "direct")
 
 
 def test_what_was_overtaken_unread_is_told_by_robot_and_kind() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from iveg.adapters.history.journal import SpillFile
 from iveg.domain.errors import HopError
-from iveg.domain.records import Record
+from iveg.domain.records import DetectionRecord, OdometryRecord, Record
 from iveg.pipeline.record import Waiting
 from tests.fakes.disk import files_no_longer_than
 from tests.fakes.records import (
@@ -16,7 +16,9 @@ from tests.fakes.records import (
     command_event_record,
     command_record,
     decision_record,
+    detection_record,
     log_record,
+    odometry_record,
 )
 
 EVERYTHING = (
@@ -184,3 +186,27 @@ def test_an_order_of_the_version_before_is_read_back_with_its_times(
     [row], _ = journal.read(0, 10)
 
     assert row.record == command_record(sent_at={"direct": 1.5})
+
+
+@pytest.mark.parametrize(
+    ("now", "before"),
+    [
+        (detection_record(transport="fiware"), {"transport": ("road", "orion")}),
+        (odometry_record(limit_factor=0.5), {"limit_factor": ("mandated_factor", 0.5)}),
+    ],
+)
+def test_a_field_of_the_version_before_is_read_back_under_its_name(
+    journal: SpillFile,
+    tmp_path: Path,
+    now: DetectionRecord | OdometryRecord,
+    before: dict[str, tuple[str, object]],
+) -> None:
+    record = {
+        key: value for key, value in asdict(now).items() if key not in before
+    } | dict(before.values())
+    line = {"kind": type(now).__name__, "revision": 1, "record": record}
+    (tmp_path / "journal").write_bytes(orjson.dumps(line) + b"\n")
+
+    [row], _ = journal.read(0, 10)
+
+    assert row.record == now

@@ -30,7 +30,9 @@ OLD_ROWS = (
     "INSERT INTO detections (at, robot_id, class_id, probability, x, y, z, confident,"
     " road, box) VALUES (1.0, 'AGI', 'farmer', 0.9, 1.0, 2.0, 0.9, true, 'mqtt',"
     ' \'{"xmin": -4.0, "frame_id": "map"}\'), '
-    "(2.0, 'AGI', 'farmer', 0.9, 1.0, 2.0, 0.9, true, 'mqtt', NULL)",
+    "(2.0, 'AGI', 'farmer', 0.9, 1.0, 2.0, 0.9, true, 'orion', NULL)",
+    "INSERT INTO odometry (at, robot_id, x, y, yaw, linear, angular, mandated_factor,"
+    " link) VALUES (1.0, 'AGI', 0.0, 0.0, 0.0, 0.8, 0.0, 0.5, 'LIVE')",
     "INSERT INTO alerts (alert_id, priority, key, raised_at, last_raised_at, slots,"
     " members, count, revision) VALUES ('A1', 'P2', 'alert.robot_lost', 1.0, 1.0,"
     ' \'{"robot": "AGI"}\', \'[{"priority": "P2", "raised_at": 1.0}]\', 1, 1)',
@@ -49,6 +51,8 @@ LOOK = (
     "SELECT rule_parameters FROM decisions",
     "SELECT box FROM detections WHERE at = 1.0",
     "SELECT slots FROM log WHERE id = 1",
+    "SELECT road FROM detections WHERE at = 2.0",
+    "SELECT mandated_factor FROM odometry",
     "SELECT sent_fiware_at FROM commands",
     "SELECT sent_direct_at FROM commands",
     "SELECT answer_fiware_at FROM commands",
@@ -87,6 +91,7 @@ async def test_rows_of_the_version_before_read_as_values(
     assert order.answer_at == {"direct": 1700000000.153}
     assert decision.rule_parameters == {"radius_m": 2.0}
     assert list(decision.links) == [{"link": "detection", "verdict": "ok"}]
+    assert (boxed.transport, unboxed.transport) == ("direct", "fiware")
     assert (boxed.box, unboxed.box) == ({"xmin": -4.0, "frame_id": "map"}, None)
     assert alert.slots == {"robot": "AGI"}
     assert list(alert.members) == [{"priority": "P2", "raised_at": 1.0}]

@@ -236,7 +236,7 @@ async def test_a_short_series_is_answered_row_by_row(
 ) -> None:
     remember(
         database_url,
-        odometry_record(at=NOON + 1, linear=0.2, mandated_factor=0.5),
+        odometry_record(at=NOON + 1, linear=0.2, limit_factor=0.5),
         odometry_record(at=NOON, linear=0.4),
         odometry_record(at=NOON, robot_id="AGII", applied_factor=None),
         odometry_record(at=NOON + 60),
@@ -245,7 +245,7 @@ async def test_a_short_series_is_answered_row_by_row(
     agi, agii = await queries.speed_series(NOON, NOON + 60)
 
     assert (agi.robot_id, agi.at, agi.linear) == ("AGI", (NOON, NOON + 1), (0.4, 0.2))
-    assert (agi.mandated, agi.slice_s) == ((1.0, 0.5), 0.0)
+    assert (agi.limit, agi.slice_s) == ((1.0, 0.5), 0.0)
     assert agii.applied == (None,)
     assert await queries.speed_series(NOON, NOON + 60, "AGII") == (agii,)
     assert await queries.speed_series(NOON, NOON + 60, "AGIII") == ()
@@ -255,14 +255,14 @@ async def test_a_long_series_is_thinned_and_keeps_a_short_slow_down(
     queries: Queries, database_url: str
 ) -> None:
     rows = [odometry_record(at=NOON + n / 2, linear=1.0) for n in range(5000)]
-    rows[2500] = replace(rows[2500], mandated_factor=0.5, applied_factor=0.0)
+    rows[2500] = replace(rows[2500], limit_factor=0.5, applied_factor=0.0)
     remember(database_url, *rows)
 
     [series] = await queries.speed_series(NOON, NOON + 2500)
 
     assert 1000 < len(series.at) <= 2000
     assert list(series.at) == sorted(series.at)
-    assert series.mandated.count(0.5) == 1
+    assert series.limit.count(0.5) == 1
     assert series.applied.count(0.0) == 1
     assert set(series.linear) == {1.0}
     assert series.slice_s == pytest.approx(2499.5 / 1999)

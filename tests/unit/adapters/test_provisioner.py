@@ -163,7 +163,7 @@ async def test_what_a_gap_has_lost_is_read_once_and_never_looks_live(
                 ]
 
     assert all(one.asked for one in read)
-    assert {one.road for one in read} == {"orion"}
+    assert {one.transport for one in read} == {"fiware"}
 
 
 async def test_f6_an_orion_that_is_down_is_told_once_and_shown(

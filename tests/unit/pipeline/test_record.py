@@ -150,14 +150,14 @@ def test_every_change_of_what_a_robot_is_told_or_applies_is_kept() -> None:
     thinner = OdometryThinner()
     first = odometry_record(at=NOON)
     changes = [
-        dataclasses.replace(first, at=NOON + 0.01, mandated_factor=0.5),
+        dataclasses.replace(first, at=NOON + 0.01, limit_factor=0.5),
         dataclasses.replace(
-            first, at=NOON + 0.02, mandated_factor=0.5, applied_factor=0.5
+            first, at=NOON + 0.02, limit_factor=0.5, applied_factor=0.5
         ),
         dataclasses.replace(
             first,
             at=NOON + 0.03,
-            mandated_factor=0.5,
+            limit_factor=0.5,
             applied_factor=0.5,
             link="LATE",
         ),

@@ -24,7 +24,7 @@ async def test_a_notification_is_taken_and_queued() -> None:
     (queued,) = desk.ingest.drain()
     assert (answer.status_code, answer.content) == (204, b"")
     assert isinstance(queued.observation, Odometry)
-    assert (queued.road, queued.asked) == ("orion", False)
+    assert (queued.transport, queued.asked) == ("fiware", False)
     assert desk.heard == [desk.clock()]
 
 

@@ -131,6 +131,7 @@ async def test_a_detection_reads_as_the_contract_says(
         "confident": True,
         "person_id": "P1",
         "peer": None,
+        "transport": "direct",
         "road": "mqtt",
     }
 
@@ -497,8 +498,8 @@ async def test_charts_show_the_last_quarter_of_an_hour(
     past.holds(
         odometry_record(at=NOON - 3600.0),
         odometry_record(at=NOON, linear=0.9),
-        odometry_record(at=NOON + 1, linear=0.4, mandated_factor=0.5),
-        odometry_record(at=NOON + 31, linear=0.0, mandated_factor=0.5),
+        odometry_record(at=NOON + 1, linear=0.4, limit_factor=0.5),
+        odometry_record(at=NOON + 31, linear=0.0, limit_factor=0.5),
         detection_record(probability=0.81),
         command_record(standstill_ms=412.0),
     )
@@ -523,11 +524,11 @@ def test_13_19_each_robot_has_a_strip_whose_slow_downs_are_shaded() -> None:
         "AGI",
         at=(10.0, 11.0, 12.0, 13.0),
         linear=(0.8, 0.4, 0.4, 0.8),
-        mandated=(1.0, 0.5, 0.5, 1.0),
+        limit=(1.0, 0.5, 0.5, 1.0),
         applied=(1.0, 0.5, 0.5, 1.0),
         slice_s=0.0,
     )
-    free = replace(slowed, robot_id="AGII", mandated=(1.0,) * 4)
+    free = replace(slowed, robot_id="AGII", limit=(1.0,) * 4)
     fleet = FleetDescription.undescribed(["AGI", "AGII"])
 
     figure = orjson.loads(charts.speed_figure([slowed, free], fleet))
