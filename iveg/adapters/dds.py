@@ -8,6 +8,7 @@ for messages that must be answered at once and wakes the event loop.
 
 import asyncio
 import threading
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -49,6 +50,8 @@ _MOST_PARTICIPANTS = 60
 _WAIT_MS = 250
 _REARM_S = 0.002
 _MOST_TAKEN = 200
+_FEW = 8
+"""Cyclone makes room for as many as are asked for, and mostly one waits."""
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 
 
@@ -230,10 +233,16 @@ class DdsReader:
         Raises:
             HopError: DDS refuses.
         """
-        found = ddspy_take(self.entity._ref, _ANY, _MOST_TAKEN)
+        found = self._take(_FEW)
+        if len(found) == _FEW:
+            found += self._take(_MOST_TAKEN)
+        return [payload for payload, about in found if about.valid_data]
+
+    def _take(self, most: int) -> list[tuple[bytes, Any]]:
+        found: list[tuple[bytes, Any]] | int = ddspy_take(self.entity._ref, _ANY, most)
         if isinstance(found, int):
             raise HopError("dds", DDSException(found, "taking").msg)
-        return [payload for payload, about in found if about.valid_data]
+        return found
 
     @property
     def writers(self) -> int:
@@ -393,7 +402,7 @@ class _Watch:
                 except RuntimeError:  # the loop has closed
                     return
             # The loop takes what came meanwhile; a flood wakes it no more often.
-            self._ended.wait(_REARM_S)
+            time.sleep(_REARM_S)
 
     def _tell(self) -> None:
         # First, so that news which on_data just misses is told again.
