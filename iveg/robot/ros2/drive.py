@@ -38,6 +38,7 @@ class DriveTopics:
         self._base_link = base_link
         self._input_faults = input_faults
         self._newest = 0.0
+        self._written: tuple[Twist2D, bytes] = REST, cdr.write(write_twist(REST))
 
     def read(self, payload: bytes, now: float) -> Twist2D | None:
         """The twist that upstream requests; None if older than the one before."""
@@ -63,8 +64,9 @@ class DriveTopics:
 
     def write(self, twist: Twist2D, wall: float) -> bytes:
         """Bytes for the base; ``wall`` is the robot's clock (Unix s)."""
-        written = write_twist(twist)
-        if not self._drive.stamped_out:
-            return cdr.write(written)
-        header = m.Header(m.Time.of(wall), self._base_link)
-        return cdr.write(m.TwistStamped(header, written))
+        if self._drive.stamped_out:
+            header = m.Header(m.Time.of(wall), self._base_link)
+            return cdr.write(m.TwistStamped(header, write_twist(twist)))
+        if self._written[0] != twist:
+            self._written = twist, cdr.write(write_twist(twist))
+        return self._written[1]
