@@ -184,13 +184,13 @@ class _Source:
         self._flush()
         count = self._count() if fixed is None else str(fixed)
         kind = np.dtype(self._order + code)
-        native = self._named(kind.newbyteorder("="))
+        turned = f".astype({self._named(kind.newbyteorder('='))})"
         many = self._fresh()
         self._line(f"at += -at & {size - 1} if {count} else 0")
         self._until(
             f"at + {count} * {size}",
             f"{many} = frombuffer(d, {self._named(kind)}, {count}, at)"
-            f".astype({native}, copy=False)",
+            f"{'' if kind.isnative else turned}",
         )
         return many
 

@@ -17,14 +17,13 @@ from iveg.domain.observations import (
     DetectionFrame,
     Instant,
     Odometry,
-    Origin,
     Unplaced,
 )
 from iveg.robot.grounding.locate import Grounding
 from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
-from iveg.robot.ros2.reading import Battery
+from iveg.robot.ros2.reading import UNSAID, Battery
 from iveg.robot.ros2.rigid import Rigid
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
@@ -283,10 +282,10 @@ class SensorInputs:
         to_map = self._in_map(odom, stamp, now.mono)
         if in_odom is None or to_map is None:
             self._here = None
-            return [Unplaced("", Origin(), "odometry", twist)]
+            return [Unplaced("", UNSAID, "odometry", twist)]
         place = to_map.compose(in_odom)
         self._here = _Here(place, in_odom, odom, stamp)
-        return [Odometry("", Origin(), place.flat(), twist)]
+        return [Odometry("", UNSAID, place.flat(), twist)]
 
     def _base_in_odom(
         self, message: m.Odometry, stamp: float, now: float
@@ -307,7 +306,7 @@ class SensorInputs:
         late = here is None or abs(stamp - here.stamp) > self._tf_max_age_s
         laser = self._laser(message.header.frame_id, stamp, now.mono)
         if late or laser is None:
-            return [Unplaced("", Origin(), "scan")]
+            return [Unplaced("", UNSAID, "scan")]
         return [reading.read_scan(message, laser)]
 
     def _laser(self, frame: str, stamp: float, now: float) -> Rigid | None:
@@ -344,7 +343,7 @@ class SensorInputs:
                     error.reason, self._name("detections_3d"), now.mono
                 )
                 lost += 1
-        return [DetectionFrame("", Origin(), tuple(found), lost)]
+        return [DetectionFrame("", UNSAID, tuple(found), lost)]
 
     def _path(self, payload: bytes, now: Instant) -> list[Sensed]:
         message = self._read("path", m.Path, payload, now.mono)
@@ -365,7 +364,7 @@ class SensorInputs:
             return []
         self._battery_told = now.mono
         share, charging, volts = said.percentage, said.charging, said.voltage
-        return [BatterySaid("", Origin(), share, charging, volts)]
+        return [BatterySaid("", UNSAID, share, charging, volts)]
 
     # --- pictures -----------------------------------------------------------------
 
@@ -405,13 +404,13 @@ class SensorInputs:
             return []
         self._look = None
         if not look.detections:
-            return [DetectionFrame("", Origin(), ())]
+            return [DetectionFrame("", UNSAID, ())]
         frame = depth.header.frame_id if depth is not None else ""
         place = self._in_map(frame, stamp, now.mono) if depth is not None else None
         if depth is None or camera is None:
             self.input_faults.note("no_depth", self._name("detections_2d"), now.mono)
         if depth is None or camera is None or place is None:
-            return [DetectionFrame("", Origin(), (), len(look.detections))]
+            return [DetectionFrame("", UNSAID, (), len(look.detections))]
         mask = pictures.nearest(self._masks, stamp, _SAME_PICTURE_S)
         try:
             picture = pictures.read_depth(depth, camera)
@@ -422,4 +421,4 @@ class SensorInputs:
             ]
         except UnreadableError as error:
             self.input_faults.note(error.reason, self._name("depth"), now.mono)
-            return [DetectionFrame("", Origin(), (), len(look.detections))]
+            return [DetectionFrame("", UNSAID, (), len(look.detections))]

@@ -17,9 +17,15 @@ from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import Rigid, rigid_of
 from iveg.ros2 import messages as m
 
+UNSAID = Origin()
+"""Whose it is and when is filled in by the uplink."""
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
 _FARTHEST_M = 1e6
+_FARTHEST_BITS = np.float32(_FARTHEST_M).view(np.uint32)
+"""Bits of a float32 are in the order of the numbers; what is negative, infinite or no
+number is above, and one comparison finds it."""
+_NOTHING = np.float32(np.inf)
 _TILT = math.radians(10.0)
 _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
@@ -78,17 +84,16 @@ def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
         raise UnreadableError("not_a_number", "a sweep")
     if not scan.range_max > 0.0:
         raise UnreadableError("bad_range", f"{scan.range_max}")
-    ranges = scan.ranges.astype(np.float32)
-    ranges[~((ranges >= 0.0) & (ranges <= _FARTHEST_M))] = np.inf
+    side = _side(laser)
     return LaserScan(
         "",
-        Origin(),
-        scan.angle_min * _side(laser),
-        scan.angle_increment * _side(laser),
+        UNSAID,
+        scan.angle_min * side,
+        scan.angle_increment * side,
         max(0.0, scan.range_min),
         min(scan.range_max, _LONGEST_RANGE_M),
         laser.flat(),
-        ranges,
+        np.where(scan.ranges.view(np.uint32) <= _FARTHEST_BITS, scan.ranges, _NOTHING),
     )
 
 
@@ -193,11 +198,11 @@ def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigatio
     poses = [*path.poses[::step], *path.poses[-1:]]
     points = np.array([(p.pose.position.x, p.pose.position.y, 0.0) for p in poses])
     if not points.size:
-        return Navigation("", Origin(), "idle")
+        return Navigation("", UNSAID, "idle")
     if not (np.abs(points) <= _FARTHEST_M).all():
         raise UnreadableError("not_a_number", "a path")
     way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
-    return Navigation("", Origin(), task, way[-1], way)
+    return Navigation("", UNSAID, task, way[-1], way)
 
 
 @dataclass(frozen=True, slots=True)

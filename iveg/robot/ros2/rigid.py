@@ -85,7 +85,8 @@ class Rigid:
     @property
     def tilt(self) -> float:
         """Angle between the two z axes (rad)."""
-        return math.acos(max(-1.0, min(1.0, self.rows[2][2])))
+        x, y, _, _ = self.q
+        return math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y))))
 
     def towards(self, later: "Rigid", part: float) -> "Rigid":
         """A share (0 to 1) of the way: linear in position, spherical in rotation."""
