@@ -27,6 +27,9 @@ class PromptClient(GreedyClient):
     def send(self, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write these at QoS 0, as far as the socket takes them."""
         packets = b"".join(packet_of(topic, payload) for topic, payload in messages)
+        packets = packets[self._written_at_once(packets) :]
+        if not packets:
+            return
         self._sending = True
         try:
             # Queued behind what waits, under no command that paho knows: it has nobody
@@ -35,6 +38,16 @@ class PromptClient(GreedyClient):
             self._write()
         finally:
             self._sending = False
+
+    def _written_at_once(self, packets: bytes) -> int:
+        """How many bytes the socket took; paho's queue looks at all that goes wrong."""
+        sock = self._client.socket()
+        if sock is None or self._client.want_write():
+            return 0
+        try:
+            return int(sock.send(packets))
+        except OSError:
+            return 0
 
     async def written(self) -> None:
         """Return once the socket has taken everything."""
