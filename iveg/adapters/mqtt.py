@@ -11,13 +11,14 @@ import logging
 import random
 import socket
 import ssl
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
 import aiomqtt
 
 from iveg.adapters.log_filter import quiet
+from iveg.adapters.mqtt_inbox import Arrived, Letter
 from iveg.adapters.mqtt_outbox import PromptClient
 from iveg.domain.errors import HopError
 
@@ -27,7 +28,7 @@ quiet("mqtt")
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
-_MAX_INCOMING = 2000
+_ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +89,10 @@ class MqttLink:
         self._on_loss = on_loss
         self._on_passed_over = on_passed_over
         self._apart_s = apart_s
-        self._client: aiomqtt.Client | None = None
+        self._client: PromptClient | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
+        self._early: list[Letter] = []
+        """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake = asyncio.Event()
         self._loss_told = False
         self._mistake: Exception | None = None
@@ -136,13 +139,13 @@ class MqttLink:
             username=address.user,
             password=address.password,
             keepalive=_KEEPALIVE_S,
-            timeout=5.0,
+            timeout=_ANSWERED_WITHIN_S,
             tls_context=ssl.create_default_context() if address.tls else None,
             socket_options=_NODELAY,
-            max_queued_incoming_messages=_MAX_INCOMING,
-            take=self._hand_telemetry,
+            take=self._take,
             apart_s=self._apart_s,
         ) as client:
+            self._early = []
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
             _heed_cancellation()
@@ -156,28 +159,31 @@ class MqttLink:
                 self._send_offered(client), name=f"mqtt-send-{self._name}"
             )
             try:
-                async for message in client.messages:
-                    if isinstance(message.payload, bytes):
-                        self._hand({message.topic.value: message.payload})
+                self._hand_letters(self._early)
+                await client.lost()
             finally:
                 sender.cancel()
 
-    def _hand_telemetry(
-        self, messages: Mapping[str, bytes], passed_over: Mapping[str, int]
-    ) -> None:
+    def _take(self, arrived: Arrived) -> None:
         """A mistake of ours in here must end ``run``, and not the connection alone."""
         try:
-            for topic, count in passed_over.items():
+            for topic, count in arrived.passed_over.items():
                 self._on_passed_over(topic, count)
-            self._hand(messages)
+            if self._on_message is not None:
+                for topic, payload in arrived.telemetry.items():
+                    self._on_message(topic, payload)
+            if self._client is None:
+                self._early += arrived.letters
+            else:
+                self._hand_letters(arrived.letters)
         except Exception as error:
             self._mistake = error
             raise
 
-    def _hand(self, messages: Mapping[str, bytes]) -> None:
+    def _hand_letters(self, letters: Iterable[Letter]) -> None:
         if self._on_message is not None:
-            for topic, payload in messages.items():
-                self._on_message(topic, payload)
+            for letter in letters:
+                self._on_message(letter.topic, letter.payload)
 
     async def _send_offered(self, client: PromptClient) -> None:
         while True:
@@ -192,19 +198,18 @@ class MqttLink:
                 )
                 for topic, (payload, qos) in offered.items():
                     if qos:
-                        await self._send_confirmed(client, topic, payload, qos)
+                        await self._send_confirmed(client, topic, payload)
                 await client.written()
 
     async def _send_confirmed(
-        self, client: PromptClient, topic: str, payload: bytes, qos: int
+        self, client: PromptClient, topic: str, payload: bytes
     ) -> None:
         try:
-            await client.publish(topic, payload, qos=qos)
+            await client.confirmed(topic, payload, _ANSWERED_WITHIN_S)
         except aiomqtt.MqttError:
             # A broker that is slow to confirm may still be there; when it is gone, the
             # session ends and this task with it.
             _log.debug("%s: %s was not confirmed", self._name, topic)
-        _heed_cancellation()
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when possible; a newer message of the topic takes its place."""
@@ -225,7 +230,11 @@ class MqttLink:
         if client is None:
             raise HopError("mqtt", "not connected")
         try:
-            await client.publish(topic, payload, qos=qos, retain=retain, timeout=1.5)
+            within_s = _CONFIRMED_WITHIN_S
+            if qos:
+                await client.confirmed(topic, payload, within_s, retain=retain)
+            else:
+                await client.publish(topic, payload, retain=retain, timeout=within_s)
         except aiomqtt.MqttError as error:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error

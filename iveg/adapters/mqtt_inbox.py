@@ -1,14 +1,15 @@
 """Reading MQTT: all that has arrived in one call, and of telemetry only the newest.
 
-The client library reads a packet's parts one by one from the socket, and one packet a
-turn of the loop.  While the loop has much else to do, that is slower than a fleet
-sends: messages on the wire grow old, and robots' answers to a STOP behind them.
+The client library reads a packet's parts one by one from the socket, one packet a turn
+of the loop, and makes two tasks for each message.  While the loop has much else to do,
+that is slower than a fleet sends: messages on the wire grow old, and robots' answers to
+a STOP behind them.  Here messages and receipts are read; the rest is left to it.
 """
 
 import socket
 import ssl
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import aiomqtt
@@ -17,11 +18,41 @@ from paho.mqtt import client as paho
 READ_AHEAD = 256 << 10
 """Taken from the wire in one call (bytes): some thirty scans."""
 _LONGEST_LENGTH = 4
-_TELEMETRY, _RETAINED = 0x30, 0x01
-"""PUBLISH at QoS 0."""
+_TELEMETRY, _CONFIRMED, _RETAINED, _AGAIN = 0x30, 0x32, 0x01, 0x08
+"""PUBLISH at QoS 0 and at QoS 1, and its flags."""
+_RECEIPT = 0x40
+"""PUBACK."""
 
-Take = Callable[[Mapping[str, bytes], Mapping[str, int]], None]
-"""Payloads by topic, and how many older ones of a topic were passed over."""
+
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """A message at QoS 1, and the number that its receipt must bear."""
+
+    topic: str
+    payload: bytes
+    number: int
+
+
+@dataclass(slots=True)
+class Arrived:
+    """What has come, sorted.
+
+    Attributes:
+        telemetry: The newest payload at QoS 0 by topic.
+        passed_over: How many older ones of a topic there were.
+        letters: Everything that was sent at QoS 1, in order.
+        receipts: Numbers of our own letters that the broker has.
+        others: Packets that are the library's to read.
+    """
+
+    telemetry: dict[str, bytes] = field(default_factory=dict)
+    passed_over: dict[str, int] = field(default_factory=dict)
+    letters: list[Letter] = field(default_factory=list)
+    receipts: list[int] = field(default_factory=list)
+    others: bytes = b""
+
+
+Take = Callable[[Arrived], None]
 
 
 class GreedyClient(aiomqtt.Client):
@@ -31,8 +62,7 @@ class GreedyClient(aiomqtt.Client):
     reading one of them: what comes within ``apart_s`` is read together.
 
     Args:
-        take: Told the telemetry that has come, the newest of each topic.  It speaks
-            MQTT 3.1.1.
+        take: Told what has come.  It speaks MQTT 3.1.1.
         apart_s: Least time between two readings (s); 0: whenever something comes.
     """
 
@@ -43,6 +73,15 @@ class GreedyClient(aiomqtt.Client):
         self._take = take
         self._apart_s = apart_s
         self._listens = False
+
+    async def lost(self) -> None:
+        """Wait for the end of the connection.
+
+        Raises:
+            MqttError: it has ended.
+        """
+        async for _ in self.messages:
+            """Nothing that anybody subscribes to comes this way."""
 
     def _on_socket_open(self, client: paho.Client, userdata: Any, sock: Any) -> None:
         # Paho reads from this; it has no public way to say which socket.
@@ -105,7 +144,7 @@ class ReadAhead:
         return getattr(self._inner, name)
 
     def recv(self, size: int) -> bytes:
-        """Up to ``size`` bytes of packets that are no telemetry; none at the end.
+        """Up to ``size`` bytes of packets that are the library's; none at the end.
 
         Raises:
             BlockingIOError: nothing is there for now.
@@ -132,43 +171,54 @@ class ReadAhead:
             return False
         self._may_take = False
         self.taken += 1
-        telemetry, passed_over, others, self._begun = sort_packets(self._begun + came)
-        self._held = memoryview(others)
-        if telemetry:
-            self._take(telemetry, passed_over)
-        if not others:
+        arrived, self._begun = sort_packets(self._begun + came)
+        self._held = memoryview(arrived.others)
+        self._take(arrived)
+        if not arrived.others:
             raise BlockingIOError
         return True
 
 
-def sort_packets(
-    read: bytes,
-) -> tuple[dict[str, bytes], Counter[str], bytes, bytes]:
-    """Tell telemetry from other packets.
+def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
+    """Tell messages and receipts from other packets.
 
     A reader that falls behind must not read ever older news: of a topic's telemetry
-    (QoS 0) the newest is kept.  What was sent at QoS 1 (orders, answers, safety
-    reports) is all among the others, in order.
+    (QoS 0) the newest is kept.  Of what was sent at QoS 1 (orders, answers, safety
+    reports) all is.
 
     Returns:
-        Payloads by topic, how many older ones of each were passed over, the other
-        packets, and what was read of one that is not whole yet.
+        What has come, and what was read of a packet that is not whole yet.
     """
-    telemetry: dict[str, bytes] = {}
-    passed_over: Counter[str] = Counter()
-    others: list[bytes] = []
+    arrived, others = Arrived(), []
     place = 0
     while (found := _packet_at(read, place)) is not None:
         body, end = found
-        name = body + 2 + int.from_bytes(read[body : body + 2], "big")
-        if read[place] & ~_RETAINED == _TELEMETRY and name <= end:
-            topic = read[body + 2 : name].decode(errors="replace")
-            passed_over[topic] += topic in telemetry
-            telemetry[topic] = read[name:end]
-        else:
+        if not _is_ours(arrived, read, place, body, end):
             others.append(read[place:end])
         place = end
-    return telemetry, +passed_over, b"".join(others), read[place:]
+    arrived.others = b"".join(others)
+    return arrived, read[place:]
+
+
+def _is_ours(arrived: Arrived, read: bytes, place: int, body: int, end: int) -> bool:
+    kind, head = read[place], int.from_bytes(read[body : body + 2], "big")
+    if kind == _RECEIPT and end == body + 2:
+        arrived.receipts.append(head)
+        return True
+    name = body + 2 + head
+    if kind & ~_RETAINED == _TELEMETRY and name <= end:
+        topic = read[body + 2 : name].decode(errors="replace")
+        if topic in arrived.telemetry:
+            older = arrived.passed_over.get(topic, 0)
+            arrived.passed_over[topic] = older + 1
+        arrived.telemetry[topic] = read[name:end]
+        return True
+    if kind & ~(_RETAINED | _AGAIN) == _CONFIRMED and name + 2 <= end:
+        topic = read[body + 2 : name].decode(errors="replace")
+        number = int.from_bytes(read[name : name + 2], "big")
+        arrived.letters.append(Letter(topic, read[name + 2 : end], number))
+        return True
+    return False
 
 
 def _packet_at(read: bytes, place: int) -> tuple[int, int] | None:

@@ -1,32 +1,84 @@
-"""Writing MQTT: telemetry together and at once.
+"""Writing MQTT: together and at once.
 
 The client library's ``publish`` makes an event, a task and two tables for each message
 and takes three turns of the loop, which is most of the cost of a robot's telemetry.
-Nobody confirms messages at QoS 0, so here they are handed over together, written at
-once, and wait only while the socket is full.
+Nobody confirms messages at QoS 0, so here they are written together, at once, and wait
+only while the socket is full; one at QoS 1 waits for its receipt and nothing else.
 """
 
 import asyncio
 from collections.abc import Iterable
 from typing import Any
 
-from iveg.adapters.mqtt_inbox import GreedyClient
+import aiomqtt
 
-_PUBLISH, _UNTOLD = b"\x30", 0
+from iveg.adapters.mqtt_inbox import Arrived, GreedyClient, Take
+
+_PUBLISH, _RETAIN, _CONFIRMED, _UNTOLD = 0x30, 0x01, 0x02, 0
+_RECEIPT = b"\x40\x02"
+"""PUBACK and its length."""
+_MOST_NUMBERS = 65_535
 
 
 class PromptClient(GreedyClient):
-    """A client with a short way for telemetry, which waits only for a full socket."""
+    """A client with a short way out, which waits only for a full socket.
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
+    Args:
+        take: Told what has come; letters are confirmed afterwards.
+    """
+
+    def __init__(self, *args: Any, take: Take, **kwargs: Any) -> None:
+        super().__init__(*args, take=self._take_in, **kwargs)
+        self._hand_over = take
+        self._awaited: dict[int, asyncio.Future[None]] = {}
+        self._number = 0
         self._sending = False
         self._room = asyncio.Event()
         self._room.set()
 
     def send(self, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write these at QoS 0, as far as the socket takes them."""
-        packets = b"".join(packet_of(topic, payload) for topic, payload in messages)
+        self._put(b"".join(packet_of(topic, payload) for topic, payload in messages))
+
+    async def confirmed(
+        self, topic: str, payload: bytes, within_s: float, *, retain: bool = False
+    ) -> None:
+        """Send at QoS 1; return when the broker has it.
+
+        Raises:
+            MqttError: not connected, or no receipt in time.
+        """
+        if self._client.socket() is None:
+            raise aiomqtt.MqttError("not connected")
+        number = self._free_number()
+        receipt = self._awaited[number] = self._loop.create_future()
+        try:
+            self._put(packet_of(topic, payload, number, retain=retain))
+            async with asyncio.timeout(within_s):
+                await receipt
+        except TimeoutError as error:
+            raise aiomqtt.MqttError(f"no receipt within {within_s:g} s") from error
+        finally:
+            del self._awaited[number]
+
+    def _free_number(self) -> int:
+        """Paho numbers its own packets, but has none under way: it subscribes first."""
+        self._number = self._number % _MOST_NUMBERS + 1
+        while self._number in self._awaited:
+            self._number = self._number % _MOST_NUMBERS + 1
+        return self._number
+
+    def _take_in(self, arrived: Arrived) -> None:
+        for number in arrived.receipts:
+            receipt = self._awaited.get(number)
+            if receipt is not None and not receipt.done():
+                receipt.set_result(None)
+        self._hand_over(arrived)
+        if arrived.letters:
+            numbers = (letter.number.to_bytes(2) for letter in arrived.letters)
+            self._put(b"".join(_RECEIPT + number for number in numbers))
+
+    def _put(self, packets: bytes) -> None:
         packets = packets[self._written_at_once(packets) :]
         if not packets:
             return
@@ -75,11 +127,16 @@ class PromptClient(GreedyClient):
             self._room.set()
 
 
-def packet_of(topic: str, payload: bytes) -> bytes:
-    """A PUBLISH at QoS 0 that is not retained (MQTT 3.1.1, section 3.3)."""
+def packet_of(
+    topic: str, payload: bytes, number: int | None = None, *, retain: bool = False
+) -> bytes:
+    """A PUBLISH (MQTT 3.1.1, section 3.3): at QoS 1 if it has a number, else at 0."""
     name = topic.encode()
-    size = 2 + len(name) + len(payload)
-    return b"".join((_PUBLISH, _length(size), len(name).to_bytes(2), name, payload))
+    told = b"" if number is None else number.to_bytes(2)
+    kind = _PUBLISH | (_CONFIRMED if told else 0) | (_RETAIN if retain else 0)
+    size = 2 + len(name) + len(told) + len(payload)
+    head = bytes((kind,)), _length(size), len(name).to_bytes(2)
+    return b"".join((*head, name, told, payload))
 
 
 def _length(size: int) -> bytes:

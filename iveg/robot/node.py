@@ -45,7 +45,7 @@ from iveg.robot.uplink import Form, Sensed, Uplink
 _log = logging.getLogger(__name__)
 _GATE_EVERY_S = 0.04
 """25 Hz, so that a late timer still gives the drive its 20."""
-_SAID_WITHIN_S = 0.01
+_SAID_WITHIN_S = 0.03
 """Odometry, upstream twist and feedback that arrive together give one drive command."""
 
 

@@ -5,14 +5,20 @@ import contextlib
 import itertools
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.adapters.mqtt_inbox import GreedyClient, ReadAhead, sort_packets
+from iveg.adapters.mqtt_inbox import (
+    Arrived,
+    GreedyClient,
+    Letter,
+    ReadAhead,
+    sort_packets,
+)
 from iveg.embedded.mqtt_telemetry import publish_packet
 
 MANY = 300
@@ -100,8 +106,8 @@ async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
     loop = asyncio.get_running_loop()
     heard = asyncio.Queue[tuple[str, float]]()
 
-    def note(said: Mapping[str, bytes], _: object) -> None:
-        for topic in said:
+    def note(arrived: Arrived) -> None:
+        for topic in arrived.telemetry:
             heard.put_nowait((topic, loop.time()))
 
     here, there = socket.socketpair()
@@ -149,6 +155,39 @@ async def test_a_line_that_ends_during_a_rest_is_lost_after_it() -> None:
     assert link.connects == 1
 
 
+async def test_a_letter_before_the_subscriptions_is_receipted_and_waits_for_them() -> (
+    None
+):
+    said: asyncio.Queue[bytes] = asyncio.Queue()
+
+    async def broker(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        await reader.read(1000)
+        writer.write(CONNACK)
+        subscribe = await reader.read(1000)
+        writer.write(confirmed_packet("t", b"order"))
+        said.put_nowait(await reader.read(1000))
+        writer.write(b"\x90\x03" + subscribe[2:4] + b"\x01")
+        await reader.read(1000)
+        writer.close()
+
+    heard: asyncio.Queue[tuple[bytes, bool]] = asyncio.Queue()
+    async with await asyncio.start_server(broker, "127.0.0.1", 0) as server:
+        link = MqttLink(
+            BrokerAddress("127.0.0.1", server.sockets[0].getsockname()[1]),
+            "test",
+            {"t": 1},
+            lambda _, payload: heard.put_nowait((payload, link.connected)),
+        )
+        reading = asyncio.create_task(link.run())
+        async with asyncio.timeout(20.0):
+            assert await said.get() == b"\x40\x02\x00\x07"
+            assert await heard.get() == (b"order", True)
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+
+
 def confirmed_packet(topic: str, payload: bytes) -> bytes:
     body = len(topic).to_bytes(2, "big") + topic.encode() + b"\x00\x07" + payload
     return b"\x32" + bytes((len(body),)) + body
@@ -159,7 +198,7 @@ def test_of_telemetry_that_has_come_the_newest_of_each_topic_is_read() -> None:
 
     newest = {"t/0": b"2998", "t/1": b"2999"}
     passed_over = {"t/0": 1499, "t/1": 1499}
-    assert sort_packets(came) == (newest, passed_over, b"", b"")
+    assert sort_packets(came) == (Arrived(newest, passed_over), b"")
 
 
 def test_what_was_sent_with_a_receipt_is_all_read_in_its_order() -> None:
@@ -167,7 +206,17 @@ def test_what_was_sent_with_a_receipt_is_all_read_in_its_order() -> None:
     looks = [publish_packet("t", b"look %d" % n) for n in range(3)]
     came = b"".join(itertools.chain(*zip(looks, letters, strict=True)))
 
-    assert sort_packets(came) == ({"t": b"look 2"}, {"t": 2}, b"".join(letters), b"")
+    arrived, _ = sort_packets(came)
+
+    assert arrived.telemetry == {"t": b"look 2"}
+    assert arrived.letters == [Letter("t", b"answer %d" % n, 7) for n in range(3)]
+
+
+def test_a_receipt_is_read_and_what_is_no_message_is_left_to_the_library() -> None:
+    arrived, begun = sort_packets(b"\x40\x02\x01\x07" + PONG + b"\x40\x02")
+
+    assert arrived == Arrived(receipts=[0x107], others=PONG)
+    assert begun == b"\x40\x02"
 
 
 @pytest.mark.parametrize("packet", [publish_packet, confirmed_packet])
@@ -196,15 +245,21 @@ def test_packets_may_come_in_any_pieces(data: st.DataObject) -> None:
     whole = b"".join(sent)
     cuts = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1), max_size=6)))
     telemetry: dict[str, bytes] = {}
+    letters: list[Letter] = []
     others = begun = b""
     for start, end in itertools.pairwise([0, *cuts, len(whole)]):
-        told, _, more, begun = sort_packets(begun + whole[start:end])
-        telemetry |= told
-        others += more
+        arrived, begun = sort_packets(begun + whole[start:end])
+        telemetry |= arrived.telemetry
+        letters += arrived.letters
+        others += arrived.others
 
     assert telemetry == {"scan": b"x" * 300, "odom": b"", "ü": b"y" * 20_000}
-    assert (others, begun) == (sent[1] + sent[3], b"")
+    assert letters == [Letter("answer", b"LATCHED", 7)]
+    assert (others, begun) == (CONNACK, b"")
 
 
 def test_a_packet_of_no_proper_length_is_left_to_the_library() -> None:
-    assert sort_packets(b"\x30\xff\xff\xff\xffrest")[2] == b"\x30\xff\xff\xff\xffrest"
+    assert (
+        sort_packets(b"\x30\xff\xff\xff\xffrest")[0].others
+        == b"\x30\xff\xff\xff\xffrest"
+    )

@@ -29,3 +29,9 @@ def test_a_length_takes_seven_bits_a_byte(size: int, length: str) -> None:
 
 def test_a_topic_is_counted_in_bytes() -> None:
     assert packet_of("ä", b"").hex() == "300400" + "02" + "c3a4"
+
+
+def test_one_at_qos_1_bears_its_number_before_the_payload() -> None:
+    packet = packet_of("/AGI/cmd", b"{}", 0x107, retain=True)
+
+    assert packet == b"\x33\x0e\x00\x08/AGI/cmd\x01\x07{}"
