@@ -8,7 +8,6 @@ for messages that must be answered at once and wakes the event loop.
 
 import asyncio
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -382,6 +381,9 @@ class _Watch:
             self._waitset.attach(condition)
         self._loop, self._on_data = loop, on_data
         self._ended = threading.Event()
+        # Nobody lets go of it: to wait for it is the cheapest rest.
+        self._rest = threading.Lock()
+        self._rest.acquire()
         self._told = False
         self._thread = threading.Thread(target=self._wait, name="dds", daemon=True)
         self._thread.start()
@@ -402,7 +404,7 @@ class _Watch:
                 except RuntimeError:  # the loop has closed
                     return
             # The loop takes what came meanwhile; a flood wakes it no more often.
-            time.sleep(_REARM_S)
+            self._rest.acquire(timeout=_REARM_S)
 
     def _tell(self) -> None:
         # First, so that news which on_data just misses is told again.
