@@ -151,6 +151,7 @@ class LeastMargins:
         for column, (person, _) in enumerate(self._detections):
             self._columns.setdefault(person.person_id, []).append(column)
         self._margins = _all_pairs(facts, [look for _, look in self._detections], now)
+        self._ages = [fact[-1] for fact in facts]
 
     def of_robot(self, robot_id: str) -> Margin | None:
         """The least margin of this robot to anybody."""
@@ -167,6 +168,31 @@ class LeastMargins:
         found = self._margins[:, columns]
         row, column = np.unravel_index(int(np.argmin(found)), found.shape)
         return self._pair(int(row), columns[int(column)])
+
+    def telling(self) -> list[Margin]:
+        """The least of all pairs that are known now, and one that is not, if any.
+
+        They say of this moment what all pairs do (``domain/exposure``).
+        """
+        if not self._robots or not self._columns:
+            return []
+        nearest = np.array(
+            [
+                np.array(columns)[self._margins[:, columns].argmin(axis=1)]
+                for columns in self._columns.values()
+            ]
+        )
+        looks = np.array([look.age_s(self._now) for _, look in self._detections])
+        age = np.maximum(np.array(self._ages), looks[nearest])
+        margins = self._margins[np.arange(len(self._robots)), nearest]
+        known = (margins > -_UNKNOWN_M / 2) | (margins < -_INSIDE_M / 2)
+        seen = known & (age <= LIMITS.seen_s)
+        places = [np.where(seen, margins, np.inf).argmin(), seen.argmin()]
+        told = [
+            self._pair(place % len(self._robots), int(nearest.flat[place]))
+            for place in map(int, places)
+        ]
+        return [one for one in told if one is not None]
 
     def _pair(self, row: int, column: int) -> Margin | None:
         return _to_look(self._robots[row], *self._detections[column], self._now)

@@ -16,7 +16,7 @@ from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.margins import margins_of
+from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
@@ -283,7 +283,7 @@ class Evaluator:
 
     def _look_at_margins(self, now: Instant) -> None:
         fleet = list(self.world.live_robots())
-        margins = [*margins_of(fleet, self.people.known.values(), now)]
+        margins = LeastMargins(fleet, self.people.known.values(), now).telling()
         ages = [robot.age_s(now) for robot in fleet]
         seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
         self._exposures.update(margins, now, seen=seen)

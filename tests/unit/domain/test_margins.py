@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from iveg.domain.exposure import Exposure, Exposures
 from iveg.domain.margins import LeastMargins, Margin, least, margin_of, margins_of
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
@@ -184,10 +185,34 @@ def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:
             assert at_once.of_person(one.person_id) == least(its)
 
 
+@pytest.mark.parametrize(
+    ("distance", "looked_s"),
+    [(distance, looked_s) for distance in (2.0, 12.0) for looked_s in (0.0, 1.3, 2.0)],
+)
+def test_two_margins_tell_the_account_of_the_day_what_all_of_them_do(
+    distance: float, looked_s: float
+) -> None:
+    scene = met(distance)
+    scene.look("AGI", person(distance), person(30.0), person(90.0))
+    scene.now = looked_s
+    scene.drive("AGI", 0.5, linear=0.3)
+    scene.look("AGI", person(30.0))
+    robots, people, now = scene.world.robots.values(), scene.everyone, at(scene.now)
+    account = Exposures(Exposure(since=at(-1.0), evaluated_at=at(scene.now - 0.5)))
+    everything = [*margins_of(robots, people, now)]
+    telling = LeastMargins(robots, people, now).telling()
+
+    assert len(telling) < len(everything)
+    assert replace(account).update(telling, now, seen=True) == replace(account).update(
+        everything, now, seen=True
+    )
+
+
 def test_without_robots_or_people_there_is_no_margin() -> None:
     scene = met()
     nobody = LeastMargins([], scene.everyone, at(0.0))
     alone = LeastMargins(scene.world.robots.values(), [], at(0.0))
 
+    assert nobody.telling() == alone.telling() == []
     assert nobody.of_person(scene.everyone[0].person_id) is None
     assert alone.of_robot("AGI") is None
