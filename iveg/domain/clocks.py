@@ -47,6 +47,8 @@ class ClockFilter:
     _suspects: list[float] = field(default_factory=list)
     _suspected_by: _Kind | None = None
     seen_at: float = float("-inf")
+    least: float | None = None
+    """Arrival less stamp of the fastest message (s); None before the first."""
 
     def observe(self, kind: _Kind, origin: Origin, now: float) -> float | None:
         """Take one message in; ``kind`` says whose count its ``seq`` belongs to.
@@ -71,11 +73,6 @@ class ClockFilter:
             self._forget_suspects()
         self._note(now, transit)
         return max(0.0, transit - least)
-
-    @property
-    def least(self) -> float | None:
-        """Arrival less stamp of the fastest message (s); None before the first."""
-        return min((transit for _, transit in self._buckets), default=None)
 
     def _place(self, kind: _Kind, seq: int | None, stamp_s: float) -> tuple[bool, bool]:
         """Whether it is the newest of its kind, and its stamp fell all the same."""
@@ -113,6 +110,9 @@ class ClockFilter:
             buckets.append((now, transit))
         elif transit < buckets[-1][1]:
             buckets[-1] = (buckets[-1][0], transit)
+        else:
+            return
+        self.least = min(transit for _, transit in buckets)
 
 
 @dataclass(slots=True)

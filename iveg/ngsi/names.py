@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from iveg.ngsi.sensors import SENSORS
 
@@ -80,6 +81,7 @@ DIRECT_SUFFIXES = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")
 """Devices that may also speak to iVeg alone, past the IoT Agent."""
 
 
+@lru_cache(maxsize=1024)
 def is_robot_id(text: str) -> bool:
     """Whether a text may name a robot."""
     return _ROBOT_ID.fullmatch(text) is not None and text not in _RESERVED
@@ -109,6 +111,7 @@ def answer_topic(apikey: str, robot_id: str) -> str:
     return f"/{apikey}/{robot_id}/cmdexe"
 
 
+@lru_cache(maxsize=1024)
 def robot_of_device(device_id: str) -> str:
     """The robot that a device belongs to: ``AGI_odom`` → ``AGI``."""
     for device in ROBOT_DEVICES:

@@ -50,8 +50,10 @@ def read_attributes(
         is_past: Tells by its identity what need not be read; None reads all.
     """
     readings = []
+    known = [name for name in attributes if name in _READERS]
     # In the order of the table: where a robot is counts for what it sees there.
-    for name in sorted(attributes.keys() & _READERS.keys(), key=_RANK.__getitem__):
+    known.sort(key=_RANK.__getitem__)
+    for name in known:
         if attributes[name] is None:
             continue
         reader = _READERS[name]
@@ -62,7 +64,7 @@ def read_attributes(
             readings.append(read_one(robot_id, reader, attributes, name))
         else:
             readings.append(ReadResult((old,)))
-    return merge(readings)
+    return readings[0] if len(readings) == 1 else merge(readings)
 
 
 def _overtaken(

@@ -47,9 +47,9 @@ def read_notification(
         notification = payloads.NotificationValue.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    return notification.subscriptionId, merge(
-        read_entity(entity, is_past) for entity in notification.data
-    )
+    entities = [read_entity(entity, is_past) for entity in notification.data]
+    read = entities[0] if len(entities) == 1 else merge(entities)
+    return notification.subscriptionId, read
 
 
 def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> ReadResult:
