@@ -7,6 +7,7 @@ import runpy
 
 BENCHMARKS = (
     "decision_cost",
+    "feedback_delay",
     "latency_cost",
     "lidar_cost",
     "emulator_cost",

@@ -86,6 +86,12 @@ class Telling:
     async def stop(self, *_: object) -> None:
         """Nobody is stopped here."""
 
+    async def release(self, *_: object) -> None:
+        """Nor released."""
+
+    async def resume(self, *_: object) -> None:
+        """Nor sent on."""
+
     async def set_desired_state(self, *_: object) -> None:
         """Nor held."""
 
