@@ -47,8 +47,9 @@ class TelemetryFeed:
         ``report``, all in its own words: ``at`` and ``within`` (s) are when; without
         ``at`` it drew nothing; ``wait`` (s) is how long the next frame may wait.
         """
-        if type(number) is int and self.window.painted(number, now, report.get("wait")):
-            self._painting.painted(number, report.get("at"), report.get("within"), now)
+        wait, within = report.get("wait"), report.get("within")
+        if type(number) is int and self.window.painted(number, now, wait, within):
+            self._painting.painted(number, report.get("at"), within, now)
             self._is_full = False
             self._subscriber.wake()
 

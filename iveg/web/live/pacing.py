@@ -45,6 +45,7 @@ class CreditWindow:
         self._sent_at = float("-inf")
         self._asked_at = float("-inf")
         self._round_trip_s = 0.0
+        self._line_s: float | None = None
 
     @property
     def unpainted(self) -> int:
@@ -61,8 +62,20 @@ class CreditWindow:
         """When the next frame may go; ``inf``: not before one is painted."""
         if len(self._sent) >= FRAMES:
             return float("inf")
-        gap_s = max(PICTURE_S, self._round_trip_s / FRAMES) if self._sent else GAP_S
+        gap_s = self._apart_s if self._sent else GAP_S
         return max(self._asked_at, self._sent_at + gap_s)
+
+    @property
+    def _apart_s(self) -> float:
+        """Between frames of which none is painted (s).
+
+        Many on a long line, so that it is used; two while the page itself draws: more
+        would only keep it from drawing.
+        """
+        if self._line_s is None:
+            return max(PICTURE_S, self._round_trip_s / FRAMES)
+        draws_s = self._round_trip_s - self._line_s
+        return max(PICTURE_S, self._line_s / FRAMES, draws_s / 2)
 
     @property
     def room(self) -> int:
@@ -75,10 +88,13 @@ class CreditWindow:
         self._sent_at = now
         self._sent.append(_Sent(self._number, heavy, now))
 
-    def painted(self, number: object, now: float, wait: object = None) -> bool:
+    def painted(
+        self, number: object, now: float, wait: object = None, within: object = None
+    ) -> bool:
         """The page has painted this frame and all before; whether that was news.
 
-        ``wait`` (s): in its own words, how long the next frame may wait.
+        In its own words (s): ``wait`` is how long the next frame may wait, ``within``
+        half its shortest round trip.
         """
         if type(number) is not int or number > self._number:
             return False
@@ -89,12 +105,15 @@ class CreditWindow:
         self._round_trip_s += _LEARNS * (away_s - self._round_trip_s)
         while self._sent and self._sent[0].number <= number:
             self._sent.popleft()
-        self._asked_at = now + _bounded(wait)
+        self._asked_at = now + (_bounded(wait, LONGEST_WAIT_S) or 0.0)
+        half_s = _bounded(within, self._round_trip_s / 2)
+        self._line_s = None if half_s is None else 2 * half_s
         return True
 
 
-def _bounded(wait: object) -> float:
-    if isinstance(wait, bool) or not isinstance(wait, int | float):
-        return 0.0
-    # True of no NaN, and of an integer of any length without an overflow.
-    return wait if 0.0 < wait <= LONGEST_WAIT_S else 0.0
+def _bounded(told: object, most: float) -> float | None:
+    """A time that a page has told; None where it is none, or longer than possible."""
+    if isinstance(told, bool) or not isinstance(told, int | float):
+        return None
+    # Not true of NaN, and of an integer of any length without an overflow.
+    return told if 0.0 <= told <= most else None

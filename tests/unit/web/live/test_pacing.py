@@ -85,6 +85,30 @@ def test_over_a_long_round_trip_the_window_is_spread_and_not_sent_in_one_go() ->
     assert window.opens_at - now == pytest.approx(0.3 / FRAMES, rel=0.01)
 
 
+def test_a_page_that_draws_slowly_is_sent_two_frames_while_it_draws() -> None:
+    window, now = CreditWindow(), NOW
+    for number in range(1, 30):
+        window.sent(0, now)
+        window.painted(number, now + 0.2, 0.0, 0.001)
+        now += 1.0
+
+    window.sent(0, now)
+
+    assert window.opens_at - now == pytest.approx((0.2 - 0.002) / 2, rel=0.01)
+
+
+def test_behind_a_long_line_a_page_that_says_so_is_sent_as_many_as_ever() -> None:
+    window, now = CreditWindow(), NOW
+    for number in range(1, 30):
+        window.sent(0, now)
+        window.painted(number, now + 0.3, 0.0, 0.145)
+        now += 1.0
+
+    window.sent(0, now)
+
+    assert window.opens_at - now == pytest.approx(0.29 / FRAMES, rel=0.01)
+
+
 def test_a_round_trip_that_becomes_short_again_is_forgotten() -> None:
     window, now = CreditWindow(), NOW
     for number in range(1, 30):
