@@ -35,7 +35,7 @@ class ContextBroker:
     def __init__(self, started: float) -> None:
         self.started = started
         self._tenants: dict[str, Tenant] = {}
-        self.outbox = Outbox(lambda: clock.now().wall)
+        self.outbox = Outbox(clock.wall)
 
     def tenant(self, service: str) -> Tenant:
         """The data of a tenant; empty for an unknown one."""
@@ -271,13 +271,15 @@ class ContextBroker:
     ) -> None:
         tenant = self.tenant(scope.service)
         names = None if alteration == "entityDelete" else tuple(touched.now)
+        correlator = scope.correlator
         for subscription in tenant.concerned(entity, names):
             if subscription.wants(touched, alteration, scope.now):
+                correlator = correlator or self.outbox.correlator()
                 self.outbox.post(
                     subscription,
                     entity,
                     touched,
                     alteration,
-                    scope.correlator,
+                    correlator,
                     scope.now,
                 )

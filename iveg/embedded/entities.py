@@ -5,8 +5,8 @@ replaced before anything uses them, the others are sent many times.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
 
 import orjson
 
@@ -45,8 +45,7 @@ class Value:
         return self._json
 
 
-@dataclass(frozen=True, slots=True)
-class Attribute:
+class Attribute(NamedTuple):
     """One attribute of an entity.
 
     Attributes:
@@ -80,7 +79,7 @@ class Attribute:
 
     def noted(self, notes: Mapping[str, bytes]) -> "Attribute":
         """The same with metadata that are not stored."""
-        return replace(self, metadata={**self.metadata, **notes})
+        return self._replace(metadata={**self.metadata, **notes})
 
     def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
         chosen: dict[str, bytes] = {}
@@ -95,8 +94,7 @@ class Attribute:
         return chosen
 
 
-@dataclass(frozen=True, slots=True)
-class EntityChange:
+class EntityChange(NamedTuple):
     """Requested change of one attribute; ``None`` leaves the present value.
 
     Attributes:
@@ -237,7 +235,7 @@ def apply(
 def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribute:
     kind = change.type or (old.type if old else default_type(change.value))
     value = change.value
-    if isinstance(value, dict) and any(key.startswith("$") for key in value):
+    if isinstance(value, dict) and "$" in "".join(value) and _is_operation(value):
         value = _operated(orjson.loads(old.json) if old else None, value)
     kept = value if isinstance(value, Value) else _value(kind, value)
     if old is None:
@@ -250,6 +248,10 @@ def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribu
 
 def _value(kind: str, value: Any) -> Value:
     return Value(json=date_text(value)) if kind == "DateTime" else Value(value)
+
+
+def _is_operation(value: Mapping[str, Any]) -> bool:
+    return any(key.startswith("$") for key in value)
 
 
 def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, bytes]:

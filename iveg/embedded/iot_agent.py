@@ -81,7 +81,7 @@ class IotAgent:
         if spoken is None:
             return
         try:
-            taken = self._take_from(spoken, payload, clock.now().wall)
+            taken = self._take_from(spoken, payload, clock.wall())
         except (NgsiError, AgentError) as error:
             _log.debug("a message on %s was discarded: %s", topic, error)
             taken = False
@@ -120,7 +120,9 @@ class IotAgent:
     def _write(
         self, device: Device, changes: Mapping[str, EntityChange], now: float
     ) -> None:
-        scope = self._scope(device.tenancy, now)
+        tenancy = device.tenancy
+        # A correlator is made if somebody is notified.
+        scope = Scope(tenancy.service, tenancy.subservice, "", now)
         self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
     def _scope(self, tenancy: Tenancy, now: float) -> Scope:

@@ -149,18 +149,22 @@ class MqttBroker(Broker):  # type: ignore[misc]
             force_qos = self._arriving.get(str(session.client_id))
         self._take(topic, bytes(data or b""), force_qos)
 
-    def _take(self, topic: str, payload: bytes, most: int | None) -> None:
+    def _take(
+        self, topic: str, payload: bytes, most: int | None, packet: bytes = b""
+    ) -> None:
         """Deliver a client's publication."""
         for listener in self._listeners:
             try:
                 listener(topic, payload)
             except Exception:
                 _log.exception("a message on %s could not be taken", topic)
-        self._spread(topic, payload, most)
+        self._spread(topic, payload, most, packet)
 
-    def _spread(self, topic: str, payload: bytes, most: int | None) -> None:
+    def _spread(
+        self, topic: str, payload: bytes, most: int | None, packet: bytes = b""
+    ) -> None:
         """Write telemetry at once; messages to be confirmed use amqtt's queue."""
-        packet, confirmed = b"", False
+        confirmed = False
         for session, wanted in self._known_audience.get(topic) or self._audience(topic):
             if wanted and most != 0:
                 confirmed = True

@@ -22,7 +22,7 @@ MOST_UNSENT = 512 << 10
 robots' scans.  Messages to be confirmed queue behind it."""
 
 Connected = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
-Take = Callable[[str, bytes, int], None]
+Take = Callable[[str, bytes, int, bytes], None]
 
 
 class PacketReader(ReaderAdapter):  # type: ignore[misc]
@@ -68,7 +68,7 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
     Args:
         connected: Serves the client until it leaves.
         take: Called with topic, payload and quality of service of each telemetry
-            message.
+            message, and with the whole packet if that is 0.
 
     Attributes:
         packets: All other packets.
@@ -140,7 +140,7 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
             self.packets.feed_eof()
             self._hold()
             return
-        self._take(topic, packet[end + 2 * qos :], qos)
+        self._take(topic, packet[end + 2 * qos :], qos, b"" if qos else packet)
         if qos:
             writer.write(b"\x40\x02" + packet[end : end + 2])
 

@@ -70,6 +70,8 @@ class DeliveryLane:
         self._closed = False
         self._overflowing = False
         self._timer: asyncio.TimerHandle | None = None
+        self._first_until = 0.0
+        """Until when the first delivery under way is awaited (loop time, s)."""
         self.dropped = 0
         """Deliveries dropped for newer ones."""
 
@@ -107,11 +109,11 @@ class DeliveryLane:
         room = (_AHEAD if self._proven else 1) - len(self._flying)
         while room > 0 and self._waiting:
             delivery = self._waiting.popleft()
+            if not self._flying:
+                self._await_first(delivery.timeout_s)
             self._flying.append(delivery)
             self._wire.write(delivery.request)
             room -= 1
-        if self._timer is None:
-            self._start_timer()
         if not self._waiting:
             self._overflowing = False
 
@@ -144,11 +146,11 @@ class DeliveryLane:
         """The oldest delivery under way got its response."""
         if wire is not self._wire or not self._flying:
             return
-        self._stop_timer()
         self._flying.popleft().done(status, body)
         if keep:
             self._proven = True
-            self._start_timer()
+            if self._flying:
+                self._await_first(self._flying[0].timeout_s)
             self._pump()
         else:
             self.lost(wire)
@@ -171,21 +173,31 @@ class DeliveryLane:
         self._waiting.extendleft(reversed(again))
         self._pump()
 
-    def _start_timer(self) -> None:
-        if self._flying:
-            self._timer = asyncio.get_running_loop().call_later(
-                self._flying[0].timeout_s, self._time_out
-            )
+    def _await_first(self, timeout_s: float) -> None:
+        """Give the first delivery under way its time.
+
+        A timer that runs is left alone: most responses come long before it.
+        """
+        loop = asyncio.get_running_loop()
+        self._first_until = loop.time() + timeout_s
+        if self._timer is None or self._timer.when() > self._first_until:
+            self._stop_timer()
+            self._timer = loop.call_at(self._first_until, self._check_first)
 
     def _stop_timer(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
-    def _time_out(self) -> None:
+    def _check_first(self) -> None:
         self._timer = None
-        if self._flying:
-            self._flying.popleft().done(0, TIMED_OUT)
+        if not self._flying:
+            return
+        loop = asyncio.get_running_loop()
+        if loop.time() < self._first_until:
+            self._timer = loop.call_at(self._first_until, self._check_first)
+            return
+        self._flying.popleft().done(0, TIMED_OUT)
         if self._wire is not None:
             self._wire.abort()
 

@@ -27,7 +27,7 @@ _EXPONENT = b"0e"
 _EXACT_DIGITS = b"0" * 16
 _NUMERIC = {float, int, type(None)}
 _WHOLE = (b".0,", b".0]", b".0}")
-"""Ends of whole numbers in a text that also contains strings."""
+"""Ends of whole numbers, negative zero among them, inside a longer text."""
 
 
 def print_value(value: Any) -> bytes:
@@ -41,14 +41,13 @@ def print_value(value: Any) -> bytes:
         # A search for two bytes is slow where one of them is frequent.
         or (b"e" in text and _EXPONENT in digits)
         or _EXACT_DIGITS in digits
-        or (b"-" in text and b"-0" in text)
     ):
         return orjson.dumps(_as_double(value))
     if b".0" not in text:
         return text
-    if b'"' not in text:
+    if b'"' not in text and b"-0.0" not in text:
         return _without_point(text)
-    if any(end in text for end in _WHOLE):
+    if text.endswith(b".0") or any(end in text for end in _WHOLE):
         return orjson.dumps(_as_double(value))
     return text
 
@@ -77,7 +76,7 @@ def _nine_decimals(given: Floats) -> Floats:
     whole = np.rint(product)
     doubt = np.abs(product - whole) + np.abs(product) * _DOUBT >= 0.5
     rounded: Floats = whole / _SCALE
-    for index in np.flatnonzero(doubt):
+    for index in doubt.nonzero()[0]:
         rounded[index] = round(float(given[index]), 9)
     # Adding zero turns a negative zero into a positive one.
     return rounded + 0.0

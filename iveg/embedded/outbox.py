@@ -3,7 +3,9 @@
 import itertools
 import re
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 from urllib.parse import urlsplit
 
 import orjson
@@ -28,8 +30,7 @@ class Outbox:
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now = now
-        self._lanes: dict[str, tuple[NotificationTarget, DeliveryLane]] = {}
-        self._heads: dict[str, tuple[dict[str, object], bytes]] = {}
+        self._routes: dict[str, _Route] = {}
         self._correlators = itertools.count(1)
         self._prefix = f"{secrets.token_hex(4)}-e4ec-11f1-9a0b-"
 
@@ -50,7 +51,8 @@ class Outbox:
         view = subscription.shown(touched)
         entity = annotated(entity, touched, view.metadata, alteration)
         body = self._body(subscription, entity, view, alteration)
-        request = self._request(subscription, entity, body, correlator)
+        route = self._route(subscription)
+        request = _write_request(route.head, entity, body, correlator)
         subscription.sent(now)
 
         def done(status: int, answer: bytes | str) -> None:
@@ -59,7 +61,7 @@ class Outbox:
             else:
                 subscription.failed(self._now(), str(answer))
 
-        self._lane(subscription).send(Delivery(request, subscription.timeout_s, done))
+        route.lane.send(Delivery(request, subscription.timeout_s, done))
 
     def _body(
         self,
@@ -78,47 +80,56 @@ class Outbox:
             return text
         return b'{"subscriptionId":%b,"data":[%b]}' % (quoted(subscription.id), text)
 
-    def _request(
-        self, subscription: Subscription, entity: Entity, body: bytes, correlator: str
-    ) -> bytes:
-        head = self._head(subscription)
-        if b"${" in head:
-            head = _filled(head.decode(), entity).encode()
-        return b"%bContent-Length: %d\r\nFiware-Correlator: %b; cbnotif=1\r\n\r\n%b" % (
-            head,
-            len(body),
-            correlator.encode(),
-            body,
-        )
-
-    def _head(self, subscription: Subscription) -> bytes:
-        """Constant part of the head, rewritten only when the subscription changed."""
-        known = self._heads.get(subscription.id)
-        if known is None or known[0] is not subscription.document:
-            known = (subscription.document, _write_head(subscription))
-            self._heads[subscription.id] = known
-        return known[1]
-
-    def _lane(self, subscription: Subscription) -> DeliveryLane:
+    def _route(self, subscription: Subscription) -> "_Route":
+        """Head and lane, made again only when the subscription changed."""
+        known = self._routes.get(subscription.id)
+        if known is not None and known.document is subscription.document:
+            return known
         target = NotificationTarget.from_url(subscription.endpoint["url"])
-        known = self._lanes.get(subscription.id)
-        if known is None or known[0] != target:
+        if known is not None and known.target != target:
             self.forget(subscription.id)
-            known = (target, DeliveryLane(target))
-            self._lanes[subscription.id] = known
-        return known[1]
+            known = None
+        lane = DeliveryLane(target) if known is None else known.lane
+        head = _write_head(subscription)
+        made = _Route(subscription.document, head, target, lane)
+        self._routes[subscription.id] = made
+        return made
 
     def forget(self, subscription_id: str) -> None:
         """Close the connection of a deleted or redirected subscription."""
-        self._heads.pop(subscription_id, None)
-        known = self._lanes.pop(subscription_id, None)
+        known = self._routes.pop(subscription_id, None)
         if known is not None:
-            known[1].close()
+            known.lane.close()
 
     def close(self) -> None:
         """Close every connection."""
-        for subscription_id in list(self._lanes):
+        for subscription_id in list(self._routes):
             self.forget(subscription_id)
+
+
+@dataclass(frozen=True, slots=True)
+class _Route:
+    """How the notifications of one version of a subscription are sent.
+
+    Attributes:
+        head: Constant part of the head.
+    """
+
+    document: Mapping[str, Any]
+    head: bytes
+    target: NotificationTarget
+    lane: DeliveryLane
+
+
+def _write_request(head: bytes, entity: Entity, body: bytes, correlator: str) -> bytes:
+    if b"${" in head:
+        head = _filled(head.decode(), entity).encode()
+    return b"%bContent-Length: %d\r\nFiware-Correlator: %b; cbnotif=1\r\n\r\n%b" % (
+        head,
+        len(body),
+        correlator.encode(),
+        body,
+    )
 
 
 def _write_head(subscription: Subscription) -> bytes:

@@ -40,6 +40,7 @@ class Subscription:
         path: Service path of its entities.
         service: Tenant, as in the notification's header.
         status: ``active``, ``inactive`` or ``oneshot``; expiry is by the clock.
+        timeout_s: Time limit of a receiver's response (s).
     """
 
     id: str
@@ -55,10 +56,13 @@ class Subscription:
     last_failure_reason: str = ""
     fails: int = 0
     view: EntityView = field(default_factory=EntityView)
+    timeout_s: float = _DEFAULT_TIMEOUT_S
     _throttling: float = 0.0
     _watched: frozenset[str] = frozenset()
     _metadata_too: bool = True
     _any_update: bool = False
+    _only_changed: bool = False
+    _alterations: Collection[str] | None = None
     _entities: list[tuple[re.Pattern[str] | str, re.Pattern[str] | str]] = field(
         default_factory=list
     )
@@ -75,11 +79,14 @@ class Subscription:
             tuple(notification.get("attrs", ())),
             tuple(notification.get("metadata", ())),
         )
+        self._only_changed = bool(notification.get("onlyChangedAttrs"))
+        self.timeout_s = self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
         condition = self.condition
+        self._alterations = condition.get("alterationTypes")
         self._throttling = self.document.get("throttling", 0)
         self._watched = frozenset(condition.get("attrs") or ())
         self._metadata_too = condition.get("notifyOnMetadataChange", True)
-        self._any_update = "entityUpdate" in condition.get("alterationTypes", ())
+        self._any_update = "entityUpdate" in (self._alterations or ())
         self._entities = [_matcher(one) for one in self.document["subject"]["entities"]]
 
     @property
@@ -100,11 +107,6 @@ class Subscription:
         notification = self.notification
         part: dict[str, Any] = notification.get("http") or notification["httpCustom"]
         return part
-
-    @property
-    def timeout_s(self) -> float:
-        """Time limit of a receiver's response (s)."""
-        return self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
         """Whether an entity is subscribed to."""
@@ -139,7 +141,7 @@ class Subscription:
         )
 
     def _alteration_wanted(self, alteration: str) -> bool:
-        wanted = self.condition.get("alterationTypes")
+        wanted = self._alterations
         if wanted is None:
             return alteration != "entityDelete"
         return alteration in wanted or (
@@ -157,7 +159,7 @@ class Subscription:
 
     def shown(self, touched: Touched) -> EntityView:
         """Attributes in the notification."""
-        if not self.notification.get("onlyChangedAttrs"):
+        if not self._only_changed:
             return self.view
         names = self.view.names or touched.now
         chosen = tuple(name for name in names if touched.has_changed(name))

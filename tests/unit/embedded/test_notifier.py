@@ -208,6 +208,28 @@ async def test_a_silent_receiver_times_out_and_the_next_delivery_goes_on() -> No
     assert known[1][1][0] == 204
 
 
+async def test_each_delivery_has_its_own_time_behind_one_that_was_answered() -> None:
+    async def talk(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter, number: int
+    ) -> None:
+        await read_one(reader)
+        writer.write(OK)
+        if number == 1:
+            await read_one(reader)
+        await reader.read()
+
+    outcomes = Outcomes()
+    async with receiver(talk) as target:
+        lane = DeliveryLane(target)
+        lane.send(outcomes.of(b"0", timeout_s=60.0))
+        await outcomes.number(1)
+        lane.send(outcomes.of(b"1", timeout_s=0.05))
+        lane.send(outcomes.of(b"2"))
+        known = await outcomes.number(3)
+        lane.close()
+    assert known[1] == (b"1", (0, TIMED_OUT))
+
+
 async def test_a_receiver_that_is_away_is_refused_at_once() -> None:
     outcomes = Outcomes()
     lane = DeliveryLane(NotificationTarget("127.0.0.1", 1))
