@@ -5,7 +5,9 @@ whole message for one apostrophe and falls seconds behind under load (docs/fiwar
 and neither people nor poses must vanish for that.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 
 from iveg.domain.observations import (
     DetectionFrame,
@@ -21,7 +23,7 @@ from iveg.domain.observations import (
 from iveg.domain.transports import DIRECT
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS
-from iveg.pipeline.kinds import Scope, read_directly
+from iveg.pipeline.kinds import Kind, Scope, read_directly
 
 _SUFFIXES: dict[type[Observation], str] = {
     Odometry: "_odom",
@@ -33,6 +35,25 @@ _SUFFIXES: dict[type[Observation], str] = {
 }
 
 PassedOver = Callable[[str, type[Observation], int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What comes on one topic.
+
+    Attributes:
+        read: Reads a payload.
+        kind: Kind of all its messages; None: they are of several.
+        apart_s: Least time between two of a robot that are read (s).
+        sparse: Its topic has two safety reports a second; see ``Received``.
+    """
+
+    robot_id: str
+    qos: int
+    read: Callable[[bytes], codec.ReadResult]
+    kind: type[Observation] | None = None
+    apart_s: float = 0.0
+    sparse: bool = True
 
 
 class DirectReader:
@@ -62,80 +83,70 @@ class DirectReader:
         self._reject = reject
         self._is_past = is_past
         self._passed_over = passed_over
-        kinds = read_directly(scope)
-        self._kinds = tuple(kinds)
-        self._apart_s = {
-            kind: row.apart_s for kind, row in kinds.items() if row.apart_s
-        }
+        rows = read_directly(scope)
+        self._kinds = tuple(rows)
         self._due: dict[tuple[str, type[Observation]], float] = {}
-        self._devices: dict[str, str] = {}
-        self._sources: dict[str, tuple[str, type[Observation]]] = {}
-        self._dense: set[str] = set()
-        self._answers: dict[str, str] = {}
-        self._subscriptions: dict[str, int] = {}
-        for robot_id in robots:
-            for kind, row in kinds.items():
-                if kind in _SUFFIXES:
-                    self._listen(apikey, robot_id, _SUFFIXES[kind], row.qos, kind)
-            if kinds:
-                self._listen(apikey, robot_id, "", 1)
-                answers = names.answer_topic(apikey, robot_id)
-                self._answers[answers] = robot_id
-                self._subscriptions[answers] = 1
+        self._sources = {
+            topic: source
+            for robot_id in robots
+            for topic, source in self._of_robot(apikey, robot_id, rows)
+        }
 
-    def _listen(
-        self,
-        apikey: str,
-        robot_id: str,
-        suffix: str,
-        qos: int,
-        kind: type[Observation] | None = None,
-    ) -> None:
-        device = robot_id + suffix
-        topics = [names.measure_topic(apikey, device)]
-        if suffix in names.DIRECT_SUFFIXES:
-            topics.append(names.direct_topic(robot_id, suffix))
-            self._dense.add(topics[-1])
-        for topic in topics:
-            self._devices[topic] = device
-            if kind is not None:
-                self._sources[topic] = robot_id, kind
-            self._subscriptions[topic] = qos
+    def _of_robot(
+        self, apikey: str, robot_id: str, rows: Mapping[type[Observation], Kind]
+    ) -> Iterator[tuple[str, _Source]]:
+        """Topics of one robot."""
+        for kind, row in rows.items():
+            if kind not in _SUFFIXES:
+                continue
+            suffix = _SUFFIXES[kind]
+            device = robot_id + suffix
+            read = partial(codec.read_measure, device, is_past=self._is_past)
+            source = _Source(robot_id, row.qos, read, kind, row.apart_s)
+            yield names.measure_topic(apikey, device), source
+            if suffix in names.DIRECT_SUFFIXES:
+                yield (
+                    names.direct_topic(robot_id, suffix),
+                    replace(source, sparse=False),
+                )
+        if rows:
+            whole = partial(codec.read_measure, robot_id, is_past=self._is_past)
+            yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)
+            answer = partial(codec.read_answer, robot_id)
+            yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)
 
     def subscriptions(self) -> dict[str, int]:
         """Topics and their QoS."""
-        return self._subscriptions
+        return {topic: source.qos for topic, source in self._sources.items()}
 
     def pass_over(self, topic: str, count: int) -> None:
         """So many messages of a topic came and were overtaken before they were read."""
-        if topic in self._sources:
-            self._passed_over(*self._sources[topic], count)
+        source = self._sources.get(topic)
+        if source is not None and source.kind is not None:
+            self._passed_over(source.robot_id, source.kind, count)
 
     def read(self, topic: str, payload: bytes) -> None:
         """Take one message."""
+        source = self._sources.get(topic)
+        if source is None:
+            return
         at = self._clock()
-        if self._is_early(topic, at.mono):
+        if self._is_early(source, at.mono):
             self.pass_over(topic, 1)
             return
-        if topic in self._devices:
-            reading = codec.read_measure(self._devices[topic], payload, self._is_past)
-        elif topic in self._answers:
-            reading = codec.read_answer(self._answers[topic], payload)
-        else:
-            return
+        reading = source.read(payload)
         for problem in reading.problems:
             self._reject(problem.source, problem.reason, problem.detail)
         for observation in reading.observations:
             if issubclass(kind_of(observation), self._kinds):
-                sparse = topic not in self._dense
-                self._offer(Received(observation, at, DIRECT.id, sparse=sparse))
+                self._offer(Received(observation, at, DIRECT.id, sparse=source.sparse))
 
-    def _is_early(self, topic: str, now: float) -> bool:
+    def _is_early(self, source: _Source, now: float) -> bool:
         """Whether nobody would look at it: one of its kind has just been read."""
-        source = self._sources.get(topic)
-        if source is None or source[1] not in self._apart_s:
+        if source.kind is None or source.apart_s == 0.0:
             return False
-        if now < self._due.get(source, 0.0):
+        stream = source.robot_id, source.kind
+        if now < self._due.get(stream, 0.0):
             return True
-        self._due[source] = now + self._apart_s[source[1]]
+        self._due[stream] = now + source.apart_s
         return False
