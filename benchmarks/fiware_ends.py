@@ -1,4 +1,4 @@
-"""Both ends of the FIWARE road, each a process that does nothing but its part.
+"""Both ends of the FIWARE transport, each a process that does nothing but its part.
 
 ``send PORT ROBOTS SECONDS`` writes packets that were encoded before to a plain socket;
 ``receive`` takes the time of each notification and answers 204.  A measure carries the

@@ -1,4 +1,4 @@
-"""From a press to a latched robot, over each road, idle and under ten times the load.
+"""From a press to a latched robot, by transport, idle and under ten times the load.
 
 Every part is a process of its own: Mosquitto with the embedded FIWARE bridged to it, or
 the embedded broker alone (``--broker embedded``), iVeg, and two emulated robots.  A
@@ -35,7 +35,7 @@ ROBOTS = ("AGI", "AGII")
 CROWD = tuple(f"L{number}" for number in range(1, 19))
 LOAD = 9
 PATIENCE_S = 20.0
-HEAD = ("road, load", "stops", "confirmed", "P50 ms", "P95 ms", "max ms")
+HEAD = ("transport, load", "stops", "confirmed", "P50 ms", "P95 ms", "max ms")
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Ear:
 
 @dataclass(frozen=True)
 class Row:
-    """What one road did under one load."""
+    """What one transport did under one load."""
 
     name: str
     took: list[float]
@@ -222,37 +222,41 @@ async def running(
 
 async def run(stops: int, broker: str) -> None:
     rows: list[Row] = []
-    for road in ("direct", "fiware"):
+    for transport in ("direct", "fiware"):
         with (
             tempfile.TemporaryDirectory(prefix="iveg-bench-") as folder,
             ExitStack() as parts,
         ):
-            rows += await measure_transport(road, stops, Path(folder), broker, parts)
+            rows += await measure_transport(
+                transport, stops, Path(folder), broker, parts
+            )
     title = f"Press to latched over {broker} ({machine()})"
     print_table(title, HEAD, [row.cells() for row in rows])
     first, second = (sorted(row.took) for row in rows[:2])
     for share in (0.50, 0.95):
         ratio = percentile(second, share) / percentile(first, share)
-        print(f"direct road, loaded / idle, P{share:.0%}".rstrip("%"), f"{ratio:.2f}")
+        print(
+            f"direct, loaded / idle, P{share:.0%}".rstrip("%"), f"{ratio:.2f}"
+        )
     confirmed = sum(row.confirmed for row in rows)
     print(f"confirmed: {confirmed} of {sum(len(row.took) for row in rows)}")
 
 
 async def measure_transport(
-    road: str, stops: int, folder: Path, broker: str, parts: ExitStack
+    transport: str, stops: int, folder: Path, broker: str, parts: ExitStack
 ) -> list[Row]:
-    """One road, idle and under the load."""
-    direct = "on" if road == "direct" else "off"
+    """One transport, idle and under the load."""
+    direct = "on" if transport == "direct" else "off"
     async with running(folder, direct, broker, parts) as (place, _, (operator, link)):
-        idle = await measure(f"{road}, idle", stops, operator, link, 0.0)
+        idle = await measure(f"{transport}, idle", stops, operator, link, 0.0)
         rate = LOAD * await messages_of(place)
-        name = f"{road}, +{rate:.0f} msg/s"
+        name = f"{transport}, +{rate:.0f} msg/s"
         return [idle, await measure(name, stops, operator, link, rate)]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--stops", type=int, default=100, help="a road and load")
+    parser.add_argument("--stops", type=int, default=100, help="a transport and load")
     brokers = ("mosquitto", "embedded")
     usual = brokers[MOSQUITTO is None]
     parser.add_argument("--broker", choices=brokers, default=usual)

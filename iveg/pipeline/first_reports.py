@@ -46,8 +46,8 @@ class FirstReports:
 
     def seen(self, person_id: str, at: Instant) -> None:
         """Note the notification of a frame that shows this person."""
-        looks = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
-        looks.append(at.mono)
+        frames = self._detections.setdefault(person_id, deque(maxlen=_KEPT))
+        frames.append(at.mono)
 
     def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
         """Note a safety report; feedback last went out at ``published_at``."""
@@ -81,11 +81,11 @@ class FirstReports:
     def _notice(
         self, person_id: str, before: float, answered: float | None = None
     ) -> FirstReport | None:
-        looks = [at for at in self._detections.get(person_id, ()) if at <= before]
+        frames = [at for at in self._detections.get(person_id, ()) if at <= before]
         now = before if answered is None else answered
-        if not looks or now - looks[-1] > FRESH_S:
+        if not frames or now - frames[-1] > FRESH_S:
             return None
-        return FirstReport(looks[-1], answered)
+        return FirstReport(frames[-1], answered)
 
     def forget(self, known: Container[str]) -> None:
         """Keep only persons who are still known."""

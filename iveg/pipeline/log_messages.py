@@ -83,9 +83,9 @@ def _without_decision(
 
 
 def _of_crossing(crossing: Crossing) -> SlowdownCauses:
-    zone, look = crossing.zone, crossing.zone.sighting
-    confidence = None if look is None else look.confidence
-    unseen = None if look is None else look.age_s(crossing.entered)
+    zone, sighting = crossing.zone, crossing.zone.sighting
+    confidence = None if sighting is None else sighting.confidence
+    unseen = None if sighting is None else sighting.age_s(crossing.entered)
     grown = unseen is not None and unseen > LIMITS.growth_grace_s
     return SlowdownCauses(
         zone.cause,
@@ -105,15 +105,15 @@ def _of_person(
 ) -> SlowdownCauses | None:
     if robot.odometry is None:
         return None
-    pose, look = robot.odometry.pose, person.newest
+    pose, sighting = robot.odometry.pose, person.newest
     return SlowdownCauses(
         person.person_id,
         person.class_,
-        look.observer,
-        pose.distance_to(look.x, look.y),
-        look.observer == robot.robot_id
-        or greenhouse.in_sight(pose.x, pose.y, look.x, look.y),
-        look.confidence,
+        sighting.observer,
+        pose.distance_to(sighting.x, sighting.y),
+        sighting.observer == robot.robot_id
+        or greenhouse.in_sight(pose.x, pose.y, sighting.x, sighting.y),
+        sighting.confidence,
     )
 
 

@@ -124,7 +124,7 @@ class Auditor:
         true_s = asked_at - datetime.fromisoformat(robot["stamp"]).timestamp()
         self.oldest_s = max(self.oldest_s, true_s)
         told = f"{robot['robot_id']}: truly {true_s:.2f} s old, shown as {robot}"
-        factor = robot["mandate"]["speed_factor"]
+        factor = robot["speed_limit"]["speed_factor"]
         if robot["age_s"] < true_s - TOLERANCE_S:
             self.wrong.append(f"too young: {told}")
         if true_s > 3.0 + TOLERANCE_S and robot["link"] == "LIVE":

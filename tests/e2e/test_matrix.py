@@ -272,7 +272,7 @@ def _ring(page: Page, stack: Site) -> tuple[float, float] | None:
         people = api.get("people").json()["items"]
         robots = api.get("robots").json()["items"]
     places = [robot["pose"] for robot in robots if robot["pose"]]
-    causes = {robot["mandate"]["cause"] for robot in robots}
+    causes = {robot["speed_limit"]["cause"] for robot in robots}
     rings = [person["position"] for person in people if person["person_id"] in causes]
     found = page.evaluate(_ON_SCREEN, [rings, places])
     return None if found is None else (found[0], found[1])

@@ -17,13 +17,13 @@ from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.domain.errors import HopError
 from tests.threads import running
 
-Mood = Literal["open", "shut", "slow", "hanging", "angry", "mad", "odd"]
+Mood = Literal["open", "shut", "slow", "hanging", "error", "malformed", "odd"]
 SLOW_S = 2.0
 _LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)", re.IGNORECASE)
 _JSON = b"HTTP/1.1 200 OK\r\nContent-Type: application/json\r\n"
 _ANSWERS: dict[str, bytes] = {
-    "angry": b"HTTP/1.1 500 Internal Server Error\r\nContent-Length: 0\r\n\r\n",
-    "mad": _JSON + b'Content-Length: 10\r\n\r\n{"orion":[',
+    "error": b"HTTP/1.1 500 Internal Server Error\r\nContent-Length: 0\r\n\r\n",
+    "malformed": _JSON + b'Content-Length: 10\r\n\r\n{"orion":[',
     "odd": _JSON + b"Fiware-Total-Count: many\r\nContent-Length: 7\r\n\r\n[7,[8]]",
 }
 """Refused, not JSON, and JSON that nobody can use."""

@@ -15,10 +15,10 @@ LINKS = ["detection", "filter", "geometry", "rule", "feedback", "applied", "obse
 WATCHED_S = 90.0
 
 
-def mandated(api: httpx.Client) -> str | None:
+def limiting_decision(api: httpx.Client) -> str | None:
     """The decision behind a speed limit that is in force."""
     robots = api.get("robots").json()["items"]
-    found = (robot["mandate"]["decision_id"] for robot in robots)
+    found = (robot["speed_limit"]["decision_id"] for robot in robots)
     return next((one for one in found if one is not None), None)
 
 
@@ -31,7 +31,9 @@ def test_an_open_decision_has_verdicts_and_a_kill_leaves_it_open_only_until_the_
     driving: Site,
 ) -> None:
     with driving.api() as api:
-        left = until(lambda: mandated(api), WATCHED_S, "a robot that is slowed")
+        left = until(
+            lambda: limiting_decision(api), WATCHED_S, "a robot that is slowed"
+        )
         verdicts = links_of(api.get(f"decisions/{left}").raise_for_status().json())
         until(
             lambda: any(

@@ -205,7 +205,7 @@ class Rig:
         return self.now - self.measured[newest.origin.boot, newest.origin.seq]
 
     def is_clear(self) -> bool:
-        """Whether the robot may drive at full speed; the fleet's eyes are open."""
+        """Whether the robot may drive at full speed, with every detector sending."""
         self.robot.detections_at = self.at().mono
         found, _ = self.speed_limits.evaluate(
             self.world, self.people, DetectionRule(), self.at(), "d"

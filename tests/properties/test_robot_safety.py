@@ -224,9 +224,9 @@ def test_R6_another_topic_never_raises_the_factor(
     more: tuple[FeedbackAlert, ...] = tuple(
         person(x, class_=class_, decision_id=f"o-{x}") for class_, x in others
     )
-    for mandated, x in told:
+    for factor, x in told:
         for rig in (one, two):
-            rig.speed_limits = {"AGI": SpeedLimit(mandated, "person")}
+            rig.speed_limits = {"AGI": SpeedLimit(factor, "person")}
             rig.alerts = () if x is None else (person(x),)
         two.hear(
             two.feedback(

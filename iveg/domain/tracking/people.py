@@ -66,7 +66,7 @@ class People:
         self._spots = PointIndex()
         self._indexed: dict[str, Person] = {}
         self.turned_away = 0
-        """How many of the last look there was no room for."""
+        """Detections of the last frame without room."""
 
     @property
     def spots(self) -> PointIndex:

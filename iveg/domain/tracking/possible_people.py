@@ -27,9 +27,9 @@ class PossiblePeople:
         self, spots: Sequence[_Spot], observer: str, at: Instant
     ) -> list[_Spot]:
         """Take one frame; returns its spots (m, ``map``) that were seen often."""
-        looks = self._detections.setdefault(observer, deque(maxlen=_OF))
-        looks.append((at.mono, spots))
-        fresh = [seen for moment, seen in looks if abs(at.mono - moment) <= _WITHIN_S]
+        frames = self._detections.setdefault(observer, deque(maxlen=_OF))
+        frames.append((at.mono, spots))
+        fresh = [seen for moment, seen in frames if abs(at.mono - moment) <= _WITHIN_S]
         return [
             spot
             for spot in spots

@@ -45,7 +45,7 @@ class AllClear:
             for sighting in list(person.sightings):
                 if not LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s:
                     continue
-                if sighting.reach_m > 0.0:  # nobody knows where to look
+                if sighting.reach_m > 0.0:  # the place is unknown
                     continue
                 if world.robot(sighting.observer).is_replay:  # no place of today
                     continue
@@ -68,9 +68,9 @@ class AllClear:
         watched: dict[_Look, float],
     ) -> bool:
         for robot_id in lookers:
-            look = sighting.chain, robot_id
-            watched[look] = self._since.get(look, now.mono)
-            if now.mono - watched[look] >= CLEAR_S:
+            pair = sighting.chain, robot_id
+            watched[pair] = self._since.get(pair, now.mono)
+            if now.mono - watched[pair] >= CLEAR_S:
                 return True
         return False
 

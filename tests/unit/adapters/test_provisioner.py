@@ -275,13 +275,13 @@ async def test_json_that_nobody_can_use_is_orions_fault_and_kills_nothing(
     fiware: Running, body: object
 ) -> None:
     async def answer(request: Request) -> Response:
-        # Alive by its probe, mad in all else.
+        # Alive by its probe, malformed in all other answers.
         known = request.path.startswith("/v2/entities/")
         return Response(404 if known else 200, b"{}" if known else orjson.dumps(body))
 
     async with http_server(answer, "127.0.0.1", 0) as port:
-        mad = Site(fiware, orion_url=f"http://127.0.0.1:{port}")
-        async with mad.running() as site:
+        malformed = Site(fiware, orion_url=f"http://127.0.0.1:{port}")
+        async with malformed.running() as site:
             await until(lambda: site.health_monitor.notify_error)
 
     assert site.health_monitor.notify_error == "answered JSON that means nothing here"

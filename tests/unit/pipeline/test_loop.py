@@ -33,13 +33,13 @@ def test_what_is_taken_is_shown_at_once_and_judged_with_the_next_judgement() -> 
     desk.hub.versions.clear()
 
     desk.loop.step([Received(near, desk.clock())], desk.clock(), judges=False)
-    shown, mandated = (
+    shown, limit = (
         "detections/AGI" in desk.hub.versions,
         desk.evaluator.speed_limits["AGI"],
     )
     desk.loop.step([], desk.clock())
 
-    assert (shown, mandated.speed_factor) == (True, 1.0)
+    assert (shown, limit.speed_factor) == (True, 1.0)
     assert desk.evaluator.speed_limits["AGI"].speed_factor == 0.5
 
 

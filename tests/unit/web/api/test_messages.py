@@ -116,7 +116,7 @@ async def test_an_empty_password_keeps_the_one_that_is_there() -> None:
 
 @pytest.mark.parametrize(
     "other",
-    [{"server": "smtp.thief.es"}, {"user": "eva"}, {"security": "starttls"}],
+    [{"server": "smtp.other.es"}, {"user": "eva"}, {"security": "starttls"}],
 )
 async def test_a_kept_password_is_sent_to_no_other_server(other: Any) -> None:
     desk = WebDesk()

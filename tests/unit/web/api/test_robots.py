@@ -30,7 +30,8 @@ async def test_a_robot_that_was_never_heard_is_all_unknown() -> None:
     assert isinstance(told, dict)
     assert told["link"] == "UNKNOWN"
     assert (told["pose"], told["age_s"], told["speed_factor"]) == (None, None, None)
-    assert told["mandate"]["speed_factor"] == 1.0
+    assert told["speed_limit"]["speed_factor"] == 1.0
+    assert told["mandate"] == told["speed_limit"]
 
 
 async def test_a_robot_is_told_with_pose_age_speed_limit_and_profile() -> None:
@@ -83,7 +84,7 @@ async def test_a_robot_that_says_nothing_of_its_speed_is_told_by_its_speed_limit
 
     assert isinstance(told, dict)
     assert told["mode"] == "SLOW"
-    assert told["mandate"]["reason"] == "stale"
+    assert told["speed_limit"]["reason"] == "stale"
 
 
 @pytest.mark.parametrize(

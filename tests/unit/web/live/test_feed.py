@@ -248,7 +248,7 @@ def test_a_robot_is_told_whole_once_and_then_what_changes(
 
     parts = [one["data"] for one in page.told("parts") if one["topic"] == "robots/AGI"]
     first, then = parts
-    assert {"robot_id", "mode", "mandate", "stop_state", "profile"} <= first.keys()
+    assert {"robot_id", "mode", "speed_limit", "stop_state", "profile"} <= first.keys()
     assert not {"pose", "twist", "stamp", "age_s"} & first.keys()
     assert "received_at" in then
     assert not {"robot_id", "mode", "profile"} & then.keys()

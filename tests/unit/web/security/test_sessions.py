@@ -1,4 +1,4 @@
-"""Sessions outlive a restart of iVeg, and nothing that a thief could use is kept."""
+"""Sessions outlive a restart of iVeg, and nothing kept lets another sign in."""
 
 import hashlib
 from collections.abc import Iterator
