@@ -235,9 +235,7 @@ async def run(stops: int, broker: str) -> None:
     first, second = (sorted(row.took) for row in rows[:2])
     for share in (0.50, 0.95):
         ratio = percentile(second, share) / percentile(first, share)
-        print(
-            f"direct, loaded / idle, P{share:.0%}".rstrip("%"), f"{ratio:.2f}"
-        )
+        print(f"direct, loaded / idle, P{share:.0%}".rstrip("%"), f"{ratio:.2f}")
     confirmed = sum(row.confirmed for row in rows)
     print(f"confirmed: {confirmed} of {sum(len(row.took) for row in rows)}")
 

@@ -18,7 +18,7 @@ from iveg.cli.running import print_sign_in_link, report_ready
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
 from iveg.web.live.bounded import BoundedSocket
-from iveg.web.prompt import prompt_http
+from iveg.web.notification_http import notification_http
 
 _log = logging.getLogger(__name__)
 _WS_MAX_BYTES = 65536
@@ -49,7 +49,7 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
     server = _Server(
         uvicorn.Config(
             app,
-            http=prompt_http(app.state.orion),
+            http=notification_http(app.state.orion),
             host=settings.host,
             port=settings.port,
             log_config=None,

@@ -116,7 +116,7 @@ class Contacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class AlertItem:
     """One occurrence of one alert, in a message.
 
     Attributes:
@@ -134,7 +134,7 @@ class Item:
 class Message:
     """What people are told at once; no items: a test."""
 
-    items: Sequence[Item] = ()
+    items: Sequence[AlertItem] = ()
 
     @property
     def is_test(self) -> bool:

@@ -23,10 +23,10 @@ from iveg.domain.errors import HopError
 from iveg.domain.events import LogEvent
 from iveg.domain.messages import (
     CHANNELS,
+    AlertItem,
     Channel,
     Contacts,
     Delivery,
-    Item,
     Message,
 )
 from iveg.domain.observations import Instant
@@ -84,14 +84,16 @@ class Messenger:
         self._rest_s = rest_s
         self._limit_s = limit_s
         self._changing = asyncio.Lock()
-        self._waiting: dict[Channel, deque[Item]] = {name: deque() for name in CHANNELS}
+        self._waiting: dict[Channel, deque[AlertItem]] = {
+            name: deque() for name in CHANNELS
+        }
         self._arrived = {name: asyncio.Event() for name in CHANNELS}
 
     def offer(self, raised: Iterable[Alert]) -> None:
         """Have people told of alerts that were raised; returns at once."""
         for alert in raised:
             last, key = alert.last, alert.condition.key
-            item = Item(alert.alert_id, last.priority, key, last.raised)
+            item = AlertItem(alert.alert_id, last.priority, key, last.raised)
             for channel in CHANNELS:
                 if self.contacts.wants(channel, item.priority):
                     self._wait(channel, item)
@@ -124,7 +126,7 @@ class Messenger:
             await self._store.save(changed)
             self.contacts = changed
 
-    def _wait(self, channel: Channel, item: Item) -> None:
+    def _wait(self, channel: Channel, item: AlertItem) -> None:
         waiting = self._waiting[channel]
         if len(waiting) == MOST_WAITING:
             waiting.popleft()
@@ -145,7 +147,7 @@ class Messenger:
                 _log.exception("what came of a message by %s is not known", channel)
             await asyncio.sleep(self._rest_s)
 
-    async def _deliver(self, channel: Channel, items: Sequence[Item]) -> None:
+    async def _deliver(self, channel: Channel, items: Sequence[AlertItem]) -> None:
         deliveries = await self._send(channel, Message(items))
         for item in items:
             self._told.told(item.alert_id, item.raised, deliveries)

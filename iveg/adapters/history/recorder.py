@@ -20,7 +20,7 @@ from typing import Literal
 
 from iveg.adapters import clock
 from iveg.adapters.history.engine import sqlite_file
-from iveg.adapters.history.journal import SpillFile
+from iveg.adapters.history.spill_file import SpillFile
 from iveg.adapters.history.store import Store
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.observations import Instant
@@ -284,5 +284,5 @@ def journal_file(database_url: str, directory: Path) -> Path:
     """
     file = sqlite_file(database_url)
     if file is None:
-        return directory / "history.journal"
+        return directory / "history.spill_file"
     return file.with_name(file.name + ".journal")

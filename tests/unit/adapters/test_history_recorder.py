@@ -230,7 +230,7 @@ async def test_a_full_disk_stops_the_history_and_not_what_matters(
 async def test_a_server_that_dies_is_missed_and_welcomed_back(
     postgresql: PostgreSQL, postgresql_url: str, tmp_path: Path
 ) -> None:
-    journal = tmp_path / "history.journal"
+    journal = tmp_path / "history.spill_file"
     async with recording(postgresql_url, tmp_path) as recorder:
         recorder.offer(command_record(state="REQUESTED"))
         await until(lambda: recorder.counters["history_written"] == 1)
@@ -451,4 +451,4 @@ def test_the_journal_lies_beside_the_file_or_in_the_data_directory() -> None:
     apart = journal_file("postgresql://server/history", directory)
 
     assert beside == Path("/var/lib/history.db.journal")
-    assert apart == Path("/data/history.journal")
+    assert apart == Path("/data/history.spill_file")

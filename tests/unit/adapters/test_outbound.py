@@ -17,10 +17,10 @@ from iveg.adapters.web_push import PushSender, decode, encode, encrypted, new_ke
 from iveg.adapters.webhook import WebhookSender
 from iveg.domain.errors import OutboundError
 from iveg.domain.messages import (
+    AlertItem,
     Contacts,
     Device,
     Email,
-    Item,
     Language,
     Message,
     Push,
@@ -31,7 +31,7 @@ from iveg.domain.messages import (
 from tests.builders import START
 from tests.fakes.outside import HttpsStand, MailStand, loopback, standing
 
-ALERT = Message([Item("01J", "P1", "stop_unconfirmed", START)])
+ALERT = Message([AlertItem("01J", "P1", "stop_unconfirmed", START)])
 
 
 def write(message: Message, language: Language) -> Text:

@@ -11,11 +11,11 @@ import pytest
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.messages import (
     CHANNELS,
+    AlertItem,
     Channel,
     Contacts,
     Device,
     Email,
-    Item,
     Push,
     Webhook,
 )
@@ -127,7 +127,13 @@ async def test_a_message_names_no_robot_no_person_and_no_place() -> None:
         post.wrong(replace(GRAVE, slots={"robot": "AGI", "lane": "Pasillo 3"}))
 
     (message,) = post.senders["webhook"].sent
-    assert set(Item.__slots__) == {"alert_id", "priority", "key", "raised", "tries"}
+    assert set(AlertItem.__slots__) == {
+        "alert_id",
+        "priority",
+        "key",
+        "raised",
+        "tries",
+    }
     assert "AGI" not in json.dumps([one.key for one in message.items])
 
 

@@ -17,9 +17,9 @@ from iveg.web.api import metrics
 from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import socket
 from iveg.web.live.bounded import BoundedSocket
+from iveg.web.notification_http import notification_http
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
-from iveg.web.prompt import prompt_http
 from iveg.web.security.authentication import Authenticator, NotifySecret, Role
 from iveg.web.views import Views
 from tests.fakes.messages import FakeContacts, FakeSender
@@ -121,7 +121,7 @@ class WebDesk(Desk):
             port=0,
             log_config=None,
             lifespan="off",
-            http=prompt_http(self.notifications),
+            http=notification_http(self.notifications),
             ws=BoundedSocket,
             timeout_graceful_shutdown=1,
         )

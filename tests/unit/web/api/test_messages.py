@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from iveg.adapters.web_push import encode, new_key, public_key
-from iveg.domain.messages import Item, Message, Text
+from iveg.domain.messages import AlertItem, Message, Text
 from iveg.web.api.messages import writer
 from iveg.web.security.authentication import Role
 from tests.builders import START
@@ -218,7 +218,7 @@ async def test_a_full_disk_changes_nothing() -> None:
 
 
 def test_a_letter_says_how_grave_and_when_in_the_readers_language() -> None:
-    one = Item("01J", "P1", "stop_unconfirmed", START)
+    one = AlertItem("01J", "P1", "stop_unconfirmed", START)
     write = writer()
 
     assert write(Message([one]), "es") == Text(

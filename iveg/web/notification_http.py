@@ -1,9 +1,9 @@
-"""An HTTP connection that answers a plain notification at once.
+"""HTTP protocol of the server that answers a plain notification at once.
 
-Hundreds come in a second and none of them waits for anything, so a task, a queue and
-an event for each would cost more than what it says.  Whatever is not plain (another
-route, a wrong secret, a body of unknown length, a request behind one that is still
-being answered) goes the way of all requests.
+Hundreds of notifications come in a second and none waits for anything, so a task, a
+queue and an event for each would cost more than its content.  A request that is not
+plain (another route, a wrong secret, a body of unknown length, a request behind one
+that is still being answered) is handled as usual by uvicorn.
 """
 
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
@@ -15,16 +15,16 @@ from iveg.web.security.headers import NOTIFICATIONS_PATH
 _URL = NOTIFICATIONS_PATH.encode()
 
 
-def prompt_http(endpoint: NotificationEndpoint) -> type[HttpToolsProtocol]:
+def notification_http(endpoint: NotificationEndpoint) -> type[HttpToolsProtocol]:
     """The protocol of a server whose notifications go to ``endpoint``."""
-    return type("Prompt", (PromptHttp,), {"endpoint": endpoint})
+    return type("BoundNotificationHttp", (NotificationHttp,), {"endpoint": endpoint})
 
 
-class PromptHttp(HttpToolsProtocol):
+class NotificationHttp(HttpToolsProtocol):
     """One connection of Orion's, or anybody's.
 
     Attributes:
-        endpoint: Of the server that the connection is to; see :func:`prompt_http`.
+        endpoint: Of the connection's server; see :func:`notification_http`.
     """
 
     endpoint: NotificationEndpoint

@@ -1,4 +1,4 @@
-"""The history's journal: a file beside the database for rows that may not be lost.
+"""Spill file of the history: rows that may not be lost, beside the database.
 
 One JSON line a record, on the disk before ``append`` returns.  Ten megabytes are held
 in reserve: a full disk stops the history long before it stops the journal.

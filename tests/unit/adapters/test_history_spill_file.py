@@ -6,7 +6,7 @@ from pathlib import Path
 import orjson
 import pytest
 
-from iveg.adapters.history.journal import SpillFile
+from iveg.adapters.history.spill_file import SpillFile
 from iveg.domain.errors import HopError
 from iveg.domain.records import DetectionRecord, OdometryRecord, Record
 from iveg.pipeline.record import Waiting
