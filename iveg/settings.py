@@ -270,7 +270,7 @@ class Settings:
 
     @property
     def notify_address(self) -> str:
-        """Where Orion posts notifications to (URL)."""
+        """URL to which Orion posts notifications."""
         own = f"http://{self.host}:{self.port}/ngsi/notifications"
         return self.notify_url or own
 
@@ -283,7 +283,7 @@ class Settings:
 
 
 def _allowed(hint: Any) -> str:
-    """What a value may be, in words: the last that stands behind its type."""
+    """Description of the allowed values, from the annotation of the type."""
     rule = getattr(hint, "__metadata__", ("",))[-1]
     if isinstance(rule, Interval):
         return f"a number from {rule.ge:g} to {rule.le:g}"

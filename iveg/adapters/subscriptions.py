@@ -135,7 +135,7 @@ async def ensure_subscriptions(
     token: str,
     wanted: Sequence[WantedSubscription],
 ) -> Ensured:
-    """Make what stands at Orion what iVeg wants, and nothing more of ours.
+    """Create, repair and remove subscriptions at Orion until they are as wanted.
 
     Run it at every start and whenever notifications stay away; it changes only what is
     wrong.  No throttling (it drops the last value) but of copies, which may or may not

@@ -36,7 +36,7 @@ class WebhookSender:
 
 
 def body_of(message: Message, now: Instant) -> dict[str, object]:
-    """What a program is told: how grave, of which kind, since when; no more."""
+    """Body for a program: priority, kind, time; no more."""
     return {
         "iveg": "test" if message.is_test else "alert",
         "sent_at": format_stamp(now.wall),

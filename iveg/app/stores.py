@@ -1,4 +1,4 @@
-"""What outlives a restart: the history and the files beside it."""
+"""Storage that outlives a restart: the history and the files beside it."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,11 +1,11 @@
-"""Where a part finds the others."""
+"""Addresses of the parts, from the settings."""
 
 from iveg.adapters.mqtt import BrokerAddress
 from iveg.settings import Settings
 
 
 def broker_of(settings: Settings) -> BrokerAddress:
-    """Where the MQTT broker is and who we are there."""
+    """Address of the MQTT broker with user and password."""
     return BrokerAddress.from_url(
         settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
     )

@@ -51,7 +51,7 @@ class Acknowledgements:
 def acknowledgements_of(
     decisions: Iterable[Decision], now: Instant
 ) -> Acknowledgements:
-    """What the decisions of the last five minutes tell; of those in memory."""
+    """Acknowledgement latencies of the decisions in memory, last five minutes."""
     recent = [one for one in decisions if _counts(one, now)]
     due = [one for one in recent if _is_due(one, now)]
     timed = [one for one in recent if one.took_s is not None]

@@ -41,7 +41,7 @@ class LaneCells:
 
     @property
     def count(self) -> int:
-        """How many cells it has."""
+        """Number of cells."""
         return self.columns * self.rows
 
     def centres(self) -> _Floats:
@@ -83,7 +83,7 @@ class Coverage:
         return lanes
 
     def share(self, now: Instant, within_s: float = RECENT_S) -> float | None:
-        """How much of the aisles was looked at lately (0-1); None without aisles."""
+        """Share of the aisles covered lately (0-1); None without aisles."""
         if not len(self._looked_at):
             return None
         return float(np.mean(now.mono - self._looked_at <= within_s))

@@ -20,7 +20,7 @@ _APART_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where a robot was in one second, and how fast (m/s)."""
+    """Pose of a robot in one second, and its speed (m/s)."""
 
     robot_id: str
     second: int
@@ -31,7 +31,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class DaySighting:
-    """Where a person was seen in one second, and by whom."""
+    """Position of a person in one second, and the observer."""
 
     second: int
     x: float

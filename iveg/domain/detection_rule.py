@@ -29,7 +29,7 @@ ALIASES: Mapping[str, Class] = {
 
 @dataclass(frozen=True, slots=True)
 class RuleVerdict:
-    """What the rule says of one detection.
+    """Result of the rule for one detection.
 
     Attributes:
         class_: ``person``, ``robot``, or None for a class that the rule does not name.

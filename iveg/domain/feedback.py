@@ -1,4 +1,4 @@
-"""What iVeg tells the fleet (Algorithm 2) and every robot reads (Algorithm 3).
+"""Feedback of iVeg to the fleet (Algorithm 2), evaluated by every robot (Algorithm 3).
 
 One ``Feedback`` goes out for each robot that observes; it carries the alerts that are
 alive and the speed limits of the whole fleet (docs/interfaces/mqtt.md).
@@ -38,7 +38,7 @@ class FeedbackAlert:
 
 @dataclass(frozen=True, slots=True)
 class SpeedLimit:
-    """The speed factor that one robot is told to keep, and why.
+    """The speed factor that one robot must keep, and the reason.
 
     Attributes:
         speed_factor: 0, 0.5 or 1.

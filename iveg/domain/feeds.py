@@ -20,7 +20,7 @@ from iveg.domain.observations import LaserScan, Odometry
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 
 Copied = type[Odometry] | type[LaserScan]
-"""What Orion may bring less often; never detections, reports, states of commands."""
+"""Kinds that Orion may throttle; never detections, reports, states of commands."""
 
 SILENT_S = 1.0
 """A direct copy older than this is missed."""

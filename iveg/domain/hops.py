@@ -75,4 +75,4 @@ NEEDS: Mapping[Check, tuple[Check, ...]] = {
     Check.DATABASE: (),
     Check.PAGE: (),
 }
-"""What each check stands on."""
+"""Checks that each check depends on."""

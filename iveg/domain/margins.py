@@ -34,7 +34,7 @@ _INSIDE_M = 1e6
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """What is left between one robot and one person, surface to surface (m).
+    """Remaining distance between one robot and one person, surface to surface (m).
 
     Attributes:
         gap_m: Centre distance less both footprints.
@@ -65,7 +65,7 @@ class Margin:
 
     @property
     def margin_m(self) -> float:
-        """What is left (m); below zero the robot could not stop in time."""
+        """The margin (m); below zero the robot could not stop in time."""
         return self.gap_m - self.needs_m
 
     @property

@@ -1,4 +1,4 @@
-"""Messages to people who are not before a page: to whom, how, and what came of it.
+"""Messages to people outside the page: recipients, channels, results.
 
 A message says how grave it is and when, never where or about whom: it passes through
 other people's servers (docs/interfaces/http.md, "Messages").
@@ -94,14 +94,14 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """Everybody who is told outside the pages; nobody at first."""
+    """All recipients outside the page; none at first."""
 
     push: Push = Push()
     email: Email = Email()
     webhook: Webhook = Webhook()
 
     def wants(self, channel: Channel, priority: Priority) -> bool:
-        """Whether a channel is on and is told of this priority."""
+        """Whether a channel is on and receives this priority."""
         if channel == "push":
             return self.push.on and priority == "P1"
         chosen = self.email if channel == "email" else self.webhook
@@ -132,7 +132,7 @@ class AlertItem:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """What people are told at once; no items: a test."""
+    """A message to people; without items a test."""
 
     items: Sequence[AlertItem] = ()
 
@@ -157,7 +157,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What became of a message to one person or device.
+    """Result of a message to one person or device.
 
     Attributes:
         failed: None where it was taken, else why not, as a code.

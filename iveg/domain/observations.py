@@ -1,4 +1,4 @@
-"""What arrives: frozen values, each naming the robot, its order and its age.
+"""Observations: frozen values, each with its robot, its order and its age.
 
 The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; times
 are Unix seconds unless said otherwise.
@@ -169,7 +169,7 @@ class Hold:
 
 @dataclass(frozen=True, slots=True)
 class RobotFault:
-    """What a robot finds wrong with its own data (docs/interfaces/mqtt.md).
+    """A fault of a robot's own data (docs/interfaces/mqtt.md).
 
     Attributes:
         code: A short, stable name, such as ``no_transform``.
@@ -238,7 +238,7 @@ class Navigation:
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """What ``sensor_msgs/BatteryState`` says that people ask for.
+    """Content of ``sensor_msgs/BatteryState`` that iVeg uses.
 
     Attributes:
         percentage: 0 to 1; None when unknown.

@@ -69,11 +69,11 @@ class ProbeLag:
 
     @property
     def transit_s(self) -> float:
-        """How long the newest probe that came back took (s); 0 before the first."""
+        """Transit time of the newest returned probe (s); 0 before the first."""
         return self._back[-1][1] if self._back else 0.0
 
     def lag(self, now: Instant) -> float | None:
-        """How far the chain is behind (s); None before the first probe left."""
+        """Lag of the data path (s); None before the first probe left."""
         known = [self._back[-1][1]] if self._back else []
         if self._out:
             known.append(max(0.0, now.mono - self._out[0]))

@@ -20,7 +20,7 @@ ByTransport = Mapping[TransportId, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionRecord:
-    """Why an alert or speed limit came to be and what it led to (docs/dashboard.md).
+    """Cause and consequences of an alert or speed limit (docs/dashboard.md).
 
     Attributes:
         kind: ``alert`` (somebody was confirmed) or ``mandate`` (a robot was told).
@@ -185,7 +185,7 @@ class LogRecord:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryRecord:
-    """Where a robot was, how fast, and what it was told and applied.
+    """Pose and speed of a robot, with its speed limit and the applied factor.
 
     Attributes:
         linear: (m/s); ``angular`` (rad/s).

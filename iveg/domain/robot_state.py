@@ -169,7 +169,7 @@ class RobotState:
         return earlier.interpolate(later, (stamp_s - before) / (after - before))
 
     def speed_gained(self) -> float:
-        """How much faster it is than in the mean of its last second (m/s)."""
+        """Gain of speed over the mean of its last second (m/s)."""
         if self.odometry is None or not self._speeds:
             return 0.0
         mean = sum(speed for _, speed in self._speeds) / len(self._speeds)

@@ -1,4 +1,4 @@
-"""How the newest of each kind changes what is known of one robot."""
+"""Updates of one robot's state by the newest observation of each kind."""
 
 from iveg.domain.observations import (
     CommandAnswer,

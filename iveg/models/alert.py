@@ -1,4 +1,4 @@
-"""Alerts (ISA-18.2) and lines of the log: sentences that people are told."""
+"""Alerts (ISA-18.2) and lines of the log."""
 
 from typing import cast
 
@@ -13,7 +13,7 @@ from iveg.models.remembered import read_slots, read_stamp
 
 
 class Told(Model):
-    """Somebody who was told outside iVeg, or was to be: ``failed`` says why not."""
+    """A recipient of an alert outside iVeg; ``failed`` is the reason of a failure."""
 
     channel: Channel
     to: str
@@ -48,7 +48,7 @@ class Occurrence(Model):
     acknowledged_by: str | None
     note: str | None
     told: list[Told]
-    """Who was told outside iVeg."""
+    """Recipients outside iVeg."""
 
     @classmethod
     def of(cls, one: alert_book.Occurrence) -> "Occurrence":
@@ -101,7 +101,7 @@ class Alert(Model):
     note: str | None
     count: int
     told: list[Told]
-    """Who was told of the newest occurrence outside iVeg."""
+    """Recipients of the newest occurrence outside iVeg."""
     members: list[Occurrence]
     """The newest occurrences, oldest first."""
 
@@ -148,7 +148,7 @@ class Alert(Model):
 
 
 class Flood(Model):
-    """How many alerts sounded within the window; ``since`` null: no flood."""
+    """Number of alerts within the window; ``since`` null: no flood."""
 
     count: int
     limit: int
@@ -157,7 +157,7 @@ class Flood(Model):
 
     @classmethod
     def of(cls, of: flood.Flood) -> "Flood":
-        """How fast alerts come."""
+        """The present rate of alerts."""
         return cls(
             count=of.count,
             limit=flood.FLOOD_LIMIT,

@@ -1,4 +1,4 @@
-"""What every model shares: frozen, nothing beside its fields, written by orjson."""
+"""Base of all models: frozen, only declared fields, encoded by orjson."""
 
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
@@ -9,7 +9,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
 
 Slots = dict[str, str | bool | int | float | None]
-"""What fills the ``{named}`` holes of a sentence."""
+"""Values of the ``{named}`` placeholders of a sentence."""
 
 
 class Model(BaseModel):

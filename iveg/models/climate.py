@@ -7,7 +7,7 @@ from iveg.models.base import Model, rounded
 
 
 class Air(Model):
-    """What the sensors measure; null where one is silent."""
+    """Measured climate; null where a sensor is silent."""
 
     temperature: float | None
     """°C."""

@@ -115,7 +115,7 @@ class Command(Model):
     """How it ended; null on ``/live``, where ``state`` says how it stands."""
     was_loud: bool = False
     steps: list[CommandStep]
-    """Of the audit trail; empty on ``/live``, where each step is told."""
+    """Steps of the audit trail; empty on ``/live``, which reports each step itself."""
 
     @classmethod
     def of(cls, of: stop.Command, machine: StopMachine, now: Instant) -> "Command":
@@ -198,7 +198,7 @@ def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
 
 
 def _note(of: stop.Command) -> Sentence | None:
-    """What a late agent means for an order that went through it."""
+    """Note about a late agent for an order that went through it."""
     lag = of.agent_lag_s
     if lag is None or lag <= AGENT_LATE_S:
         return None
@@ -267,7 +267,7 @@ class RobotLatency(Model):
 
 
 class Latency(Model):
-    """How long the newest STOPs of a range took."""
+    """Times of the newest STOPs of a range."""
 
     since: str
     until: str

@@ -37,7 +37,7 @@ class Pass(Model):
 
 
 class Day(Model):
-    """What the fleet did on one day, Europe/Madrid, and what is due on the next."""
+    """Summary of one day of the fleet, Europe/Madrid, and what is due on the next."""
 
     day: str
     """ISO date."""

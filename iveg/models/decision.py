@@ -30,7 +30,7 @@ class DecisionLink(Model):
 
 
 class DecisionPlace(Model):
-    """Where a robot was when a decision began, in ``map`` (m, rad)."""
+    """Pose of a robot when a decision began, in ``map`` (m, rad)."""
 
     robot_id: str
     x: float
@@ -39,7 +39,7 @@ class DecisionPlace(Model):
 
 
 class Decision(Model):
-    """Who was seen by whom, which rule fired, and when the robot obeyed."""
+    """One decision: detection, observer, rule, and the robot's reaction."""
 
     decision_id: str
     kind: Literal["alert", "mandate"]
@@ -67,7 +67,7 @@ class Decision(Model):
     links: list[DecisionLink]
     sentence: Sentence
     places: list[DecisionPlace]
-    """Of the robot and its observer; empty for those of the earlier version."""
+    """Poses of the robot and its observer; empty for those of the earlier version."""
 
     @classmethod
     def of_record(cls, record: DecisionRecord) -> "Decision":

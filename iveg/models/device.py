@@ -1,4 +1,4 @@
-"""What a robot has at the IoT Agent, and when something was last heard of it."""
+"""Devices of a robot at the IoT Agent, with the time of their last message."""
 
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState

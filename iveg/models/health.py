@@ -44,7 +44,7 @@ class NotAcknowledged(Model):
 
 
 class NegativeMargin(Model):
-    """How much of today's known time some margin was below zero (0 to 1)."""
+    """Share of today's known time with a margin below zero (0 to 1)."""
 
     share: float | None
     known_s: float
@@ -65,7 +65,7 @@ class WorstMargin(Model):
 
 
 class Safety(Model):
-    """How soon the fleet obeys and how close it comes to people; never "safe"."""
+    """Reaction times of the fleet and its margins to people; never "safe"."""
 
     alert_latency: AlertLatency
     not_echoed: NotAcknowledged
@@ -130,11 +130,11 @@ def _ms(seconds: float | None) -> float | None:
 
 
 class Health(Model):
-    """Whether the data path is whole, what was counted, how the fleet is told."""
+    """State of the data path, counters, and reaction times of the fleet."""
 
     ok: bool
     hops: list[HopHealth]
     counters: dict[str, int]
     safety: Safety
     earlier: Literal["known", "reading", "unknown"]
-    """What an earlier run left open."""
+    """State of the records of earlier runs."""

@@ -1,4 +1,4 @@
-"""What each message takes from hop to hop (docs/interfaces/resources.md)."""
+"""Latency of messages from hop to hop (docs/interfaces/resources.md)."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from iveg.models.base import Model
 
 
 class SegmentSpread(Model):
-    """What one hop takes; null where nothing was measured."""
+    """Latency of one hop; null where nothing was measured."""
 
     count: int
     mean_ms: float | None
@@ -35,7 +35,7 @@ class LatencyRow(Model):
     data: Data
     hops: dict[str, SegmentSpread]
     sampled: list[Segment]
-    """Hops of which not every message is told."""
+    """Hops at which only a part of the messages is measured."""
     bins: dict[str, SegmentBins] | None = None
     """Null unless they were asked for."""
 
@@ -51,7 +51,7 @@ class LatencyClock(Model):
 
 
 class SegmentOrder(Model):
-    """What passed a hop since the start."""
+    """Order of the messages at a hop since the start."""
 
     passed: int
     missing: int
@@ -68,7 +68,7 @@ class LatencyStream(Model):
     agent_hz: float
     orion_hz: float
     kept_back: float | None
-    """Share (0 to 1) that the agent was not sent; null while nothing is heard."""
+    """Share (0 to 1) not sent to the agent; null without messages."""
     throttled: bool
     orion_first: int
     uplink: SegmentOrder
@@ -78,7 +78,7 @@ class LatencyStream(Model):
 
 
 class SegmentRemark(Model):
-    """What is wrong with a hop now: a sentence's name, and what fills it."""
+    """A present problem of a hop: key and values of a sentence."""
 
     key: str
     hop: str
@@ -114,7 +114,7 @@ class LatencyTable(Model):
     """Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers."""
     rows: list[LatencyRow]
     paper: dict[str, dict[str, dict[str, float]]]
-    """What the paper printed, by place, kind of data and column (ms)."""
+    """The paper's printed numbers, by place, kind of data and column (ms)."""
     clocks: list[LatencyClock]
     pages_within_ms: float | None
     """How well pages' clocks are known; null while none has told."""
@@ -122,7 +122,7 @@ class LatencyTable(Model):
     remarks: list[SegmentRemark]
     trace: LatencyTrace | None
     library: str
-    """Where the script lies that draws the figures."""
+    """Path of the script that draws the figures."""
     style_ids: list[str]
     figures: dict[str, Any]
     """``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted."""

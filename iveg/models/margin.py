@@ -6,7 +6,7 @@ from iveg.models.base import Model
 
 
 class MarginParts(Model):
-    """What stopping takes, term by term (m)."""
+    """Terms of the protective distance (m)."""
 
     person_walks_m: float
     reaction_m: float
@@ -26,7 +26,7 @@ class Margin(Model):
     band: margins.Band
     parts: MarginParts
     age_s: float
-    """Of the older position."""
+    """Age of the older position."""
     braking: float
     """Counted on (m/s²)."""
     walking_speed: float
@@ -34,7 +34,7 @@ class Margin(Model):
 
     @classmethod
     def of(cls, margin: margins.Margin | None) -> "Margin | None":
-        """What is left between a robot and a person; None where there is no pair."""
+        """Margin between a robot and a person; None where there is no pair."""
         if margin is None:
             return None
         return cls(

@@ -1,4 +1,4 @@
-"""Who is told outside iVeg, as an operator reads it: no password and no key."""
+"""Recipients outside iVeg, as an operator reads them: no password and no key."""
 
 from collections.abc import Mapping, Sequence
 from urllib.parse import urlsplit
@@ -11,7 +11,7 @@ from iveg.models.base import Model
 
 
 class PushDevice(Model):
-    """One browser that is told."""
+    """One browser that receives push messages."""
 
     device_id: str
     who: str
@@ -27,7 +27,7 @@ class PushChannel(Model):
     public_key: str | None
     devices: list[PushDevice]
     last: list[Told]
-    """What came of the newest message, to each."""
+    """Result of the newest message for each recipient."""
 
 
 class Recipient(Model):
@@ -54,7 +54,7 @@ class EmailChannel(Model):
 
 
 class WebhookChannel(Model):
-    """The address is a secret: only its host is told, null where there is none."""
+    """The webhook; of its secret address only the host is shown, null without one."""
 
     on: bool
     who: str
@@ -64,7 +64,7 @@ class WebhookChannel(Model):
 
 
 class Messages(Model):
-    """Everybody who is told outside iVeg, and how that goes."""
+    """Channels to recipients outside iVeg, with their results."""
 
     push: PushChannel
     email: EmailChannel
@@ -96,7 +96,7 @@ class Messages(Model):
 
 
 class MessageTest(Model):
-    """What came of a test, to each."""
+    """Result of a test for each recipient."""
 
     told: list[Told]
 

@@ -23,16 +23,16 @@ class Acting(Model):
 
 
 class Person(Model):
-    """A person, or a robot that is none of the fleet."""
+    """A person, or a robot outside the fleet."""
 
     person_id: str
     class_: Class = Field(validation_alias="class", serialization_alias="class")
     class_id: str
-    """As the detector said."""
+    """The detector's own class name."""
     stage: Stage
     position: Position
     radius_m: float | None
-    """Of the widest ring."""
+    """Radius of the widest ring."""
     confidence: float
     first_seen: str
     last_seen: str
@@ -43,7 +43,7 @@ class Person(Model):
     doubtful: bool
     """Seen beyond the walls: the position is its observer's."""
     decision_id: str | None
-    """Of the newest slow-down for it that goes on."""
+    """Newest open decision about this person."""
     lane: str | None
     acting: list[Acting]
     margin: Margin | None
@@ -91,7 +91,7 @@ class Detection(Model):
     peer: str | None = None
     """The robot of the fleet that was seen."""
     transport: TransportId
-    """Of the copy that was first."""
+    """Transport of the copy that was first."""
     road: str
     """The same in the words of an earlier version."""
 

@@ -32,13 +32,13 @@ class Area(Model):
 
 
 class Lane(Area):
-    """Where robots drive."""
+    """A lane of the greenhouse."""
 
     label: str
 
 
 class Obstacle(Area):
-    """What stands in the way."""
+    """An obstacle."""
 
     kind: str
 
@@ -108,7 +108,7 @@ class LaneCoverage(Area):
     columns: int
     rows: int
     ages_s: list[int | None]
-    """Whole seconds since a camera last looked at a cell; null: never."""
+    """Whole seconds since a camera last covered a cell; null: never."""
 
 
 class Coverage(Model):
@@ -116,10 +116,10 @@ class Coverage(Model):
 
     at: str
     cameras: int
-    """That look now."""
+    """Number of working cameras."""
     within_s: float
     share: float | None
-    """Of the cells, looked at within that (0-1); null without aisles."""
+    """Share of the cells covered within that time (0-1); null without aisles."""
     lanes: list[LaneCoverage]
 
 

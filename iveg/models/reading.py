@@ -1,4 +1,4 @@
-"""What small sensors of robots said, remembered."""
+"""Stored readings of small sensors of robots."""
 
 from pydantic import JsonValue
 

@@ -1,4 +1,4 @@
-"""What the history holds as JSON, as models have it."""
+"""Conversion of the history's JSON to models."""
 
 from pydantic import JsonValue
 
@@ -7,7 +7,7 @@ from iveg.models.base import Slots, stamp
 
 
 def read_slots(found: Json) -> Slots:
-    """What fills the holes of a sentence."""
+    """Values of a sentence's placeholders."""
     return {
         name: value
         for name, value in found.items()

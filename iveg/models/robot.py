@@ -56,7 +56,7 @@ class Hold(Model):
 
 
 class Fault(Model):
-    """What a robot finds wrong with its own data."""
+    """A fault of a robot's own data, as the robot reports it."""
 
     code: str
     about: str
@@ -64,7 +64,7 @@ class Fault(Model):
 
 
 class Applied(Model):
-    """What the robot itself says it applies."""
+    """Limit that the robot reports to apply."""
 
     reason: str
     cause: str | None
@@ -91,7 +91,7 @@ class Applied(Model):
 
 
 class SpeedLimit(Model):
-    """How fast a robot may drive at most, and why."""
+    """Greatest speed factor of a robot, and its reason."""
 
     speed_factor: float
     reason: str
@@ -101,7 +101,7 @@ class SpeedLimit(Model):
 
     @classmethod
     def of(cls, limit: feedback.SpeedLimit) -> "SpeedLimit":
-        """What is in force."""
+        """The speed limit in force."""
         return cls(
             speed_factor=limit.speed_factor,
             reason=limit.reason,
@@ -145,7 +145,7 @@ class Navigation(Model):
 
     @classmethod
     def of(cls, robot: RobotState) -> "Navigation | None":
-        """What a robot says it is about to do; None while it says nothing."""
+        """Intent that the robot reports; None without one."""
         intent = robot.navigation
         if intent is None:
             return None
@@ -158,7 +158,7 @@ class Navigation(Model):
 
 
 class Profile(Model):
-    """What is known of this kind of robot (m, m/s)."""
+    """Known properties of the robot (m, m/s)."""
 
     drive: str
     length: float
@@ -184,7 +184,7 @@ class Robot(Model):
     robot_id: str
     link: Link
     mode: Mode
-    """What the robot has just said; while it says nothing, what it was told."""
+    """The robot's recent report; without one, the speed limit."""
     pose: Pose | None
     twist: Twist | None
     stamp: str | None
@@ -194,7 +194,7 @@ class Robot(Model):
     """At most; null while nobody knows."""
     age_estimated: bool
     speed_factor: float | None
-    """What the robot says it applies."""
+    """Speed factor that the robot reports to apply."""
     applied: Applied | None
     speed_limit: SpeedLimit
     mandate: SpeedLimit
@@ -205,9 +205,9 @@ class Robot(Model):
     replay: bool
     clock_offset_s: float | None
     road: str
-    """Of the newest detections."""
+    """Transport of the newest detections, in the words of an earlier version."""
     transport: TransportId
-    """That feeds the pose."""
+    """Transport that feeds the pose."""
     profile: Profile
     margin: Margin | None
     cmd_status: str | None

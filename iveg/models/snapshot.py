@@ -23,7 +23,7 @@ class Server(Model):
 
 
 class User(Model):
-    """Who is signed in."""
+    """The signed-in user."""
 
     name: str
     role: str

@@ -88,7 +88,7 @@ def is_robot_id(text: str) -> bool:
 
 
 def measure_topic(apikey: str, device_id: str) -> str:
-    """Where a device publishes its measures."""
+    """Topic of a device's measures."""
     return f"/{apikey}/{device_id}/attrs"
 
 
@@ -102,12 +102,12 @@ def direct_topic(robot_id: str, suffix: str) -> str:
 
 
 def command_topic(apikey: str, robot_id: str) -> str:
-    """Where a robot hears its commands."""
+    """Topic of a robot's commands."""
     return f"/{apikey}/{robot_id}/cmd"
 
 
 def answer_topic(apikey: str, robot_id: str) -> str:
-    """Where a robot answers its commands."""
+    """Topic of a robot's answers."""
     return f"/{apikey}/{robot_id}/cmdexe"
 
 

@@ -43,7 +43,7 @@ Count = Annotated[int, Field(ge=0, le=2**53)]
 
 
 class FeedbackRefValue(Wire):
-    """The newest feedback of iVeg that a robot has heard."""
+    """The newest feedback of iVeg that a robot has received."""
 
     boot: Text
     seq: Count
@@ -161,7 +161,7 @@ class NavigationValue(OriginFields):
 
 
 class AnswerValue(OriginFields):
-    """What a robot says on ``cmdexe``."""
+    """Answer of a robot on ``cmdexe``."""
 
     id: Text | None = None
     r: Literal["LATCHED", "RELEASED", "RESUMED", "REFUSED"]
@@ -204,7 +204,7 @@ class SpeedLimitValue(Wire):
 
 
 class FeedbackPose(Wire):
-    """Where iVeg believes the observer to be."""
+    """Pose of the observer as iVeg knows it."""
 
     x: Metres
     y: Metres

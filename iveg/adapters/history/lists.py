@@ -78,7 +78,7 @@ class Page(Generic[R]):
 
 @dataclass(frozen=True, slots=True)
 class ListOf(Generic[R]):
-    """How one kind of record is listed.
+    """Listing of one kind of record.
 
     Attributes:
         at: The column that orders it; ``key`` settles equal times.
@@ -156,7 +156,7 @@ def read_page(connection: Connection, of: ListOf[R], asked: Filter) -> Page[R]:
 
 
 def conditions(of: ListOf[R], asked: Filter) -> Iterator[ColumnElement[bool]]:
-    """What a row must fulfil."""
+    """SQL conditions of a filter."""
     if asked.since is not None:
         yield of.at >= asked.since
     if asked.until is not None:

@@ -61,14 +61,14 @@ def alembic_config(connection: Connection) -> Config:
 
 
 def migrations_directory() -> Path:
-    """Where the migrations are: inside an installed package, else in the checkout."""
+    """Directory of the migrations: in an installed package, else in the checkout."""
     package = Path(iveg.__file__).parent
     installed = package / "_migrations"
     return installed if installed.is_dir() else package.parent / "migrations"
 
 
 def reason_of(error: Exception) -> str:
-    """What the driver said, in one line, without statement and parameters."""
+    """The driver's error in one line, without statement and parameters."""
     cause = getattr(error, "orig", None) or error
     return " ".join(str(cause).split())
 

@@ -41,7 +41,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """One time that a condition held, who was told of it, and who acknowledged it."""
+    """One period in which a condition held, with recipients and acknowledgement."""
 
     priority: Priority
     raised: Instant
@@ -142,7 +142,7 @@ class AlertBook:
     def told(
         self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
     ) -> Alert | None:
-        """Who was told of one occurrence outside iVeg; None when it is forgotten."""
+        """Record the recipients of one occurrence; None when it is forgotten."""
         alert = self.find(alert_id)
         if alert is None or all(one.raised != raised for one in alert.members):
             return None

@@ -17,7 +17,7 @@ UNREADABLE_SHOWN_S = 10.0
 KIND_SHOWN_S = 10.0
 """How long after its last message a robot of the wrong kind is reported (s)."""
 STORM_SHOWN_S = 10.0
-"""So that a detector at its bound is one alert and not one a second."""
+"""Hysteresis, so that a detector at its bound is one alert and not one a second."""
 
 
 def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
@@ -79,7 +79,7 @@ def _may_be_late_s(robot: RobotState, now: Instant) -> float:
 
 
 def _was_moving(robot: RobotState) -> bool:
-    """Whether the robot moved when last heard, by its newer report or odometry."""
+    """Whether the robot moved in its last report or odometry, the newer of both."""
     report, at = robot.safety, robot.safety_received
     if report is None or at is None or at.mono < (robot.pose_at or 0.0):
         return not robot.stands

@@ -44,7 +44,7 @@ class Bounds:
     high: float = _INF
 
     def within(self, other: "Bounds") -> "Bounds":
-        """What both allow; empty (low > high) where they contradict each other."""
+        """Intersection of both bounds; empty (low > high) if they contradict."""
         return Bounds(max(self.low, other.low), min(self.high, other.high))
 
 
@@ -99,7 +99,7 @@ class ClockOffset:
 
     @property
     def uncertainty_s(self) -> float | None:
-        """How wrong ``offset_s`` may be (s); None where nothing bounds it."""
+        """Greatest error of ``offset_s`` (s); None where nothing bounds it."""
         offset, bounds = self.offset_s, self.bounds
         if offset is None or bounds.high == _INF:
             return None
@@ -147,7 +147,7 @@ class ClockOffset:
         self._settle()
 
     def _settle(self) -> None:
-        """What the bounds mean."""
+        """Derive offset and uncertainty from the bounds."""
         bounds = self.bounds = self._older.within(self._newer)
         if bounds.low <= STAMP_S and bounds.high >= -STAMP_S:
             self.state = "assumed" if bounds.high == _INF else "in_step"

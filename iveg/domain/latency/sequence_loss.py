@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 _RECENT_S: Final = 3
-"""What is said of now is of so many seconds."""
+"""Length of the recent window (s)."""
 _LEAP: Final = 100_000
 
 
@@ -68,7 +68,7 @@ class SequenceLoss:
 
     @property
     def lately(self) -> RecentLoss:
-        """What happened in the last three seconds."""
+        """Counts of the last three seconds."""
         if not self._past:
             return RecentLoss(0, 0, 0)
         passed, missing, reordered = self._past[0]

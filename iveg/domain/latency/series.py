@@ -22,7 +22,7 @@ _BUFFER: Final = 512
 
 
 class Series:
-    """What one hop took, for one kind of data of one robot."""
+    """Latency of one hop, for one kind of data of one robot."""
 
     __slots__ = (
         "_buffer",

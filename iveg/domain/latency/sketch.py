@@ -52,7 +52,7 @@ class Sketch:
         return self.total / self.count if self.count else None
 
     def quantile(self, share: float) -> float | None:
-        """What this share (0 to 1) did not exceed (s), within 1 %; None of nothing."""
+        """The quantile of a share (0 to 1) (s), within 1 %; None without data."""
         value = self._filled.get_quantile_value(share)
         return None if value is None else min(max(float(value), self.least), self.most)
 

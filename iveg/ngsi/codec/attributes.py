@@ -70,7 +70,7 @@ def read_attributes(
 def _overtaken(
     robot_id: str, name: str, attributes: Mapping[str, Any], is_past: IsPast
 ) -> Overtaken | None:
-    """What is left of a message that its stream is past; None where it may be news."""
+    """Remains of a message that is older than its stream; None where it may be new."""
     if name not in _IDENTITY:
         return None
     kind, holder = _IDENTITY[name]
@@ -92,7 +92,7 @@ def _overtaken(
 def read_one(
     source: str, reader: _Reader, attributes: Mapping[str, Any], name: str = ""
 ) -> ReadResult:
-    """What one reader makes of an entity, or why it cannot."""
+    """Result of one reader on an entity, or the reason of its failure."""
     try:
         return ReadResult((reader(source, attributes),))
     except ValidationError as error:
@@ -118,7 +118,7 @@ def _odometry_of(robot_id: str, value: payloads.OdometryValue) -> Odometry:
 
 
 def _refuse_unplaced(value: Any) -> None:
-    """What a robot could not place is counted and never drawn."""
+    """Refuse data without a position: it is counted and never drawn."""
     if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
         raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
 
@@ -355,7 +355,7 @@ _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]]
 
 
 def climate(_: str, attributes: Mapping[str, Any]) -> Climate:
-    """What the greenhouse measures."""
+    """Climate of the greenhouse."""
     value = payloads.ClimateValue.model_validate(dict(attributes))
     return Climate(value.temperature, value.relativeHumidity, value.co2)
 

@@ -1,4 +1,4 @@
-"""What iVeg asks of one robot: a command, or the retained desired state."""
+"""Orders to one robot: a command, or the retained desired state."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal

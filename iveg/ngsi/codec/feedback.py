@@ -126,7 +126,7 @@ def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
 
 
 def _write_shared(feedback: Feedback) -> dict[str, Any]:
-    """What every robot is told alike.
+    """Part of the feedback that is the same for all robots.
 
     A limit that limits nothing is left out, or the fleet's limits would be most of the
     message.  ``mandates`` holds them all under the name that robots of the version

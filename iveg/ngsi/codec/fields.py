@@ -12,7 +12,7 @@ from iveg.ngsi import payloads
 
 
 def read_origin(value: payloads.OriginFields) -> Origin:
-    """Which boot, which message, when, and what its sender had heard."""
+    """Read boot, sequence number, time, and the newest feedback of the sender."""
     stamp_s = None if value.stamp is None else parse_stamp(value.stamp)
     heard = value.heard
     return Origin(
@@ -21,7 +21,7 @@ def read_origin(value: payloads.OriginFields) -> Origin:
         value.stamp,
         stamp_s,
         value.mono,
-        # A robot that has heard nothing yet says so with ``null``.
+        # A robot without feedback yet sends ``null``.
         acknowledgements="heard" in value.model_fields_set,
         heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
         replay=value.replay,

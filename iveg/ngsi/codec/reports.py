@@ -1,4 +1,4 @@
-"""What robots and sensors publish; the inverse of the readers."""
+"""Messages of robots and sensors; the inverse of the readers."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a stranger sends: JSON that may be hostile, and what could not be read."""
+"""Parsing of untrusted JSON, and the parts that could not be read."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class UnreadPart:
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """What a message held: what could be read and what could not."""
+    """Content of a message: observations, and the parts that could not be read."""
 
     observations: tuple[Observation, ...] = ()
     problems: tuple[UnreadPart, ...] = ()
@@ -54,7 +54,7 @@ def load_json(body: bytes | str) -> Any:
 
 
 def _brackets(body: bytes | str) -> int:
-    """How many could open: no text is deeper than that, and most have few."""
+    """Upper bound of the nesting: the number of brackets."""
     text = body.encode() if isinstance(body, str) else body
     return text.count(b"[") + text.count(b"{")
 

@@ -25,7 +25,7 @@ export type Alert = {
   acknowledged_by: string | null;
   note: string | null;
   count: number;
-  /** Who was told of the newest occurrence outside iVeg. */
+  /** Recipients of the newest occurrence outside iVeg. */
   told: Told[];
   /** The newest occurrences, oldest first. */
   members: Occurrence[];
@@ -48,7 +48,7 @@ export type AlertListing = {
   flood: Flood;
 };
 
-/** What the robot itself says it applies. */
+/** Limit that the robot reports to apply. */
 export type Applied = {
   reason: string;
   cause: string | null;
@@ -124,7 +124,7 @@ export type Command = {
   /** How it ended; null on ``/live``, where ``state`` says how it stands. */
   outcome: "open" | "stood" | "not_seen_standing" | "released" | "resumed" | "refused" | "expired" | "replaced" | null;
   was_loud: boolean;
-  /** Of the audit trail; empty on ``/live``, where each step is told. */
+  /** Steps of the audit trail; empty on ``/live``, which reports each step itself. */
   steps: CommandStep[];
 };
 
@@ -175,15 +175,15 @@ export type Costmap = {
 /** When a camera last looked at each cell of the aisles. */
 export type Coverage = {
   at: string;
-  /** That look now. */
+  /** Number of working cameras. */
   cameras: number;
   within_s: number;
-  /** Of the cells, looked at within that (0-1); null without aisles. */
+  /** Share of the cells covered within that time (0-1); null without aisles. */
   share: number | null;
   lanes: LaneCoverage[];
 };
 
-/** Who was seen by whom, which rule fired, and when the robot obeyed. */
+/** One decision: detection, observer, rule, and the robot's reaction. */
 export type Decision = {
   decision_id: string;
   kind: "alert" | "mandate";
@@ -210,7 +210,7 @@ export type Decision = {
   speed_after: number | null;
   links: DecisionLink[];
   sentence: Sentence;
-  /** Of the robot and its observer; empty for those of the earlier version. */
+  /** Poses of the robot and its observer; empty for those of the earlier version. */
   places: DecisionPlace[];
 };
 
@@ -222,7 +222,7 @@ export type DecisionLink = {
   verdict: string;
 };
 
-/** Where a robot was when a decision began, in ``map`` (m, rad). */
+/** Pose of a robot when a decision began, in ``map`` (m, rad). */
 export type DecisionPlace = {
   robot_id: string;
   x: number;
@@ -252,7 +252,7 @@ export type Detection = {
   person_id: string | null;
   /** The robot of the fleet that was seen. */
   peer: string | null;
-  /** Of the copy that was first. */
+  /** Transport of the copy that was first. */
   transport: string;
   /** The same in the words of an earlier version. */
   road: string;
@@ -334,7 +334,7 @@ export type Experiments = {
   refused: string | null;
 };
 
-/** What a robot finds wrong with its own data. */
+/** A fault of a robot's own data, as the robot reports it. */
 export type Fault = {
   code: string;
   about: string;
@@ -346,7 +346,7 @@ export type FleetPressed = {
   commands: Pressed[];
 };
 
-/** How many alerts sounded within the window; ``since`` null: no flood. */
+/** Number of alerts within the window; ``since`` null: no flood. */
 export type Flood = {
   count: number;
   limit: number;
@@ -364,13 +364,13 @@ export type GreenhouseMap = {
   obstacles: Obstacle[];
 };
 
-/** Whether the data path is whole, what was counted, how the fleet is told. */
+/** State of the data path, counters, and reaction times of the fleet. */
 export type Health = {
   ok: boolean;
   hops: HopHealth[];
   counters: Record<string, number>;
   safety: Safety;
-  /** What an earlier run left open. */
+  /** State of the records of earlier runs. */
   earlier: "known" | "reading" | "unknown";
 };
 
@@ -395,7 +395,7 @@ export type HopHealth = {
 
 export type JsonValue = unknown;
 
-/** Where robots drive. */
+/** A lane of the greenhouse. */
 export type Lane = {
   xmin: number;
   ymin: number;
@@ -413,11 +413,11 @@ export type LaneCoverage = {
   label: string;
   columns: number;
   rows: number;
-  /** Whole seconds since a camera last looked at a cell; null: never. */
+  /** Whole seconds since a camera last covered a cell; null: never. */
   ages_s: (number | null)[];
 };
 
-/** How long the newest STOPs of a range took. */
+/** Times of the newest STOPs of a range. */
 export type Latency = {
   since: string;
   until: string;
@@ -437,7 +437,7 @@ export type LatencyClock = {
 export type LatencyRow = {
   data: "odometry" | "detections" | "lidar";
   hops: Record<string, SegmentSpread>;
-  /** Hops of which not every message is told. */
+  /** Hops at which only a part of the messages is measured. */
   sampled: ("uplink" | "fiware" | "robot_orion" | "iveg" | "screen")[];
   /** Null unless they were asked for. */
   bins: Record<string, SegmentBins> | null;
@@ -458,7 +458,7 @@ export type LatencyStream = {
   heard_hz: number;
   agent_hz: number;
   orion_hz: number;
-  /** Share (0 to 1) that the agent was not sent; null while nothing is heard. */
+  /** Share (0 to 1) not sent to the agent; null without messages. */
   kept_back: number | null;
   throttled: boolean;
   orion_first: number;
@@ -478,7 +478,7 @@ export type LatencyTable = {
   /** Whether iVeg reads the broker itself, so that Δt₁ and Δt₂ are two numbers. */
   direct: boolean;
   rows: LatencyRow[];
-  /** What the paper printed, by place, kind of data and column (ms). */
+  /** The paper's printed numbers, by place, kind of data and column (ms). */
   paper: Record<string, Record<string, Record<string, number>>>;
   clocks: LatencyClock[];
   /** How well pages' clocks are known; null while none has told. */
@@ -486,7 +486,7 @@ export type LatencyTable = {
   streams: LatencyStream[];
   remarks: SegmentRemark[];
   trace: LatencyTrace | null;
-  /** Where the script lies that draws the figures. */
+  /** Path of the script that draws the figures. */
   library: string;
   style_ids: string[];
   /** ``bars``, ``cdf`` and ``trace`` as Plotly draws them; empty if unwanted. */
@@ -523,7 +523,7 @@ export type Margin = {
   margin_m: number;
   band: "clear" | "tight" | "inside" | "unknown";
   parts: MarginParts;
-  /** Of the older position. */
+  /** Age of the older position. */
   age_s: number;
   /** Counted on (m/s²). */
   braking: number;
@@ -531,7 +531,7 @@ export type Margin = {
   walking_speed: number;
 };
 
-/** What stopping takes, term by term (m). */
+/** Terms of the protective distance (m). */
 export type MarginParts = {
   person_walks_m: number;
   reaction_m: number;
@@ -539,12 +539,12 @@ export type MarginParts = {
   uncertainty_m: number;
 };
 
-/** What came of a test, to each. */
+/** Result of a test for each recipient. */
 export type MessageTest = {
   told: Told[];
 };
 
-/** Everybody who is told outside iVeg, and how that goes. */
+/** Channels to recipients outside iVeg, with their results. */
 export type Messages = {
   push: PushChannel;
   email: EmailChannel;
@@ -560,7 +560,7 @@ export type Navigation = {
   path: [number, number][];
 };
 
-/** How much of today's known time some margin was below zero (0 to 1). */
+/** Share of today's known time with a margin below zero (0 to 1). */
 export type NegativeMargin = {
   share: number | null;
   known_s: number;
@@ -579,7 +579,7 @@ export type NotAcknowledged = {
   age_s: number | null;
 };
 
-/** What stands in the way. */
+/** An obstacle. */
 export type Obstacle = {
   xmin: number;
   ymin: number;
@@ -596,19 +596,19 @@ export type Occurrence = {
   acknowledged_at: string | null;
   acknowledged_by: string | null;
   note: string | null;
-  /** Who was told outside iVeg. */
+  /** Recipients outside iVeg. */
   told: Told[];
 };
 
-/** A person, or a robot that is none of the fleet. */
+/** A person, or a robot outside the fleet. */
 export type Person = {
   person_id: string;
   class: "person" | "robot";
-  /** As the detector said. */
+  /** The detector's own class name. */
   class_id: string;
   stage: "seen" | "remembered" | "last_seen" | "gone";
   position: Position;
-  /** Of the widest ring. */
+  /** Radius of the widest ring. */
   radius_m: number | null;
   confidence: number;
   first_seen: string;
@@ -619,7 +619,7 @@ export type Person = {
   possible: boolean;
   /** Seen beyond the walls: the position is its observer's. */
   doubtful: boolean;
-  /** Of the newest slow-down for it that goes on. */
+  /** Newest open decision about this person. */
   decision_id: string | null;
   lane: string | null;
   acting: Acting[];
@@ -660,7 +660,7 @@ export type Pressed = {
   state: string;
 };
 
-/** What is known of this kind of robot (m, m/s). */
+/** Known properties of the robot (m, m/s). */
 export type Profile = {
   drive: string;
   length: number;
@@ -675,11 +675,11 @@ export type PushChannel = {
   contact: string;
   public_key: string | null;
   devices: PushDevice[];
-  /** What came of the newest message, to each. */
+  /** Result of the newest message for each recipient. */
   last: Told[];
 };
 
-/** One browser that is told. */
+/** One browser that receives push messages. */
 export type PushDevice = {
   device_id: string;
   who: string;
@@ -705,7 +705,7 @@ export type Recipient = {
 export type Robot = {
   robot_id: string;
   link: "UNKNOWN" | "LIVE" | "LATE" | "LOST";
-  /** What the robot has just said; while it says nothing, what it was told. */
+  /** The robot's recent report; without one, the speed limit. */
   mode: "RUNNING" | "SLOW" | "STOPPED";
   pose: Pose | null;
   twist: Twist | null;
@@ -715,7 +715,7 @@ export type Robot = {
   /** At most; null while nobody knows. */
   age_s: number | null;
   age_estimated: boolean;
-  /** What the robot says it applies. */
+  /** Speed factor that the robot reports to apply. */
   speed_factor: number | null;
   applied: Applied | null;
   speed_limit: SpeedLimit;
@@ -726,9 +726,9 @@ export type Robot = {
   navigation: Navigation | null;
   replay: boolean;
   clock_offset_s: number | null;
-  /** Of the newest detections. */
+  /** Transport of the newest detections, in the words of an earlier version. */
   road: string;
-  /** That feeds the pose. */
+  /** Transport that feeds the pose. */
   transport: string;
   profile: Profile;
   margin: Margin | null;
@@ -769,7 +769,7 @@ export type Rule = {
   since: string | null;
 };
 
-/** How soon the fleet obeys and how close it comes to people; never "safe". */
+/** Reaction times of the fleet and its margins to people; never "safe". */
 export type Safety = {
   alert_latency: AlertLatency;
   not_echoed: NotAcknowledged;
@@ -795,7 +795,7 @@ export type SegmentBins = {
   total_ms: number;
 };
 
-/** What passed a hop since the start. */
+/** Order of the messages at a hop since the start. */
 export type SegmentOrder = {
   passed: number;
   missing: number;
@@ -803,14 +803,14 @@ export type SegmentOrder = {
   repeated: number;
 };
 
-/** What is wrong with a hop now: a sentence's name, and what fills it. */
+/** A present problem of a hop: key and values of a sentence. */
 export type SegmentRemark = {
   key: string;
   hop: string;
   slots: Record<string, string | number>;
 };
 
-/** What one hop takes; null where nothing was measured. */
+/** Latency of one hop; null where nothing was measured. */
 export type SegmentSpread = {
   count: number;
   mean_ms: number | null;
@@ -872,7 +872,7 @@ export type Snapshot = {
   climate: Climate | null;
 };
 
-/** How fast a robot may drive at most, and why. */
+/** Greatest speed factor of a robot, and its reason. */
 export type SpeedLimit = {
   speed_factor: number;
   reason: string;
@@ -881,7 +881,7 @@ export type SpeedLimit = {
   decision_id: string | null;
 };
 
-/** Somebody who was told outside iVeg, or was to be: ``failed`` says why not. */
+/** A recipient of an alert outside iVeg; ``failed`` is the reason of a failure. */
 export type Told = {
   channel: "push" | "email" | "webhook";
   to: string;
@@ -895,13 +895,13 @@ export type Twist = {
   angular: number;
 };
 
-/** Who is signed in. */
+/** The signed-in user. */
 export type User = {
   name: string;
   role: string;
 };
 
-/** The address is a secret: only its host is told, null where there is none. */
+/** The webhook; of its secret address only the host is shown, null without one. */
 export type WebhookChannel = {
   on: boolean;
   who: string;

@@ -81,7 +81,7 @@ class EmailBody(_Body):
     language: Language = "es"
 
     def applied_to(self, before: messages.Email) -> messages.Email | None:
-        """What it makes of the settings; None where a password is missing."""
+        """The settings with these changes; None where a password is missing."""
         password = before.password if self.password is None else self.password
         if self.password is None and password and self._goes_elsewhere(before):
             return None
@@ -114,7 +114,7 @@ class WebhookBody(_Body):
     least: Level = "P1"
 
     def applied_to(self, before: messages.Webhook) -> messages.Webhook:
-        """What it makes of the settings."""
+        """The settings with these changes."""
         url = before.url if self.url is None else self.url
         return messages.Webhook(self.on, self.who, url, self.least)
 
@@ -212,7 +212,7 @@ def router(desk: Desk) -> APIRouter:
 
     @routes.get("", response_model=Messages)
     async def read(_: _Operator) -> Response:
-        """Who is told, by which channel, and what came of the newest message."""
+        """Recipients by channel, and the result of the newest message."""
         return desk.answer()
 
     @routes.post("/{channel}/test", response_model=MessageTest)

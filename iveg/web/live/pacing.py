@@ -79,7 +79,7 @@ class CreditWindow:
 
     @property
     def room(self) -> int:
-        """How many heavy bytes may go with it."""
+        """Number of heavy bytes that may go with it."""
         return BYTES - sum(one.heavy for one in self._sent)
 
     def sent(self, heavy: int, now: float) -> None:

@@ -25,7 +25,7 @@ _KEEP_SEEN_S = 60.0
 
 
 class SessionStore(Protocol):
-    """Where sessions outlive a restart; ``adapters.sessions`` is one."""
+    """Storage of sessions over a restart; implemented by ``adapters.sessions``."""
 
     def load(self) -> Sequence[Session]:
         """All that were kept."""
