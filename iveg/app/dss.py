@@ -40,7 +40,7 @@ from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.loop import reading_apart_s
-from iveg.pipeline.ports import Sender
+from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
 from iveg.settings import Settings
 from iveg.web.api import messages, metrics
@@ -155,7 +155,7 @@ class Dss:
             lambda: recorder.health(clock.now()).state,
         )
 
-    def _senders(self) -> dict[Channel, Sender]:
+    def _senders(self) -> dict[Channel, MessageSender]:
         write = messages.writer()
         return {
             "push": PushSender(self.outbound, write),

@@ -32,7 +32,7 @@ _LASER = "laser"
 _GIVES_UP_S, _RESTS_S = 1.0, 0.8
 
 
-class Navigation:
+class SimulatedNavigation:
     """Nav2 as a gate meets it: requests twists, gives up without progress, tries again.
 
     After a resume the gate stays closed until zero was requested; a real navigation
@@ -65,7 +65,7 @@ class DriveWatchdog:
     def __init__(self) -> None:
         self._command, self._at = REST, -math.inf
 
-    def told(self, command: Twist2D, now: float) -> None:
+    def take(self, command: Twist2D, now: float) -> None:
         """Take a command."""
         self._command, self._at = command, now
 
@@ -109,7 +109,7 @@ class Ros2Base:
         self._rig, self._world = rig, world
         self._frames = config.frames
         self._rate_hz = rate_hz
-        self._base, self._navigation = DriveWatchdog(), Navigation()
+        self._base, self._navigation = DriveWatchdog(), SimulatedNavigation()
         self._odom_in_map = rig.vehicle.pose
         self._run_began = 0.0
         self._is_odometry_frozen = False
@@ -173,7 +173,7 @@ class Ros2Base:
         except UnreadableError as error:
             _log.warning("%s: unusable command: %s", self.robot_id, error)
             return
-        self._base.told(twist, now)
+        self._base.take(twist, now)
 
     def _tell_place(self, stamp: m.Time) -> None:
         measured = self._rig.odometry()

@@ -28,8 +28,8 @@ from iveg.pipeline.ports import (
     CommandPort,
     ContactStore,
     FleetPort,
+    MessageSender,
     RuleStore,
-    Sender,
     StopJournal,
 )
 from iveg.pipeline.publish import Hub
@@ -193,7 +193,10 @@ def build(
 
 
 def build_services(
-    parts: Pipeline, kept: KeptChoices, senders: Mapping[Channel, Sender], clock: Clock
+    parts: Pipeline,
+    kept: KeptChoices,
+    senders: Mapping[Channel, MessageSender],
+    clock: Clock,
 ) -> Services:
     """The parts beside a pipeline; raised alerts reach the messenger."""
     evaluator, event_log = parts.evaluator, parts.event_log

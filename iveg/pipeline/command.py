@@ -43,7 +43,7 @@ from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
 from iveg.pipeline.presses import Presses
 from iveg.pipeline.publish import Hub
-from iveg.pipeline.sending import IsCut, Sender
+from iveg.pipeline.sending import IsCut, OrderSender
 
 _log = logging.getLogger(__name__)
 _KEPT = 200
@@ -101,7 +101,7 @@ class Commander:
         """Robots whose machine once had no step: shown until iVeg starts again."""
         self._presses = Presses()
         by_id = {transport.id: port for transport, port in ports.items()}
-        self._sender = Sender(
+        self._sender = OrderSender(
             by_id, fleet, journal, event_log, clock, self._came_back, is_cut
         )
         self._agent_lag_s = agent_lag_s

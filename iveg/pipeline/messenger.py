@@ -31,7 +31,7 @@ from iveg.domain.messages import (
 )
 from iveg.domain.observations import Instant
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.ports import Clock, ContactStore, Sender
+from iveg.pipeline.ports import Clock, ContactStore, MessageSender
 
 _log = logging.getLogger(__name__)
 
@@ -44,7 +44,7 @@ LIMIT_S = 15.0
 """For one message to everybody of a channel, however slowly a server answers."""
 
 
-class Told(Protocol):
+class DeliveryLog(Protocol):
     """Who keeps what came of a message: the alerts."""
 
     def told(
@@ -66,8 +66,8 @@ class Messenger:
         self,
         contacts: Contacts,
         store: ContactStore,
-        senders: Mapping[Channel, Sender],
-        told: Told,
+        senders: Mapping[Channel, MessageSender],
+        told: DeliveryLog,
         event_log: EventLog,
         clock: Clock,
         rest_s: float = REST_S,

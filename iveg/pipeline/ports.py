@@ -97,7 +97,7 @@ class ContactStore(Protocol):
         """Put them in the place of those before; returns on disk. Raises HopError."""
 
 
-class Sender(Protocol):
+class MessageSender(Protocol):
     """One channel to people who are not before a page."""
 
     async def send(

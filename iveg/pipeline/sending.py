@@ -27,7 +27,7 @@ CameBack = Callable[[StopMachine, list[Effect], Instant], None]
 IsCut = Callable[[TransportId, Instant], bool]
 
 
-class Sender:
+class OrderSender:
     """Sends STOPs, releases, resumes and desired states, each in its own task.
 
     Args:

@@ -26,7 +26,7 @@ Pace = Literal["at once", "frame", "read-out", "picture"]
 """At once, past all telemetry; in each frame; as digits are read; as pictures are."""
 
 
-class Reader(Protocol):
+class StateReader(Protocol):
     """Source of the newest value of every topic (``web.views``)."""
 
     def robot(self, robot_id: str, now: Instant) -> Robot:
@@ -90,10 +90,10 @@ class Topic:
 
     name: str
     model: Any = None
-    read: Callable[[Reader, str, Instant], Any] | None = None
-    tell: Callable[[Reader, Any, Instant], Any] = lambda _, item, __: item
+    read: Callable[[StateReader, str, Instant], Any] | None = None
+    tell: Callable[[StateReader, Any, Instant], Any] = lambda _, item, __: item
     member: str = ""
-    every: Callable[[Reader, Instant], Any] | None = None
+    every: Callable[[StateReader, Instant], Any] | None = None
     pace: Pace = "at once"
 
     def of(self, key: str) -> str:
@@ -234,6 +234,6 @@ def is_telemetry(topic: str) -> bool:
     return find(topic)[0].pace != "at once"
 
 
-def read_all(reader: Reader, now: Instant) -> dict[str, Any]:
+def read_all(reader: StateReader, now: Instant) -> dict[str, Any]:
     """The members of the snapshot that topics have, by name."""
     return {row.member: row.every(reader, now) for row in TOPICS if row.every}

@@ -13,7 +13,7 @@ from iveg.emulator.camera import DETECTORS
 from iveg.emulator.layout import lay_out
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
-from iveg.emulator.ros2_base import Navigation as Nav
+from iveg.emulator.ros2_base import SimulatedNavigation as Nav
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.world import REST, SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
@@ -31,7 +31,7 @@ AHEAD = Twist2D(0.5, 0.1)
 def test_a_base_does_what_it_was_told_last_for_half_a_second() -> None:
     base = DriveWatchdog()
     before = base.command(0.0)
-    base.told(AHEAD, 10.0)
+    base.take(AHEAD, 10.0)
 
     assert (before, base.command(10.0 + TIMEOUT_S)) == (REST, AHEAD)
     assert base.command(10.0 + TIMEOUT_S + 0.001) == REST
