@@ -45,7 +45,7 @@ class TopicListener:
                 heard.set()
 
     async def heard(self, mark: str, within_s: float) -> None:
-        """Return once a message has carried the mark.
+        """Wait until a message has carried the mark.
 
         Raises:
             TimeoutError: none has.
@@ -77,7 +77,7 @@ class ProbeDevice:
 async def probe_device(
     address: BrokerAddress, topics: Sequence[str], within_s: float
 ) -> AsyncIterator[ProbeDevice]:
-    """Be connected while the block lasts, without reconnecting.
+    """Stay connected while the block lasts, without reconnecting.
 
     Args:
         address: The broker.

@@ -138,7 +138,7 @@ class CommandRegistrations(Entities, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Provisioned:
-    """What provisioning did, as sentences.
+    """Result of provisioning, as sentences.
 
     Attributes:
         mended: What it made or corrected; empty when all was well.

@@ -30,7 +30,7 @@ ROBOT_ATTRIBUTES = (
     names.COMMAND_INFO,
     *names.ALGORITHM_1,
 )
-"""What is read of a robot.  Never ``cmd``: Orion would go and ask the agent for it."""
+"""Attributes read of a robot.  Never ``cmd``: Orion would query the agent for it."""
 
 
 class OrionClient(OrionSubscriptions):

@@ -1,4 +1,4 @@
-"""What Orion is asked to tell of, and whom it asks in turn: its two lists."""
+"""Subscriptions and registrations at Orion."""
 
 from collections.abc import Mapping
 from typing import Any

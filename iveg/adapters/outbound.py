@@ -71,7 +71,7 @@ class OutboundHttp:
         self._threads.shutdown(wait=False, cancel_futures=True)
 
     async def tls(self) -> ssl.SSLContext:
-        """Whose certificates are believed; read from the disk once."""
+        """Trusted certificates; read from the disk once."""
         if self._tls is None:
             loop = asyncio.get_running_loop()
             make = ssl.create_default_context

@@ -1,4 +1,4 @@
-"""Where a key of a TOML file stands, for complaints that name line and column.
+"""Position of a key in a TOML file, for errors that name line and column.
 
 ``tomllib`` tells places of syntax errors alone.  This finds the rest line by line:
 tables, lists of tables, dotted keys and inline tables, as people write them.

@@ -87,7 +87,7 @@ def new_key() -> str:
 
 
 def public_key(key: str) -> str:
-    """What browsers are told of it (``applicationServerKey``)."""
+    """The key as browsers expect it (``applicationServerKey``)."""
     return encode(_point(_private(key)))
 
 

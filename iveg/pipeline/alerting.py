@@ -36,7 +36,7 @@ class Alerting:
 
     @property
     def flood(self) -> Flood:
-        """How fast alerts come."""
+        """Rate of alerts at present."""
         return self._gauge.flood
 
     def knows(self, alert_id: str) -> bool:
@@ -62,7 +62,7 @@ class Alerting:
     def told(
         self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
     ) -> None:
-        """Write down who was told of an alert outside iVeg."""
+        """Record the recipients of an alert outside iVeg."""
         alert = self._book.told(alert_id, raised, deliveries)
         if alert is not None:
             self._event_log.alert(alert)

@@ -11,7 +11,7 @@ from iveg.domain.world import World
 from iveg.pipeline.ports import FleetPort
 
 USED_HZ, BURST = 30.0, 8.0
-"""What robots can use of feedback, and how many may come at once (1/s, 1)."""
+"""Greatest mean rate of feedback, and size of a burst (1/s, 1)."""
 MOST_ALERTS = 256
 """A robot refuses feedback with more."""
 
@@ -73,7 +73,7 @@ class FeedbackPublisher:
         }
         robots = self._world.robots
         first, last = self._seq + 1, self._seq + len(robots)
-        # Before anybody can have heard it: a moment too early makes ages no younger.
+        # Before any robot has received it: a moment too early makes no age younger.
         self._world.ledger.composed(self._boot, first, last, now.mono)
         for robot in robots.values():
             self._seq += 1

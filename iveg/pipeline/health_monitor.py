@@ -53,7 +53,7 @@ class HopHealth:
 
 @dataclass(slots=True)
 class Pace:
-    """How soon a neighbour answers.
+    """Response time of a service.
 
     One slow answer is a hiccup, of a disk or of a busy machine: it is shown, and it is
     a fault only when the next is slow as well.
@@ -62,7 +62,7 @@ class Pace:
     slow: int = 0
 
     def took(self, spent_s: float) -> str:
-        """What the newest answer (s) says against it; empty when nothing."""
+        """Problem shown by the newest response time (s); empty for none."""
         self.slow = self.slow + 1 if spent_s > SLOW_S else 0
         return f"answers take {spent_s:.1f} s" if self.slow else ""
 
@@ -201,7 +201,7 @@ class HealthMonitor:
         return HopHealth(Hop.AGENT, state, age, detail, lag, growing)
 
     def _lag(self, now: Instant) -> tuple[float | None, bool]:
-        """How far the agent is behind (s), and whether that grows.
+        """Lag of the agent (s), and whether it grows.
 
         For a probe that Orion has and that did not come back, notifications are at
         fault, and the lag of the agent is unknown.
@@ -213,7 +213,7 @@ class HealthMonitor:
     def _agent_says(
         self, lag_s: float | None, *, growing: bool
     ) -> tuple[HopState, str]:
-        """What is said of an agent that measures pass, the lag before all else."""
+        """State of an agent that measures pass, with the lag first."""
         if lag_s is not None and lag_s > SLOW_S:
             return "late", lag_in_words(lag_s, growing=growing)
         if self.agent_silent:

@@ -101,7 +101,7 @@ class Ingest:
 
     @property
     def waiting(self) -> int:
-        """How much waits to be taken."""
+        """Number of pending messages."""
         return len(self._queue)
 
     def drain(self) -> Iterable[Received]:
@@ -163,7 +163,7 @@ _UNTOLD = Origin()
 
 
 def _identity(observation: Observation) -> _Identity:
-    """What tells a message from all others, where its sender counts."""
+    """Identity of a message, where its sender counts."""
     origin: Origin = getattr(observation, "origin", _UNTOLD)
     robot_id = getattr(observation, "robot_id", None)
     return robot_id, kind_of(observation), origin.boot, origin.seq
@@ -181,7 +181,7 @@ def _is_twin_of_a_picture(observation: Observation) -> bool:
 
 
 def _stream(received: Received) -> _Stream | None:
-    """Whose telemetry of which kind; None for what is never dropped."""
+    """Robot and kind of telemetry; None for messages that are never dropped."""
     observation = received.observation
     if not kind(observation).may_drop:
         return None

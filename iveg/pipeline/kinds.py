@@ -82,7 +82,7 @@ class Kind:
 
 
 def _low_battery(battery: Battery) -> float | None:
-    """What counts: one that charges is on its way up."""
+    """State of charge that counts as low; a charging battery does not."""
     return None if battery.charging else battery.percentage
 
 
@@ -126,7 +126,7 @@ def kind(observation: Observation) -> Kind:
 
 
 def read_directly(scope: Scope) -> dict[type[Observation], Kind]:
-    """What is read straight from MQTT in a scope."""
+    """Kinds that are read directly from MQTT in a scope."""
     most = _SCOPES[scope]
     return {
         row.of: row
@@ -142,7 +142,7 @@ class LowValues:
         self._low: set[tuple[str, type[Observation]]] = set()
 
     def conditions(self, robot: RobotState) -> Iterable[Condition]:
-        """What is low of one robot now."""
+        """Low values of one robot at present."""
         name = robot.robot_id
         for row in KINDS:
             read = robot.sensed.get(row.of)

@@ -42,7 +42,7 @@ class LatencyMonitor:
             self._tell(remark, now)
 
     def remember(self, hours: Iterable[Measured]) -> None:
-        """What ``hours_of`` made of the history."""
+        """Restore the hours that ``hours_of`` made of the history."""
         self.watch.remember(hours)
 
     def _tell(self, remark: Remark, now: Instant) -> None:

@@ -45,7 +45,7 @@ LIMIT_S = 15.0
 
 
 class DeliveryLog(Protocol):
-    """Who keeps what came of a message: the alerts."""
+    """Storage of the results of messages: the alerts."""
 
     def told(
         self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
@@ -54,7 +54,7 @@ class DeliveryLog(Protocol):
 
 
 class Messenger:
-    """Everybody who is told outside iVeg, and the messages on their way.
+    """Sends alerts to people outside iVeg; holds recipients and pending messages.
 
     Attributes:
         contacts: Whom, as an operator wants it.

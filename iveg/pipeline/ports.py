@@ -91,7 +91,7 @@ class RuleStore(Protocol):
 
 
 class ContactStore(Protocol):
-    """Who is told outside iVeg."""
+    """Storage of the recipients outside iVeg."""
 
     async def save(self, contacts: Contacts) -> None:
         """Put them in the place of those before; returns on disk. Raises HopError."""

@@ -81,7 +81,7 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
             max_overflow=0,
             pool_timeout=5,
             pool_pre_ping=True,
-            # A number that is none becomes null; PostgreSQL would refuse the row.
+            # NaN becomes null; PostgreSQL would refuse the row.
             json_serializer=lambda value: orjson.dumps(value).decode(),
             connect_args=_POSTGRESQL | {"options": options},
         )
@@ -91,7 +91,7 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
 
 
 def _with_timeout(url: URL) -> URL:
-    """How long to wait for a lock; an address may say otherwise: ``?timeout=0.5``."""
+    """Time to wait for a lock; the URL may set another: ``?timeout=0.5``."""
     if "timeout" in url.query:
         return url
     return url.update_query_dict({"timeout": str(_BUSY_TIMEOUT_S)})

@@ -111,7 +111,7 @@ def _prepare_file(file: Path) -> None:
 
 
 def _damage(file: Path) -> str | None:
-    """What is wrong with a file's structure; None when nothing was found in 5 s.
+    """Damage of a file's structure; None when none was found in 5 s.
 
     A locked file is not a damaged one; later calls deal with it.
     """

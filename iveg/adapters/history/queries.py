@@ -228,7 +228,7 @@ class Queries:
     async def day_series(
         self, since: float, until: float
     ) -> tuple[tuple[Pose, ...], tuple[DaySighting, ...]]:
-        """Where robots and people were in each second of a range."""
+        """Poses of robots and positions of people in each second of a range."""
         poses = await self._ask(lambda c: series.poses_of(c, since, until))
         return poses, await self._ask(lambda c: series.people_seen(c, since, until))
 
@@ -247,7 +247,7 @@ class Queries:
     async def command_latencies(
         self, since: float, until: float, robot: str | None = None
     ) -> tuple[series.CommandLatency, ...]:
-        """How long the newest STOPs of a range took, oldest first."""
+        """Times of the newest STOPs of a range, oldest first."""
         return await self._ask(
             lambda c: series.command_latencies(c, since, until, robot)
         )

@@ -277,7 +277,7 @@ class Recorder:
 
 
 def journal_file(database_url: str, directory: Path) -> Path:
-    """Where the journal of a database is: beside an SQLite file, else in a directory.
+    """Spill file of a database: beside an SQLite file, else in a directory.
 
     Raises:
         SettingsError: the address cannot be used.

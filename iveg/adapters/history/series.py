@@ -69,7 +69,7 @@ class ClimateSeries:
 
 @dataclass(frozen=True, slots=True)
 class ConfidenceCount:
-    """How many detections of a class fell into one slice of confidence.
+    """Number of detections of a class in one interval of confidence.
 
     Attributes:
         class_id: As the detector said.
@@ -83,7 +83,7 @@ class ConfidenceCount:
 
 @dataclass(frozen=True, slots=True)
 class CommandLatency:
-    """How long one STOP took from the press (ms); None where it never came.
+    """Times of one STOP from the press (ms); None where a step never came.
 
     Without a told press, the press is when it was accepted.
 
@@ -110,7 +110,7 @@ def speed_series(
     robot: str | None = None,
     most: int = MOST_POINTS,
 ) -> tuple[SpeedSeries, ...]:
-    """One series for each robot that was heard in ``since <= at < until``."""
+    """One series for each robot with data in ``since <= at < until``."""
     robots = _robots(connection) if robot is None else [robot]
     found = (_one(connection, one, since, until, most) for one in robots)
     return tuple(series for series in found if series.at)
@@ -145,7 +145,7 @@ def _climate(rows: list[_Point], slice_s: float) -> ClimateSeries:
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
-    """Where robots were in each second of ``since <= at < until``, in order."""
+    """Poses of robots in each second of ``since <= at < until``, in order."""
     c = odometry.c
     second = _whole(connection, c.at)
     wanted = (
@@ -166,7 +166,7 @@ def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, 
 def people_seen(
     connection: Connection, since: float, until: float
 ) -> tuple[DaySighting, ...]:
-    """Where people were seen for sure in each second of ``since <= at < until``."""
+    """Positions of confirmed people in each second of ``since <= at < until``."""
     c = detections.c
     second = _whole(connection, c.at)
     wanted = (

@@ -23,7 +23,7 @@ from iveg.pipeline.record import Waiting
 _log = logging.getLogger(__name__)
 _KINDS: dict[str, type[Record]] = {kind.__name__: kind for kind in RECORD_TYPES}
 _ONCE_TEXT = frozenset({"rule_parameters", "links", "slots", "members", "box"})
-"""What the version before wrote as JSON in a text."""
+"""Fields that the version before wrote as JSON in a text."""
 _ONCE_NAMED = {"road": "transport", "mandated_factor": "limit_factor"}
 """Fields that the version before called by another name."""
 _ONCE_VALUED = {one.alias: one.id for one in TRANSPORTS}

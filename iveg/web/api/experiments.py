@@ -30,7 +30,7 @@ it has neither cookie nor API."""
 
 
 class ExperimentRunner(Protocol):
-    """What runs experiments."""
+    """Port of the program that runs experiments."""
 
     def start(self, size: Size) -> Experiment:
         """Start one. Raises ExperimentRefusedError."""

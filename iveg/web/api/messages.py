@@ -156,7 +156,7 @@ class DeviceBody(_Body):
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """What the routes are made of.
+    """Ports of the routes.
 
     Attributes:
         messenger: Who keeps and tells people.
@@ -310,7 +310,7 @@ def _refused(why: str, status: int = 422) -> Response:
 
 
 def writer() -> Callable[[Message, Language], Text]:
-    """Messages in words: how grave and when, and nothing of where or about whom."""
+    """Writes messages in words: priority and time, but no place and no person."""
     sentences = {one: Sentences(read_translations(one)) for one in LANGUAGES}
 
     def write(message: Message, language: Language) -> Text:

@@ -52,7 +52,7 @@ def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
 
     @routes.get("/devices", response_model=Listing[Device])
     async def devices() -> Response:
-        """Each robot's devices at the IoT Agent, and when each was last heard of."""
+        """Each robot's devices at the IoT Agent, and the time of their last message."""
         return Json(Listing(items=views.devices(clock())))
 
     @routes.get("/map", response_model=GreenhouseMap)

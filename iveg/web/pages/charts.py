@@ -115,7 +115,7 @@ def confidence_figure(
 
 
 def stop_figure(latencies: Sequence[CommandLatency]) -> bytes:
-    """How long each STOP took (ms): to each transport's answer, and to standing."""
+    """Times of each STOP (ms): to each transport's answer, and to standing."""
     kinds: dict[str, list[float | None]] = {
         transport.id: [one.answer_ms.get(transport.id) for one in latencies]
         for transport in TRANSPORTS

@@ -1,1 +1,1 @@
-"""Who may do what: authentication, sessions, roles, CSRF, headers, rate limits."""
+"""Access control: authentication, sessions, roles, CSRF, headers, rate limits."""

@@ -108,7 +108,7 @@ class BodyLimit:
 
 
 def _declared_length(scope: Scope) -> int | None:
-    """What Content-Length says (bytes); None when the body comes in chunks."""
+    """Value of Content-Length (bytes); None when the body comes in chunks."""
     for name, value in scope["headers"]:
         if name == b"content-length":
             return int(value) if value.isdigit() else None

@@ -42,7 +42,7 @@ class FailedAttempts:
         self._wrong: OrderedDict[str, deque[float]] = OrderedDict()
 
     def wait_s(self, address: str, now: float) -> float:
-        """How long this address has to wait (s); 0 when it may try.
+        """Time that this address has to wait (s); 0 when it may try.
 
         Args:
             address: Where they come from.

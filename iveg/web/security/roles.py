@@ -36,4 +36,4 @@ class Principal:
 
 
 NOBODY = Principal("nobody", "expired")
-"""Who comes through an open route unknown; never handed to a route that asks more."""
+"""Unknown caller of an open route; never passed to a route that requires a role."""
