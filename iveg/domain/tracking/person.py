@@ -26,7 +26,7 @@ class Sighting:
         possible: It was below the threshold, but seen again and again.
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
-        chain: Number of the chain of looks whose newest this is.
+        chain: Number of the chain of sightings whose newest this is.
         recording: The map frame of the recording that saw it; None: a robot of today.
     """
 
@@ -47,7 +47,7 @@ class Sighting:
         return max(0.0, now.mono - self.at.mono)
 
     def in_chain(self, chain: int) -> "Sighting":
-        """The same look as the newest of a chain."""
+        """The same sighting as the newest of a chain."""
         # Made for each box of each picture: ``replace`` takes three times as long.
         return Sighting(
             self.observer,
@@ -70,7 +70,7 @@ class Person:
 
     Attributes:
         person_id: Of the track: the same person as long as iVeg can tell.
-        sightings: The newest of each chain of looks; each has a ring of its own.
+        sightings: The newest of each chain of sightings; each has a ring of its own.
         number: Counts tracks in the order of their appearance.
     """
 
@@ -111,9 +111,9 @@ class Person:
         """Robots that see this person now, in the order in which they began to."""
         return list(
             dict.fromkeys(
-                look.observer
-                for look in self.sightings
-                if look.age_s(now) <= LIMITS.seen_s
+                one.observer
+                for one in self.sightings
+                if one.age_s(now) <= LIMITS.seen_s
             )
         )
 

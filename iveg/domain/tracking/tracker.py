@@ -84,7 +84,7 @@ class Tracker:
     def drop(self, person_id: str, sighting: Sighting) -> Person:
         """Drop a sighting whose place was seen to be empty."""
         person = self.known[person_id]
-        left = tuple(look for look in person.sightings if look != sighting)
+        left = tuple(earlier for earlier in person.sightings if earlier != sighting)
         self.known[person_id] = person.seen_as(person.newest, left)
         return self.known[person_id]
 
@@ -106,27 +106,30 @@ class Tracker:
             return out
         observer = picture[0].sighting.observer
         own = [
-            (person, look)
+            (person, earlier)
             for person in self.known.values()
-            for look in person.sightings
-            if look.observer == observer and look.age_s(at) <= LIMITS.ring_lasts_s
+            for earlier in person.sightings
+            if earlier.observer == observer and earlier.age_s(at) <= LIMITS.ring_lasts_s
         ]
         for is_live in (True, False):
             wanting = [index for index, old in enumerate(out) if old is None]
             if not wanting:
                 break
             offered = [
-                (person, look)
-                for person, look in own
-                if (look.age_s(at) <= LIMITS.seen_s) is is_live
+                (person, earlier)
+                for person, earlier in own
+                if (earlier.age_s(at) <= LIMITS.seen_s) is is_live
             ]
             costs = [
-                [_chain_cost(picture[i], person, look, at) for person, look in offered]
+                [
+                    _chain_cost(picture[i], person, earlier, at)
+                    for person, earlier in offered
+                ]
                 for i in wanting
             ]
             for row, column in assign(costs):
-                person, look = offered[column]
-                out[wanting[row]] = person.person_id, look
+                person, earlier = offered[column]
+                out[wanting[row]] = person.person_id, earlier
         return out
 
     def _chained(
@@ -190,7 +193,7 @@ class Tracker:
         track: str | None,
         at: Instant,
     ) -> str | None:
-        """Keep a sighting in its track; its chain's earlier look goes, wherever."""
+        """Keep a sighting in its track; its chain's earlier one is removed."""
         if old is not None:
             if old[1].at.mono > one.sighting.at.mono:
                 return old[0]
@@ -199,7 +202,9 @@ class Tracker:
             return self._begin(one, at)
         person, sighting = self.known[track], one.sighting
         kept = tuple(
-            look for look in person.sightings if look.age_s(at) <= LIMITS.ring_lasts_s
+            earlier
+            for earlier in person.sightings
+            if earlier.age_s(at) <= LIMITS.ring_lasts_s
         )
         later = sighting.at.mono > person.newest.at.mono
         newest = sighting if later else person.newest
@@ -212,9 +217,9 @@ class Tracker:
         self._drop_mark(one, at)
         self._tracks += 1
         track = f"{'P' if one.class_ == 'person' else 'R'}{self._tracks}"
-        look = one.sighting
+        sighting = one.sighting
         self.known[track] = Person(
-            track, one.class_, one.decision_id, at, look, (look,), self._tracks
+            track, one.class_, one.decision_id, at, sighting, (sighting,), self._tracks
         )
         return track
 
@@ -291,7 +296,7 @@ class Tracker:
         """Every sighting of both is kept: names change, rings do not."""
         older, younger = self.known[first], self.known[second]
         self.known[first] = older.seen_as(
-            max(older.newest, younger.newest, key=lambda look: look.at.mono),
+            max(older.newest, younger.newest, key=lambda sighting: sighting.at.mono),
             (*older.sightings, *younger.sightings),
         )
         apart = self._together.get(second, set()) - {first}
@@ -314,39 +319,41 @@ def _is_alike(person: Person, one: PlacedDetection) -> bool:
 
 
 def _chain_cost(
-    one: PlacedDetection, person: Person, look: Sighting, at: Instant
+    one: PlacedDetection, person: Person, earlier: Sighting, at: Instant
 ) -> float:
-    """Distance to the same observer's earlier look (m); inf where it is another's."""
-    if not _is_alike(person, one) or bool(look.reach_m) != bool(one.sighting.reach_m):
+    """Distance to the observer's own earlier sighting (m); inf for another person's."""
+    if not _is_alike(person, one) or bool(earlier.reach_m) != bool(
+        one.sighting.reach_m
+    ):
         return math.inf
-    if look.reach_m:
+    if earlier.reach_m:
         return 0.0
-    distance = _distance(look, one.sighting)
-    return distance if distance <= _gate(look, at) else math.inf
+    distance = _distance(earlier, one.sighting)
+    return distance if distance <= _gate(earlier, at) else math.inf
 
 
 def _live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
-    """Distance to the nearest fresh look of anybody (m); inf beyond its gate.
+    """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
 
     Where two robots see one person with noise, a detection that lies far from the one
-    look seldom lies far from both.
+    sighting seldom lies far from both.
     """
     if not _is_alike(person, one) or one.sighting.reach_m:
         return math.inf
     return min(
         (
             distance
-            for look in person.sightings
-            if not look.reach_m
-            and look.age_s(at) <= LIMITS.seen_s
-            and (distance := _distance(look, one.sighting)) <= _gate(look, at)
+            for earlier in person.sightings
+            if not earlier.reach_m
+            and earlier.age_s(at) <= LIMITS.seen_s
+            and (distance := _distance(earlier, one.sighting)) <= _gate(earlier, at)
         ),
         default=math.inf,
     )
 
 
 def _lost_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
-    """Distance to the last look (m); inf beyond what is likely."""
+    """Distance to the last sighting (m); inf beyond what is likely."""
     last = person.newest
     if not _is_alike(person, one) or one.sighting.reach_m or last.reach_m:
         return math.inf
@@ -359,6 +366,6 @@ def _distance(one: Sighting, other: Sighting) -> float:
     return math.hypot(one.x - other.x, one.y - other.y)
 
 
-def _gate(look: Sighting, at: Instant) -> float:
-    """How far one may have walked since a look (m, capped)."""
-    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - look.at.mono))
+def _gate(earlier: Sighting, at: Instant) -> float:
+    """How far one may have walked since a sighting (m, capped)."""
+    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - earlier.at.mono))
