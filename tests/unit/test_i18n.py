@@ -23,7 +23,10 @@ _IN_PYTHON = re.compile(r"""f?"((?:log|alert|health)\.[a-z_.]+)(?<!\.)["{]""")
 
 ES, EN = read_translations("es"), read_translations("en")
 _BLOCKS = "|".join(sorted({key.partition(".")[0] for key in ES.sentences}))
-_IN_SCRIPTS = re.compile(rf"""["`]((?:{_BLOCKS})\.[\w.]*)(["`]|\$)""")
+_IN_SCRIPTS = re.compile(
+    rf"""(?<!named\()["`]((?:{_BLOCKS})\.(?!js`)[\w.]*)(["`]|\$)"""
+)
+_NAMED_IN_SCRIPTS = re.compile(r"""named\("([\w.]+)",""")
 
 
 def holes(sentence: str) -> set[str]:
@@ -78,8 +81,10 @@ def test_every_word_that_scripts_ask_for_exists() -> None:
 
 
 def test_every_family_of_words_that_scripts_ask_for_exists() -> None:
-    asked = _IN_SCRIPTS.findall(sources("iveg/static/js", ".js"))
+    scripts = sources("iveg/static/js", ".js")
+    asked = _IN_SCRIPTS.findall(scripts)
     families = {key for key, end in asked if end == "$" or key.endswith(".")}
+    families |= {f"{block}." for block in _NAMED_IN_SCRIPTS.findall(scripts)}
     known = "\n".join(ES.sentences)
     assert len(families) > 10
     assert [f for f in sorted(families) if not re.search(rf"^{f}", known, re.M)] == []
