@@ -33,6 +33,8 @@ from iveg.domain.robot_updates import dated, learn_kind, take_in
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import FIWARE
 
+_UNTOLD = Origin()
+_OF_NO_ROBOT = Climate, HeartbeatProbe
 _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 
 
@@ -92,11 +94,11 @@ class World:
             UnknownRobotError: from a robot that is not in the fleet.
         """
         observation, at = received.observation, received.at
-        if isinstance(observation, Climate | HeartbeatProbe):
+        if isinstance(observation, _OF_NO_ROBOT):
             self._note(observation, at)
             return "new"
         robot = self.robot(observation.robot_id)
-        origin = getattr(observation, "origin", Origin())
+        origin = getattr(observation, "origin", _UNTOLD)
         if self.refuses(received):
             # What Orion kept may be of a time when the robot was a recording.
             robot.refused_at = robot.refused_at if received.asked else at.mono
@@ -138,7 +140,7 @@ class World:
         Nothing of it counts: whoever plays it is not that robot.
         """
         observation = received.observation
-        if getattr(observation, "origin", Origin()).replay is None:
+        if getattr(observation, "origin", _UNTOLD).replay is None:
             return False
         robot_id = getattr(observation, "robot_id", None)
         robot = None if robot_id is None else self.robots.get(robot_id)

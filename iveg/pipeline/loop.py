@@ -98,10 +98,10 @@ class RuleLoop:
                 self._taken.append(received)
             if isinstance(received.observation, HeartbeatProbe):
                 self._health_monitor.received(received.observation.origin, received.at)
-            if received.asked or self._evaluator.world.refuses(received):
-                continue
             # The second transport's answer is no news, but its time is kept.
-            if fresh or isinstance(received.observation, CommandAnswer):
+            if not fresh and not isinstance(received.observation, CommandAnswer):
+                continue
+            if not received.asked and not self._evaluator.world.refuses(received):
                 self._commander.take(received, self._evaluator.world.age_then(received))
         if judges:
             self._evaluator.settle()
