@@ -167,7 +167,11 @@ def router(
 
 
 class Line:
-    """The messages to one browser, one after the other."""
+    """The messages to one browser, one after the other.
+
+    Args:
+        limit_s: How long a browser may take to read one.
+    """
 
     def __init__(
         self,
@@ -175,11 +179,13 @@ class Line:
         subscriber: Subscriber,
         encoder: Encoder,
         clock: Callable[[], Instant],
+        limit_s: float = _SEND_LIMIT_S,
     ) -> None:
         self._websocket = websocket
         self._subscriber = subscriber
         self._encoder = encoder
         self._clock = clock
+        self._limit_s = limit_s
         self._sending_since: float | None = None
 
     async def say(self, frame: bytes) -> None:
@@ -209,7 +215,7 @@ class Line:
         """Whether the browser has not read for long."""
         since = self._sending_since
         now = asyncio.get_running_loop().time()
-        return since is not None and now - since > _SEND_LIMIT_S
+        return since is not None and now - since > self._limit_s
 
     async def close_slow(self) -> None:
         """Close: the browser reads too slowly."""

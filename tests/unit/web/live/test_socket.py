@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from iveg.domain.observations import Climate
 from iveg.pipeline.publish import MAX_PENDING
+from iveg.web.live.socket import Line
 from iveg.web.security.authentication import Role
 from tests.builders import detection, scan
 from tests.unit.pipeline.desk import settle
@@ -271,6 +272,35 @@ async def test_f23_one_that_is_too_slow_does_not_hold_up_another() -> None:
             await quick.read_until("health")
 
         assert desk.hub.watchers == 2
+
+
+class Deaf:
+    """A browser's line that takes nothing."""
+
+    async def send_text(self, _: str) -> None:
+        """Wait for room, in vain."""
+        await asyncio.Event().wait()
+
+
+async def test_f23_who_does_not_read_what_is_sent_is_noticed_and_who_waits_is_not() -> (
+    None
+):
+    desk = WebDesk()
+    told, untold = desk.hub.join(), desk.hub.join()
+    lines = [
+        Line(Deaf(), each, desk.encoder, desk.clock, limit_s=0.01)  # type: ignore[arg-type]
+        for each in (told, untold)
+    ]
+    sending = [asyncio.create_task(line.send(None)) for line in lines]
+    told.changed("health")
+    async with asyncio.timeout(30):
+        while not lines[0].is_stuck:  # noqa: ASYNC110 - nothing tells of it
+            await asyncio.sleep(0.005)
+
+    assert not lines[1].is_stuck
+    for task in sending:
+        task.cancel()
+    await asyncio.gather(*sending, return_exceptions=True)
 
 
 # --- what browsers say ------------------------------------------------------------
