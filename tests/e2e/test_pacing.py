@@ -7,10 +7,11 @@ One page has a processor six times slower; the other sits behind a line of 1 Mbi
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page
+from playwright.sync_api import Browser, Page
 
 from iveg.web.live.pacing import FRAMES
 from tests.bonds import bound
@@ -82,11 +83,13 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
     browser: Browser, crowd: Site
 ) -> None:
-    with Radio(int(crowd.settings["IVEG_PORT"])) as line:
+    # A page that stayed open would paint twenty robots until all tests end.
+    with ExitStack() as open_, Radio(int(crowd.settings["IVEG_PORT"])) as line:
         line.weather = FAR
+        links = {crowd.sign_in_link: 6, _through(crowd, line): 1}
         pages = [
-            _open(browser, crowd.sign_in_link, slower=6),
-            _open(browser, crowd.sign_in_link.replace(crowd.url, _at(line.port))),
+            open_.enter_context(_opened(browser, link, slower))
+            for link, slower in links.items()
         ]
         pages[0].wait_for_timeout(1000 * SECONDS)
         for page in pages:
@@ -94,8 +97,6 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
                 ALL_PAINTED, arg=[len(ROBOTS), FRAMES], timeout=60_000
             )
         seen = [evaluate(page, "() => window.seen") for page in pages]
-        for page in pages:
-            page.context.close()
 
     for told in seen:
         assert told["older"] == []
@@ -103,15 +104,17 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
         assert told["frames"] > FRAMES
 
 
-def _open(browser: Browser, link: str, slower: float = 1) -> Page:
-    context: BrowserContext = browser.new_context()
-    context.add_init_script(f"({WATCH})()")
-    page = context.new_page()
-    page.goto(link)
-    tools = context.new_cdp_session(page)
-    tools.send("Emulation.setCPUThrottlingRate", {"rate": slower})
-    return page
+@contextmanager
+def _opened(browser: Browser, link: str, slower: float) -> Iterator[Page]:
+    with browser.new_context() as context:
+        context.add_init_script(f"({WATCH})()")
+        page = context.new_page()
+        page.goto(link)
+        tools = context.new_cdp_session(page)
+        tools.send("Emulation.setCPUThrottlingRate", {"rate": slower})
+        yield page
 
 
-def _at(port: int) -> str:
-    return f"http://127.0.0.1:{port}"
+def _through(place: Site, line: Radio) -> str:
+    """The sign-in link at the other end of a line."""
+    return place.sign_in_link.replace(place.url, f"http://127.0.0.1:{line.port}")
