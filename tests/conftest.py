@@ -32,7 +32,7 @@ _BUSY = (
     *("e2e/driving", "e2e/test_stop_states", "e2e/test_matrix", "e2e/test_stop"),
     *("e2e/test_pacing", "chaos/test_backlog", "e2e/test_stop_restart"),
     *("e2e/test_pictures", "e2e/test_faults", "e2e/test_probes"),
-    *("e2e/test_stop_drills", "e2e/test_layout", "e2e/test_demo"),
+    *("e2e/test_stop_drills", "e2e/test_layout", "e2e/test_ros2", "e2e/test_demo"),
 )
 _WAITING = (
     *("integration/test_faults", "integration/test_overload"),
@@ -40,7 +40,7 @@ _WAITING = (
     *("chaos/test_ros2_kills", "integration/test_emulator", "chaos/test_network"),
     *("integration/test_robot_node", "chaos/test_kills", "chaos/test_faults"),
     *("integration/test_deploy", "integration/test_decisions"),
-    "integration/test_doctor",
+    *("integration/test_ros2_robot", "integration/test_doctor"),
 )
 """The longest modules of both sorts, in falling order."""
 _FIRST = [name for pair in zip(_BUSY, _WAITING, strict=True) for name in pair]
