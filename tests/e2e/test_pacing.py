@@ -84,7 +84,7 @@ def test_nothing_older_than_its_successor_is_painted_and_the_window_holds(
     browser: Browser, crowd: Site
 ) -> None:
     # A page that stayed open would paint twenty robots until all tests end.
-    with ExitStack() as open_, Radio(int(crowd.settings["IVEG_PORT"])) as line:
+    with Radio(int(crowd.settings["IVEG_PORT"])) as line, ExitStack() as open_:
         line.weather = FAR
         links = {crowd.sign_in_link: 6, _through(crowd, line): 1}
         pages = [
