@@ -1,6 +1,5 @@
 """A scenario on the experiment's virtual clock, and what iVeg says of it."""
 
-from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -42,9 +41,7 @@ class Stage:
             greenhouse, layout, DETECTORS[layout.detector or profile], seed
         )
         self._desk = desk = Desk(robots, greenhouse)
-        self._views = Views(
-            desk.evaluator, desk.commander, desk.event_log, desk.health_monitor, Counter
-        )
+        self._views = Views(desk.parts)
         self._stage = staging.Stage(
             world,
             layout.incidents,

@@ -185,13 +185,6 @@ class Dss:
 
     def _face(self, tenant: tuple[str, str]) -> Face:
         parts = self.pipeline
-        views = Views(
-            parts.evaluator,
-            parts.commander,
-            parts.event_log,
-            parts.health_monitor,
-            self.counters,
-        )
         authenticator = Authenticator(
             sign_in_token=self.sign_in_token,
             api_token=self.settings.api_token,
@@ -211,7 +204,7 @@ class Dss:
         return Face(
             pipeline=parts,
             services=self.services,
-            views=views,
+            views=Views(parts, self.counters),
             authenticator=authenticator,
             orion=orion,
             site=Site(greenhouse, self.fleet.ids, __version__, self._demo),

@@ -5,7 +5,6 @@ runs of one seed give the same counts on any machine.
 """
 
 import asyncio
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
@@ -157,13 +156,7 @@ class VirtualRun:
         parts = build(load_fleet(words=ROBOTS), greenhouse, ports, Choices(rule))
         self._parts = parts
         self._mapper = Mapper(parts.world, greenhouse.bounds)
-        self._views = Views(
-            parts.evaluator,
-            parts.commander,
-            parts.event_log,
-            parts.health_monitor,
-            Counter,
-        )
+        self._views = Views(parts)
 
     async def play(self, seconds: float) -> VirtualRunResult:
         """Run from the start; yields to other tasks once a virtual second."""

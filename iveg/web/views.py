@@ -45,30 +45,27 @@ from iveg.models.robot import (
 )
 from iveg.models.rule import Rule
 from iveg.ngsi.names import ROBOT_DEVICES
-from iveg.pipeline.command import Commander
-from iveg.pipeline.evaluate import Evaluator
-from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.health_monitor import HealthMonitor, HopHealth
+from iveg.pipeline.build import Pipeline
+from iveg.pipeline.health_monitor import HopHealth
 
 _FIRST_LINES = 200
 
 
 class Views:
-    """Reads the pipeline's state for browsers and integrators."""
+    """Reads the pipeline's state for browsers and integrators.
+
+    Args:
+        parts: Whose state.
+        counters: Everything that is counted; unless told, what the pipeline counts.
+    """
 
     def __init__(
-        self,
-        evaluator: Evaluator,
-        commander: Commander,
-        event_log: EventLog,
-        health_monitor: HealthMonitor,
-        counters: Callable[[], Counter[str]],
+        self, parts: Pipeline, counters: Callable[[], Counter[str]] | None = None
     ) -> None:
-        self._evaluator = evaluator
-        self._commander = commander
-        self._event_log = event_log
-        self._health_monitor = health_monitor
-        self._counters = counters
+        self._evaluator, self._commander = parts.evaluator, parts.commander
+        self._event_log = parts.event_log
+        self._health_monitor = parts.health_monitor
+        self._counters = counters or parts.counters
 
     @property
     def _world(self) -> World:

@@ -52,13 +52,7 @@ class WebDesk(Desk):
         kept = KeptChoices(self.rule_store, self.contact_store)
         self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
         self.rules = self.services.rules
-        self.views = Views(
-            self.evaluator,
-            self.commander,
-            self.event_log,
-            self.health_monitor,
-            lambda: Counter({"some": 1}),
-        )
+        self.views = Views(self.parts, lambda: Counter({"some": 1}))
         self.encoder = socket.Encoder(self.views, self.hub, self.clock)
         self.notifications = notifications.NotificationEndpoint(
             self.ingest,
