@@ -59,7 +59,8 @@ class Kind:
         of: The observation.
         ordered: By the robot's own count, or by arrival.
         may_drop: Whether the oldest gives way when more comes than can be taken.
-        lands: Member of ``RobotState`` or ``World`` that keeps the newest.
+        lands: Member of ``RobotState`` or ``World`` that keeps the newest; None for an
+            event, which the machine of its command takes.
         touches: Topics that are new with it; those of detections depend on what is
             seen, those of a command on the machine.
         direct: From which scope on it is read straight from MQTT; ``off`` never.
@@ -72,7 +73,7 @@ class Kind:
     of: type[Observation]
     ordered: Literal["counted", "by arrival"] = "counted"
     may_drop: bool = True
-    lands: str = "sensed"
+    lands: str | None = "sensed"
     touches: tuple[Topic, ...] = ()
     direct: Scope = "off"
     qos: int = 0
@@ -106,7 +107,7 @@ KINDS = (
     ),
     Kind(Navigation, lands="navigation", direct="all"),
     Kind(CommandStatus, ordered="by arrival", lands="command_status"),
-    Kind(CommandAnswer, may_drop=False, lands="commander", direct="safety", qos=1),
+    Kind(CommandAnswer, may_drop=False, lands=None, direct="safety", qos=1),
     Kind(Climate, ordered="by arrival", lands="climate", touches=(topics.CLIMATE,)),
     Kind(HeartbeatProbe, ordered="by arrival", lands="heartbeat_at"),
     Kind(

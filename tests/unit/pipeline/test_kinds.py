@@ -4,17 +4,45 @@ import typing
 
 import pytest
 
-from iveg.domain.observations import Battery, Observation, Overtaken
+from iveg.domain.observations import (
+    Battery,
+    Climate,
+    CommandAnswer,
+    CommandStatus,
+    HeartbeatProbe,
+    Navigation,
+    Observation,
+    Overtaken,
+    Received,
+)
 from iveg.domain.records import ReadingRecord
-from iveg.domain.robot_state import RobotState
 from iveg.domain.world import World
 from iveg.ngsi import codec, names
 from iveg.ngsi.sensors import SENSORS, Sensor
 from iveg.pipeline.kinds import KINDS, Kind, read_directly
-from tests.builders import origin
+from tests.builders import (
+    at,
+    detection_frame,
+    odometry,
+    origin,
+    safety_report,
+    scan,
+)
 from tests.unit.pipeline.desk import Desk, conditions_of
 
 LOW = "alert.battery_low"
+SAID: tuple[Observation, ...] = (
+    odometry(),
+    scan(),
+    detection_frame(),
+    safety_report(),
+    Navigation("AGI", origin(), "weeding"),
+    CommandStatus("AGI", "PENDING"),
+    CommandAnswer("AGI", origin(), "01STOP", "LATCHED"),
+    Climate(21.5),
+    HeartbeatProbe(origin()),
+    Battery("AGI", origin(), 0.5),
+)
 
 
 def battery(desk: Desk, level: float | None, *, charging: bool | None = False) -> None:
@@ -28,11 +56,21 @@ def test_every_kind_of_observation_has_one_row() -> None:
     assert {row.of for row in KINDS} == kinds
 
 
+def kept(world: World, place: str) -> object:
+    """What a member of the world or of its robot holds, as text."""
+    robot = world.robot("AGI")
+    return repr(getattr(robot if hasattr(robot, place) else world, place))
+
+
 @pytest.mark.parametrize("row", KINDS, ids=lambda row: row.of.__name__)
 def test_a_kind_lands_where_its_row_says(row: Kind) -> None:
-    places = {*RobotState.__dataclass_fields__, *vars(World(("AGI",))), "commander"}
+    world = World(("AGI",))
+    observation = next(one for one in SAID if isinstance(one, row.of))
+    before = kept(world, row.lands or "sensed")
 
-    assert row.lands in places
+    world.apply(Received(observation, at(1.0)))
+
+    assert (kept(world, row.lands or "sensed") != before) == (row.lands is not None)
 
 
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.attribute)
