@@ -23,6 +23,7 @@ APART_S = 0.00025
 """Least time between two takings for each robot of the fleet: 5 ms with twenty."""
 JUDGED_APART_S = 2 * APART_S
 """The same between two judgements: what robots are shown to be needs none."""
+_LATEST_APART_S = JUDGED_APART_S + APART_S / 2
 _HEALTH_PERIOD_S = 1.0
 _WORTH_S = 0.001
 """A shorter wait costs more than it saves."""
@@ -72,18 +73,20 @@ class RuleLoop:
         while True:
             waits_s = TICK_S
             if self._evaluator.is_unjudged:
-                waits_s = judged_at + JUDGED_APART_S * robots - self._clock().mono
+                # The next taking judges; by itself only what none comes after.
+                waits_s = judged_at + _LATEST_APART_S * robots - self._clock().mono
             await self._ingest.wait(max(0.0, waits_s))
             # What comes close together is taken together.
             early = taken_at + APART_S * robots - self._clock().mono
             if early > _WORTH_S:
                 await asyncio.sleep(early)
             now = self._clock()
-            taken_at = now.mono
-            judges = taken_at - judged_at >= JUDGED_APART_S * robots - _WORTH_S
+            if self._ingest.waiting:
+                taken_at = now.mono
+            judges = now.mono - judged_at >= JUDGED_APART_S * robots - _WORTH_S
             self.step(self._ingest.drain(), now, judges=judges)
             if judges:
-                judged_at = taken_at
+                judged_at = now.mono
 
     def step(
         self, arrived: Iterable[Received], now: Instant, *, judges: bool = True
