@@ -5,7 +5,7 @@ import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
 import { LAYERS } from "../../iveg/static/js/map/picture.js";
 import { hiddenSaid } from "../../iveg/static/js/panels/hidden_layers.js";
 import { paintSign, SIGNS } from "../../iveg/static/js/panels/legend.js";
-import { coverageSaid } from "../../iveg/static/js/panels/mapbox.js";
+import { coverageSaid } from "../../iveg/static/js/panels/map_facts.js";
 import { equal, test } from "./harness.js";
 
 const words = /** @type {any} */ ({ t: (/** @type {string} */ key) => key });

@@ -6,7 +6,7 @@
  * own would make thirty such frames a second.
  */
 
-import { onNextFrame } from "./hub.js";
+import { guarded, onNextFrame } from "./hub.js";
 
 /** Digits that change more often than this cannot be read (ms). */
 export const BEAT_MS = 200;
@@ -36,15 +36,6 @@ export function createBeat(schedule = onNextFrame) {
     if (waitMs > 0) setTimeout(schedule, waitMs, beat);
     else schedule(beat);
   };
-}
-
-/** One panel's error must not silence the others. @param {() => void} fn */
-function guarded(fn) {
-  try {
-    fn();
-  } catch (error) {
-    reportError(error);
-  }
 }
 
 /** The one beat of this page. */

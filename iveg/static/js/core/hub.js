@@ -74,13 +74,13 @@ export function createHub(schedule, scheduleReadings = schedule) {
 /**
  * One panel's error must not silence the others, the STOP control among them.
  *
- * @param {Listener} fn
- * @param {any} data
- * @param {string} topic
+ * @template {unknown[]} T
+ * @param {(...values: T) => void} fn
+ * @param {T} values
  */
-function guarded(fn, data, topic) {
+export function guarded(fn, ...values) {
   try {
-    fn(data, topic);
+    fn(...values);
   } catch (error) {
     reportError(error);
   }

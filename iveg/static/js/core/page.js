@@ -10,6 +10,7 @@ import { createHealthPanel } from "../panels/health.js";
 import { createSignOut } from "../panels/signout.js";
 import { labelTables } from "../panels/tables.js";
 import { createTone } from "../panels/tone.js";
+import { guarded } from "./hub.js";
 import { createInstalling, registerWorker } from "./install.js";
 import { createWakeLock } from "./wakelock.js";
 
@@ -41,16 +42,16 @@ export async function startPage(app) {
   const decision = createDecisionPanel(app);
   const installing = createInstalling();
   const page = { ...app, installing, tone: createTone(), wake: createWakeLock() };
-  attempt(() => createAlertsPanel(app, page.tone));
-  attempt(() => createHealthPanel(app));
-  attempt(() => createSignOut(app));
-  attempt(wirePrinting);
+  guarded(() => createAlertsPanel(app, page.tone));
+  guarded(() => createHealthPanel(app));
+  guarded(() => createSignOut(app));
+  guarded(wirePrinting);
   registerWorker();
-  attempt(() => labelTables(app));
+  guarded(() => labelTables(app));
   const route = ROUTES[document.body.dataset.route ?? ""];
   if (route) (await route()).start(page);
   if (!document.querySelector("#map")) return;
-  attempt(() => page.wake.supervise());
+  guarded(() => page.wake.supervise());
   const parts = await Promise.allSettled([
     import("../panels/mapbox.js").then(({ createMapbox }) =>
       createMapbox(app, decision),
@@ -72,14 +73,5 @@ export async function startPage(app) {
 function wirePrinting() {
   for (const button of document.querySelectorAll("[data-prints]")) {
     button.addEventListener("click", () => print());
-  }
-}
-
-/** @param {() => void} start */
-function attempt(start) {
-  try {
-    start();
-  } catch (error) {
-    reportError(error);
   }
 }

@@ -1,0 +1,99 @@
+/**
+ * The facts over the map: people, coverage by cameras, climate, age of the costmap.
+ */
+
+import { onBeat } from "../core/beat.js";
+import { ageOf } from "../core/clock.js";
+import { need, setHidden, setText } from "./dom.js";
+
+/** @typedef {import("../core/protocol.js").Person} Person */
+
+const AGE_MS = 1000;
+/** The coverage is polled every two seconds. */
+const COVERAGE_OLD_S = 6;
+
+/**
+ * @param {import("../main.js").App} app
+ * @param {import("./mapbox.js").LiveMap} map
+ * @returns {() => void} draws all of them
+ */
+export function createMapFacts({ store, i18n }, map) {
+  function drawPeople() {
+    const people = store.people().filter(isPresent);
+    setText(need("#people-count"), peopleSaid(people.length));
+    const unseen = people.flatMap(({ acting }) => acting).filter((it) => !it.in_sight);
+    const nlos = need("#nlos-count");
+    setHidden(nlos, unseen.length === 0);
+    const slowed = new Set(unseen.map(({ robot_id }) => robot_id)).size;
+    const key = slowed === 1 ? "map.nlos_one" : "map.nlos_count";
+    setText(nlos, i18n.t(key, { count: slowed }));
+  }
+
+  /** @param {number} count */
+  function peopleSaid(count) {
+    const said = coverageSaid(store.get("coverage"), i18n);
+    if (count === 0 && said.isBlind) return said.text;
+    const seen = count === 1 ? "map.people_one" : "map.people_count";
+    const people = count ? i18n.t(seen, { count }) : i18n.t("map.people_none");
+    return said.text ? `${people} · ${said.text}` : people;
+  }
+
+  function drawCostmapAge() {
+    /** @type {import("../core/protocol.js").Costmap | undefined} */
+    const costmap = store.get("costmap");
+    const isOn = map.layers().some(({ name, on }) => name === "costmap" && on);
+    const isKnown = typeof costmap?.age_s === "number";
+    const key = isKnown ? "map.costmap_age" : "map.costmap_none";
+    setHidden(need("#costmap-age"), !isOn);
+    setText(
+      need("#costmap-age"),
+      i18n.t(key, { age: costmap && isKnown ? ageOf(costmap) : 0 }),
+    );
+  }
+
+  function drawClimate() {
+    /** @type {import("../core/protocol.js").Climate | null | undefined} */
+    const climate = store.get("climate");
+    const said = [
+      ["temperature", climate?.temperature],
+      ["humidity", climate?.relative_humidity],
+      ["co2", climate?.co2],
+    ]
+      .filter(([, value]) => typeof value === "number")
+      .map(([name, value]) => i18n.t(`climate.${name}`, { value }));
+    setHidden(need("#climate"), said.length === 0);
+    setText(need("#climate"), said.join(" · "));
+  }
+
+  setInterval(onBeat, AGE_MS, drawCostmapAge);
+  store.subscribe("people", drawPeople);
+  store.subscribe("coverage", drawPeople);
+  store.subscribe("costmap", drawCostmapAge);
+  store.subscribe("climate", drawClimate);
+  return () => {
+    drawPeople();
+    drawCostmapAge();
+    drawClimate();
+  };
+}
+
+/**
+ * The share of the lanes within sight of cameras, as a text; blind when there is none.
+ *
+ * @param {import("../core/protocol.js").Coverage | undefined} coverage
+ * @param {import("../core/i18n.js").I18n} i18n
+ * @returns {{text: string, isBlind: boolean}}
+ */
+export function coverageSaid(coverage, i18n) {
+  if (!coverage) return { text: i18n.t("map.coverage_unknown"), isBlind: true };
+  const isOld =
+    ageOf({ age_s: 0, receivedAtMs: coverage.receivedAtMs }) > COVERAGE_OLD_S;
+  if (isOld) return { text: i18n.t("map.coverage_unknown"), isBlind: true };
+  if (!coverage.cameras) return { text: i18n.t("map.coverage_blind"), isBlind: true };
+  if (coverage.share === null) return { text: "", isBlind: false };
+  const share = Math.floor(coverage.share * 100) / 100;
+  return { text: i18n.t("map.coverage_share", { share }), isBlind: false };
+}
+
+/** @param {Person} person */
+const isPresent = (person) => person.class === "person" && person.stage !== "last_seen";
