@@ -163,6 +163,19 @@ test("a snapshot is told before what it brought", () => {
   equal(heard, ["snapshot", "robots/AGI"]);
 });
 
+test("a command that follows a snapshot is told after it, and after the snapshot's own", () => {
+  const { store } = storeByHand();
+  /** @type {string[]} */
+  const heard = [];
+  for (const topic of ["snapshot", "commands/"])
+    store.subscribe(topic, (data) => void heard.push(data.state ?? "snapshot"));
+
+  store.apply("snapshot", snapshot({ commands: [command({ state: "SENT" })] }));
+  store.apply("commands/c1", command({ state: "DELIVERED" }));
+
+  equal(heard, ["snapshot", "SENT", "DELIVERED"]);
+});
+
 test("who is told of a snapshot finds all of it in the store", () => {
   const { store } = storeByHand();
   /** @type {unknown[]} */

@@ -1,12 +1,15 @@
 /**
- * Subscriptions: facts are delivered at once, state once per frame and topic, telemetry
- * with the page's beat.
+ * Subscriptions: facts and snapshots are delivered at once, state once per frame and topic,
+ * telemetry with the page's beat.
  *
  * @typedef {(data: any, topic: string) => void} Listener
  */
 
 /** A hidden page gets no animation frames; alerts must be heard there all the same. */
 const HIDDEN_FLUSH_MS = 250;
+
+/** A fact of its own, or what later facts must not be told before. */
+const AT_ONCE = /^(log|snapshot)$|^commands\//;
 
 /**
  * @param {(flush: () => void) => void} schedule
@@ -56,7 +59,7 @@ export function createHub(schedule, scheduleReadings = schedule) {
     /** @param {string} topic @param {any} data */
     tell(topic, data) {
       for (const fn of watchers) guarded(fn, data, topic);
-      if (topic === "log" || topic.startsWith("commands/")) {
+      if (AT_ONCE.test(topic)) {
         deliver(topic, data);
         return;
       }

@@ -4,7 +4,8 @@
  * A snapshot replaces everything; after it the newest value of each topic wins, so memory
  * is bounded by the fleet and not by time.  Subscribers hear of a topic at most once per
  * animation frame, of telemetry with the page's beat; `log` and `commands/{id}` are
- * delivered one by one, because each of them is a fact and not a state.
+ * delivered one by one, because each of them is a fact and not a state, and `snapshot`
+ * before all that follows it.
  *
  * A snapshot is delivered as `snapshot` first and every topic in it after that, except
  * the entries of the log: a panel that shows the log rebuilds it from `log()` then.
