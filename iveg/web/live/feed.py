@@ -11,7 +11,7 @@ from typing import Final
 from iveg.domain.observations import Instant
 from iveg.pipeline import topics
 from iveg.pipeline.publish import Subscriber
-from iveg.web.live.pacing import BYTES, CreditWindow
+from iveg.web.live.pacing import BYTES, FEW_ROBOTS, CreditWindow
 from iveg.web.live.painting import Painting
 from iveg.web.live.telemetry import Part, TelemetryEncoder
 
@@ -35,6 +35,8 @@ class TelemetryFeed:
         self._subscriber = subscriber
         self._moved: dict[str, None] = {}
         """Robots, by topic; their positions go with each frame."""
+        self._robots: set[str] = set()
+        """All that have ever moved, by topic."""
         self._read_outs: dict[str, float] = {}
         self._pictures: dict[str, float] = {}
         """Topics that have changed, and when each may be told (monotonic, s)."""
@@ -88,11 +90,13 @@ class TelemetryFeed:
             row, robot_id = topics.find(topic)
             if row is topics.ROBOT:
                 self._moved[topic] = None
+                self._robots.add(topic)
                 self._note(self._read_outs, topics.ROBOT_STATE.of(robot_id), READ_OUT_S)
             elif row.pace == "read-out":
                 self._note(self._read_outs, topic, READ_OUT_S)
             else:
                 self._note(self._pictures, topic, PICTURE_S)
+        self.window.gathers = len(self._robots) > FEW_ROBOTS
 
     def _note(self, waiting: dict[str, float], topic: str, apart_s: float) -> None:
         if topic in waiting:

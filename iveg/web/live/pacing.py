@@ -6,7 +6,9 @@ painted, and no more than a window of unpainted frames is ever sent: further cha
 wait in slots, where the newest wins.
 
 A page also says how long the next frame may wait to come just in time for its next
-picture: one frame a picture is as fresh as many, and costs both sides a third.
+picture: of many robots one frame a picture is nearly as fresh as many frames, and costs
+both sides a third.  Of few robots less than a frame a picture comes by itself, so it
+goes at once.
 """
 
 from collections import deque
@@ -27,6 +29,9 @@ that who is late for a picture is sent something newer before the next."""
 LONGEST_WAIT_S: Final = 0.1
 """For which a page may ask: more would show the past, and counts as nothing."""
 
+FEW_ROBOTS: Final = 2
+"""So few bring less than a frame a picture by themselves."""
+
 _LEARNS: Final = 0.5
 
 
@@ -37,9 +42,15 @@ class _Sent(NamedTuple):
 
 
 class CreditWindow:
-    """The frames that one page has not painted yet; times are monotonic (s)."""
+    """The frames that one page has not painted yet; times are monotonic (s).
+
+    Attributes:
+        gathers: Whether changes wait for each other, to go together in one frame a
+            picture.
+    """
 
     def __init__(self) -> None:
+        self.gathers = True
         self._sent: deque[_Sent] = deque()
         self._number = 0
         self._sent_at = float("-inf")
@@ -63,19 +74,22 @@ class CreditWindow:
         if len(self._sent) >= FRAMES:
             return float("inf")
         gap_s = self._apart_s if self._sent else GAP_S
-        return max(self._asked_at, self._sent_at + gap_s)
+        free_at = self._sent_at + gap_s
+        return max(self._asked_at, free_at) if self.gathers else free_at
 
     @property
     def _apart_s(self) -> float:
         """Between frames of which none is painted (s).
 
-        Many on a long line, so that it is used; two while the page itself draws: more
-        would only keep it from drawing.
+        Many on a long line, so that it is used; two while a page draws that takes
+        longer than screens do: more would only keep it from drawing.
         """
+        least_s = PICTURE_S if self.gathers else GAP_S
         if self._line_s is None:
-            return max(PICTURE_S, self._round_trip_s / FRAMES)
-        draws_s = self._round_trip_s - self._line_s
-        return max(PICTURE_S, self._line_s / FRAMES, draws_s / 2)
+            return max(least_s, self._round_trip_s / FRAMES)
+        half_s = (self._round_trip_s - self._line_s) / 2
+        draws_s = half_s if half_s > PICTURE_S else 0.0
+        return max(least_s, self._line_s / FRAMES, draws_s)
 
     @property
     def room(self) -> int:

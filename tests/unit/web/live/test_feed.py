@@ -175,21 +175,34 @@ def test_pictures_and_read_outs_go_as_often_as_eyes_need(
     assert topics.count("robots/AGI") <= seconds / READ_OUT_S + 1
 
 
-def test_the_next_frame_comes_when_the_page_asked_for_it(
-    desk: WebDesk, page: Page
-) -> None:
+def test_of_many_robots_the_next_frame_comes_when_the_page_asked_for_it() -> None:
+    desk = WebDesk(MANY)
+    page = Page(desk)
+    for robot_id in MANY:
+        desk.drive(robot_id)
+    page.read()
+    desk.clock.now += 0.005
+    page.feed.painted(1, desk.clock().mono, {"wait": 0.007})
+    desk.drive(MANY[0], 1.0)
+
+    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(0.007)
+    assert page.read() is None
+    desk.drive(MANY[0], 2.0)
+    desk.clock.now += 0.007 + 1e-6
+    page.read()
+    assert [move[3] for move in page.told("moves")] == [0.0] * len(MANY) + [2.0]
+
+
+def test_of_two_robots_each_change_goes_at_once(desk: WebDesk, page: Page) -> None:
     desk.drive("AGI")
+    desk.drive("AGII")
     page.read()
     desk.clock.now += 0.005
     page.feed.painted(1, desk.clock().mono, {"wait": 0.007})
     desk.drive("AGI", 1.0)
 
-    assert page.feed.wait_s(desk.clock().mono) == pytest.approx(0.007)
-    assert page.read() is None
-    desk.drive("AGI", 2.0)
-    desk.clock.now += 0.007 + 1e-6
-    page.read()
-    assert [move[3] for move in page.told("moves")] == [0.0, 2.0]
+    assert page.feed.wait_s(desk.clock().mono) == 0.0
+    assert page.read() is not None
 
 
 def test_what_was_not_due_comes_when_it_is(desk: WebDesk, page: Page) -> None:

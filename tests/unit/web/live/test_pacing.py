@@ -44,6 +44,18 @@ def test_while_none_is_painted_there_is_a_frame_for_each_picture_of_a_screen() -
     assert window.opens_at == NOW + PICTURE_S
 
 
+def test_of_few_robots_no_frame_waits_for_others() -> None:
+    window = CreditWindow()
+    window.gathers = False
+
+    window.sent(0, NOW)
+    between_unpainted = window.opens_at
+    window.painted(1, NOW + 0.008, 0.05)
+
+    assert between_unpainted == NOW + GAP_S
+    assert window.opens_at == NOW + GAP_S
+
+
 def test_what_is_painted_opens_the_window_at_once_with_a_little_between_frames() -> (
     None
 ):
