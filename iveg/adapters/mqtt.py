@@ -18,8 +18,8 @@ from urllib.parse import unquote, urlsplit
 import aiomqtt
 
 from iveg.adapters.log_filter import quiet
-from iveg.adapters.mqtt_inbox import Arrived, Letter
-from iveg.adapters.mqtt_outbox import PromptClient
+from iveg.adapters.mqtt_inbox import Arrived, Qos1Message
+from iveg.adapters.mqtt_outbox import OutboxClient
 from iveg.domain.errors import HopError
 
 _log = logging.getLogger(__name__)
@@ -89,9 +89,9 @@ class MqttLink:
         self._on_loss = on_loss
         self._on_passed_over = on_passed_over
         self._apart_s = apart_s
-        self._client: PromptClient | None = None
+        self._client: OutboxClient | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
-        self._early: list[Letter] = []
+        self._early: list[Qos1Message] = []
         """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake = asyncio.Event()
         self._loss_told = False
@@ -133,7 +133,7 @@ class MqttLink:
 
     async def _session(self) -> None:
         address = self._address
-        async with PromptClient(
+        async with OutboxClient(
             address.host,
             address.port,
             username=address.user,
@@ -159,7 +159,7 @@ class MqttLink:
                 self._send_offered(client), name=f"mqtt-send-{self._name}"
             )
             try:
-                self._hand_letters(self._early)
+                self._hand_qos1(self._early)
                 await client.lost()
             finally:
                 sender.cancel()
@@ -173,19 +173,19 @@ class MqttLink:
                 for topic, payload in arrived.telemetry.items():
                     self._on_message(topic, payload)
             if self._client is None:
-                self._early += arrived.letters
+                self._early += arrived.qos1
             else:
-                self._hand_letters(arrived.letters)
+                self._hand_qos1(arrived.qos1)
         except Exception as error:
             self._mistake = error
             raise
 
-    def _hand_letters(self, letters: Iterable[Letter]) -> None:
+    def _hand_qos1(self, messages: Iterable[Qos1Message]) -> None:
         if self._on_message is not None:
-            for letter in letters:
-                self._on_message(letter.topic, letter.payload)
+            for message in messages:
+                self._on_message(message.topic, message.payload)
 
-    async def _send_offered(self, client: PromptClient) -> None:
+    async def _send_offered(self, client: OutboxClient) -> None:
         while True:
             await self._wake.wait()
             self._wake.clear()
@@ -202,7 +202,7 @@ class MqttLink:
                 await client.written()
 
     async def _send_confirmed(
-        self, client: PromptClient, topic: str, payload: bytes
+        self, client: OutboxClient, topic: str, payload: bytes
     ) -> None:
         try:
             await client.confirmed(topic, payload, _ANSWERED_WITHIN_S)

@@ -3,7 +3,7 @@
 The client library reads a packet's parts one by one from the socket, one packet a turn
 of the loop, and makes two tasks for each message.  While the loop has much else to do,
 that is slower than a fleet sends: messages on the wire grow old, and robots' answers to
-a STOP behind them.  Here messages and receipts are read; the rest is left to it.
+a STOP behind them.  Here messages and PUBACKs are read; the rest is left to it.
 """
 
 import socket
@@ -20,17 +20,17 @@ READ_AHEAD = 256 << 10
 _LONGEST_LENGTH = 4
 _TELEMETRY, _CONFIRMED, _RETAINED, _AGAIN = 0x30, 0x32, 0x01, 0x08
 """PUBLISH at QoS 0 and at QoS 1, and its flags."""
-_RECEIPT = 0x40
+_PUBACK = 0x40
 """PUBACK."""
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
-    """A message at QoS 1, and the number that its receipt must bear."""
+class Qos1Message:
+    """A message at QoS 1, and its packet identifier."""
 
     topic: str
     payload: bytes
-    number: int
+    packet_id: int
 
 
 @dataclass(slots=True)
@@ -40,22 +40,22 @@ class Arrived:
     Attributes:
         telemetry: The newest payload at QoS 0 by topic.
         passed_over: How many older ones of a topic there were.
-        letters: Everything that was sent at QoS 1, in order.
-        receipts: Numbers of our own letters that the broker has.
+        qos1: Everything that was sent at QoS 1, in order.
+        pubacks: Packet identifiers of our own messages that the broker has.
         others: Packets that are the library's to read.
     """
 
     telemetry: dict[str, bytes] = field(default_factory=dict)
     passed_over: dict[str, int] = field(default_factory=dict)
-    letters: list[Letter] = field(default_factory=list)
-    receipts: list[int] = field(default_factory=list)
+    qos1: list[Qos1Message] = field(default_factory=list)
+    pubacks: list[int] = field(default_factory=list)
     others: bytes = b""
 
 
 Take = Callable[[Arrived], None]
 
 
-class GreedyClient(aiomqtt.Client):
+class InboxClient(aiomqtt.Client):
     """A client that reads all that has arrived, and then rests.
 
     A fleet sends hundreds of messages in a second, and each event costs as much as
@@ -180,7 +180,7 @@ class ReadAhead:
 
 
 def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
-    """Tell messages and receipts from other packets.
+    """Tell messages and PUBACKs from other packets.
 
     A reader that falls behind must not read ever older news: of a topic's telemetry
     (QoS 0) the newest is kept.  Of what was sent at QoS 1 (orders, answers, safety
@@ -202,8 +202,8 @@ def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
 
 def _is_ours(arrived: Arrived, read: bytes, place: int, body: int, end: int) -> bool:
     kind, head = read[place], int.from_bytes(read[body : body + 2], "big")
-    if kind == _RECEIPT and end == body + 2:
-        arrived.receipts.append(head)
+    if kind == _PUBACK and end == body + 2:
+        arrived.pubacks.append(head)
         return True
     name = body + 2 + head
     if kind & ~_RETAINED == _TELEMETRY and name <= end:
@@ -216,7 +216,7 @@ def _is_ours(arrived: Arrived, read: bytes, place: int, body: int, end: int) -> 
     if kind & ~(_RETAINED | _AGAIN) == _CONFIRMED and name + 2 <= end:
         topic = read[body + 2 : name].decode(errors="replace")
         number = int.from_bytes(read[name : name + 2], "big")
-        arrived.letters.append(Letter(topic, read[name + 2 : end], number))
+        arrived.qos1.append(Qos1Message(topic, read[name + 2 : end], number))
         return True
     return False
 

@@ -3,7 +3,7 @@
 The client library's ``publish`` makes an event, a task and two tables for each message
 and takes three turns of the loop, which is most of the cost of a robot's telemetry.
 Nobody confirms messages at QoS 0, so here they are written together, at once, and wait
-only while the socket is full; one at QoS 1 waits for its receipt and nothing else.
+only while the socket is full; one at QoS 1 waits for its PUBACK and nothing else.
 """
 
 import asyncio
@@ -12,19 +12,19 @@ from typing import Any
 
 import aiomqtt
 
-from iveg.adapters.mqtt_inbox import Arrived, GreedyClient, Take
+from iveg.adapters.mqtt_inbox import Arrived, InboxClient, Take
 
 _PUBLISH, _RETAIN, _CONFIRMED, _UNTOLD = 0x30, 0x01, 0x02, 0
-_RECEIPT = b"\x40\x02"
+_PUBACK = b"\x40\x02"
 """PUBACK and its length."""
 _MOST_NUMBERS = 65_535
 
 
-class PromptClient(GreedyClient):
+class OutboxClient(InboxClient):
     """A client with a short way out, which waits only for a full socket.
 
     Args:
-        take: Told what has come; letters are confirmed afterwards.
+        take: Told what has come; messages at QoS 1 are acknowledged afterwards.
     """
 
     def __init__(self, *args: Any, take: Take, **kwargs: Any) -> None:
@@ -46,18 +46,18 @@ class PromptClient(GreedyClient):
         """Send at QoS 1; return when the broker has it.
 
         Raises:
-            MqttError: not connected, or no receipt in time.
+            MqttError: not connected, or no PUBACK in time.
         """
         if self._client.socket() is None:
             raise aiomqtt.MqttError("not connected")
         number = self._free_number()
-        receipt = self._awaited[number] = self._loop.create_future()
+        puback = self._awaited[number] = self._loop.create_future()
         try:
             self._put(packet_of(topic, payload, number, retain=retain))
             async with asyncio.timeout(within_s):
-                await receipt
+                await puback
         except TimeoutError as error:
-            raise aiomqtt.MqttError(f"no receipt within {within_s:g} s") from error
+            raise aiomqtt.MqttError(f"no PUBACK within {within_s:g} s") from error
         finally:
             del self._awaited[number]
 
@@ -69,14 +69,14 @@ class PromptClient(GreedyClient):
         return self._number
 
     def _take_in(self, arrived: Arrived) -> None:
-        for number in arrived.receipts:
-            receipt = self._awaited.get(number)
-            if receipt is not None and not receipt.done():
-                receipt.set_result(None)
+        for number in arrived.pubacks:
+            puback = self._awaited.get(number)
+            if puback is not None and not puback.done():
+                puback.set_result(None)
         self._hand_over(arrived)
-        if arrived.letters:
-            numbers = (letter.number.to_bytes(2) for letter in arrived.letters)
-            self._put(b"".join(_RECEIPT + number for number in numbers))
+        if arrived.qos1:
+            numbers = (message.packet_id.to_bytes(2) for message in arrived.qos1)
+            self._put(b"".join(_PUBACK + number for number in numbers))
 
     def _put(self, packets: bytes) -> None:
         packets = packets[self._written_at_once(packets) :]

@@ -24,7 +24,7 @@ from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
 from iveg.robot.ros2.reading import UNSAID, Battery
-from iveg.robot.ros2.rigid import Rigid
+from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
@@ -87,8 +87,8 @@ def listened(topics: Topics) -> dict[str, tuple[str, type[Message]]]:
 class _Here:
     """Pose of the robot in ``map`` and in its odometry frame, at a stamp (s)."""
 
-    in_map: Rigid
-    in_odom: Rigid
+    in_map: RigidTransform
+    in_odom: RigidTransform
     odom: str
     stamp: float
 
@@ -152,7 +152,7 @@ class SensorInputs:
         self.input_faults = InputFaults()
 
     @property
-    def place(self) -> Rigid | None:
+    def place(self) -> RigidTransform | None:
         """Newest pose of the robot in ``map``."""
         return None if self._here is None else self._here.in_map
 
@@ -258,10 +258,12 @@ class SensorInputs:
 
     # --- places -------------------------------------------------------------------
 
-    def _in_map(self, frame: str, stamp: float, now: float) -> Rigid | None:
+    def _in_map(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         return self._lookup(self._frames.map, frame, stamp, now)
 
-    def _lookup(self, outer: str, inner: str, stamp: float, now: float) -> Rigid | None:
+    def _lookup(
+        self, outer: str, inner: str, stamp: float, now: float
+    ) -> RigidTransform | None:
         """Transform of a frame; None for a missing one, which is noted as a fault."""
         try:
             return self._transforms.lookup(outer, inner.lstrip("/"), stamp)
@@ -289,7 +291,7 @@ class SensorInputs:
 
     def _base_in_odom(
         self, message: m.Odometry, stamp: float, now: float
-    ) -> Rigid | None:
+    ) -> RigidTransform | None:
         pose = reading.read_pose(message)
         child = message.child_frame_id.lstrip("/")
         if child in ("", self._frames.base_link):
@@ -309,7 +311,7 @@ class SensorInputs:
             return [Unplaced("", UNSAID, "scan")]
         return [reading.read_scan(message, laser)]
 
-    def _laser(self, frame: str, stamp: float, now: float) -> Rigid | None:
+    def _laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
         """Pose of the laser relative to the robot's odometry pose."""
         here = self._here
         if here is not None:
@@ -326,7 +328,7 @@ class SensorInputs:
             return []
         message, stamp = read
         found: list[Detection] = []
-        places: dict[str, Rigid | None] = {}
+        places: dict[str, RigidTransform | None] = {}
         lost = 0
         for one in message.detections:
             frame = one.header.frame_id or message.header.frame_id

@@ -19,7 +19,7 @@ from iveg.robot.grounding.cloud import DepthPicture, Pinhole, top_left
 from iveg.robot.grounding.locate import Grounded, Grounding, Segment, ground
 from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
 from iveg.robot.ros2.reading import hull_of, read_hypothesis
-from iveg.robot.ros2.rigid import Rigid
+from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
 
 _SQUARE = 0.02
@@ -91,7 +91,7 @@ def grounded(
     look: m.Detection2DArray,
     picture: DepthPicture,
     mask: m.Image | None,
-    place: Rigid,
+    place: RigidTransform,
     classes: tuple[str, ...],
     settings: Grounding,
 ) -> DetectionFrame:
@@ -122,7 +122,7 @@ def _place(
     seen: m.Detection2D,
     picture: DepthPicture,
     owners: NDArray[Any] | None,
-    place: Rigid,
+    place: RigidTransform,
     classes: tuple[str, ...],
     settings: Grounding,
 ) -> Detection | str:

@@ -14,7 +14,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Navigation, Origin
 from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
-from iveg.robot.ros2.rigid import Rigid, rigid_of
+from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
 
 UNSAID = Origin()
@@ -31,7 +31,7 @@ _LONGEST_RANGE_M = 1e4
 _FORBIDDEN = str.maketrans(dict.fromkeys("<>\"'=;()"))
 
 
-def read_pose(odometry: m.Odometry) -> Rigid:
+def read_pose(odometry: m.Odometry) -> RigidTransform:
     """Pose of the robot in the odometry frame.
 
     Raises:
@@ -63,7 +63,7 @@ def write_twist(twist: Twist2D) -> m.Twist:
     return m.Twist(m.Vector3(twist.linear_x), m.Vector3(z=twist.angular_z))
 
 
-def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
+def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
     """A scan of a laser that is mounted level, upright or upside down.
 
     Args:
@@ -97,7 +97,7 @@ def read_scan(scan: m.LaserScan, laser: Rigid) -> LaserScan:
     )
 
 
-def _side(laser: Rigid) -> int:
+def _side(laser: RigidTransform) -> int:
     """Direction of growing angles seen from above."""
     if laser.tilt <= _TILT:
         return 1
@@ -107,7 +107,7 @@ def _side(laser: Rigid) -> int:
 
 
 def read_detection(
-    detection: m.Detection3D, place: Rigid, classes: tuple[str, ...]
+    detection: m.Detection3D, place: RigidTransform, classes: tuple[str, ...]
 ) -> Detection:
     """A box in ``map``: the hull of the rotated one.
 
@@ -188,7 +188,9 @@ def _within_world(box: Box3D) -> Box3D:
     raise UnreadableError("absurd", "a box outside of the world")
 
 
-def read_path(path: m.Path, place: Rigid, task: str = "navigating") -> Navigation:
+def read_path(
+    path: m.Path, place: RigidTransform, task: str = "navigating"
+) -> Navigation:
     """The path in ``map``; a long one is thinned to 1,024 points.
 
     Raises:

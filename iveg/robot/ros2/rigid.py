@@ -18,7 +18,7 @@ Rows = tuple[Three, Three, Three]
 
 
 @dataclass(frozen=True, slots=True)
-class Rigid:
+class RigidTransform:
     """Pose of a frame in another: p_outer = turn · p_inner + move (m).
 
     Attributes:
@@ -44,7 +44,7 @@ class Rigid:
         moved: NDArray[np.float64] = points @ np.array(self.rows).T + self.move
         return moved
 
-    def compose(self, inner: "Rigid") -> "Rigid":
+    def compose(self, inner: "RigidTransform") -> "RigidTransform":
         """Product: the inner transform's inner frame in this one's outer frame."""
         x, y, z, w = self.q
         a, b, c, d = inner.q
@@ -56,14 +56,14 @@ class Rigid:
         )
         u, v, t = self._turned(inner.move)
         right, up, out = self.move
-        return Rigid((u + right, v + up, t + out), turned)
+        return RigidTransform((u + right, v + up, t + out), turned)
 
-    def inverse(self) -> "Rigid":
+    def inverse(self) -> "RigidTransform":
         """The inverse transform."""
         x, y, z, w = self.q
-        back = Rigid(q=(-x, -y, -z, w))
+        back = RigidTransform(q=(-x, -y, -z, w))
         u, v, t = back._turned(self.move)
-        return Rigid((-u, -v, -t), back.q)
+        return RigidTransform((-u, -v, -t), back.q)
 
     def _turned(self, point: Three) -> Three:
         """Rotated vector: v + 2 w (q × v) + 2 q × (q × v)."""
@@ -88,24 +88,26 @@ class Rigid:
         x, y, _, _ = self.q
         return math.acos(max(-1.0, min(1.0, 1 - 2 * (x * x + y * y))))
 
-    def towards(self, later: "Rigid", part: float) -> "Rigid":
+    def towards(self, later: "RigidTransform", part: float) -> "RigidTransform":
         """A share (0 to 1) of the way: linear in position, spherical in rotation."""
         ends = zip(self.move, later.move, strict=True)
         x, y, z = (a + part * (b - a) for a, b in ends)
-        return Rigid((x, y, z), _slerp(self.q, later.q, part))
+        return RigidTransform((x, y, z), _slerp(self.q, later.q, part))
 
 
-HERE = Rigid()
+IDENTITY = RigidTransform()
 
 
-def rigid_of(translation: m.Vector3 | m.Point, rotation: m.Quaternion) -> Rigid | None:
+def rigid_of(
+    translation: m.Vector3 | m.Point, rotation: m.Quaternion
+) -> RigidTransform | None:
     """A translation and a quaternion of any length; None for an invalid rotation."""
     move = translation.x, translation.y, translation.z
     x, y, z, w = rotation.x, rotation.y, rotation.z, rotation.w
     length = math.sqrt(x * x + y * y + z * z + w * w)
     if not (1e-6 < length < math.inf and all(map(math.isfinite, move))):
         return None
-    return Rigid(move, (x / length, y / length, z / length, w / length))
+    return RigidTransform(move, (x / length, y / length, z / length, w / length))
 
 
 def _slerp(a: Four, b: Four, part: float) -> Four:

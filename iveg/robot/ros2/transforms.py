@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from iveg.domain.errors import IvegError
-from iveg.robot.ros2.rigid import HERE, Rigid, rigid_of
+from iveg.robot.ros2.rigid import IDENTITY, RigidTransform, rigid_of
 from iveg.ros2 import messages as m
 
 KEPT_S = 10.0
@@ -40,7 +40,7 @@ class _At:
     """One transform at its stamp (s)."""
 
     stamp: float
-    rigid: Rigid
+    rigid: RigidTransform
 
 
 class _Link:
@@ -99,7 +99,7 @@ class TransformBuffer:
         """Delete dynamic transforms, since the clock was reset."""
         self._links = {c: one for c, one in self._links.items() if one.static}
 
-    def lookup(self, outer: str, inner: str, stamp: float) -> Rigid:
+    def lookup(self, outer: str, inner: str, stamp: float) -> RigidTransform:
         """Transform from ``inner`` to ``outer`` at a stamp.
 
         Raises:
@@ -126,14 +126,14 @@ class TransformBuffer:
         """Missing link between two trees: the root of one and the root of the other."""
         return f"{list(down)[-1]} → {list(up)[-1]}"
 
-    def _climb(self, frames: Iterable[str], stamp: float) -> Rigid:
-        rigid: Rigid | None = None
+    def _climb(self, frames: Iterable[str], stamp: float) -> RigidTransform:
+        rigid: RigidTransform | None = None
         for frame in frames:
             outer = self._at(frame, stamp)
             rigid = outer if rigid is None else outer.compose(rigid)
-        return HERE if rigid is None else rigid
+        return IDENTITY if rigid is None else rigid
 
-    def _at(self, child: str, stamp: float) -> Rigid:
+    def _at(self, child: str, stamp: float) -> RigidTransform:
         link = self._links[child]
         known = link.known
         if link.static:

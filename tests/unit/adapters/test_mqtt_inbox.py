@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.mqtt_inbox import (
     Arrived,
-    GreedyClient,
-    Letter,
+    InboxClient,
+    Qos1Message,
     ReadAhead,
     sort_packets,
 )
@@ -113,7 +113,7 @@ async def test_what_comes_during_a_rest_is_read_together_after_it() -> None:
     here, there = socket.socketpair()
     with here, there:
         here.setblocking(False)
-        client = GreedyClient("nowhere", take=note, apart_s=REST_S)
+        client = InboxClient("nowhere", take=note, apart_s=REST_S)
         line = client._client._sock = ReadAhead(here, note)
         client._listen(line)
         async with asyncio.timeout(20.0):
@@ -155,9 +155,7 @@ async def test_a_line_that_ends_during_a_rest_is_lost_after_it() -> None:
     assert link.connects == 1
 
 
-async def test_a_letter_before_the_subscriptions_is_receipted_and_waits_for_them() -> (
-    None
-):
+async def test_a_message_before_the_subscriptions_is_acknowledged_and_waits() -> None:
     said: asyncio.Queue[bytes] = asyncio.Queue()
 
     async def broker(
@@ -201,21 +199,21 @@ def test_of_telemetry_that_has_come_the_newest_of_each_topic_is_read() -> None:
     assert sort_packets(came) == (Arrived(newest, passed_over), b"")
 
 
-def test_what_was_sent_with_a_receipt_is_all_read_in_its_order() -> None:
-    letters = [confirmed_packet("t", b"answer %d" % n) for n in range(3)]
+def test_what_was_sent_at_qos_1_is_all_read_in_its_order() -> None:
+    messages = [confirmed_packet("t", b"answer %d" % n) for n in range(3)]
     looks = [publish_packet("t", b"look %d" % n) for n in range(3)]
-    came = b"".join(itertools.chain(*zip(looks, letters, strict=True)))
+    came = b"".join(itertools.chain(*zip(looks, messages, strict=True)))
 
     arrived, _ = sort_packets(came)
 
     assert arrived.telemetry == {"t": b"look 2"}
-    assert arrived.letters == [Letter("t", b"answer %d" % n, 7) for n in range(3)]
+    assert arrived.qos1 == [Qos1Message("t", b"answer %d" % n, 7) for n in range(3)]
 
 
-def test_a_receipt_is_read_and_what_is_no_message_is_left_to_the_library() -> None:
+def test_a_puback_is_read_and_what_is_no_message_is_left_to_the_library() -> None:
     arrived, begun = sort_packets(b"\x40\x02\x01\x07" + PONG + b"\x40\x02")
 
-    assert arrived == Arrived(receipts=[0x107], others=PONG)
+    assert arrived == Arrived(pubacks=[0x107], others=PONG)
     assert begun == b"\x40\x02"
 
 
@@ -245,16 +243,16 @@ def test_packets_may_come_in_any_pieces(data: st.DataObject) -> None:
     whole = b"".join(sent)
     cuts = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1), max_size=6)))
     telemetry: dict[str, bytes] = {}
-    letters: list[Letter] = []
+    messages: list[Qos1Message] = []
     others = begun = b""
     for start, end in itertools.pairwise([0, *cuts, len(whole)]):
         arrived, begun = sort_packets(begun + whole[start:end])
         telemetry |= arrived.telemetry
-        letters += arrived.letters
+        messages += arrived.qos1
         others += arrived.others
 
     assert telemetry == {"scan": b"x" * 300, "odom": b"", "ü": b"y" * 20_000}
-    assert letters == [Letter("answer", b"LATCHED", 7)]
+    assert messages == [Qos1Message("answer", b"LATCHED", 7)]
     assert (others, begun) == (CONNACK, b"")
 
 

@@ -29,7 +29,7 @@ from iveg.domain.messages import (
     Webhook,
 )
 from tests.builders import START
-from tests.fakes.outside import HttpsStand, MailStand, loopback, standing
+from tests.fakes.outbound import HttpsStand, MailStand, loopback, standing
 
 ALERT = Message([AlertItem("01J", "P1", "stop_unconfirmed", START)])
 
