@@ -54,7 +54,7 @@ async function probeAge() {
   return Date.now() - Date.parse(dateModified);
 }
 
-/** How long it has been deaf by our own looks (ms); the first look starts the count. */
+/** How long it has been deaf by our own checks (ms); the first check starts the count. */
 function silentFor() {
   try {
     return Date.now() - Number(fs.readFileSync(SILENT_SINCE, "utf8"));

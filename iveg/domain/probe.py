@@ -103,5 +103,5 @@ def lag_in_words(lag_s: float, *, growing: bool = False, at_least: bool = False)
 
 
 def _count(origin: Origin) -> Origin:
-    """What names a probe; stamps may be reprinted on the way."""
+    """Identity of a probe; stamps may be reprinted on the way."""
     return Origin(origin.boot, origin.seq)

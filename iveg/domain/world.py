@@ -128,7 +128,7 @@ class World:
         return verdict
 
     def _note(self, observation: Climate | HeartbeatProbe, at: Instant) -> None:
-        """What no robot says."""
+        """Observations without a robot."""
         if isinstance(observation, Climate):
             self.climate, self.climate_received = observation, at
         else:

@@ -107,7 +107,7 @@ class Pipeline:
 
 @dataclass(frozen=True, slots=True)
 class KeptChoices:
-    """What people have chosen while iVeg ran, and where that is kept.
+    """Choices that people made while iVeg ran, and their stores.
 
     Attributes:
         rules: Every version of the rule, oldest first.

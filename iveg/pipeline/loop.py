@@ -62,7 +62,7 @@ class RuleLoop:
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
-        """What the fleet has not been judged with yet."""
+        """Observations taken since the last judgement."""
         self._states: dict[str, HopState] = {}
         self._broken: set[str] = set()
 

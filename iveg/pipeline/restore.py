@@ -117,7 +117,7 @@ def alert_of(record: AlertRecord, now: Instant) -> Alert:
 
 
 def _subject(record: AlertRecord) -> str:
-    """Whom it was about; of a person nobody knows after a restart who it was."""
+    """The robot or person concerned; the person is unknown after a restart."""
     if record.robot_id is None or "person" in record.slots:
         return record.alert_id
     return record.robot_id

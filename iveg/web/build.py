@@ -37,7 +37,7 @@ from iveg.web.views import Views
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Face:
-    """The parts that everybody is shown who asks what there is now.
+    """The parts that answer requests for the present state.
 
     Attributes:
         orion: Takes Orion's notifications.

@@ -41,7 +41,7 @@ class AccessError(IvegError):
 
 
 class NotSignedInError(AccessError):
-    """The request is from nobody who is known."""
+    """The request is not authenticated."""
 
     def __init__(self) -> None:
         super().__init__("Sign in with the link that iVeg printed, or send a token.")

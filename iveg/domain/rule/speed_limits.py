@@ -1,4 +1,4 @@
-"""Who must drive slower, and why: the fleet's speed limits at one moment.
+"""Speed limits of the fleet at one moment, with their causes.
 
 A robot inside the ring of a person or of a moving peer is limited to half speed;
 it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap

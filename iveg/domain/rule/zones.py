@@ -106,7 +106,7 @@ Near = Callable[[RobotState], Iterable[Zone]]
 
 
 class ZoneFinder:
-    """Finds out which robots are near which circles."""
+    """Finds the circles near each robot."""
 
     def __init__(self) -> None:
         self._known: _Neighbours | None = None
@@ -119,7 +119,7 @@ class ZoneFinder:
         now: Instant,
         inside: Mapping[str, Mapping[str, Any]],
     ) -> Near:
-        """Which robots are near which circles now.
+        """Find the robots that are near each circle now.
 
         Args:
             world: The fleet.
@@ -155,7 +155,7 @@ class _Circles:
         self._made: dict[str, list[Zone]] = {}
 
     def near(self, robot: RobotState) -> Iterable[Zone]:
-        """What ``Near`` says: people in the order of their names, then peers."""
+        """``Near``: people in the order of their numbers, then peers."""
         robot_id, known = robot.robot_id, self._people.known
         inside = self._inside.get(robot_id, {}).keys()
         people = self._neighbours.people.get(robot_id, _NOBODY) | inside
@@ -192,19 +192,19 @@ _Place = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class _Neighbours:
-    """Who may come near whom within half a second.
+    """Pairs that may come near each other within half a second.
 
     Attributes:
         at: When all were compared (monotonic, s).
-        places: Where robots were then; ``looks`` what was known of people.
+        places: Places of the robots then; ``persons`` likewise.
         people: Robot → people; ``peers``: robot → robots.
-        checked: The newest of each person that is still within reach of ``looks``.
+        checked: The newest of each person that is still within reach of ``persons``.
     """
 
     at: float
     radius_m: float
     places: Mapping[str, _Place]
-    looks: Mapping[str, Person]
+    persons: Mapping[str, Person]
     people: Mapping[str, set[str]]
     peers: Mapping[str, set[str]]
     checked: dict[str, Person]
@@ -233,8 +233,10 @@ class _Neighbours:
             # A robot is near itself, which does not slow it.
             if row != column:
                 beside.setdefault(names[row], set()).add(names[column])
-        looks = dict(people.known)
-        return cls(now.mono, rule.radius_m, places, looks, near, beside, dict(looks))
+        persons = dict(people.known)
+        return cls(
+            now.mono, rule.radius_m, places, persons, near, beside, dict(persons)
+        )
 
     def hold(
         self, world: World, people: People, rule: DetectionRule, now: Instant
@@ -258,7 +260,7 @@ class _Neighbours:
     def _is_still_seen_there(self, person: Person) -> bool:
         if self.checked.get(person.person_id) is person:
             return True
-        before = self.looks.get(person.person_id)
+        before = self.persons.get(person.person_id)
         if before is None:
             return False
         spots = [
@@ -278,7 +280,7 @@ class _Neighbours:
 
 
 def _place_of(robot: RobotState) -> _Place | None:
-    """None where nobody knows."""
+    """The place of a robot; None where it is unknown."""
     since = robot.likely_pose_at()
     if robot.odometry is None or since is None:
         return None

@@ -1,4 +1,4 @@
-"""One attempt to release a robot or to let it drive, and what its copies can still do.
+"""One attempt to release or resume a robot, and the effect its copies can still have.
 
 An order carries a challenge that the robot spends on the first copy, whatever it makes
 of it.  So a newer report with another challenge says that no copy can act any more:
@@ -90,7 +90,7 @@ class Attempt:
 
 
 def drives(report: SafetyReport) -> bool:
-    """Whether a robot says that it is free to drive."""
+    """Whether a robot reports that it is free to drive."""
     return not report.holds and report.speed_factor > 0
 
 

@@ -1,4 +1,4 @@
-"""One STOP, RELEASE or RESUME as it is at one moment, with the time of each step.
+"""State of one STOP, RELEASE or RESUME at one moment, with the time of each step.
 
 A STOP's times are the press on the browser's clock, accepted (``requested``), sent and
 answered on each transport, and standing (docs/interfaces/resources.md).
@@ -52,7 +52,7 @@ PLAIN = Press()
 
 
 def believe(pressed_at: float | None, at: Instant) -> float | None:
-    """When it was pressed (Unix s), if that can be: never ahead of ``at``, not old."""
+    """The press (Unix s) if plausible: not ahead of ``at`` and not old; else None."""
     if pressed_at is None:
         return None
     if not -PRESS_AHEAD_S <= at.wall - pressed_at <= PRESS_OLDEST_S:
@@ -62,7 +62,7 @@ def believe(pressed_at: float | None, at: Instant) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """When each step of a command was taken; all but ``pressed`` on our clocks.
+    """Time of each step of a command; all but ``pressed`` on the server's clocks.
 
     Attributes:
         pressed: Unix time (s); None where it was not told, or is impossible.
@@ -80,7 +80,7 @@ class Times:
 
     @classmethod
     def of(cls, at: Instant, press: Press) -> "Times":
-        """Accepted now; pressed when the page says, if that can be."""
+        """A command accepted now; its press as told by the page, if plausible."""
         pressed = believe(press.pressed_at, at)
         doubted = pressed is None and press.pressed_at is not None
         return cls(at, pressed, doubted)
@@ -93,7 +93,7 @@ class Times:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One STOP, RELEASE or RESUME as people follow it.
+    """One STOP, RELEASE or RESUME as the operator follows it.
 
     Attributes:
         reason: Why it began or ended as it did; None for a plain press.
@@ -124,16 +124,16 @@ class Command:
 
     @property
     def hold_id(self) -> str | None:
-        """What this STOP is called at the robot; a release or resume holds nothing."""
+        """Id of this STOP's hold at the robot; a release or resume has none."""
         return (self.held_as or self.command_id) if self.kind == "stop" else None
 
     def sent(
         self, transport: Transport, left: Instant, *, ok: bool, doubtful: bool
     ) -> "Command":
-        """A transport took what ``left`` for it, or failed; taken is not arrived.
+        """Note that a transport accepted the message, or failed.
 
-        The time is when it left: the robot's answer is often here before the
-        transport's, and no answer comes before its question.
+        Accepted is not arrived.  The time is when it ``left``: the robot's answer is
+        often here before the transport's, and no answer comes before its question.
 
         Only a broker's PUBACK of a STOP is evidence; Orion's 204 and an order at QoS 0
         say nothing until the robot answers.
@@ -150,19 +150,19 @@ class Command:
         return replace(self, times=times, transports=self._with(transport.id, now))
 
     def heard_of(self, transport: TransportId, at: Instant) -> "Command":
-        """The robot has said on this way that it has it; the first time counts."""
+        """Note the robot's confirmation on this transport; the first one counts."""
         if transport in self.times.answered:
             return self
         answered = {**self.times.answered, transport: at}
         return replace(self, times=replace(self.times, answered=answered))
 
     def answered(self, transport: TransportId, at: Instant) -> "Command":
-        """The robot's own answer to it has come."""
+        """Note the robot's own answer."""
         heard = self.heard_of(transport, at)
         return replace(heard, transports=self._with(transport, "ok"))
 
     def stood(self, first: Instant) -> "Command":
-        """The robot was measured to stand since ``first``; the first time counts."""
+        """Note the measured standstill since ``first``; the first one counts."""
         if self.times.standing is not None:
             return self
         return replace(
@@ -172,7 +172,7 @@ class Command:
         )
 
     def ended(self, why: str) -> "Command":
-        """No longer followed; a release that the robot never confirmed says so."""
+        """The closed command; a release that the robot never confirmed is marked."""
         if self.kind == "stop":
             return replace(self, state="REPLACED")
         expired = why == "release_unconfirmed"

@@ -17,13 +17,13 @@ _NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALERTS}
 
 
 def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condition]:
-    """STOPs that are not confirmed or not obeyed."""
+    """Conditions of STOPs that are not confirmed or not obeyed."""
     for machine in machines:
         yield from _of(machine, now)
 
 
 def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
-    """Mistakes of the machine itself."""
+    """Conditions of internal errors of the machine."""
     for one in mistakes:
         slots: dict[str, Slot] = {
             "robot": one.robot_id,

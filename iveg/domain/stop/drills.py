@@ -30,11 +30,11 @@ class Drills:
             self.passed(robot_id, at)
 
     def passed(self, robot_id: str, at: float) -> None:
-        """A drill has ended well."""
+        """Note a drill that ended in a standstill."""
         self.last[robot_id] = max(at, self.last.get(robot_id, at))
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
-        """Robots whose last drill is older than the configured days."""
+        """Conditions of robots whose last drill is older than the configured days."""
         for robot_id, at in self.last.items():
             age_days = (now.wall - at) / _DAY_S
             if 0 < self._days < age_days:

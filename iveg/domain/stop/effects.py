@@ -28,13 +28,13 @@ Key = Literal[
     "ready",
     "running",
 ]
-"""What can happen; also names the sentence that tells of it."""
+"""Kinds of events; also names of their log sentences."""
 _ORDERS: Mapping[Key, Kind] = {"releasing": "release", "resuming": "resume"}
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """An event, with what its step needs.
+    """An event, with the arguments of its step.
 
     Attributes:
         new_id: Names the command that begins, and its hold unless one is ``kept``.
@@ -53,7 +53,7 @@ class Event:
     attempt: Attempt | None = None
 
     def begins(self, robot_id: str, transports: Iterable[Transport]) -> Command:
-        """The command that begins with it; ``off`` on what does not carry it.
+        """The command that begins with it; ``off`` on transports that cannot carry it.
 
         A release or resume is sent once, at once; a STOP as often as it takes.
         """
@@ -105,7 +105,7 @@ class SendOnce:
 
     @classmethod
     def of(cls, attempt: Attempt, ours: Iterable[str]) -> "SendOnce":
-        """What an attempt sends; ``ours`` are STOPs of iVeg that the robot holds."""
+        """Message of an attempt; ``ours`` are STOPs of iVeg that the robot holds."""
         command, ids = attempt.command, attempt.ids
         return cls(
             command.robot_id,

@@ -1,4 +1,4 @@
-"""The robot's newest report, its age, and what it says of motion."""
+"""The robot's newest report, its age, and its evidence of motion."""
 
 from collections import deque
 from math import inf, isfinite
@@ -37,7 +37,7 @@ class Evidence:
     def motion(
         self, report: SafetyReport, at: Instant, *, sparse: bool
     ) -> Literal["moves", "stands"] | None:
-        """What the newest report says of motion; None while it is not certain."""
+        """Motion by the newest report; None while it is uncertain."""
         if not stands(report):
             self._standstill.forget()
             return "moves"
@@ -98,5 +98,5 @@ class Evidence:
 
 
 def stands(report: SafetyReport) -> bool:
-    """Whether a robot says that it is at rest."""
+    """Whether a robot reports that it is at rest."""
     return max(abs(report.linear), abs(report.angular)) < LIMITS.standing_speed

@@ -1,4 +1,4 @@
-"""How long STOP takes, over many STOPs: half of them, nearly all, and the longest."""
+"""Latency of STOP over many STOPs: median, 95th percentile and maximum."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class StopLatency:
 
 
 def spread(values: Iterable[float | None]) -> StopLatency:
-    """Summarise what was measured; what never came is left out and not counted."""
+    """Summarise measured times; missing ones are left out and not counted."""
     known = sorted(value for value in values if value is not None)
     if not known:
         return StopLatency(0, None, None, None)
@@ -32,5 +32,5 @@ def spread(values: Iterable[float | None]) -> StopLatency:
 
 
 def nearest_rank(known: list[float], share: float) -> float:
-    """Of sorted values the least that this share (0 to 1) does not exceed."""
+    """Nearest-rank percentile of sorted values, for a share from 0 to 1."""
     return known[max(0, ceil(share * len(known)) - 1)]

@@ -91,12 +91,12 @@ class StopMachine(StopStatus):
         return [*effects, self._changed("requested", self.stop, f"joined by {by}")]
 
     def restore(self, wanted: DesiredRecord, at: Instant, new_id: str) -> list[Effect]:
-        """STOP once more what an earlier run had stopped."""
+        """STOP again a robot that an earlier run had stopped."""
         kept = wanted.hold_to_assert()
         return self._take(Event("reasserted", at, new_id, wanted.by, kept=kept))
 
     def drill(self, by: str, at: Instant, new_id: str, press: Press) -> list[Effect]:
-        """Prove that STOP works. Raises CommandRefusedError where a guard objects."""
+        """Begin a STOP drill. Raises CommandRefusedError where a guard objects."""
         self._guard_drill(at)
         return self._take(Event("requested", at, new_id, by, press))
 
@@ -150,7 +150,7 @@ class StopMachine(StopStatus):
         return self._take(Event("sent", at))
 
     def note_lag(self, lag_s: float | None) -> None:
-        """How far the agent is behind while an order is being sent (s)."""
+        """Note the lag of the IoT Agent while an order is being sent (s)."""
         newest = self.once or self.stop
         if newest is not None:
             self._keep(replace(newest, agent_lag_s=lag_s))
@@ -160,7 +160,7 @@ class StopMachine(StopStatus):
     def answered(
         self, answer: CommandAnswer, at: Instant, transport: TransportId, new_id: str
     ) -> list[Effect]:
-        """The robot's own answer on ``cmdexe`` or ``cmd_info``."""
+        """Take the robot's own answer on ``cmdexe`` or ``cmd_info``."""
         is_news = self.is_news(answer.origin)
         if self.attempt is not None:
             if not self.attempt.is_meant_by(answer, is_news=is_news):
@@ -189,7 +189,7 @@ class StopMachine(StopStatus):
         *,
         sparse: bool = False,
     ) -> list[Effect]:
-        """The robot's safety report, new by (boot, seq), ``age_s`` old at most.
+        """Take the robot's safety report, new by (boot, seq), ``age_s`` old at most.
 
         ``sparse``: it came on a topic that has two of them a second, not ten.
         """
@@ -229,7 +229,7 @@ class StopMachine(StopStatus):
         origin: Origin = UNKNOWN,
         age_s: float = inf,
     ) -> list[Effect]:
-        """A speed, proven to be no older than ``age_s``."""
+        """Take a speed, proven to be no older than ``age_s``."""
         contradicted = self.is_contradicted(linear, angular, at, origin, age_s)
         moved = contradicted and self.state == "STANDING"
         return self._stop_again("moved", at, new_id) if moved else []
@@ -356,7 +356,7 @@ class StopMachine(StopStatus):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What follows an event.
+    """The transition of an event.
 
     Attributes:
         to: The new state; None is the one that the attempt began in.
@@ -370,7 +370,7 @@ class Step:
 
 
 def _rows() -> Iterable[tuple[Key, tuple[State, ...], Step]]:
-    """One row an event: from which states, and what follows."""
+    """One row an event: its states of origin and its transition."""
     m, every = StopMachine, get_args(State)
     begin, order = Step("REQUESTED", m._begin), Step("RELEASING", m._send_once)
     yield "requested", every, begin

@@ -1,4 +1,4 @@
-"""How an order ended, for readers of the history (docs/interfaces/resources.md).
+"""Outcome of an order, for readers of the history (docs/interfaces/resources.md).
 
 A row keeps the state of the machine when the order was no longer followed, and that is
 the robot's state: "running" does not say how a STOP ended.
@@ -23,7 +23,7 @@ LOUD = frozenset({"UNCONFIRMED", "STILL_MOVING"})
 
 
 def outcome_of(record: CommandRecord) -> Outcome:
-    """What became of an order; ``open`` while it is followed."""
+    """Outcome of an order; ``open`` while it is followed."""
     if record.state == "EXPIRED":
         return "expired"
     if record.state == "REPLACED":
@@ -44,5 +44,5 @@ def _of_stop(record: CommandRecord) -> Outcome:
 
 
 def was_loud(states: Iterable[str]) -> bool:
-    """Whether it was, at any time, not confirmed or not obeyed."""
+    """Whether it was unconfirmed or not obeyed at any time."""
     return not LOUD.isdisjoint(states)

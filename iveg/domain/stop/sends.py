@@ -1,4 +1,4 @@
-"""When a STOP is sent again, and on which transport.
+"""Timetable of the repetitions of a STOP on each transport.
 
 A transport that takes any number: at 0, 250, 500 and 1000 ms, then every half second,
 after ten seconds every second; to a robot that has it every second, to a standing one
@@ -22,7 +22,7 @@ _EARLY_S = 1e-3
 """Clocks that tick in fractions meet a planned moment only nearly."""
 
 Progress = Literal["asked", "delivered", "standing"]
-"""What the robot has said so far: nothing, that it has it, that it stands."""
+"""Progress known from the robot: none, STOP received, standing still."""
 _PROGRESS: Mapping[str, Progress] = {
     "DELIVERED": "delivered",
     "STILL_MOVING": "delivered",
@@ -38,14 +38,14 @@ class Repeated:
         self._age_then = 0.0
 
     def now(self, _: Instant) -> None:
-        """At the next look."""
+        """Make the next check send."""
         self._sent_at = float("-inf")
 
     def begin(self) -> None:
         """A new episode."""
 
     def came_back(self, at: Instant) -> None:
-        """How it went says nothing of when the next is due."""
+        """Without effect: the result does not change the timetable."""
 
     def is_due(self, at: Instant, age_s: float, progress: Progress) -> bool:
         """Whether to send now; that counts as sent."""
@@ -69,7 +69,7 @@ class OneAtATime:
         self._busy = False
 
     def now(self, at: Instant) -> None:
-        """As soon as nothing is under way."""
+        """Send as soon as no request is under way."""
         self._next = at.mono
 
     def begin(self) -> None:
@@ -77,7 +77,7 @@ class OneAtATime:
         self._busy = False
 
     def came_back(self, at: Instant) -> None:
-        """It has answered, or will not."""
+        """Note that the request has ended."""
         self._busy = False
         self._next = at.mono + FIWARE_PAUSE_S
 
@@ -108,23 +108,23 @@ class Sends:
         self.now(at)
 
     def now(self, at: Instant) -> None:
-        """On every transport at once, whatever was due when."""
+        """Make every transport due now."""
         for way in self._ways.values():
             way.now(at)
 
     def repeat_now(self, at: Instant) -> None:
-        """At the next look on those that take any number."""
+        """Make those that take any number due at the next check."""
         for way in self._ways.values():
             if isinstance(way, Repeated):
                 way.now(at)
 
     def came_back(self, transport: TransportId, at: Instant) -> None:
-        """A transport has answered, or will not."""
+        """Note that a transport's request has ended."""
         if transport in self._ways:
             self._ways[transport].came_back(at)
 
     def due(self, stop: Command, at: Instant) -> list[SendStop]:
-        """What to send of it now; that counts as sent."""
+        """Sends that are due now; they count as sent."""
         age_s = at.mono - stop.times.requested.mono
         progress = _PROGRESS.get(stop.state, "asked")
         hold_id = stop.hold_id or stop.command_id
@@ -136,7 +136,7 @@ class Sends:
 
 
 def _pause(age_s: float, progress: Progress) -> float:
-    """How long after a send at this age the next is due (s)."""
+    """Pause after a send at this age (s)."""
     if progress == "standing":
         return STANDING_RESEND_S
     if progress == "delivered":

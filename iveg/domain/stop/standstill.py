@@ -1,4 +1,4 @@
-"""Standing still, measured: what safety reports show and odometry does not contradict.
+"""Measured standstill: shown by safety reports and not contradicted by odometry.
 
 Five samples at rest over at least a second, none more than half a second after the one
 before (0.75 s on a topic that has two a second).  Both are measured on the robot's own
@@ -25,7 +25,7 @@ _UNKNOWN = Origin()
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """When something was measured: on the robot's clock if that can be compared.
+    """Time of a measurement, on the robot's clock if it is comparable.
 
     Attributes:
         boot: Of the robot; None where its clock says nothing.
@@ -52,7 +52,7 @@ class TopicOrder:
     _broken: str | None = None
 
     def moment(self, origin: Origin, arrived: Instant) -> Moment:
-        """When a message of this topic was measured."""
+        """Time of measurement of a message of this topic."""
         before, self._newest = self._newest, origin
         unknown = Moment(None, arrived.mono)
         if origin.boot is None or origin.seq is None or origin.mono is None:
@@ -90,7 +90,7 @@ class Standstill:
         self._reports, self._odometry = TopicOrder(), TopicOrder()
 
     def forget(self) -> None:
-        """What was measured does not count any more."""
+        """Discard all samples."""
         self._stood = None
         self._begin_anew()
 
@@ -100,7 +100,7 @@ class Standstill:
     def rested(
         self, at: Instant, origin: Origin = _UNKNOWN, *, sparse: bool = False
     ) -> bool:
-        """One more report at rest; whether the rest is a standstill.
+        """Take one more report at rest; returns whether the rest is a standstill.
 
         ``sparse``: it came on a topic that has two reports a second, not ten.
         """
@@ -135,7 +135,7 @@ class Standstill:
     def odometry(
         self, at: Instant, origin: Origin = _UNKNOWN, age_s: float = inf, *, moves: bool
     ) -> bool | None:
-        """One sample of odometry, proven to be no older than ``age_s``.
+        """Take one sample of odometry, proven to be no older than ``age_s``.
 
         Returns:
             Whether several in a row have moved; None for one from before the rest,

@@ -1,4 +1,4 @@
-"""What is wanted of one robot and how far that has come; which orders are refused.
+"""Desired state of one robot, its progress, and the guards that refuse orders.
 
 The guards stand before the machine's table: a request that must not happen is refused
 here, and changes nothing.
@@ -19,7 +19,7 @@ from iveg.domain.stop.wanted import NEW_HOLD, Kept
 
 
 class StopStatus(Evidence):
-    """The state of one robot's STOP, beside what the robot itself has said.
+    """The state of one robot's STOP, added to the robot's own reports.
 
     Attributes:
         robot_id: Whose.
@@ -49,7 +49,7 @@ class StopStatus(Evidence):
 
     @property
     def once(self) -> Command | None:
-        """The release or resume under way, as people follow it."""
+        """The release or resume under way."""
         return None if self.attempt is None else self.attempt.command
 
     @property
@@ -63,7 +63,7 @@ class StopStatus(Evidence):
         )
 
     def _keep(self, command: Command) -> None:
-        """One of the two is now like this."""
+        """Store the new value of one of the two commands."""
         if command.kind == "stop":
             self.stop = command
         elif self.attempt is not None:
@@ -105,7 +105,7 @@ class StopStatus(Evidence):
         return Changed(self.robot_id, command_id, self.state, key, why, self.commands)
 
     def _closed_by(self, key: Key) -> list[Closed]:
-        """What is followed no more says so in its own row."""
+        """Effects that close the commands of the ended episode."""
         return [
             Closed(self.robot_id, one.ended(key), key)
             for one in reversed(self.commands)
@@ -114,7 +114,7 @@ class StopStatus(Evidence):
     # --- guards -------------------------------------------------------------------
 
     def _guard_drill(self, at: Instant) -> None:
-        """Only a robot that hardly moves is stopped to prove that STOP works."""
+        """Refuse a drill of a robot that moves."""
         if self.state != "RUNNING":
             raise self._refused("Drill", f"its state is {self.state}")
         if self.report is None or not self._is_fresh(at):
@@ -162,7 +162,7 @@ class StopStatus(Evidence):
         return CommandRefusedError(self.robot_id, asked, why)
 
     def _is_fresh(self, at: Instant) -> bool:
-        """Whether the robot's last word has just come, and was not old when it came."""
+        """Whether the robot's newest report is recent, and was not old on arrival."""
         if self.report_age(at) > LIMITS.report_fresh_s:
             return False
         return self.evidence_age(at) <= LIMITS.report_stale_s

@@ -1,4 +1,4 @@
-"""What was wanted of a robot before: by an earlier run of iVeg, by an earlier STOP."""
+"""Earlier desired state of a robot: of an earlier run, or of an earlier STOP."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from iveg.domain.limits import LIMITS
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A hold that the robot has already, and that a STOP holds on to.
+    """An existing hold of the robot that a new STOP asserts again.
 
     Attributes:
         hold_id: None: the STOP is a new hold.
@@ -23,7 +23,7 @@ NEW_HOLD = Kept()
 
 @dataclass(frozen=True, slots=True)
 class DesiredRecord:
-    """A robot that was to stand.
+    """The stored desire that a robot stands.
 
     Attributes:
         by: Who asked.
@@ -41,7 +41,7 @@ class DesiredRecord:
     challenge: str | None = None
 
     def hold_to_assert(self) -> Kept:
-        """The hold that a STOP after a restart holds on to.
+        """The hold that a STOP after a restart asserts again.
 
         A hold that no release ever named cannot have been lifted, so asserting it again
         adds none.  One that was named may have been: the robot would answer RELEASED

@@ -351,7 +351,7 @@ _IDENTITY: Mapping[str, tuple[type[Odometry | LaserScan | DetectionFrame], str]]
     names.LIDAR: (LaserScan, names.LIDAR_HEADER),
     names.BOXES: (DetectionFrame, names.BOXES_HEADER),
 }
-"""Where telemetry says who counts it and how far."""
+"""Headers that carry the origin (boot, seq) of telemetry."""
 
 
 def climate(_: str, attributes: Mapping[str, Any]) -> Climate:

@@ -1,4 +1,4 @@
-"""Who is told outside iVeg, over HTTP: an operator reads, changes and tries it.
+"""Contacts for messages outside iVeg, over HTTP: an operator reads and tests them.
 
 What goes in as a secret never comes out: a password, the address of a webhook and the
 keys of browsers are written, replaced, and told to nobody.

@@ -105,7 +105,7 @@ class TelemetryFeed:
         waiting[topic] = -_INF if told is None else _next_after(told[1], apart_s)
 
     def _due_at(self) -> float:
-        """When the first waiting part may go; parts without room wait for credit."""
+        """Earliest time of a waiting part; parts without room wait for credit."""
         if self._moved:
             return -_INF
         if self._is_full:

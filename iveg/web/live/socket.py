@@ -133,7 +133,7 @@ def router(
         websocket: WebSocket,
         principal: Annotated[Principal, Depends(require("read"))],
     ) -> None:
-        """A browser looks."""
+        """Serve one browser."""
         is_paced = SUBPROTOCOL in websocket.scope.get("subprotocols", ())
         await websocket.accept(SUBPROTOCOL if is_paced else None)
         subscriber = hub.join()
