@@ -191,25 +191,20 @@ class MqttLink:
             self._wake.clear()
             while self._offered:
                 offered, self._offered = self._offered, {}
-                client.send(
-                    (topic, payload)
-                    for topic, (payload, qos) in offered.items()
-                    if not qos
-                )
-                for topic, (payload, qos) in offered.items():
-                    if qos:
-                        await self._send_confirmed(client, topic, payload)
+                client.send(_of_qos(0, offered))
+                if confirmed := _of_qos(1, offered):
+                    await self._send_confirmed(client, confirmed)
                 await client.written()
 
     async def _send_confirmed(
-        self, client: OutboxClient, topic: str, payload: bytes
+        self, client: OutboxClient, messages: list[tuple[str, bytes]]
     ) -> None:
         try:
-            await client.confirmed(topic, payload, _ANSWERED_WITHIN_S)
+            await client.confirmed(messages, _ANSWERED_WITHIN_S)
         except aiomqtt.MqttError:
             # A broker that is slow to confirm may still be there; when it is gone, the
             # session ends and this task with it.
-            _log.debug("%s: %s was not confirmed", self._name, topic)
+            _log.debug("%s: not all of %d confirmed", self._name, len(messages))
 
     def offer(self, topic: str, payload: bytes, qos: int = 0) -> None:
         """Send when possible; a newer message of the topic takes its place."""
@@ -232,13 +227,22 @@ class MqttLink:
         try:
             within_s = _CONFIRMED_WITHIN_S
             if qos:
-                await client.confirmed(topic, payload, within_s, retain=retain)
+                await client.confirmed([(topic, payload)], within_s, retain=retain)
             else:
                 await client.publish(topic, payload, retain=retain, timeout=within_s)
         except aiomqtt.MqttError as error:
             _heed_cancellation()
             raise HopError("mqtt", str(error)) from error
         _heed_cancellation()
+
+
+def _of_qos(
+    wanted: int, offered: Mapping[str, tuple[bytes, int]]
+) -> list[tuple[str, bytes]]:
+    """The offered topics and payloads of one quality of service."""
+    return [
+        (topic, payload) for topic, (payload, qos) in offered.items() if qos == wanted
+    ]
 
 
 def _heed_cancellation() -> None:

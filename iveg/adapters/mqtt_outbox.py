@@ -3,11 +3,12 @@
 The client library's ``publish`` makes an event, a task and two tables for each message
 and takes three turns of the loop, which is most of the cost of a robot's telemetry.
 Nobody confirms messages at QoS 0, so here they are written together, at once, and wait
-only while the socket is full; one at QoS 1 waits for its PUBACK and nothing else.
+only while the socket is full; those at QoS 1 wait for their PUBACKs and nothing else.
 """
 
 import asyncio
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Any
 
 import aiomqtt
@@ -20,6 +21,19 @@ _PUBACK = b"\x40\x02"
 _MOST_NUMBERS = 65_535
 
 
+@dataclass(slots=True)
+class _Batch:
+    """Messages at QoS 1 that were sent together, by packet identifier."""
+
+    done: asyncio.Future[None]
+    missing: set[int] = field(default_factory=set)
+
+    def acknowledge(self, number: int) -> None:
+        self.missing.discard(number)
+        if not self.missing and not self.done.done():
+            self.done.set_result(None)
+
+
 class OutboxClient(InboxClient):
     """A client with a short way out, which waits only for a full socket.
 
@@ -30,7 +44,7 @@ class OutboxClient(InboxClient):
     def __init__(self, *args: Any, take: Take, **kwargs: Any) -> None:
         super().__init__(*args, take=self._take_in, **kwargs)
         self._hand_over = take
-        self._awaited: dict[int, asyncio.Future[None]] = {}
+        self._awaited: dict[int, _Batch] = {}
         self._number = 0
         self._sending = False
         self._room = asyncio.Event()
@@ -41,25 +55,40 @@ class OutboxClient(InboxClient):
         self._put(b"".join(packet_of(topic, payload) for topic, payload in messages))
 
     async def confirmed(
-        self, topic: str, payload: bytes, within_s: float, *, retain: bool = False
+        self,
+        messages: Iterable[tuple[str, bytes]],
+        within_s: float,
+        *,
+        retain: bool = False,
     ) -> None:
-        """Send at QoS 1; return when the broker has it.
+        """Send these together at QoS 1; return when the broker has all of them.
 
         Raises:
-            MqttError: not connected, or no PUBACK in time.
+            MqttError: not connected, or a PUBACK is missing after ``within_s``.
         """
         if self._client.socket() is None:
             raise aiomqtt.MqttError("not connected")
-        number = self._free_number()
-        puback = self._awaited[number] = self._loop.create_future()
+        batch = _Batch(self._loop.create_future())
         try:
-            self._put(packet_of(topic, payload, number, retain=retain))
+            self._put(
+                b"".join(
+                    packet_of(topic, payload, self._number_for(batch), retain=retain)
+                    for topic, payload in messages
+                )
+            )
             async with asyncio.timeout(within_s):
-                await puback
+                await batch.done
         except TimeoutError as error:
             raise aiomqtt.MqttError(f"no PUBACK within {within_s:g} s") from error
         finally:
-            del self._awaited[number]
+            for number in batch.missing:
+                del self._awaited[number]
+
+    def _number_for(self, batch: "_Batch") -> int:
+        number = self._free_number()
+        self._awaited[number] = batch
+        batch.missing.add(number)
+        return number
 
     def _free_number(self) -> int:
         """Paho numbers its own packets, but has none under way: it subscribes first."""
@@ -70,9 +99,9 @@ class OutboxClient(InboxClient):
 
     def _take_in(self, arrived: Arrived) -> None:
         for number in arrived.pubacks:
-            puback = self._awaited.get(number)
-            if puback is not None and not puback.done():
-                puback.set_result(None)
+            batch = self._awaited.pop(number, None)
+            if batch is not None:
+                batch.acknowledge(number)
         self._hand_over(arrived)
         if arrived.qos1:
             numbers = (message.packet_id.to_bytes(2) for message in arrived.qos1)

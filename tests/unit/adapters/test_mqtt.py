@@ -117,6 +117,37 @@ async def test_of_what_is_offered_while_away_the_newest_of_each_topic_arrives() 
     assert heard.link.replaced == 9
 
 
+async def test_messages_at_qos_1_go_together_and_newer_ones_after_their_pubacks() -> (
+    None
+):
+    said: asyncio.Queue[bytes] = asyncio.Queue()
+    acknowledges = asyncio.Event()
+
+    async def broker(
+        reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        await reader.read(1000)
+        writer.write(b"\x20\x02\x00\x00")  # CONNACK
+        said.put_nowait(await reader.readexactly(2 * len(first)))
+        await acknowledges.wait()
+        writer.write(b"\x40\x02\x00\x02" + b"\x40\x02\x00\x01")
+        said.put_nowait(await reader.readexactly(len(first)))
+        writer.close()
+
+    first = b"\x32\x06\x00\x01a\x00\x011"
+    async with await asyncio.start_server(broker, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        link = MqttLink(BrokerAddress("127.0.0.1", port), "test")
+        link.offer("a", b"1", qos=1)
+        link.offer("b", b"2", qos=1)
+        async with running(link):
+            assert await said.get() == first + b"\x32\x06\x00\x01b\x00\x022"
+            link.offer("a", b"3", qos=1)
+            assert said.empty()
+            acknowledges.set()
+            assert await said.get() == b"\x32\x06\x00\x01a\x00\x033"
+
+
 async def test_while_the_socket_is_full_only_the_newest_of_a_topic_waits() -> None:
     heard, reads = bytearray(), asyncio.Event()
 
