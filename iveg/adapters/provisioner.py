@@ -175,6 +175,7 @@ class Provisioner:
                 self._health_monitor.stored(observation.origin)
         if self._health_monitor.orion_error:
             self._health_monitor.orion_error = ""
+            self._health_monitor.orion_back_at = at.mono
             self._gap.set()
         return self._tell("orion", None)
 

@@ -80,6 +80,8 @@ class HealthMonitor:
         mqtt_error: Why the broker did not confirm the last probe.
         orion_error: What the last question to Orion came to; empty when well.
         orion_slow: That it answers, and how late.
+        orion_back_at: When it answered again after an outage (s, monotonic): earlier
+            notifications do not prove that it still has its subscriptions.
         agent_error: The same of the IoT Agent; ``agent_slow`` too.
         agent_silent: That the agent takes questions and does not answer them.
         agent_warning: What a person should look at though all seems well.
@@ -100,6 +102,7 @@ class HealthMonitor:
         self.mqtt_error = ""
         self.orion_error = self.orion_slow = ""
         self.orion_ok_at: float | None = None
+        self.orion_back_at = float("-inf")
         self.agent_error = self.agent_silent = ""
         self.agent_slow = self.agent_warning = ""
         self.notify_error = self.notify_detail = ""
@@ -244,6 +247,8 @@ class HealthMonitor:
     def _notifications(self, now: Instant, *, blind: bool) -> HopHealth:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
+        if state == "ok" and (self.notified_at or 0.0) < self.orion_back_at:
+            return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
         if state == "ok":
             missed: HopState = "down" if self.notify_error else "ok"
             return HopHealth(Hop.NOTIFICATIONS, missed, age, self.notify_error)

@@ -91,24 +91,24 @@ test("without the server nothing else is known", () => {
   equal(judgeDataPath(hops({}), [], false).key, "fleet.silent_server");
 });
 
-test("each road is measured from the press on, and silence is no number", () => {
-  equal(tookOf(order()), {
+test("each transport is measured from the press on, and silence is no number", () => {
+  equal(tookOf(order(), ["direct", "fiware", "dds"]), {
     accepted: null,
-    sentDirect: 2,
-    direct: null,
-    sentFiware: 4,
-    fiware: 50,
+    sent: [2, 4, null],
+    answer: [null, 50, null],
     standing: 412,
   });
 });
 
 test("release and resume are left out of what a STOP takes", () => {
-  const found = summaryOf([order(), order({ kind: "release", standstill_ms: 9000 })]);
+  const orders = [order(), order({ kind: "release", standstill_ms: 9000 })];
+  const found = summaryOf(orders, ["fiware"]);
   equal([found.count, found.standing], [1, { median: 412, worst: 412 }]);
+  equal(found.answer, [{ median: 50, worst: 50 }]);
 });
 
 test("a STOP that nobody confirmed is counted", () => {
-  equal(summaryOf([order({ state: "RUNNING", was_loud: true })]).unconfirmed, 1);
+  equal(summaryOf([order({ state: "RUNNING", was_loud: true })], []).unconfirmed, 1);
 });
 
 test("13.7: a STOP pressed while the server was dead has one zero: the press", () => {
@@ -118,8 +118,9 @@ test("13.7: a STOP pressed while the server was dead has one zero: the press", (
       times: { ...times, pressed: "2026-11-20T11:59:20.000Z" },
       standstill_ms: 40412,
     }),
+    ["direct", "fiware"],
   );
-  equal([took.accepted, took.sentDirect, took.fiware], [40000, 40002, 40050]);
+  equal([took.accepted, took.sent[0], took.answer[1]], [40000, 40002, 40050]);
   equal(took.standing, 40412);
 });
 

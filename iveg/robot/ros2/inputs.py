@@ -32,8 +32,6 @@ from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
 
 TOPICS: dict[str, type[Message]] = {
-    "tf_static": m.TFMessage,
-    "tf": m.TFMessage,
     "odometry": m.Odometry,
     "scan": m.LaserScan,
     "detections_3d": m.Detection3DArray,
@@ -43,8 +41,14 @@ TOPICS: dict[str, type[Message]] = {
     "mask": m.Image,
     "battery": m.BatteryState,
     "path": m.Path,
+    "tf_static": m.TFMessage,
+    "tf": m.TFMessage,
 }
-"""Topics that are subscribed to, in the order of reading."""
+"""Topics that are subscribed to, in the order of reading.
+
+Transforms come last: after a pause each datum then finds the transform that was
+published before it, though both arrive while the topics are being read.
+"""
 _UNREAD = frozenset(
     {
         (m.PoseWithCovariance, "covariance"),

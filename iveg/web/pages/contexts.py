@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.transports import TRANSPORTS
 from iveg.models.day import Day
 from iveg.web.pages.openapi import ApiDoc
 
@@ -24,12 +25,14 @@ class Site:
         greenhouse: Name as people say it.
         robots: Ids in fleet order; the order decides each robot's colour.
         demo: The robots are emulated.
+        transports: Ids, in the order of their columns.
     """
 
     greenhouse: str
     robots: tuple[str, ...]
     version: str
     demo: bool
+    transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
 
 
 @dataclass(frozen=True, slots=True)

@@ -223,6 +223,17 @@ def test_a_device_that_may_swallow_commands_is_shown_though_measures_pass() -> N
     assert not health_monitor.whole(at(10.0))
 
 
+def test_what_orion_sent_before_an_outage_says_nothing_of_its_subscriptions() -> None:
+    health_monitor = healthy(10.0)
+
+    health_monitor.orion_back_at = at(11.0).mono
+    before = states(health_monitor, 12.0)["notifications"]
+    health_monitor.notified_at = at(11.5).mono
+
+    assert before == "unknown"
+    assert states(health_monitor, 12.0)["notifications"] == "ok"
+
+
 def test_what_never_came_is_down_after_the_first_seconds() -> None:
     health_monitor = HealthMonitor(START)
     health_monitor.mqtt_connected = True

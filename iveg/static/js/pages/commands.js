@@ -6,7 +6,7 @@ import { all, make, need, needPart, setText } from "../panels/dom.js";
 import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
 import { dayAndTime, millisecondsOf } from "./history/local_time.js";
 import { endSaid, summaryOf, tookOf, zeroOf } from "./latency.js";
-import { createChips, createRows, soon } from "./rows.js";
+import { createChips, createRows, soon, transportsOfPage } from "./rows.js";
 
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 
@@ -14,14 +14,15 @@ import { createChips, createRows, soon } from "./rows.js";
 export function start({ store, i18n }) {
   /** @type {Set<string>} orders whose steps somebody reads */
   const opened = new Set();
+  const transports = transportsOfPage();
   const isChosen = createChips("data-kind-chip", () => rows.draw());
   const rows = createRows({
     name: "orders",
     path: "commands",
     i18n,
-    cells: (command) => cellsOf(command, i18n, opened),
+    cells: (command) => cellsOf(command, transports, i18n, opened),
     admits: ({ kind }) => isChosen(kind),
-    onItems: (items) => drawSummary(items, i18n),
+    onItems: (items) => drawSummary(items, transports, i18n),
   });
   const drills = createDrills(store, i18n);
   function load() {
@@ -79,11 +80,12 @@ function createDrills(store, i18n) {
 
 /**
  * @param {import("./latency.js").Order} command
+ * @param {readonly string[]} transports
  * @param {I18n} i18n
  * @param {Set<string>} opened
  */
-function cellsOf(command, i18n, opened) {
-  const took = tookOf(command);
+function cellsOf(command, transports, i18n, opened) {
+  const took = tookOf(command, transports);
   const number = (/** @type {number | null} */ value) =>
     make("td", "number", value === null ? "—" : i18n.number(value, 0));
   return [
@@ -93,10 +95,7 @@ function cellsOf(command, i18n, opened) {
     endOf(command, i18n, opened),
     make("td", "", command.requested_by),
     number(took.accepted),
-    number(took.sentDirect),
-    number(took.direct),
-    number(took.sentFiware),
-    number(took.fiware),
+    ...transports.flatMap((_, i) => [number(took.sent[i]), number(took.answer[i])]),
     number(took.standing),
     number(command.tries),
   ];
@@ -135,12 +134,18 @@ function orderSaid({ kind, drill }, i18n) {
   return drill ? i18n.t("drill.heading") : i18n.t(`history.kind.${kind}`);
 }
 
-/** @param {import("./latency.js").Order[]} items @param {I18n} i18n */
-function drawSummary(items, i18n) {
-  const { count, unconfirmed, ...times } = summaryOf(items);
+/**
+ * @param {import("./latency.js").Order[]} items
+ * @param {readonly string[]} transports
+ * @param {I18n} i18n
+ */
+function drawSummary(items, transports, i18n) {
+  const { count, unconfirmed, answer, standing } = summaryOf(items, transports);
   setText(need("#took-count"), i18n.number(count, 0));
   setText(need("#took-unconfirmed"), i18n.number(unconfirmed, 0));
-  for (const [name, stat] of Object.entries(times)) {
+  const stats = [...answer, standing];
+  for (const [i, name] of [...transports, "standing"].entries()) {
+    const stat = stats[i];
     setText(need(`#took-${name}`), stat ? i18n.t("commandspage.stat", stat) : "—");
   }
 }

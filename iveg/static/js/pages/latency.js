@@ -17,20 +17,22 @@ export function zeroOf({ pressed, requested }) {
 }
 
 /**
+ * All in ms from the press on; null where nothing came.
+ *
  * @param {Order} order
- * @returns {Record<"accepted" | "sentDirect" | "direct" | "sentFiware" | "fiware" |
- *   "standing", number | null>} (ms) from the press on; null where no answer came
+ * @param {readonly string[]} transports
+ * @returns {{accepted: number | null, sent: (number | null)[],
+ *   answer: (number | null)[], standing: number | null}} `sent` and `answer` in the
+ *   order of the transports
  */
-export function tookOf({ times, standstill_ms }) {
+export function tookOf({ times, standstill_ms }, transports) {
   const zero = Date.parse(zeroOf(times));
   const since = (/** @type {string | undefined} */ at) =>
     at === undefined ? null : Date.parse(at) - zero;
   return {
     accepted: times.pressed ? since(times.requested) : null,
-    sentDirect: since(times.sent.direct),
-    direct: since(times.answer.direct),
-    sentFiware: since(times.sent.fiware),
-    fiware: since(times.answer.fiware),
+    sent: transports.map((id) => since(times.sent[id])),
+    answer: transports.map((id) => since(times.answer[id])),
     standing: standstill_ms,
   };
 }
@@ -52,15 +54,15 @@ export function endSaid({ state, reason, outcome = "open", was_loud }, i18n) {
  * The STOPs among orders; release and resume are not measured against a press.
  *
  * @param {Order[]} orders
+ * @param {readonly string[]} transports
  */
-export function summaryOf(orders) {
+export function summaryOf(orders, transports) {
   const stops = orders.filter(({ kind }) => kind === "stop");
-  const took = stops.map(tookOf);
+  const took = stops.map((order) => tookOf(order, transports));
   return {
     count: stops.length,
     unconfirmed: stops.filter(({ was_loud }) => was_loud).length,
-    direct: statOf(took.map(({ direct }) => direct)),
-    fiware: statOf(took.map(({ fiware }) => fiware)),
+    answer: transports.map((_, i) => statOf(took.map(({ answer }) => answer[i]))),
     standing: statOf(took.map(({ standing }) => standing)),
   };
 }

@@ -126,3 +126,9 @@ export function createChips(attribute, onChange) {
   }
   return (value) => pressed.size === 0 || pressed.has(value);
 }
+
+/** The transports that a page has columns for. */
+export function transportsOfPage() {
+  const page = /** @type {HTMLElement} */ (document.querySelector("[data-transports]"));
+  return String(page.dataset.transports).split(" ");
+}

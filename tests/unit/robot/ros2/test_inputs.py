@@ -14,6 +14,7 @@ from iveg.domain.observations import (
     Unplaced,
 )
 from iveg.robot.ros2.input_faults import speed_of
+from iveg.robot.ros2.inputs import TOPICS
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from tests.unit.robot.ros2 import said
@@ -367,3 +368,7 @@ def test_a_foreign_frame_cannot_say_what_orion_refuses() -> None:
     bench.hear("odometry", said.odometry()).tick()
 
     assert bench.faults() == {"no_transform": "map → abc"}
+
+
+def test_transforms_are_read_after_the_data_that_need_them() -> None:
+    assert list(TOPICS)[-2:] == ["tf_static", "tf"]

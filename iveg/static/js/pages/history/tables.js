@@ -6,6 +6,7 @@
 
 import { make, need, setHidden } from "../../panels/dom.js";
 import { endSaid, tookOf, zeroOf } from "../latency.js";
+import { transportsOfPage } from "../rows.js";
 import { dayAndTime } from "./local_time.js";
 
 /** Worst first: a decision is as good as its worst link. */
@@ -88,15 +89,14 @@ export function decisionCells(item, i18n) {
  * @param {import("../../core/i18n.js").I18n} i18n
  */
 export function commandCells(item, i18n) {
-  const took = tookOf(item);
+  const took = tookOf(item, transportsOfPage());
   return [
     make("td", "", dayAndTime(zeroOf(item.times))),
     make("td", "", item.robot_id),
     make("td", "", i18n.t(`history.kind.${item.kind}`)),
     make("td", "rows__what", endSaid(item, i18n)),
     make("td", "", item.requested_by),
-    numberCell(took.direct, 0, i18n),
-    numberCell(took.fiware, 0, i18n),
+    ...took.answer.map((one) => numberCell(one, 0, i18n)),
     numberCell(item.standstill_ms, 0, i18n),
     numberCell(item.tries, 0, i18n),
   ];
