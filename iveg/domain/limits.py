@@ -125,7 +125,10 @@ class SafetyLimits:
         2.0, "s", "chosen", "an unconfirmed release becomes a STOP"
     )
     joined_unseen_s: float = _limit(
-        2.0, "s", "hold to confirm", "whoever releases has not seen a newer press"
+        3.0,
+        "s",
+        "hold to confirm, and its way",
+        "whoever releases has not seen a newer press",
     )
     most_holds: int = _limit(
         3, "holds", "chosen", "of iVeg's at one robot; no further one beside them"

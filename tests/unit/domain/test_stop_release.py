@@ -632,7 +632,13 @@ def test_i2_a_release_is_refused_while_another_stop_cannot_have_been_seen() -> N
     with pytest.raises(CommandRefusedError, match="just now"):
         bench.release(bench.ours.id)
 
-    for _ in range(20):
+    # A release that was begun just before takes two seconds to hold, and its way.
+    for _ in range(25):
+        bench.report(bench.ours)
+        bench.wait(0.1)
+    with pytest.raises(CommandRefusedError, match="just now"):
+        bench.release(bench.ours.id)
+    for _ in range(5):
         bench.report(bench.ours)
         bench.wait(0.1)
     bench.release(bench.ours.id)
