@@ -22,6 +22,7 @@ import orjson
 import uvloop
 
 from benchmarks.process import pause
+from iveg.adapters.mqtt_packets import publish_packet
 
 RATE_HZ = 30
 TOPICS = 3
@@ -78,18 +79,6 @@ def _as_a_driver(metres: float) -> float:
     A scan of round millimetres is the easiest there is to print; no driver sends one.
     """
     return round(float(np.float32(metres)), 11)
-
-
-def publish_packet(topic: str, payload: bytes) -> bytes:
-    """One QoS 0 PUBLISH of MQTT 3.1.1."""
-    name = topic.encode()
-    body = len(name).to_bytes(2, "big") + name + payload
-    size, length = len(body), bytearray()
-    while True:
-        size, low = divmod(size, 128)
-        length.append(low | (128 if size else 0))
-        if not size:
-            return b"\x30" + bytes(length) + body
 
 
 def _moment_us() -> int:

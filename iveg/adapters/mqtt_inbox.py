@@ -15,13 +15,19 @@ from typing import Any
 import aiomqtt
 from paho.mqtt import client as paho
 
+from iveg.adapters.mqtt_packets import (
+    DUPLICATE,
+    PUBACK,
+    PUBLISH,
+    QOS_1,
+    RETAINED,
+    packet_bounds,
+)
+
 READ_AHEAD = 256 << 10
 """Taken from the wire in one call (bytes): some thirty scans."""
-_LONGEST_LENGTH = 4
-_TELEMETRY, _CONFIRMED, _RETAINED, _AGAIN = 0x30, 0x32, 0x01, 0x08
-"""PUBLISH at QoS 0 and at QoS 1, and its flags."""
-_PUBACK = 0x40
-"""PUBACK."""
+_TELEMETRY, _CONFIRMED = PUBLISH, PUBLISH | QOS_1
+"""First bytes of a PUBLISH at QoS 0 and at QoS 1, without flags."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,18 +208,18 @@ def sort_packets(read: bytes) -> tuple[Arrived, bytes]:
 
 def _is_ours(arrived: Arrived, read: bytes, place: int, body: int, end: int) -> bool:
     kind, head = read[place], int.from_bytes(read[body : body + 2], "big")
-    if kind == _PUBACK and end == body + 2:
+    if kind == PUBACK and end == body + 2:
         arrived.pubacks.append(head)
         return True
     name = body + 2 + head
-    if kind & ~_RETAINED == _TELEMETRY and name <= end:
+    if kind & ~RETAINED == _TELEMETRY and name <= end:
         topic = read[body + 2 : name].decode(errors="replace")
         if topic in arrived.telemetry:
             older = arrived.passed_over.get(topic, 0)
             arrived.passed_over[topic] = older + 1
         arrived.telemetry[topic] = read[name:end]
         return True
-    if kind & ~(_RETAINED | _AGAIN) == _CONFIRMED and name + 2 <= end:
+    if kind & ~(RETAINED | DUPLICATE) == _CONFIRMED and name + 2 <= end:
         topic = read[body + 2 : name].decode(errors="replace")
         number = int.from_bytes(read[name : name + 2], "big")
         arrived.qos1.append(Qos1Message(topic, read[name + 2 : end], number))
@@ -226,14 +232,9 @@ def _packet_at(read: bytes, place: int) -> tuple[int, int] | None:
 
     A length of more than four bytes is nobody's: the library hangs up on it.
     """
-    length, shift, body = 0, 0, place + 1
-    while body < len(read):
-        byte = read[body]
-        length |= (byte & 0x7F) << shift
-        shift, body = shift + 7, body + 1
-        if byte < 0x80:
-            end = body + length
-            return (body, end) if end <= len(read) else None
-        if body - place > _LONGEST_LENGTH:
-            return body, len(read)
-    return None
+    body, end = packet_bounds(read, place)
+    if not body or end > len(read):
+        return None
+    if end == body and read[body - 1] >= 0x80:
+        return body, len(read)
+    return body, end

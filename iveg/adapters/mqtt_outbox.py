@@ -14,10 +14,9 @@ from typing import Any
 import aiomqtt
 
 from iveg.adapters.mqtt_inbox import Arrived, InboxClient, Take
+from iveg.adapters.mqtt_packets import puback_packet, publish_packet
 
-_PUBLISH, _RETAIN, _CONFIRMED, _UNTOLD = 0x30, 0x01, 0x02, 0
-_PUBACK = b"\x40\x02"
-"""PUBACK and its length."""
+_UNTOLD = 0
 _MOST_NUMBERS = 65_535
 
 
@@ -52,7 +51,9 @@ class OutboxClient(InboxClient):
 
     def send(self, messages: Iterable[tuple[str, bytes]]) -> None:
         """Write these at QoS 0, as far as the socket takes them."""
-        self._put(b"".join(packet_of(topic, payload) for topic, payload in messages))
+        self._put(
+            b"".join(publish_packet(topic, payload) for topic, payload in messages)
+        )
 
     async def confirmed(
         self,
@@ -72,7 +73,9 @@ class OutboxClient(InboxClient):
         try:
             self._put(
                 b"".join(
-                    packet_of(topic, payload, self._number_for(batch), retain=retain)
+                    publish_packet(
+                        topic, payload, self._number_for(batch), retain=retain
+                    )
                     for topic, payload in messages
                 )
             )
@@ -105,7 +108,7 @@ class OutboxClient(InboxClient):
         self._hand_over(arrived)
         if arrived.qos1:
             numbers = (message.packet_id.to_bytes(2) for message in arrived.qos1)
-            self._put(b"".join(_PUBACK + number for number in numbers))
+            self._put(b"".join(map(puback_packet, numbers)))
 
     def _put(self, packets: bytes) -> None:
         packets = packets[self._written_at_once(packets) :]
@@ -154,25 +157,3 @@ class OutboxClient(InboxClient):
             self._loop.add_writer(sock.fileno(), self._write)
         else:
             self._room.set()
-
-
-def packet_of(
-    topic: str, payload: bytes, number: int | None = None, *, retain: bool = False
-) -> bytes:
-    """A PUBLISH (MQTT 3.1.1, section 3.3): at QoS 1 if it has a number, else at 0."""
-    name = topic.encode()
-    told = b"" if number is None else number.to_bytes(2)
-    kind = _PUBLISH | (_CONFIRMED if told else 0) | (_RETAIN if retain else 0)
-    size = 2 + len(name) + len(told) + len(payload)
-    head = bytes((kind,)), _length(size), len(name).to_bytes(2)
-    return b"".join((*head, name, told, payload))
-
-
-def _length(size: int) -> bytes:
-    """A remaining length: seven bits a byte, the lowest first (section 2.2.3)."""
-    parts = bytearray()
-    while size > 127:
-        parts.append(size & 127 | 128)
-        size >>= 7
-    parts.append(size)
-    return bytes(parts)

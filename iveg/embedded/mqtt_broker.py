@@ -18,8 +18,9 @@ from typing import Any
 from amqtt.broker import Broker
 
 from iveg.adapters.log_filter import quiet
+from iveg.adapters.mqtt_packets import publish_packet
 from iveg.embedded.loopback import require_loopback
-from iveg.embedded.mqtt_telemetry import BoundedWriter, PacketProtocol, publish_packet
+from iveg.embedded.mqtt_telemetry import BoundedWriter, PacketProtocol
 
 for _name in ("amqtt", "transitions"):
     # Both log every packet at INFO and DEBUG, which costs more than the packet.

@@ -13,9 +13,10 @@ from functools import lru_cache
 
 from amqtt.adapters import ReaderAdapter, StreamWriterAdapter
 
-_PLAIN = (0x30, 0x32)
+from iveg.adapters.mqtt_packets import PUBLISH, QOS_1, packet_bounds, puback_packet
+
+_PLAIN = (PUBLISH, PUBLISH | QOS_1)
 """PUBLISH at QoS 0 and 1, neither retained nor a duplicate."""
-_LONGEST_LENGTH = 4
 _FORBIDDEN = re.compile("^\\$|[+#\0\ufffd]")
 MOST_UNSENT = 512 << 10
 """Limit of the data pending for one slow client (bytes): a fifth of a second of ten
@@ -142,28 +143,12 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
             return
         self._take(topic, packet[end + 2 * qos :], qos, b"" if qos else packet)
         if qos:
-            writer.write(b"\x40\x02" + packet[end : end + 2])
+            writer.write(puback_packet(packet[end : end + 2]))
 
     def _hold(self) -> None:
         self._holding = True
         if self._line is not None:
             self._line.pause_reading()
-
-
-def packet_bounds(data: bytes, start: int) -> tuple[int, int]:
-    """Begin and end of the body of the packet at ``start``.
-
-    The end may be behind the data; both are 0 while the fixed header is incomplete.  A
-    fifth length byte is an error that amqtt reports: it gets the header alone.
-    """
-    length = shift = 0
-    at = start + 1
-    for byte in data[at : at + _LONGEST_LENGTH]:
-        length |= (byte & 0x7F) << shift
-        at, shift = at + 1, shift + 7
-        if byte < 0x80:
-            return at, at + length
-    return (at, at) if at == start + 1 + _LONGEST_LENGTH else (0, 0)
 
 
 @lru_cache(maxsize=2048)
@@ -193,21 +178,3 @@ class BoundedWriter(StreamWriterAdapter):  # type: ignore[misc]
             self.missed += 1
         elif not self.is_closed:
             self._line.write(packet)
-
-
-def publish_packet(topic: str, payload: bytes) -> bytes:
-    """One PUBLISH of QoS 0."""
-    name = topic.encode()
-    size = 2 + len(name) + len(payload)
-    length = bytearray()
-    while True:
-        size, low = divmod(size, 128)
-        length.append(low | (128 if size else 0))
-        if not size:
-            break
-    return b"\x30%b%b%b%b" % (
-        bytes(length),
-        len(name).to_bytes(2, "big"),
-        name,
-        payload,
-    )

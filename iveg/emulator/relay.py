@@ -11,6 +11,7 @@ from types import TracebackType
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.mqtt_packets import puback_packet
 from iveg.emulator.radio import Packet, Radio
 
 _PUBLISH = 3
@@ -169,5 +170,5 @@ async def read_packet(reader: asyncio.StreamReader) -> Packet:
     size = int.from_bytes(rest[:2], "big")
     topic = rest[2 : 2 + size].decode("utf-8", "replace")
     qos = head[0] >> 1 & 3
-    receipt = b"\x40\x02" + rest[2 + size : 4 + size] if qos == 1 else b""
+    receipt = puback_packet(rest[2 + size : 4 + size]) if qos == 1 else b""
     return Packet(topic, qos, head + rest, receipt)

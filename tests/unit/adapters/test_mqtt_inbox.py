@@ -19,7 +19,7 @@ from iveg.adapters.mqtt_inbox import (
     ReadAhead,
     sort_packets,
 )
-from iveg.embedded.mqtt_telemetry import publish_packet
+from iveg.adapters.mqtt_packets import publish_packet
 
 MANY = 300
 CONNACK = b"\x20\x02\x00\x00"

@@ -7,9 +7,10 @@ from contextlib import asynccontextmanager
 import aiomqtt
 import pytest
 
+from iveg.adapters.mqtt_packets import publish_packet
 from iveg.embedded import mqtt_telemetry
 from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
-from iveg.embedded.mqtt_telemetry import PacketReader, publish_packet
+from iveg.embedded.mqtt_telemetry import PacketReader
 
 CONNACK = b"\x20\x02\x00\x00"
 PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"
