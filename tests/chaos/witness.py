@@ -18,6 +18,8 @@ class Seen:
         allowed: Whether a person has resumed it since it last reported a hold.
         starts: Times it began to move; ``unlicensed`` those that nobody allowed.
         report: Boot and count of its newest report.
+        held_at: Its own clock at the first report of this hold (s).
+        moved: Boot and own clock of its newest odometry.
     """
 
     speed: float = 0.0
@@ -28,6 +30,8 @@ class Seen:
     factor: float = 0.0
     words: int = 0
     report: tuple[str | None, int] = (None, 0)
+    held_at: float = 0.0
+    moved: tuple[str | None, float] = (None, 0.0)
 
 
 @dataclass
@@ -75,7 +79,7 @@ class Witness:
             return
         for word in codec.read_measure(device, payload).observations:
             if isinstance(word, Odometry):
-                self._moves(self.of(word.robot_id), abs(word.twist.linear_x))
+                self._moves(self.of(word.robot_id), word)
             elif isinstance(word, SafetyReport):
                 self._reports(self.of(word.robot_id), word)
 
@@ -84,20 +88,27 @@ class Witness:
         boot, seq = report.origin.boot, report.origin.seq or 0
         if boot == seen.report[0] and seq <= seen.report[1]:
             return
+        held = any(hold.ack != "auto" for hold in report.holds)
+        if held and not (seen.held and boot == seen.report[0]):
+            seen.held_at = report.origin.own_s or 0.0
         seen.report = boot, seq
         seen.words += 1
         seen.factor = report.speed_factor
-        seen.held = any(hold.ack != "auto" for hold in report.holds)
-        self._forbid_at_rest(seen)
+        seen.held = held
 
-    def _forbid_at_rest(self, seen: Seen) -> None:
-        # Only a robot at rest: one that brakes has not been stopped yet.
-        if seen.held and seen.speed < LIMITS.standing_speed:
-            seen.allowed = False
+    def _moves(self, seen: Seen, word: Odometry) -> None:
+        """Motion by the robot's own clock: a report overtakes odometry that waits.
 
-    def _moves(self, seen: Seen, speed: float) -> None:
+        Only a robot that was at rest after it was held may not start: one that brakes
+        has not been stopped yet.
+        """
+        speed, at = abs(word.twist.linear_x), word.origin.own_s or 0.0
+        if word.origin.boot == seen.moved[0] and at <= seen.moved[1]:
+            return
+        seen.moved = word.origin.boot, at
         begins = seen.speed < LIMITS.standing_speed <= speed
         seen.starts += begins
         seen.unlicensed += begins and not seen.allowed
         seen.speed = speed
-        self._forbid_at_rest(seen)
+        if seen.held and at > seen.held_at and speed < LIMITS.standing_speed:
+            seen.allowed = False
