@@ -49,6 +49,7 @@ TOPICS: dict[str, type[Message]] = {
 Transforms come last: after a pause each datum then finds the transform that was
 published before it, though both arrive while the topics are being read.
 """
+_TREE = frozenset({"tf_static", "tf"})
 _UNREAD = frozenset(
     {
         (m.PoseWithCovariance, "covariance"),
@@ -144,6 +145,7 @@ class SensorInputs:
         self._stamps: dict[str, _Stamps] = {}
         self._newest: dict[str, bytes] = {}
         self._heard_at: dict[str, float] = {}
+        self._first_heard = float("inf")
         self._began: float | None = None
         self._here: _Here | None = None
         self._depths: deque[m.Image] = deque(maxlen=_PICTURES)
@@ -172,9 +174,10 @@ class SensorInputs:
     ) -> None:
         """Take pending messages of one of ``TOPICS``; ``most`` is its queue depth."""
         self._heard_at[topic] = now
+        self._first_heard = min(self._first_heard, now)
         if most and len(arrived) >= most:
             self.input_faults.note("flood", self._name(topic), now)
-        if topic in ("tf", "tf_static"):
+        if topic in _TREE:
             for one in arrived:
                 self._hear_transforms(topic, one, now)
         else:
@@ -192,6 +195,8 @@ class SensorInputs:
             self._began = now.mono
         found: list[Sensed] = []
         self._note_silence(now.mono)
+        if self._awaits_transforms(now.mono):
+            return found
         for topic, work in (
             ("odometry", self._odometry),
             ("scan", self._scan),
@@ -208,6 +213,15 @@ class SensorInputs:
                 found += self._attempt(topic, work, payload, now)
         found += self._grounded(now)
         return found
+
+    def _awaits_transforms(self, now: float) -> bool:
+        """Whether the first data stay pending, since transforms may follow at once.
+
+        DDS matches the topics of a base one after the other.
+        """
+        if self._heard_at.keys() >= _TREE:
+            return False
+        return now - self._first_heard <= self._tf_max_age_s
 
     def _attempt(
         self,

@@ -94,7 +94,11 @@ def look(*found: m.Detection3D, after: float = 0.0) -> m.Detection3DArray:
 
 
 class Bench:
-    """Senses that are told messages; by default all of TF is there."""
+    """Senses that are told messages; by default all of TF is there.
+
+    Args:
+        heard_for: Time since the first message of the base (s).
+    """
 
     def __init__(
         self,
@@ -102,8 +106,10 @@ class Bench:
         *,
         tree: bool = True,
         classes: tuple[str, ...] = (),
+        heard_for: float = 1.0,
     ) -> None:
         self.inputs = SensorInputs(config or RobotConfig(), classes)
+        self.hear("tf", tf(), -heard_for)
         if tree:
             self.hear("tf_static", tf(link("base_link", "laser", 0.3)))
             self.hear("tf", tf(link("map", "odom", 10.0)))

@@ -63,6 +63,29 @@ def test_without_a_transform_odometry_is_unplaced_and_the_link_is_named() -> Non
     assert bench.faults() == {"no_transform": "map → odom"}
 
 
+def test_the_first_data_wait_for_the_transforms_that_follow_them() -> None:
+    bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry(2.0))
+    early = bench.tick()
+
+    bench.hear("tf_static", tf()).hear("tf", tf(link("map", "odom", 10.0)), 0.1)
+    (found,) = bench.tick(0.1)
+
+    assert early == []
+    assert isinstance(found, Odometry)
+    assert bench.faults(0.1) == {}
+
+
+def test_the_first_data_wait_no_longer_than_a_transform_may_be_old() -> None:
+    bench = Bench(tree=False, heard_for=0.0).hear("odometry", said.odometry())
+
+    early = bench.tick(0.5)
+    (late,) = bench.tick(0.6)
+
+    assert early == []
+    assert isinstance(late, Unplaced)
+    assert bench.faults(0.6) == {"no_transform": "map → odom"}
+
+
 def test_an_old_transform_is_named_with_its_age_and_places_nothing() -> None:
     bench = Bench().hear("odometry", said.odometry(after=2.1), 2.1)
 
