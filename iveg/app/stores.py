@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iveg.adapters.contacts import FileContacts
-from iveg.adapters.history.engine import sqlite_file, sqlite_url
+from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.adapters.journal import FileJournal
@@ -39,7 +39,7 @@ class Stores:
 
 def open_stores(settings: Settings, data_directory: Path) -> Stores:
     """Open them; the directory is made where it is missing."""
-    url = settings.database_url or sqlite_url(data_directory / "iveg.sqlite")
+    url = history_url(settings.database_url, data_directory)
     database = sqlite_file(url)
     directory = data_directory if database is None else database.parent
     directory.mkdir(parents=True, exist_ok=True)

@@ -31,7 +31,7 @@ from iveg.adapters.doctor import (
     probe_device,
 )
 from iveg.adapters.fiware_http import FiwareHttp
-from iveg.adapters.history.engine import describe, sqlite_url
+from iveg.adapters.history.engine import describe, history_url
 from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.orion import OrionClient
 from iveg.cli.addresses import broker_of
@@ -100,7 +100,7 @@ class Examination:
         self._settings = settings
         self._patience_s = patience_s
         self._address = broker_of(settings)
-        self._database = settings.database_url or sqlite_url(data / "iveg.sqlite")
+        self._database = history_url(settings.database_url, data)
         self._orion = OrionClient(settings.orion_url, *service)
         self._agent = IotAgentClient(settings.iota_url, *service)
         self._page = FiwareHttp(

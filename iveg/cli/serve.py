@@ -9,7 +9,7 @@ from pathlib import Path
 
 import uvicorn
 
-from iveg.adapters.history.engine import sqlite_url
+from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app import Dss
 from iveg.asgi import create_app
@@ -77,13 +77,9 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
 async def _upgrade_history(settings: Settings, data: Path) -> None:
     """Upgrade the history; a newer or broken database ends the start."""
     try:
-        await asyncio.to_thread(upgrade, _database_url(settings, data))
+        await asyncio.to_thread(upgrade, history_url(settings.database_url, data))
     except HopError as error:
         _log.warning("the history starts without its database: %s", error)
-
-
-def _database_url(settings: Settings, data: Path) -> str:
-    return settings.database_url or sqlite_url(data / "iveg.sqlite")
 
 
 def _print_link(settings: Settings, dss: Dss) -> None:
@@ -93,6 +89,6 @@ def _print_link(settings: Settings, dss: Dss) -> None:
 def upgrade_database(settings: Settings, data: Path) -> int:
     """Upgrade the history's database to the newest schema."""
     data.mkdir(parents=True, exist_ok=True)
-    upgrade(_database_url(settings, data))
+    upgrade(history_url(settings.database_url, data))
     print("The database is up to date.")
     return 0

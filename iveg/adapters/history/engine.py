@@ -32,6 +32,11 @@ def sqlite_url(file: Path) -> str:
     return URL.create("sqlite", database=str(file)).render_as_string()
 
 
+def history_url(configured: str | None, data: Path) -> str:
+    """The address that is configured, else that of a file in the data folder."""
+    return configured or sqlite_url(data / "iveg.sqlite")
+
+
 def sqlite_file(database_url: str) -> Path | None:
     """The file that an address names; None when it is a server's.
 
