@@ -7,7 +7,7 @@ often and says so.  Times are monotonic (s); the news is new at every moment.
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.web.live.pacing import PICTURE_S, CreditWindow
+from iveg.web.live.pacing import SCREEN_FRAME_S, CreditWindow
 
 SECONDS = 12.0
 SETTLED = 6.0
@@ -52,7 +52,7 @@ def test_what_is_painted_is_no_older_than_two_frames_and_the_round_trip(
     frame_s: float, round_trip_s: float, says_so: bool
 ) -> None:
     # A screen faster than usual is sent no more than a usual one while it says nothing.
-    apart_s = max(frame_s, PICTURE_S)
+    apart_s = max(frame_s, SCREEN_FRAME_S)
     bound = frame_s + apart_s + round_trip_s + STEP
 
     within = round_trip_s / 2 if says_so else None

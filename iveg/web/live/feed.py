@@ -6,6 +6,7 @@ times a second cannot be read.
 """
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from iveg.domain.observations import Instant
@@ -91,18 +92,22 @@ class TelemetryFeed:
             if row is topics.ROBOT:
                 self._moved[topic] = None
                 self._robots.add(topic)
-                self._note(self._read_outs, topics.ROBOT_STATE.of(robot_id), READ_OUT_S)
+                self._note(self._read_outs, topics.ROBOT_STATE.of(robot_id), _next_beat)
             elif row.pace == "read-out":
-                self._note(self._read_outs, topic, READ_OUT_S)
+                self._note(self._read_outs, topic, _next_beat)
             else:
-                self._note(self._pictures, topic, PICTURE_S)
+                self._note(self._pictures, topic, _next_picture)
         self.window.gathers = len(self._robots) > FEW_ROBOTS
 
-    def _note(self, waiting: dict[str, float], topic: str, apart_s: float) -> None:
-        if topic in waiting:
-            return
-        told = self._told.get(topic)
-        waiting[topic] = -_INF if told is None else _next_after(told[1], apart_s)
+    def _note(
+        self,
+        waiting: dict[str, float],
+        topic: str,
+        next_after: Callable[[float], float],
+    ) -> None:
+        if topic not in waiting:
+            told = self._told.get(topic)
+            waiting[topic] = -_INF if told is None else next_after(told[1])
 
     def _due_at(self) -> float:
         """Earliest time of a waiting part; parts without room wait for credit."""
@@ -191,12 +196,15 @@ class _Frame:
         return b"".join((len(head).to_bytes(4, "little"), head, *bodies))
 
 
-def _next_after(told_at: float, apart_s: float) -> float:
-    """When a topic may be told again (monotonic, s).
+def _next_picture(told_at: float) -> float:
+    """When a scan or a detection frame may be told again (monotonic, s)."""
+    return told_at + PICTURE_S
+
+
+def _next_beat(told_at: float) -> float:
+    """When a read-out may be told again (monotonic, s).
 
     Read-outs go together, at the same moments to all browsers: what takes all robots
     and people is worked out once for all of them.
     """
-    if apart_s == PICTURE_S:
-        return told_at + apart_s
-    return (math.floor(told_at / apart_s + 1e-6) + 1) * apart_s
+    return (math.floor(told_at / READ_OUT_S + 1e-6) + 1) * READ_OUT_S

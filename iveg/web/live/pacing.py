@@ -23,7 +23,7 @@ BYTES: Final = 24_576
 """Of what is heavy in them (scans, detections, people): 0.2 s of a line of 1 Mbit/s."""
 GAP_S: Final = 0.004
 """Frames nearer to each other would cost more than the freshness that they bring."""
-PICTURE_S: Final = 0.015
+SCREEN_FRAME_S: Final = 0.015
 """Between frames of which none is painted yet: a little less than screens take, so
 that who is late for a picture is sent something newer before the next."""
 LONGEST_WAIT_S: Final = 0.1
@@ -84,11 +84,11 @@ class CreditWindow:
         Many on a long line, so that it is used; two while a page draws that takes
         longer than screens do: more would only keep it from drawing.
         """
-        least_s = PICTURE_S if self.gathers else GAP_S
+        least_s = SCREEN_FRAME_S if self.gathers else GAP_S
         if self._line_s is None:
             return max(least_s, self._round_trip_s / FRAMES)
         half_s = (self._round_trip_s - self._line_s) / 2
-        draws_s = half_s if half_s > PICTURE_S else 0.0
+        draws_s = half_s if half_s > SCREEN_FRAME_S else 0.0
         return max(least_s, self._line_s / FRAMES, draws_s)
 
     @property

@@ -7,7 +7,7 @@ from iveg.web.live.pacing import (
     FRAMES,
     GAP_S,
     LONGEST_WAIT_S,
-    PICTURE_S,
+    SCREEN_FRAME_S,
     CreditWindow,
 )
 
@@ -41,7 +41,7 @@ def test_what_is_painted_makes_room_for_as_much() -> None:
 def test_while_none_is_painted_there_is_a_frame_for_each_picture_of_a_screen() -> None:
     window = filled(1)
 
-    assert window.opens_at == NOW + PICTURE_S
+    assert window.opens_at == NOW + SCREEN_FRAME_S
 
 
 def test_of_few_robots_no_frame_waits_for_others() -> None:
@@ -130,7 +130,7 @@ def test_a_round_trip_that_becomes_short_again_is_forgotten() -> None:
 
     window.sent(0, now)
 
-    assert window.opens_at - now == pytest.approx(PICTURE_S)
+    assert window.opens_at - now == pytest.approx(SCREEN_FRAME_S)
 
 
 @pytest.mark.parametrize("word", [9, -1, 0, "1", True, 1.0, None, [1], 10**30])
