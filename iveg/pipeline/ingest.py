@@ -20,6 +20,7 @@ from iveg.domain.observations import (
     kind_of,
 )
 from iveg.pipeline.kinds import kind
+from iveg.pipeline.waiting import wait_set
 
 _log = logging.getLogger(__name__)
 
@@ -113,13 +114,7 @@ class Ingest:
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
-        # A timeout of asyncio costs more than most of what it would wait for.
-        timer = asyncio.get_running_loop().call_later(timeout_s, self._wake.set)
-        try:
-            await self._wake.wait()
-        finally:
-            timer.cancel()
-        self._wake.clear()
+        await wait_set(self._wake, timeout_s)
 
     def _make_room(self, stream: "_Stream | None") -> bool:
         """Drop the oldest of a stream; whether there is room for what comes.

@@ -10,6 +10,7 @@ from collections import Counter, deque
 from typing import Any
 
 from iveg.pipeline.topics import is_telemetry
+from iveg.pipeline.waiting import wait_set
 
 MAX_PENDING = 1000
 
@@ -30,14 +31,11 @@ class Subscriber:
         self.pending: deque[tuple[str, Any]] = deque()
         self.overflowed = False
         self.wants_telemetry = True
-        self._is_awake = False
-        self._sleep: asyncio.Future[None] | None = None
+        self._awake = asyncio.Event()
 
     def wake(self) -> None:
         """Signal that there is something to take."""
-        self._is_awake = True
-        if self._sleep is not None and not self._sleep.done():
-            self._sleep.set_result(None)
+        self._awake.set()
 
     def changed(self, topic: str) -> None:
         """Mark a state topic as changed."""
@@ -58,21 +56,8 @@ class Subscriber:
         self.wake()
 
     async def news(self, within_s: float | None = None) -> None:
-        """Wait until there may be something to take, or for that long (s).
-
-        Some hundred times a second and browser, so a timer and no ``timeout``.
-        """
-        if not self._is_awake:
-            loop = asyncio.get_running_loop()
-            self._sleep = loop.create_future()
-            timer = None if within_s is None else loop.call_later(within_s, self.wake)
-            try:
-                await self._sleep
-            finally:
-                self._sleep = None
-                if timer is not None:
-                    timer.cancel()
-        self._is_awake = False
+        """Wait until there may be something to take, or for that long (s)."""
+        await wait_set(self._awake, within_s)
 
     def take_events(self) -> list[tuple[str, Any]]:
         """Every event since the last time, in order."""
