@@ -247,9 +247,9 @@ class HealthMonitor:
     def _notifications(self, now: Instant, *, blind: bool) -> HopHealth:
         age = _age(self.notified_at, now)
         state = self._by_age(age, now)
-        if state == "ok" and (self.notified_at or 0.0) < self.orion_back_at:
-            return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
         if state == "ok":
+            if (self.notified_at or 0.0) < self.orion_back_at:
+                return HopHealth(Hop.NOTIFICATIONS, "unknown", age)
             missed: HopState = "down" if self.notify_error else "ok"
             return HopHealth(Hop.NOTIFICATIONS, missed, age, self.notify_error)
         if blind:

@@ -79,7 +79,7 @@ class StopJournal(Protocol):
     ) -> None:
         """Write down that a release is about to name these STOPs; likewise.
 
-        The robot is still to stand: only ``wanted`` with ``run`` ends that.
+        The robot is still to stand: only a desired state of ``run`` ends that.
         """
 
 

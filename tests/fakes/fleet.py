@@ -9,7 +9,7 @@ from iveg.domain.feedback import Feedback
 
 
 class FakeFleet:
-    """Implements ``pipeline.ports.Fleet``.
+    """Implements ``pipeline.ports.FleetPort``.
 
     Attributes:
         told: Feedback in the order it was offered.
