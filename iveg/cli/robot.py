@@ -14,6 +14,7 @@ from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.mqtt import MqttLink
 from iveg.cli.addresses import broker_of
+from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK, report_ready, run_until_stopped
 from iveg.domain.errors import (
@@ -92,6 +93,7 @@ async def _ride(
         )
         if options.attended:
             robot.node.release_locally()
+        tune_garbage_collection()
         running = asyncio.create_task(robot.run(), name=f"robot-{options.id}")
         try:
             report_ready()
