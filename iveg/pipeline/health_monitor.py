@@ -110,7 +110,6 @@ class HealthMonitor:
         self.stored_at: float | None = None
         self.notified_at: float | None = None
         self.probe = ProbeLag()
-        self._last_return: float | None = None
         self._gap_s = 0.0
         self.database: HopState = "unknown"
         self.earlier_read = False
@@ -123,9 +122,9 @@ class HealthMonitor:
 
     def received(self, origin: Origin, now: Instant) -> None:
         """A probe has come back as a notification."""
-        if self._last_return is not None:
-            self._gap_s = now.mono - self._last_return
-        self._last_return = now.mono
+        if self.received_at is not None:
+            self._gap_s = now.mono - self.received_at
+        self.received_at = now.mono
         self.probe.returned(origin, now)
 
     def stored(self, origin: Origin) -> None:

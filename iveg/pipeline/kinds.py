@@ -60,7 +60,7 @@ class Kind:
         ordered: By the robot's own count, or by arrival.
         may_drop: Whether the oldest gives way when more comes than can be taken.
         lands: Member of ``RobotState`` or ``World`` that keeps the newest; None for an
-            event, which the machine of its command takes.
+            event: the machine of its command or the health monitor takes it.
         touches: Topics that are new with it; those of detections depend on what is
             seen, those of a command on the machine.
         direct: From which scope on it is read straight from MQTT; ``off`` never.
@@ -109,7 +109,7 @@ KINDS = (
     Kind(CommandStatus, ordered="by arrival", lands="command_status"),
     Kind(CommandAnswer, may_drop=False, lands=None, direct="safety", qos=1),
     Kind(Climate, ordered="by arrival", lands="climate", touches=(topics.CLIMATE,)),
-    Kind(HeartbeatProbe, ordered="by arrival", lands="heartbeat_at"),
+    Kind(HeartbeatProbe, ordered="by arrival", lands=None),
     Kind(
         Battery,
         touches=(topics.ROBOT,),

@@ -119,7 +119,6 @@ class RuleLoop:
             self._latency.tick(now)
 
     def _watch_chain(self, now: Instant) -> None:
-        self._health_monitor.received_at = self._evaluator.world.heartbeat_at
         self._health_monitor.database = self._database_state()
         changed = False
         for hop in self._health_monitor.hops(now):
