@@ -62,7 +62,6 @@ class World:
         }
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
-        self.heartbeat_at: float | None = None
         self.counters: Counter[str] = Counter()
         self.feeds = Feeds()
 
@@ -131,8 +130,6 @@ class World:
         """Observations without a robot."""
         if isinstance(observation, Climate):
             self.climate, self.climate_received = observation, at
-        else:
-            self.heartbeat_at = at.mono
 
     def refuses(self, received: Received) -> bool:
         """Whether a message calls itself a replay while its robot is live.

@@ -345,7 +345,6 @@ def test_climate_and_heartbeat_belong_to_no_robot() -> None:
 
     assert world.climate == Climate(21.5)
     assert world.climate_received == START
-    assert world.heartbeat_at == START.mono
 
 
 def test_an_unreadable_detection_is_remembered_with_its_moment() -> None:
