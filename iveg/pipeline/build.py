@@ -135,7 +135,8 @@ def build(
 ) -> Pipeline:
     """All parts, wired."""
     start, hub = ports.clock(), Hub()
-    event_log, health_monitor = EventLog(hub, ports.sink, start), HealthMonitor(start)
+    event_log = EventLog(hub, ports.sink, start)
+    health_monitor = HealthMonitor(start, ports.history_state)
     world = World(fleet, health_monitor.probe)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
@@ -176,7 +177,6 @@ def build(
         event_log,
         hub,
         ports.clock,
-        ports.history_state,
         latency,
     )
     return Pipeline(

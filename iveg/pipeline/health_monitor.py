@@ -11,6 +11,7 @@ F4).  The last place where it was seen tells which hop lost it::
 A hop behind a broken one is unknown, never reported as the cause.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -75,6 +76,10 @@ class Pace:
 class HealthMonitor:
     """Collects the evidence about each hop.
 
+    Args:
+        start: When iVeg started.
+        database: The recorder's state.
+
     Attributes:
         mqtt_connected: Whether our own connection to the broker stands.
         mqtt_error: Why the broker did not confirm the last probe.
@@ -91,12 +96,14 @@ class HealthMonitor:
         stored_at: When the newest probe that Orion has was sent (s, monotonic).
         notified_at: When the newest notification of any kind came (s, monotonic).
         probe: How far the whole chain is behind.
-        database: The recorder's state.
         earlier_read: Whether what earlier runs left in the history is taken up.
     """
 
-    def __init__(self, start: Instant) -> None:
+    def __init__(
+        self, start: Instant, database: Callable[[], HopState] = lambda: "unknown"
+    ) -> None:
         self._start = start
+        self._database = database
         self.mqtt_connected = False
         self._was_connected = False
         self.mqtt_error = ""
@@ -111,7 +118,6 @@ class HealthMonitor:
         self.notified_at: float | None = None
         self.probe = ProbeLag()
         self._gap_s = 0.0
-        self.database: HopState = "unknown"
         self.earlier_read = False
 
     # --- the heartbeat probe --------------------------------------------------------
@@ -145,7 +151,7 @@ class HealthMonitor:
             agent,
             orion,
             self._notifications(now, blind=blind or mqtt.state == "down"),
-            HopHealth(Hop.DATABASE, self.database),
+            HopHealth(Hop.DATABASE, self._database()),
         ]
 
     def earlier(self, now: Instant) -> Earlier:

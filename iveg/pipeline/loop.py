@@ -4,7 +4,7 @@ If this loop hangs, feedback stops and every robot slows down by itself (fault F
 """
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from iveg.domain.events import LogEvent
 from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Instant, Received
@@ -47,7 +47,6 @@ class RuleLoop:
         event_log: EventLog,
         hub: Hub,
         clock: Clock,
-        database_state: Callable[[], HopState],
         latency: LatencyMonitor,
     ) -> None:
         self._ingest = ingest
@@ -57,7 +56,6 @@ class RuleLoop:
         self._event_log = event_log
         self._hub = hub
         self._clock = clock
-        self._database_state = database_state
         self._latency = latency
         self._ticked = float("-inf")
         self._health_at = float("-inf")
@@ -119,7 +117,6 @@ class RuleLoop:
             self._latency.tick(now)
 
     def _watch_chain(self, now: Instant) -> None:
-        self._health_monitor.database = self._database_state()
         changed = False
         for hop in self._health_monitor.hops(now):
             if hop.state == self._states.get(hop.name):

@@ -17,12 +17,11 @@ def hop(health_monitor: HealthMonitor, name: str, now: float) -> HopHealth:
 
 
 def healthy(now: float) -> HealthMonitor:
-    health_monitor = HealthMonitor(START)
+    health_monitor = HealthMonitor(START, lambda: "ok")
     health_monitor.mqtt_connected = True
     health_monitor.orion_ok_at = health_monitor.received_at = (
         health_monitor.notified_at
     ) = at(now).mono
-    health_monitor.database = "ok"
     return health_monitor
 
 

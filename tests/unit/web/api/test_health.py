@@ -13,7 +13,6 @@ def whole(desk: WebDesk) -> WebDesk:
     desk.health_monitor.orion_ok_at = desk.health_monitor.received_at = (
         desk.health_monitor.notified_at
     ) = now
-    desk.health_monitor.database = "ok"
     return desk
 
 
