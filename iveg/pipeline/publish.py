@@ -75,11 +75,6 @@ class Subscriber:
         """The topics that changed and are paced."""
         return _taken(self.telemetry)
 
-    async def take(self) -> tuple[list[tuple[str, Any]], list[str]]:
-        """Wait for news; returns events in order and the topics that changed."""
-        await self.news()
-        return self.take_events(), self.take_topics() + self.take_telemetry()
-
 
 def _taken(topics: dict[str, None]) -> list[str]:
     taken = list(topics)

@@ -16,9 +16,9 @@ async def test_the_loop_takes_what_waits_without_being_called() -> None:
 
     browser = desk.hub.join()
     async with asyncio.timeout(30):
-        _, topics = await browser.take()
+        await browser.news()
 
-    assert "robots/AGI" in topics
+    assert "robots/AGI" in browser.take_telemetry()
 
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)
@@ -100,17 +100,15 @@ async def test_health_is_told_every_second() -> None:
 # --- to whom it may concern -------------------------------------------------------
 
 
-async def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
+def test_a_browser_gets_the_newest_of_each_topic_and_every_event() -> None:
     hub = Desk().hub
     browser = hub.join()
     for number in range(3):
         hub.changed("robots/AGI")
         hub.append("log", number)
 
-    events, topics = await browser.take()
-
-    assert events == [("log", 0), ("log", 1), ("log", 2)]
-    assert topics == ["robots/AGI"]
+    assert browser.take_events() == [("log", 0), ("log", 1), ("log", 2)]
+    assert browser.take_telemetry() == ["robots/AGI"]
 
 
 async def test_a_browser_that_lets_events_pile_up_is_marked_and_keeps_no_more() -> None:
