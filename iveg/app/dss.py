@@ -264,7 +264,7 @@ class Dss:
             day = clock.now().wall - WINDOW_S["24h"]
             measured = await queries.latency_minutes(day)
             # A day of twenty robots is half a million rows: not in the loop's thread.
-            parts.latency.remember(await asyncio.to_thread(hours_of, measured))
+            parts.latency.watch.remember(await asyncio.to_thread(hours_of, measured))
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         """A part that must live has died: say so and stop; the robots slow down."""

@@ -8,7 +8,7 @@ from iveg.domain.latency.overloads import Remark
 from iveg.domain.latency.segments import DATA, SEGMENTS, Data, Segment
 from iveg.domain.latency.sketch import Sketch, merged, read_bins, write_bins
 from iveg.domain.latency.watch import LatencyWatch, Measured
-from iveg.domain.observations import Instant, Received
+from iveg.domain.observations import Instant
 from iveg.domain.records import LatencyRecord
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.record import RecordSink
@@ -18,7 +18,11 @@ _QUIET_S = 10.0
 
 
 class LatencyMonitor:
-    """Hands messages to the watch, and its findings to history and log."""
+    """Hands the findings of the watch to history and log.
+
+    Attributes:
+        watch: Where the time goes.
+    """
 
     def __init__(
         self, watch: LatencyWatch, sink: RecordSink, event_log: EventLog
@@ -28,10 +32,6 @@ class LatencyMonitor:
         self._event_log = event_log
         self._told: dict[str, float] = {}
 
-    def decided(self, taken: Iterable[Received], now: Instant) -> None:
-        """Note messages that became part of the state and were judged."""
-        self.watch.decided(taken, now)
-
     def tick(self, now: Instant) -> None:
         """Let time pass."""
         self.watch.tick(now)
@@ -40,10 +40,6 @@ class LatencyMonitor:
         self.watch.ended.clear()
         for remark in self.watch.overloads.remarks:
             self._tell(remark, now)
-
-    def remember(self, hours: Iterable[Measured]) -> None:
-        """Restore the hours that ``hours_of`` made of the history."""
-        self.watch.remember(hours)
 
     def _tell(self, remark: Remark, now: Instant) -> None:
         """Log a remark once, for as long as it lasts."""

@@ -107,7 +107,7 @@ class RuleLoop:
         if judges:
             self._evaluator.settle()
         if self._taken and not self._evaluator.is_unjudged:
-            self._latency.decided(self._taken, self._clock())
+            self._latency.watch.decided(self._taken, self._clock())
             self._taken.clear()
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono

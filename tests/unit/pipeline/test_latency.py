@@ -67,7 +67,7 @@ async def test_a_minute_goes_to_the_history_and_comes_back_from_it() -> None:
 
     kept = desk.records(LatencyRecord)
     later = Desk()
-    later.latency.remember(hours_of(kept))
+    later.latency.watch.remember(hours_of(kept))
 
     assert {one.hop for one in kept} == {"uplink", "fiware", "robot_orion", "iveg"}
     day = later.latency.watch.streams[0].segments["fiware"].parts("24h")
