@@ -16,7 +16,6 @@ import logging
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from iveg.domain.alerts.alert_book import Alert
 from iveg.domain.errors import HopError
@@ -29,7 +28,7 @@ from iveg.domain.messages import (
     Delivery,
     Message,
 )
-from iveg.domain.observations import Instant
+from iveg.pipeline.alerting import Alerting
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock, ContactStore, MessageSender
 
@@ -42,15 +41,6 @@ REST_S = 30.0
 TRIES = 3
 LIMIT_S = 15.0
 """For one message to everybody of a channel, however slowly a server answers."""
-
-
-class DeliveryLog(Protocol):
-    """Storage of the results of messages: the alerts."""
-
-    def told(
-        self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
-    ) -> None:
-        """Write it down beside one occurrence."""
 
 
 class Messenger:
@@ -67,7 +57,7 @@ class Messenger:
         contacts: Contacts,
         store: ContactStore,
         senders: Mapping[Channel, MessageSender],
-        told: DeliveryLog,
+        alerts: Alerting,
         event_log: EventLog,
         clock: Clock,
         rest_s: float = REST_S,
@@ -78,7 +68,7 @@ class Messenger:
         self.counters: Counter[str] = Counter()
         self._store = store
         self._senders = senders
-        self._told = told
+        self._alerts = alerts
         self._event_log = event_log
         self._clock = clock
         self._rest_s = rest_s
@@ -150,7 +140,7 @@ class Messenger:
     async def _deliver(self, channel: Channel, items: Sequence[AlertItem]) -> None:
         deliveries = await self._send(channel, Message(items))
         for item in items:
-            self._told.told(item.alert_id, item.raised, deliveries)
+            self._alerts.told(item.alert_id, item.raised, deliveries)
         if deliveries and all(one.failed for one in deliveries):
             for item in items:
                 if item.tries + 1 < TRIES:

@@ -3,20 +3,14 @@
 import asyncio
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Protocol
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import OutdatedError
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.observations import Instant
+from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import RuleStore
-
-
-class Judge(Protocol):
-    """The part that applies the rule: the assessor."""
-
-    rule: DetectionRule
 
 
 class Rules:
@@ -28,21 +22,21 @@ class Rules:
 
     def __init__(
         self,
-        judge: Judge,
+        evaluator: Evaluator,
         store: RuleStore,
         event_log: EventLog,
         past: Iterable[DetectionRule],
     ) -> None:
-        self._judge = judge
+        self._evaluator = evaluator
         self._store = store
         self._event_log = event_log
         self._one_by_one = asyncio.Lock()
-        self.versions = [*past] or [judge.rule]
+        self.versions = [*past] or [evaluator.rule]
 
     @property
     def current(self) -> DetectionRule:
         """The version in force."""
-        return self._judge.rule
+        return self._evaluator.rule
 
     async def change(
         self, wanted: DetectionRule, by: str, at: Instant, seen: int | None = None
@@ -71,7 +65,7 @@ class Rules:
                 since=at.wall,
             )
             await self._store.append(rule)
-            self._judge.rule = rule
+            self._evaluator.rule = rule
             self.versions.append(rule)
         self._event_log.rule(_line(before, rule), at)
         return rule
