@@ -32,24 +32,24 @@ class OdometryThinner:
     that was set) starts a new period rather than silencing the robot.
     """
 
-    def __init__(self, period_s: float = ODOMETRY_PERIOD_S) -> None:
-        self._period_s = period_s
+    def __init__(self) -> None:
         self._last: dict[str, OdometryRecord] = {}
 
     def take(self, record: OdometryRecord) -> OdometryRecord | None:
         """The record if it is worth keeping, else None."""
         last = self._last.get(record.robot_id)
-        if last is not None and not self._tells_more(last, record):
+        if last is not None and not _tells_more(last, record):
             return None
         self._last[record.robot_id] = record
         return record
 
-    def _tells_more(self, last: OdometryRecord, record: OdometryRecord) -> bool:
-        said = (last.limit_factor, last.applied_factor, last.link)
-        if said != (record.limit_factor, record.applied_factor, record.link):
-            return True
-        # Robots tick at 10 or 20 Hz: half a tick early must not wait a whole tick more.
-        return not 0.0 <= record.at - last.at < 0.95 * self._period_s
+
+def _tells_more(last: OdometryRecord, record: OdometryRecord) -> bool:
+    said = (last.limit_factor, last.applied_factor, last.link)
+    if said != (record.limit_factor, record.applied_factor, record.link):
+        return True
+    # Robots tick at 10 or 20 Hz: half a tick early must not wait a whole tick more.
+    return not 0.0 <= record.at - last.at < 0.95 * ODOMETRY_PERIOD_S
 
 
 @dataclass(frozen=True, slots=True)
