@@ -108,7 +108,6 @@ def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
         EventLog(hub, Sink(), start),
         hub,
         lambda: f"{next(numbers):026d}",
-        codec.format_stamp,
         "bench",
     )
 

@@ -149,7 +149,6 @@ async def delays(robots: int, seconds: float, *, direct: bool) -> list[float]:
         Sink(),
         clock.now,
         new_id,
-        codec.format_stamp,
     )
     parts = build(fleet, greenhouse, ports, Choices())
     mapper = Mapper(parts.world, greenhouse.bounds)

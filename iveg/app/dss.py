@@ -36,7 +36,6 @@ from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.experiment.runner import ExperimentRunner
-from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.loop import reading_apart_s
@@ -150,7 +149,6 @@ class Dss:
             recorder,
             clock.now,
             new_id,
-            format_stamp,
             self._rejected,
             lambda: recorder.health(clock.now()).state,
         )

@@ -28,7 +28,6 @@ from iveg.experiment.beliefs import Belief, belief_of
 from iveg.experiment.plan import ROBOTS, PlannedRun
 from iveg.experiment.scoring import Pair, Picture, SeenObject
 from iveg.experiment.stage import STEP_S, Stage, heard
-from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.mapping import Mapper
 from iveg.web.views import Views
@@ -151,7 +150,6 @@ class VirtualRun:
             outside,
             lambda: self._now,
             lambda: f"{next(ids):026d}",
-            format_stamp,
         )
         parts = build(load_fleet(words=ROBOTS), greenhouse, ports, Choices(rule))
         self._parts = parts

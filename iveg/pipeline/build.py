@@ -48,7 +48,6 @@ class Ports:
         sink: The history.
         clock: Reads both clocks.
         new_id: A new id, sortable by time.
-        stamp: Writes a time (Unix s) as robots read it.
         rejected: Called for each new kind of unusable message.
         history_state: State of the history.
         agent_lag_s: How far the IoT Agent is behind; None asks the probe.
@@ -61,7 +60,6 @@ class Ports:
     sink: RecordSink
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
-    stamp: Callable[[float], str]
     rejected: Callable[[str, str], None] | None = None
     history_state: Callable[[], HopState] = lambda: "ok"
     agent_lag_s: Callable[[Instant], float | None] | None = None
@@ -151,7 +149,6 @@ def build(
         event_log,
         hub,
         ports.new_id,
-        ports.stamp,
         choices.boot,
         health_monitor.probe.lag,
     )

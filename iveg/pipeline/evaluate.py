@@ -50,7 +50,6 @@ class Evaluator:
     """Keeps the world and decides for the fleet.
 
     Args:
-        stamp: Writes a wall-clock moment the way the wire does.
         boot: Random, new at each start: identity of our feedback.
 
     Attributes:
@@ -66,7 +65,6 @@ class Evaluator:
         event_log: EventLog,
         hub: Hub,
         new_id: Ids,
-        stamp: Callable[[float], str],
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
     ) -> None:
@@ -88,7 +86,7 @@ class Evaluator:
         self._staleness = Staleness(world, self.people, greenhouse, event_log, hub)
         other = self.tracking.other
         self._feedback_publisher = FeedbackPublisher(
-            world, self.people, other, fleet, stamp, boot, backlog
+            world, self.people, other, fleet, boot, backlog
         )
         self._event_log = event_log
         self._hub = hub

@@ -6,6 +6,7 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.observations import Instant, Origin
 from iveg.domain.robot_state import RobotState
+from iveg.domain.stamps import format_stamp
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.pipeline.ports import FleetPort
@@ -24,7 +25,6 @@ class FeedbackPublisher:
 
     Args:
         other: When each robot's newest confident object of another class came.
-        stamp: Writes a wall-clock moment the way the wire does.
         boot: Random, new at each start: identity of our feedback.
         backlog: How far Orion is behind (s); None where nobody knows.
     """
@@ -35,7 +35,6 @@ class FeedbackPublisher:
         people: People,
         other: Mapping[str, Instant],
         fleet: FleetPort,
-        stamp: Callable[[float], str],
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
     ) -> None:
@@ -44,7 +43,6 @@ class FeedbackPublisher:
         self._people = people
         self._other = other
         self._fleet = fleet
-        self._stamp = stamp
         self._boot = boot
         self._backlog = backlog
         self._seq = 0
@@ -90,12 +88,12 @@ class FeedbackPublisher:
         mine = [one for one in alerts if one.observer == robot.robot_id]
         newest = max(mine, key=lambda one: one.stamp, default=None)
         if newest is None and robot.robot_id in self._other:
-            stamp = self._stamp(self._other[robot.robot_id].wall)
+            stamp = format_stamp(self._other[robot.robot_id].wall)
             newest = FeedbackAlert("", stamp)
         odometry = None if robot.is_replay else robot.odometry
         return Feedback(
             robot.robot_id,
-            Origin(self._boot, self._seq, self._stamp(now.wall)),
+            Origin(self._boot, self._seq, format_stamp(now.wall)),
             newest,
             alerts,
             None if odometry is None else odometry.pose,
@@ -114,7 +112,7 @@ class FeedbackPublisher:
                     continue
                 yield FeedbackAlert(
                     person.decision_id,
-                    self._stamp(sighting.at.wall),
+                    format_stamp(sighting.at.wall),
                     person.class_,
                     sighting.class_id,
                     sighting.confidence,

@@ -17,7 +17,6 @@ from iveg.domain.observations import (
 )
 from iveg.domain.stop import Command
 from iveg.domain.transports import DIRECT, FIWARE, Transport, TransportId
-from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.build import Choices, Ports, build
 from iveg.pipeline.ports import CommandPort
 from tests.builders import (
@@ -73,7 +72,6 @@ class Desk:
                 self.sink,
                 self.clock,
                 self.ids,
-                format_stamp,
                 lambda source, reason: self.rejected.append((source, reason)),
                 agent_lag_s=lambda _: self.lag_s,
                 fiware_is_cut=lambda _: self.is_cut,
