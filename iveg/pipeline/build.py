@@ -50,7 +50,6 @@ class Ports:
         new_id: A new id, sortable by time.
         rejected: Called for each new kind of unusable message.
         history_state: State of the history.
-        agent_lag_s: How far the IoT Agent is behind; None asks the probe.
         fiware_is_cut: Whether orders get nowhere there; None asks the health monitor.
     """
 
@@ -60,9 +59,8 @@ class Ports:
     sink: RecordSink
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
-    rejected: Callable[[str, str], None] | None = None
+    rejected: Callable[[str, str], None] = lambda _source, _reason: None
     history_state: Callable[[], HopState] = lambda: "ok"
-    agent_lag_s: Callable[[Instant], float | None] | None = None
     fiware_is_cut: Callable[[Instant], bool] | None = None
 
 
@@ -163,7 +161,7 @@ def build(
         ports.new_id,
         ports.clock,
         drills=choices.drills,
-        agent_lag_s=ports.agent_lag_s or health_monitor.probe.lag,
+        agent_lag_s=health_monitor.probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and fiware_is_cut(at),
     )
     loop = RuleLoop(

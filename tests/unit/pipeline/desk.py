@@ -49,7 +49,6 @@ class Desk:
         also: Mapping[Transport, CommandPort] | None = None,
     ) -> None:
         self.clock = FakeClock()
-        self.lag_s: float | None = None
         self.is_cut = False
         self.fleet = FakeFleet()
         self.broker = FakeContextBroker()
@@ -73,7 +72,6 @@ class Desk:
                 self.clock,
                 self.ids,
                 lambda source, reason: self.rejected.append((source, reason)),
-                agent_lag_s=lambda _: self.lag_s,
                 fiware_is_cut=lambda _: self.is_cut,
             ),
             Choices(),
@@ -89,6 +87,11 @@ class Desk:
         self.seq = 0
 
     # --- what arrives -------------------------------------------------------------
+
+    def lag(self, seconds: float) -> None:
+        """The newest heartbeat probe has been out for so long."""
+        left = self.clock().later(-seconds)
+        self.health_monitor.sent(Origin("iveg", 1), left)
 
     def hear(
         self,

@@ -382,7 +382,7 @@ async def test_an_order_remembers_how_far_the_agent_was_behind_when_it_left() ->
     desk = Desk()
     command = await press(desk)
     await desk.stand()
-    desk.lag_s = 12.0
+    desk.lag(12.0)
 
     once = await desk.commander.release(
         "AGI", [command.command_id], "ana", desk.clock()

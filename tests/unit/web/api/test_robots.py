@@ -129,18 +129,17 @@ async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
 @pytest.mark.parametrize(
     ("direct", "lag_s", "key"),
     [
-        (True, None, None),
         (True, 0.4, None),
         (True, 12.34, "stop.note.direct"),
         (False, 12.34, "stop.note.fiware"),
     ],
 )
 async def test_an_order_says_what_a_late_agent_means_for_it(
-    direct: bool, lag_s: float | None, key: str | None
+    direct: bool, lag_s: float, key: str | None
 ) -> None:
     desk = WebDesk()
     desk.fleet.fails = not direct
-    desk.lag_s = lag_s
+    desk.lag(lag_s)
     await desk.commander.stop(["AGI"], "ana", desk.clock())
     await settle()
 
