@@ -41,7 +41,7 @@ class Ingest:
     def __init__(
         self,
         known: Callable[[str], bool],
-        rejected: Callable[[str, str], None] | None = None,
+        rejected: Callable[[str, str], None] = lambda _source, _reason: None,
         is_past: Callable[[str, type[Observation], str, int], bool] = lambda *_: False,
         passed: Callable[[Received], None] = lambda _: None,
     ) -> None:
@@ -97,8 +97,7 @@ class Ingest:
             return
         self._told.add(key)
         _log.warning("rejected from %s: %s %s", source, reason, detail)
-        if self._rejected is not None:
-            self._rejected(source, reason)
+        self._rejected(source, reason)
 
     @property
     def waiting(self) -> int:
