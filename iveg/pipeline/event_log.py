@@ -33,9 +33,8 @@ from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
 
 _KEPT_LINES = 500
-CLIMATE_PERIOD_S = 60.0
-"""Air changes slowly: a day is 1,440 rows."""
 READING_PERIOD_S = 60.0
+"""Air and batteries change slowly: a day is 1,440 rows."""
 _NOT_VALUES = ("robot_id", "origin")
 
 
@@ -50,8 +49,8 @@ class EventLog:
         self._hub = hub
         self._sink = sink
         self._thinner = OdometryThinner()
-        self._climate_kept: float | None = None
-        self._readings_kept: dict[tuple[str, type[Observation]], float] = {}
+        # The last reading of each robot and kind; the air is of no robot.
+        self._kept: dict[tuple[str, type[Observation]], float] = {}
         # Starting at the clock keeps ids growing over restarts without asking anyone.
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
@@ -217,27 +216,21 @@ class EventLog:
 
     def climate(self, read: Climate, at: Instant) -> None:
         """Record a climate reading, once a minute."""
-        # Devices that send every minute are late as often as early.
-        kept = self._climate_kept
-        if kept is not None and at.mono - kept < 0.9 * CLIMATE_PERIOD_S:
-            return
-        self._climate_kept = at.mono
-        self._sink.offer(
-            ClimateRecord(
-                at=at.wall,
-                temperature=read.temperature,
-                relative_humidity=read.relative_humidity,
-                co2=read.co2,
+        if self._is_due("", Climate, at):
+            self._sink.offer(
+                ClimateRecord(
+                    at=at.wall,
+                    temperature=read.temperature,
+                    relative_humidity=read.relative_humidity,
+                    co2=read.co2,
+                )
             )
-        )
 
     def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
         """Record a reading of a small sensor, once a minute for each."""
         kind = type(read)
-        kept = self._readings_kept.get((robot_id, kind))
-        if kept is not None and at.mono - kept < 0.9 * READING_PERIOD_S:
+        if not self._is_due(robot_id, kind, at):
             return
-        self._readings_kept[robot_id, kind] = at.mono
         own = (one.name for one in fields(read) if one.name not in _NOT_VALUES)
         self._sink.offer(
             ReadingRecord(
@@ -247,6 +240,15 @@ class EventLog:
                 value={name: getattr(read, name) for name in own},
             )
         )
+
+    def _is_due(self, robot_id: str, kind: type[Observation], at: Instant) -> bool:
+        """Whether a minute has passed since the last one; the next counts from now."""
+        kept = self._kept.get((robot_id, kind), float("-inf"))
+        # Devices that send every minute are late as often as early.
+        is_due = at.mono - kept >= 0.9 * READING_PERIOD_S
+        if is_due:
+            self._kept[robot_id, kind] = at.mono
+        return is_due
 
     def alert(self, alert: Alert) -> None:
         """Record an alert that was raised, acknowledged or cleared."""
