@@ -98,15 +98,14 @@ class Telling:
 
 def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
     """The rule with everything round it but the network and the disk."""
-    hub, numbers = Hub(), itertools.count()
+    numbers = itertools.count()
     start = Instant(0.0, WALL)
     return Evaluator(
         World(load_fleet(words=robots)),
         load_greenhouse("agroconnect"),
         DetectionRule(),
         fleet,
-        EventLog(hub, Sink(), start),
-        hub,
+        EventLog(Hub(), Sink(), start),
         lambda: f"{next(numbers):026d}",
         "bench",
     )

@@ -11,7 +11,6 @@ from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.log_messages import alert_line, flood_line
 from iveg.pipeline.ports import Ids
-from iveg.pipeline.publish import Hub
 
 
 class Alerting:
@@ -21,10 +20,9 @@ class Alerting:
         on_raised: Given every alert that is raised; must neither wait nor fail.
     """
 
-    def __init__(self, event_log: EventLog, hub: Hub, new_id: Ids) -> None:
+    def __init__(self, event_log: EventLog, new_id: Ids) -> None:
         self.on_raised: Callable[[Sequence[Alert]], None] = lambda _: None
         self._event_log = event_log
-        self._hub = hub
         self._new_id = new_id
         self._book = AlertBook()
         self._gauge = FloodGauge()
@@ -46,7 +44,7 @@ class Alerting:
     def remember(self, earlier: Iterable[Alert]) -> None:
         """Take up unacknowledged alerts of an earlier run."""
         self._book.remember(one for one in earlier if not self.knows(one.alert_id))
-        self._hub.changed(topics.ALERTS.name)
+        self._event_log.changed(topics.ALERTS.name)
 
     def sync(self, wrong: Iterable[Condition], now: Instant) -> None:
         """Take the conditions that hold now."""
@@ -88,7 +86,7 @@ class Alerting:
         after = self._gauge.take(raised, now)
         if after == before:
             return
-        self._hub.changed(topics.FLOOD.name)
+        self._event_log.changed(topics.FLOOD.name)
         line = flood_line(before, after)
         if line is not None:
             self._event_log.log(line, now)

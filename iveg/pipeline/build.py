@@ -145,7 +145,6 @@ def build(
         choices.rule,
         ports.fleet,
         event_log,
-        hub,
         ports.new_id,
         choices.boot,
         health_monitor.probe.lag,
@@ -157,7 +156,6 @@ def build(
         ports.fleet,
         ports.journal,
         event_log,
-        hub,
         ports.new_id,
         ports.clock,
         drills=choices.drills,
@@ -170,7 +168,6 @@ def build(
         commander,
         health_monitor,
         event_log,
-        hub,
         ports.clock,
         latency,
     )

@@ -42,7 +42,6 @@ from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Clock, CommandPort, FleetPort, Ids, StopJournal
 from iveg.pipeline.presses import Presses
-from iveg.pipeline.publish import Hub
 from iveg.pipeline.sending import IsCut, OrderSender
 
 _log = logging.getLogger(__name__)
@@ -68,7 +67,6 @@ class Commander:
         fleet: Keeps the desired state of each robot.
         journal: Outlives a crash.
         event_log: Tells people and the history.
-        hub: Tells browsers.
         new_id: Makes ULIDs.
         clock: Reads both clocks.
         drills: When each robot's STOP was last proved.
@@ -83,7 +81,6 @@ class Commander:
         fleet: FleetPort,
         journal: StopJournal,
         event_log: EventLog,
-        hub: Hub,
         new_id: Ids,
         clock: Clock,
         *,
@@ -107,7 +104,6 @@ class Commander:
         self._agent_lag_s = agent_lag_s
         self._journal = journal
         self._event_log = event_log
-        self._hub = hub
         self._new_id = new_id
 
     def machine(self, robot_id: str) -> StopMachine:
@@ -335,7 +331,7 @@ class Commander:
         self._show(machine)
 
     def _show(self, machine: StopMachine) -> None:
-        self._hub.changed(topics.ROBOT.of(machine.robot_id))
+        self._event_log.changed(topics.ROBOT.of(machine.robot_id))
 
     def _tell(self, machine: StopMachine, changed: Changed, at: Instant) -> None:
         # What is open may know more than this step did: how late the agent is.

@@ -15,7 +15,6 @@ from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.ports import Ids
-from iveg.pipeline.publish import Hub
 
 _LOGGED_S = 2.0
 _MAX_SUBJECTS = 1000
@@ -39,7 +38,6 @@ class DetectionTracking:
         world: World,
         people: People,
         event_log: EventLog,
-        hub: Hub,
         new_id: Ids,
         overload: Overload,
     ) -> None:
@@ -48,7 +46,6 @@ class DetectionTracking:
         self._world = world
         self._people = people
         self._event_log = event_log
-        self._hub = hub
         self._new_id = new_id
         self._overload = overload
         self._told: dict[tuple[str, str], float] = {}
@@ -88,7 +85,7 @@ class DetectionTracking:
             self._overload.judged(robot_id, received.at, whole=not turned_away)
         if verdict == "new":
             self.placed[robot_id] = placed
-            self._hub.changed(topics.DETECTIONS.of(robot_id))
+            self._event_log.changed(topics.DETECTIONS.of(robot_id))
 
     def _age_s(self, frame: DetectionFrame, received: Received) -> float:
         """Age of a frame that has just come (s)."""
@@ -103,7 +100,7 @@ class DetectionTracking:
         for one in placed:
             self._describe(one, frame, received)
         if any(one.person is not None for one in placed):
-            self._hub.changed(topics.PEOPLE.name)
+            self._event_log.changed(topics.PEOPLE.name)
         return placed
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:

@@ -40,7 +40,6 @@ from iveg.pipeline.first_reports import FirstReports
 from iveg.pipeline.kinds import LowValues, kind
 from iveg.pipeline.log_messages import evidence_of, speed_line
 from iveg.pipeline.ports import FleetPort, Ids
-from iveg.pipeline.publish import Hub
 from iveg.pipeline.staleness import Staleness
 
 HEARTBEAT_S = 0.1
@@ -63,7 +62,6 @@ class Evaluator:
         rule: DetectionRule,
         fleet: FleetPort,
         event_log: EventLog,
-        hub: Hub,
         new_id: Ids,
         boot: str,
         backlog: Callable[[Instant], float | None] = lambda _: None,
@@ -73,7 +71,7 @@ class Evaluator:
         self.rule = rule
         self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
-        self.alerts = Alerting(event_log, hub, new_id)
+        self.alerts = Alerting(event_log, new_id)
         self._exposures = Exposures()
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
@@ -81,15 +79,14 @@ class Evaluator:
         self._speed_limits = SpeedLimits(greenhouse)
         overload = self._speed_limits.overload
         self.tracking = DetectionTracking(
-            world, self.people, event_log, hub, new_id, overload
+            world, self.people, event_log, new_id, overload
         )
-        self._staleness = Staleness(world, self.people, greenhouse, event_log, hub)
+        self._staleness = Staleness(world, self.people, greenhouse, event_log)
         other = self.tracking.other
         self._feedback_publisher = FeedbackPublisher(
             world, self.people, other, fleet, boot, backlog
         )
         self._event_log = event_log
-        self._hub = hub
         self._new_id = new_id
         self._applied: dict[str, tuple[float, str]] = {}
         self._first_reports = FirstReports()
@@ -146,7 +143,7 @@ class Evaluator:
             return False
         row, robot_id = kind(observation), getattr(observation, "robot_id", "")
         for topic in row.touches:
-            self._hub.changed(topic.of(robot_id))
+            self._event_log.changed(topic.of(robot_id))
         if row.kept:
             self._event_log.reading(observation, robot_id, received.at)
         match observation:
@@ -221,7 +218,7 @@ class Evaluator:
             or speed_limit.reason != before[robot_id].reason
         ]
         for robot_id in changed:
-            self._hub.changed(topics.ROBOT.of(robot_id))
+            self._event_log.changed(topics.ROBOT.of(robot_id))
             if self.world.robots[robot_id].safety is None:
                 self._log_speed_limit(
                     robot_id, before[robot_id], speed_limits[robot_id], now

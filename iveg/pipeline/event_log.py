@@ -1,4 +1,4 @@
-"""The event log: events for people at once, and rows for the history.
+"""The event log: events and changes for people at once, and rows for the history.
 
 One place turns domain values into log lines and history records, so that the page, the
 API and the database agree.
@@ -39,13 +39,15 @@ _NOT_VALUES = ("robot_id", "origin")
 
 
 class EventLog:
-    """Writes log lines and history records.
+    """Writes log lines and history records, and tells browsers what changed.
 
     Attributes:
+        changed: Marks a topic as changed for every browser (``Hub.changed``).
         lines: The newest log lines, oldest first.
     """
 
     def __init__(self, hub: Hub, sink: RecordSink, start: Instant) -> None:
+        self.changed = hub.changed
         self._hub = hub
         self._sink = sink
         self._thinner = OdometryThinner()
@@ -199,7 +201,7 @@ class EventLog:
         """Log a new version of the rule; its rings change, too."""
         self.log(event, at)
         for topic in (topics.RULE, topics.PEOPLE):
-            self._hub.changed(topic.name)
+            self.changed(topic.name)
 
     def _audit(
         self, command: Command | CommandRecord, state: str, why: str, at: Instant
@@ -270,7 +272,7 @@ class EventLog:
                 members=[_member(one) for one in alert.members],
             )
         )
-        self._hub.changed(topics.ALERTS.name)
+        self.changed(topics.ALERTS.name)
 
 
 def _number(line: LogRecord) -> int:

@@ -16,7 +16,6 @@ from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.ports import Clock
-from iveg.pipeline.publish import Hub
 
 TICK_S = 0.05
 APART_S = 0.00025
@@ -45,7 +44,6 @@ class RuleLoop:
         commander: Commander,
         health_monitor: HealthMonitor,
         event_log: EventLog,
-        hub: Hub,
         clock: Clock,
         latency: LatencyMonitor,
     ) -> None:
@@ -54,7 +52,6 @@ class RuleLoop:
         self._commander = commander
         self._health_monitor = health_monitor
         self._event_log = event_log
-        self._hub = hub
         self._clock = clock
         self._latency = latency
         self._ticked = float("-inf")
@@ -126,7 +123,7 @@ class RuleLoop:
             self._tell(hop, now)
         if changed or now.mono - self._health_at >= _HEALTH_PERIOD_S:
             self._health_at = now.mono
-            self._hub.changed(topics.HEALTH.name)
+            self._event_log.changed(topics.HEALTH.name)
 
     def _tell(self, hop: HopHealth, now: Instant) -> None:
         """A loss once, and its end once; what is merely late or unknown is neither."""

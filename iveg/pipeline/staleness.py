@@ -10,7 +10,6 @@ from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.event_log import EventLog
-from iveg.pipeline.publish import Hub
 
 _STAGE_KEYS = {
     "seen": "log.person_seen",
@@ -28,13 +27,11 @@ class Staleness:
         people: People,
         greenhouse: Greenhouse,
         event_log: EventLog,
-        hub: Hub,
     ) -> None:
         self._world = world
         self._people = people
         self._greenhouse = greenhouse
         self._event_log = event_log
-        self._hub = hub
         self._all_clear = AllClear()
         self._links: dict[str, Link] = {}
         self._stages: dict[str, str] = {}
@@ -51,7 +48,7 @@ class Staleness:
             self._log_clear(person, now)
         for person in people.forget(now):
             self._stages.pop(person.person_id, None)
-            self._hub.changed(topics.PEOPLE.name)
+            self._event_log.changed(topics.PEOPLE.name)
 
     def _watch_link(self, robot: RobotState, now: Instant) -> None:
         link = robot.link(now)
@@ -59,7 +56,7 @@ class Staleness:
         if link == before:
             return
         self._links[robot.robot_id] = link
-        self._hub.changed(topics.ROBOT.of(robot.robot_id))
+        self._event_log.changed(topics.ROBOT.of(robot.robot_id))
         if link == "UNKNOWN":
             # For as long as it takes to prove an age; if that fails, it is LOST.
             return
@@ -75,7 +72,7 @@ class Staleness:
         if stage == before:
             return
         self._stages[person.person_id] = stage
-        self._hub.changed(topics.PEOPLE.name)
+        self._event_log.changed(topics.PEOPLE.name)
         key = _STAGE_KEYS.get(stage)
         # The first sighting has a line of its own.
         if key is None or before is None:
@@ -92,7 +89,7 @@ class Staleness:
         )
 
     def _log_clear(self, person: Person, now: Instant) -> None:
-        self._hub.changed(topics.PEOPLE.name)
+        self._event_log.changed(topics.PEOPLE.name)
         newest = person.newest
         if person.sightings or person.stage(now) != "remembered":
             return
