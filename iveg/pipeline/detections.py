@@ -67,17 +67,17 @@ class DetectionTracking:
         A frame that is later than a ring lives protects nobody, and would only show
         ghosts.
         """
-        late = verdict == "late" and not received.asked
-        if verdict != "new" and not (
-            late and self._age_s(frame, received) <= LIMITS.ring_lasts_s
-        ):
-            return
         robot_id = frame.robot_id
+        seen_at = self._world.robot(robot_id).sighted_at or received.at
+        late = verdict == "late" and not received.asked
+        protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
+        if verdict != "new" and not protects:
+            return
         if not self._overload.admits(robot_id, received.at):
             self._world.counters["pictures.not_judged"] += 1
             self._overload.judged(robot_id, received.at, whole=False)
             return
-        placed = self._look(frame, received, rule)
+        placed = self._look(frame, received, rule, seen_at)
         turned_away = self._people.turned_away
         if turned_away:
             self._world.counters["people.turned_away"] += turned_away
@@ -87,15 +87,13 @@ class DetectionTracking:
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))
 
-    def _age_s(self, frame: DetectionFrame, received: Received) -> float:
-        """Age of a frame that has just come (s)."""
-        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
-        return received.at.mono - seen_at.mono
-
     def _look(
-        self, frame: DetectionFrame, received: Received, rule: DetectionRule
+        self,
+        frame: DetectionFrame,
+        received: Received,
+        rule: DetectionRule,
+        seen_at: Instant,
     ) -> list[Placed]:
-        seen_at = self._world.robot(frame.robot_id).sighted_at or received.at
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
         for one in placed:
             self._describe(one, frame, received)
