@@ -6,13 +6,13 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
 from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.exposure import Exposure, Exposures
+from iveg.domain.exposure import Exposures
 from iveg.domain.feedback import CLEAR, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
@@ -28,7 +28,7 @@ from iveg.domain.observations import (
 )
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
-from iveg.domain.tracking.people import People, Placed
+from iveg.domain.tracking.people import People
 from iveg.domain.world import World
 from iveg.pipeline import topics
 from iveg.pipeline.alerting import Alerting
@@ -72,7 +72,7 @@ class Evaluator:
         self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
         self.alerts = Alerting(event_log, new_id)
-        self._exposures = Exposures()
+        self.exposures = Exposures()
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(world.robots, CLEAR)
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
@@ -100,11 +100,6 @@ class Evaluator:
         """Every robot that is inside a ring now, with the ring."""
         return self._speed_limits.crossings
 
-    @property
-    def placed(self) -> Mapping[str, list[Placed]]:
-        """Detections of each robot's newest frame, faint ones included."""
-        return self.tracking.placed
-
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
         """A decision that is still in memory, with the verdicts of now."""
         decision = self.decisions.get(decision_id)
@@ -118,11 +113,6 @@ class Evaluator:
             for one in self.decisions.known
             if not robots[one.crossing.robot_id].is_replay
         )
-
-    @property
-    def exposure(self) -> Exposure | None:
-        """Today's exposure; None before the first evaluation."""
-        return self._exposures.today
 
     # --- what arrives -------------------------------------------------------------
 
@@ -158,7 +148,7 @@ class Evaluator:
         return True
 
     def _notice(self, robot_id: str, at: Instant) -> None:
-        for one in self.placed.get(robot_id, ()):
+        for one in self.tracking.placed.get(robot_id, ()):
             if one.person is not None:
                 self._first_reports.seen(one.person.person_id, at)
 
@@ -272,7 +262,7 @@ class Evaluator:
             self.tell(now)
         for decision in self.decisions.every_open():
             self._advance(decision, decision.aged(now), now)
-        if self._exposures.due(now):
+        if self.exposures.due(now):
             self._look_at_margins(now)
         self.alerts.sync([*self._conditions(now), *more], now)
 
@@ -281,7 +271,7 @@ class Evaluator:
         margins = LeastMargins(fleet, self.people.known.values(), now).telling()
         ages = [robot.age_s(now) for robot in fleet]
         seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
-        self._exposures.update(margins, now, seen=seen)
+        self.exposures.update(margins, now, seen=seen)
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():

@@ -243,7 +243,7 @@ class Views:
             age_s=round(now.mono - robot.detections_at, 3),
             items=[
                 Detection.of(one, robot_id, stamp, transport)
-                for one in self._evaluator.placed.get(robot_id, [])
+                for one in self._evaluator.tracking.placed.get(robot_id, [])
             ],
         )
 
@@ -303,7 +303,7 @@ class Views:
     def safety(self, now: Instant) -> Safety:
         """How soon the fleet obeys, and how close it comes to people."""
         acknowledgements = acknowledgements_of(self._evaluator.live_decisions(), now)
-        return Safety.of(acknowledgements, self._evaluator.exposure, now)
+        return Safety.of(acknowledgements, self._evaluator.exposures.today, now)
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""

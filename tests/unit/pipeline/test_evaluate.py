@@ -516,7 +516,7 @@ def test_a_late_look_still_protects_whom_it_saw_and_leaves_the_page_alone() -> N
     desk.loop.step([], desk.clock())
 
     assert desk.evaluator.speed_limits["AGI"].reason == "person"
-    assert desk.evaluator.placed["AGII"] == []
+    assert desk.evaluator.tracking.placed["AGII"] == []
 
 
 def test_what_orion_kept_of_yesterday_makes_nobody_appear() -> None:
