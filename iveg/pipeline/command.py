@@ -253,9 +253,8 @@ class Commander:
         """After a restart: stop every robot again that was to stand."""
         for robot_id, one in wanted.items():
             machine = self.machines.get(robot_id)
-            if machine is None:
-                continue
-            self._perform(machine, machine.restore(one, now, self._new_id()), now)
+            if machine is not None:
+                self._perform(machine, machine.restore(one, now, self._new_id()), now)
 
     def close_earlier(self, left: Iterable[CommandRecord], now: Instant) -> None:
         """Close the rows that an earlier run left open; nobody follows them any more.

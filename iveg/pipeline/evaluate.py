@@ -77,14 +77,12 @@ class Evaluator:
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
         self._speed_limits = SpeedLimits(greenhouse)
-        overload = self._speed_limits.overload
         self.tracking = DetectionTracking(
-            world, self.people, event_log, new_id, overload
+            world, self.people, event_log, new_id, self._speed_limits.overload
         )
         self._staleness = Staleness(world, self.people, greenhouse, event_log)
-        other = self.tracking.other
         self._feedback_publisher = FeedbackPublisher(
-            world, self.people, other, fleet, boot, backlog
+            world, self.people, self.tracking.other, fleet, boot, backlog
         )
         self._event_log = event_log
         self._new_id = new_id

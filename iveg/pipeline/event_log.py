@@ -77,7 +77,9 @@ class EventLog:
     def recall(self, earlier: Iterable[LogRecord]) -> None:
         """Put lines of an earlier run before those of this one; any order."""
         first = self.lines[0].id if self.lines else self._next_id + 1
-        before = sorted((one for one in earlier if one.id < first), key=_number)
+        before = sorted(
+            (one for one in earlier if one.id < first), key=lambda one: one.id
+        )
         before = before[-(_KEPT_LINES - len(self.lines)) :]
         if before and len(self.lines) < _KEPT_LINES:
             self.lines.extendleft(reversed(before))
@@ -273,10 +275,6 @@ class EventLog:
             )
         )
         self.changed(topics.ALERTS.name)
-
-
-def _number(line: LogRecord) -> int:
-    return line.id
 
 
 def _member(one: Occurrence) -> dict[str, Any]:
