@@ -60,14 +60,18 @@ class OriginFields(Wire):
     replay: Text | None = None
 
 
-class OdometryValue(OriginFields):
-    """``base_pose_ground_truth``; Algorithm 1's ``pose`` has the same fields."""
+class MotionFields(Wire):
+    """Pose in ``map`` and twist."""
 
     x: Metres
     y: Metres
     yaw: Radians
     linear_velocity: Speed = 0.0
     angular_velocity: Speed = 0.0
+
+
+class OdometryValue(MotionFields, OriginFields):
+    """``base_pose_ground_truth``; Algorithm 1's ``pose`` has the same fields."""
 
 
 class LidarHeaderValue(OriginFields):
@@ -203,14 +207,9 @@ class SpeedLimitValue(Wire):
     decision_id: Text | None = None
 
 
-class FeedbackPose(Wire):
+class FeedbackPose(MotionFields):
     """Pose of the observer as iVeg knows it."""
 
-    x: Metres
-    y: Metres
-    yaw: Radians
-    linear_velocity: Speed = 0.0
-    angular_velocity: Speed = 0.0
     stamp: Text | None = None
 
 
