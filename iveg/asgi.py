@@ -28,18 +28,15 @@ def create_app(dss: Dss) -> FastAPI:
         description="Supervise mixed robot fleets in greenhouses.",
         lifespan=dss.running,
     )
-    reader, evaluator = require("read"), dss.pipeline.evaluator
     app.include_router(
         routes.router(
             pages,
-            reader=reader,
-            anyone=require("open"),
             document=cache(lambda: openapi.describe_api(app)),
-            rule=lambda: evaluator.rule,
+            rule=lambda: dss.pipeline.evaluator.rule,
         )
     )
 
-    @app.get("/openapi.json", dependencies=[Depends(reader)])
+    @app.get("/openapi.json", dependencies=[Depends(require("read"))])
     async def document() -> Any:
         """This interface in OpenAPI."""
         return app.openapi()
@@ -57,7 +54,6 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     yield day.router(days, pages, clock)
     yield history.router(
         queries,
-        reader=require("read"),
         threshold=lambda: evaluator.rule.threshold,
         present=lambda name: evaluator.decision_record(name, clock()),
         flood=views.flood,
@@ -65,5 +61,4 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     )
     yield sign_in_code.router(dss.sign_in_token)
     yield experiments.router(dss.experiments)
-    yield experiments.page_router(pages)
     yield service_worker.router()

@@ -1,4 +1,4 @@
-"""Experiments over HTTP and their page: start, watch, stop, open."""
+"""Experiments over HTTP: start, watch, stop, open."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Protocol
@@ -7,18 +7,14 @@ from fastapi import APIRouter, Depends
 from fastapi import Path as InPath
 from pydantic import BaseModel, ConfigDict
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, Response
 
 from iveg.models.experiment import Experiment, Experiments
 from iveg.web.api.answers import Json
-from iveg.web.pages.contexts import ExperimentsPage
-from iveg.web.pages.routes import Pages
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.authentication import require
 
 Size = Literal["minimal", "quick", "full"]
 Name = Annotated[str, InPath(pattern=r"^(minimal|quick|full)-\d{3}$")]
-Reading = Annotated[Principal, Depends(require("read"))]
 Running = [Depends(require("release"))]
 _REPORT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -111,15 +107,3 @@ def _found(file: Path | None) -> Path:
     if file is None:
         raise HTTPException(404, "There is no such experiment, or nothing of it yet.")
     return file
-
-
-def page_router(pages: Pages) -> APIRouter:
-    """The page."""
-    routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-
-    @routes.get("/experiments", response_model=None)
-    async def experiments(request: Request, visitor: Reading) -> Response:
-        frame = pages.frame(request, "experiments", visitor)
-        return pages.draw(ExperimentsPage(frame))
-
-    return routes

@@ -39,6 +39,7 @@ from iveg.web.pages import charts
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import read_translations
+from iveg.web.security.authentication import require
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
@@ -64,7 +65,6 @@ class _List(Generic[R]):
 def router(
     queries: Queries,
     *,
-    reader: Callable[..., Any],
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
     flood: Callable[[], Flood] = lambda: Flood.of(NoFlood()),
@@ -75,14 +75,13 @@ def router(
 
     Args:
         queries: Where the past is asked for.
-        reader: Dependency that refuses principals who may not read.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         flood: How fast alerts come.
         fleet: Whose greatest speeds the chart is about.
         read_clock: What "the last 15 minutes" end at.
     """
-    routes = APIRouter(dependencies=[Depends(reader)], tags=["history"])
+    routes = APIRouter(dependencies=[Depends(require("read"))], tags=["history"])
     for one in _lists(queries, flood):
         _add_list(routes, one)
 

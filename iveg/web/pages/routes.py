@@ -1,14 +1,13 @@
 """HTML pages: each is one context drawn by its template, in the reader's language.
 
-``Pages`` draws; ``router`` gives each page its address.  The dependencies that are
-handed in decide who may read.
+``Pages`` draws; ``router`` gives each page its address.
 """
 
 import json
 from collections.abc import Callable
 from datetime import datetime
 from importlib.resources import files
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -21,23 +20,14 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
-    AlertsPage,
     Appearance,
-    ClimatePage,
-    CommandsPage,
     DecisionPage,
     DocsPage,
     ErrorPage,
-    FleetPage,
-    HistoryPage,
-    LatencyPage,
-    LivePage,
     Page,
     PageFrame,
-    SettingsPage,
     SignInPage,
     Site,
-    Theme,
 )
 from iveg.web.pages.local_time import in_madrid
 from iveg.web.pages.openapi import ApiDoc
@@ -50,6 +40,7 @@ from iveg.web.pages.translations import (
     read_translations,
 )
 from iveg.web.problems import Problem
+from iveg.web.security.authentication import Authenticator, Principal, require
 
 LANGUAGE_COOKIE = "iveg_language"
 THEME_COOKIE = "iveg_theme"
@@ -57,18 +48,20 @@ PALETTE_COOKIE = "iveg_palette"
 
 _DECISION_ID = r"^[ -~]{1,64}$"
 _EXPLAINED = (400, 401, 403, 404, 405, 429, 500, 503)
+_SCRIPTED: Final = {
+    "live": "/",
+    "alerts": "/alerts",
+    "climate": "/climate",
+    "commands": "/commands",
+    "experiments": "/experiments",
+    "fleet": "/fleet",
+    "history": "/history",
+    "latency": "/latency",
+    "settings": "/settings",
+}
+"""Pages that scripts fill, and their addresses."""
 
-
-class Visitor(Protocol):
-    """The reader of a page; ``auth.Principal`` is one."""
-
-    @property
-    def name(self) -> str:
-        """As shown to other people."""
-
-    @property
-    def role(self) -> str:
-        """``viewer``, ``operator``, ``admin`` or ``program``."""
+_Reader = Annotated[Principal, Depends(require("read"))]
 
 
 class Pages:
@@ -86,7 +79,7 @@ class Pages:
         }
 
     def frame(
-        self, request: Request, route: str, visitor: Visitor | None = None
+        self, request: Request, route: str, visitor: Principal | None = None
     ) -> PageFrame:
         """The frame around a page for this reader."""
         look = _look(request)
@@ -102,7 +95,7 @@ class Pages:
             status: HTTP status.
         """
         environment = self._environments[page.frame.look.language]
-        html = environment.get_template(page.template).render(page=page)
+        html = environment.get_template(f"{page.frame.route}.html").render(page=page)
         return HTMLResponse(html, status, {"Vary": "Cookie, Accept-Language"})
 
     def problem(self, request: Request, problem: Problem) -> Response:
@@ -111,7 +104,7 @@ class Pages:
             return self.sign_in(request, 401)
         known = problem.status if problem.status in _EXPLAINED else "other"
         # Somebody signed in keeps the STOP controls, whatever page went wrong.
-        frame = self.frame(request, "error", _identified(request))
+        frame = self.frame(request, "error", _authenticator(request).identify(request))
         page = ErrorPage(frame, problem.status, f"error.{known}")
         response = self.draw(page, problem.status)
         response.headers.update(problem.headers)
@@ -135,8 +128,6 @@ class Pages:
 def router(
     pages: Pages,
     *,
-    reader: Callable[..., Any],
-    anyone: Callable[..., Any],
     document: Callable[[], ApiDoc],
     rule: Callable[[], DetectionRule],
 ) -> APIRouter:
@@ -144,87 +135,50 @@ def router(
 
     Args:
         pages: What draws them.
-        reader: Dependency that gives the visitor, or refuses a stranger.
-        anyone: Dependency of the page that is open to strangers.
         document: The HTTP interface as it stands.
         rule: The version in force.
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
-    who = Depends(reader)
-
-    @routes.get("/", response_model=None)
-    async def live(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(LivePage(pages.frame(request, "live", visitor)))
-
-    @routes.get("/history", response_model=None)
-    async def history(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(HistoryPage(pages.frame(request, "history", visitor)))
-
-    _add_supervision(routes, pages, who)
-
-    @routes.get("/docs", response_model=None)
-    async def docs(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(DocsPage(pages.frame(request, "docs", visitor), document()))
-
-    @routes.get("/about", response_model=None)
-    async def about(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
-
-    @routes.get("/signin", response_model=None, dependencies=[Depends(anyone)])
-    async def signin(request: Request) -> Response:
-        return pages.sign_in(request)
-
-    @routes.post("/signout", response_model=None, dependencies=[who])
-    async def sign_out(request: Request) -> Response:
-        left: Response = request.app.state.authenticator.sign_out(request)
-        return left
-
-    return routes
-
-
-def _add_supervision(routes: APIRouter, pages: Pages, who: Any) -> None:
-    """The pages beside the map: what was, what is connected, what is in force."""
-
-    @routes.get("/alerts", response_model=None)
-    async def alerts(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(AlertsPage(pages.frame(request, "alerts", visitor)))
-
-    @routes.get("/commands", response_model=None)
-    async def commands(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(CommandsPage(pages.frame(request, "commands", visitor)))
-
-    @routes.get("/fleet", response_model=None)
-    async def fleet(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(FleetPage(pages.frame(request, "fleet", visitor)))
-
-    @routes.get("/climate", response_model=None)
-    async def climate(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(ClimatePage(pages.frame(request, "climate", visitor)))
-
-    @routes.get("/latency", response_model=None)
-    async def latency(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(LatencyPage(pages.frame(request, "latency", visitor)))
-
-    @routes.get("/settings", response_model=None)
-    async def settings(request: Request, visitor: Annotated[Any, who]) -> Response:
-        return pages.draw(SettingsPage(pages.frame(request, "settings", visitor)))
+    for route, path in _SCRIPTED.items():
+        _add_scripted(routes, pages, route, path)
 
     @routes.get("/decisions/{decision_id}", response_model=None)
     async def decision(
         request: Request,
-        visitor: Annotated[Any, who],
+        visitor: _Reader,
         decision_id: Annotated[str, Path(pattern=_DECISION_ID)],
     ) -> Response:
         frame = pages.frame(request, "decision", visitor)
         return pages.draw(DecisionPage(frame, decision_id))
 
+    @routes.get("/docs", response_model=None)
+    async def docs(request: Request, visitor: _Reader) -> Response:
+        return pages.draw(DocsPage(pages.frame(request, "docs", visitor), document()))
 
-def _identified(request: Request) -> Visitor | None:
-    authenticator = getattr(request.app.state, "authenticator", None)
-    visitor: Visitor | None = (
-        None if authenticator is None else authenticator.identify(request)
-    )
-    return visitor
+    @routes.get("/about", response_model=None)
+    async def about(request: Request, visitor: _Reader) -> Response:
+        return pages.draw(AboutPage(pages.frame(request, "about", visitor), rule()))
+
+    @routes.get("/signin", response_model=None, dependencies=[Depends(require("open"))])
+    async def signin(request: Request) -> Response:
+        return pages.sign_in(request)
+
+    @routes.post("/signout", response_model=None)
+    async def sign_out(request: Request, _: _Reader) -> Response:
+        return _authenticator(request).sign_out(request)
+
+    return routes
+
+
+def _add_scripted(routes: APIRouter, pages: Pages, route: str, path: str) -> None:
+    @routes.get(path, name=route, response_model=None)
+    async def scripted(request: Request, visitor: _Reader) -> Response:
+        return pages.draw(Page(pages.frame(request, route, visitor)))
+
+
+def _authenticator(request: Request) -> Authenticator:
+    authenticator: Authenticator = request.app.state.authenticator
+    return authenticator
 
 
 def _look(request: Request) -> Appearance:
@@ -232,15 +186,8 @@ def _look(request: Request) -> Appearance:
     language = cookies.get(LANGUAGE_COOKIE, "")
     if language not in LANGUAGES:
         language = preferred_language(request.headers.get("accept-language", ""))
-    theme = _theme(cookies.get(THEME_COOKIE))
+    theme = THEMES.get(cookies.get(THEME_COOKIE, ""), "auto")
     return Appearance(language, theme, cookies.get(PALETTE_COOKIE) == "paper")
-
-
-def _theme(wanted: str | None) -> Theme:
-    for theme in THEMES:
-        if theme == wanted:
-            return theme
-    return "auto"
 
 
 def limits_text() -> str:
@@ -279,8 +226,7 @@ def _environment(translations: Translations) -> Environment:
         )
 
     def greenhouse(name: str) -> str:
-        known = translations.sentences.get(f"greenhouse.{name}")
-        return name if known is None else known
+        return translations.sentences.get(f"greenhouse.{name}", name)
 
     def say_house(name: str) -> Markup:
         key = f"greenhouse.{name}"

@@ -26,7 +26,7 @@ from iveg.web.pages import service_worker
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.openapi import describe_api
 from iveg.web.pages.routes import Pages, router
-from iveg.web.security.authentication import Authenticator, Principal
+from iveg.web.security.authentication import Authenticator, Principal, require
 from iveg.web.security.headers import SecurityHeaders
 from tests.browsers import running_browser
 from tests.builders import START
@@ -64,13 +64,13 @@ class Server:
         app.state.authenticator = Authenticator(
             sign_in_token="cd" * 32, api_token="", clock=lambda: START
         )
+        reader = Principal("ana", "operator")
+        app.dependency_overrides[require("read")] = lambda: reader
         app.include_router(service_worker.router())
-        app.include_router(history.router(self._queries, reader=lambda: None))
+        app.include_router(history.router(self._queries))
         app.include_router(
             router(
                 Pages(_SITE),
-                reader=lambda: Principal("ana", "operator"),
-                anyone=lambda: None,
                 document=lambda: describe_api(app),
                 rule=DetectionRule,
             )

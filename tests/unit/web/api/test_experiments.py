@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
+from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import ExperimentRefusedError
 from iveg.models.experiment import Experiment, Experiments
 from iveg.web.api import experiments
 from iveg.web.pages import routes
-from iveg.web.pages.contexts import Site
+from iveg.web.pages.openapi import ApiDoc
 from iveg.web.security.authentication import Role
 from tests.unit.web.desk import WebDesk
 
@@ -56,8 +57,10 @@ class FakeRunner:
 def desk_with(bench: FakeRunner) -> WebDesk:
     desk = WebDesk()
     desk.app.include_router(experiments.router(bench))
-    drawn = routes.Pages(Site("field", ("AGI", "AGII"), "1", demo=True))
-    desk.app.include_router(experiments.page_router(drawn))
+    nothing = ApiDoc("", "", (), ())
+    desk.app.include_router(
+        routes.router(desk.pages, document=lambda: nothing, rule=DetectionRule)
+    )
     return desk
 
 

@@ -23,6 +23,7 @@ from iveg.pipeline.record import Waiting
 from iveg.web import problems
 from iveg.web.api.history import router
 from iveg.web.pages import charts
+from iveg.web.security.authentication import require
 from tests.fakes.records import (
     NOON,
     alert_record,
@@ -49,10 +50,10 @@ class Past:
         self._open = open_
         self.present: dict[str, DecisionRecord] = {}
         self.app = FastAPI()
+        self.app.dependency_overrides[require("read")] = self._reader
         self.app.include_router(
             router(
                 self._queries,
-                reader=self._reader,
                 threshold=lambda: 0.8,
                 present=self.present.get,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
@@ -628,7 +629,8 @@ async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(
 ) -> None:
     app = FastAPI()
     queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
-    app.include_router(router(queries, reader=lambda: None))
+    app.dependency_overrides[require("read")] = lambda: None
+    app.include_router(router(queries))
     problems.install(app)
     transport = httpx.ASGITransport(app=app)
 

@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.web.pages.contexts import LivePage, Site
+from iveg.web.pages.contexts import Page, Site
 from iveg.web.pages.openapi import (
     AnswerDoc,
     ApiDoc,
@@ -23,7 +23,7 @@ from iveg.web.pages.openapi import (
 from iveg.web.pages.routes import Pages, router
 from iveg.web.pages.translations import read_translations
 from iveg.web.problems import NotSignedInError, install
-from iveg.web.security.authentication import Principal, require
+from iveg.web.security.authentication import Principal
 from iveg.web.security.headers import CONTENT_SECURITY_POLICY, SecurityHeaders
 
 ROUTES = (
@@ -82,7 +82,7 @@ class FakeAuthenticator:
         self.left += 1
         return RedirectResponse("/", 303)
 
-    def reader(self) -> Principal:
+    def authorise(self, _request: object, _action: object) -> Principal:
         if self.visitor is None:
             raise NotSignedInError
         return self.visitor
@@ -104,8 +104,6 @@ async def browser(authenticator: FakeAuthenticator) -> AsyncIterator[httpx.Async
     app.include_router(
         router(
             pages,
-            reader=authenticator.reader,
-            anyone=require("open"),
             document=lambda: API,
             rule=lambda: replace(DetectionRule(), threshold=0.75, radius_m=2.5),
         )
@@ -316,7 +314,7 @@ def test_13_16_a_greenhouse_of_iveg_has_a_name_in_the_readers_language(
     }
     frame = pages.frame(Request(scope), "live", Principal("ana", "operator"))
 
-    drawn = bytes(pages.draw(LivePage(frame)).body).decode()
+    drawn = bytes(pages.draw(Page(frame)).body).decode()
 
     assert f"<title>iVeg · {said}</title>" in drawn
     assert re.search(rf'brand__house">(<[^>]+>)?{re.escape(said)}', drawn)
