@@ -17,7 +17,7 @@ import numpy as np
 import orjson
 
 from benchmarks.process import print_table
-from iveg.app import Dss
+from iveg.app.dss import Dss
 from iveg.asgi import create_app
 from iveg.embedded.orion_numbers import print_value
 from iveg.ngsi.codec import read_notification

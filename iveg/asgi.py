@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, FastAPI
 from starlette.staticfiles import StaticFiles
 
 from iveg import __version__
-from iveg.app import Dss
+from iveg.app.dss import Dss
 from iveg.web.api import day, experiments, history, sign_in_code, stop_records
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker

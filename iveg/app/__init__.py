@@ -1,5 +1,1 @@
 """Composition root of the DSS: settings → parts.  Wires, decides nothing."""
-
-from iveg.app.dss import Dss
-
-__all__ = ["Dss"]

@@ -11,7 +11,7 @@ import uvicorn
 
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
-from iveg.app import Dss
+from iveg.app.dss import Dss
 from iveg.asgi import create_app
 from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.running import print_sign_in_link, report_ready

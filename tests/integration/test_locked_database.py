@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app import Dss
+from iveg.app.dss import Dss
 from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings

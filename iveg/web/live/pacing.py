@@ -59,11 +59,6 @@ class CreditWindow:
         self._line_s: float | None = None
 
     @property
-    def unpainted(self) -> int:
-        """Number of frames on their way."""
-        return len(self._sent)
-
-    @property
     def next_number(self) -> int:
         """Number of the next frame, from 1."""
         return self._number + 1

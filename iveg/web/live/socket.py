@@ -44,7 +44,6 @@ TOO_SLOW = 4008
 _SEND_LIMIT_S = 10.0
 _CHECK_S = 0.5
 _MAX_MESSAGE = 65536
-_SNAPSHOT_LINES = 200
 _CACHE = 512
 
 Stop = Callable[[str | None, str, Press], Awaitable[object]]

@@ -1,8 +1,8 @@
 """Authentication and authorisation of people, programs and Orion.
 
 People come with a session cookie, programs with a bearer token, Orion with a shared
-secret.  Every route declares its requirement with ``require``; ``undeclared`` finds
-routes that declare none::
+secret.  Every route declares its requirement with ``require``; ``declared_action``
+reads it::
 
     link with token ──> session cookie ──> operator: read, stop, release
     bearer token ─────────────────────────> program:  read, stop
@@ -14,12 +14,10 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 import hmac
 import logging
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
-from fastapi import FastAPI
 from fastapi.dependencies.models import Dependant
-from fastapi.routing import iter_route_contexts
 from starlette.exceptions import WebSocketException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
@@ -45,7 +43,6 @@ __all__ = [
     "Role",
     "declared_action",
     "require",
-    "undeclared",
 ]
 
 NO_SESSION, FOREIGN_ORIGIN = 4401, 4403
@@ -261,16 +258,6 @@ def declared_action(route: Any) -> Action | None:
     ]
     # A router's requirement comes before the route's own, which is stricter.
     return actions[-1] if actions else None
-
-
-def undeclared(app: FastAPI, open_paths: Iterable[str] = ()) -> list[str]:
-    """All routes and WebSockets that declare nothing and are not in ``open_paths``."""
-    allowed = frozenset(open_paths)
-    return sorted(
-        str(route.path)
-        for route in iter_route_contexts(app.routes)
-        if declared_action(route) is None and route.path not in allowed
-    )
 
 
 def _calls(dependant: Dependant) -> Iterator[object]:

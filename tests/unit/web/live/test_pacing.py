@@ -33,7 +33,6 @@ def test_what_is_painted_makes_room_for_as_much() -> None:
 
     assert window.painted(3, NOW + 0.02)
 
-    assert window.unpainted == FRAMES - 3
     assert window.room == 3 * (BYTES // FRAMES)
     assert window.opens_at < float("inf")
 
@@ -139,14 +138,14 @@ def test_what_no_page_can_have_painted_gives_no_credit(word: object) -> None:
 
     assert not window.painted(word, NOW)
 
-    assert window.unpainted == FRAMES
+    assert window.opens_at == float("inf")
 
 
 def test_a_frame_is_painted_once() -> None:
-    window = filled(FRAMES)
+    window = filled(FRAMES, heavy=BYTES // FRAMES)
     window.painted(2, NOW)
 
     assert not window.painted(2, NOW)
     assert not window.painted(1, NOW)
 
-    assert window.unpainted == FRAMES - 2
+    assert window.room == 2 * (BYTES // FRAMES)
