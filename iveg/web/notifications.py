@@ -17,13 +17,12 @@ from iveg.ngsi.codec import read_notification
 from iveg.pipeline.ingest import Ingest
 from iveg.web.problems import Problem, problem_of
 from iveg.web.security.authentication import Action, NotifySecret
-from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH
+from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
 
 _TAKEN = (
     {"type": "http.response.start", "status": 204, "headers": []},
     {"type": "http.response.body", "body": b""},
 )
-_TOO_LONG = f"A body may have {MAX_BODY} bytes at most."
 _FORGED = Problem(401, "The notification secret is wrong.")
 
 
@@ -78,7 +77,7 @@ class NotificationEndpoint:
                 body = await _body(receive)
             except _GoneError:
                 return
-            problem = Problem(413, _TOO_LONG) if body is None else self._take(body, at)
+            problem = Problem(413, TOO_LONG) if body is None else self._take(body, at)
         if problem is None:
             for message in _TAKEN:
                 await send(message)
@@ -108,7 +107,7 @@ class NotificationEndpoint:
         declared = headers.get(b"content-length", b"")
         if declared.isdigit() and int(declared) > MAX_BODY:
             # The unread body would be taken for the next request.
-            return Problem(413, _TOO_LONG, headers={"Connection": "close"})
+            return Problem(413, TOO_LONG, headers={"Connection": "close"})
         if self._is_admitted(headers):
             return None
         client = scope.get("client")

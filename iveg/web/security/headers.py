@@ -12,6 +12,7 @@ from iveg.web.problems import Problem
 
 MAX_BODY = 1_048_576
 """1 MiB, as at Orion (bytes)."""
+TOO_LONG = f"A body may have {MAX_BODY} bytes at most."
 
 NOTIFICATIONS_PATH = "/ngsi/notifications"
 
@@ -67,9 +68,8 @@ def _guard(headers: MutableHeaders, scope: Scope) -> None:
 class BodyLimit:
     """Refuses a body over the limit: before it is read where its length is declared."""
 
-    def __init__(self, app: ASGIApp, max_body: int = MAX_BODY) -> None:
+    def __init__(self, app: ASGIApp) -> None:
         self._app = app
-        self._max_body = max_body
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -78,33 +78,27 @@ class BodyLimit:
             return
         declared = _declared_length(scope)
         if declared is None:
-            receive = self._counted(receive)
-        elif declared > self._max_body:
-            await self._refuse(scope, receive, send)
+            receive = _counted(receive)
+        elif declared > MAX_BODY:
+            # The unread body would be taken for the next request.
+            problem = Problem(413, TOO_LONG, headers={"Connection": "close"})
+            await problem.response()(scope, receive, send)
             return
         await self._app(scope, receive, send)
 
-    def _counted(self, receive: Receive) -> Receive:
-        taken = 0
 
-        async def receive_counted() -> Message:
-            nonlocal taken
-            message = await receive()
-            taken += len(message.get("body", b""))
-            if taken > self._max_body:
-                raise HTTPException(413, self._sentence)
-            return message
+def _counted(receive: Receive) -> Receive:
+    taken = 0
 
-        return receive_counted
+    async def receive_counted() -> Message:
+        nonlocal taken
+        message = await receive()
+        taken += len(message.get("body", b""))
+        if taken > MAX_BODY:
+            raise HTTPException(413, TOO_LONG)
+        return message
 
-    @property
-    def _sentence(self) -> str:
-        return f"A body may have {self._max_body} bytes at most."
-
-    async def _refuse(self, scope: Scope, receive: Receive, send: Send) -> None:
-        # The unread body would be taken for the next request.
-        problem = Problem(413, self._sentence, headers={"Connection": "close"})
-        await problem.response()(scope, receive, send)
+    return receive_counted
 
 
 def _declared_length(scope: Scope) -> int | None:

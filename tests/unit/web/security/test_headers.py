@@ -9,11 +9,10 @@ from fastapi import FastAPI, Request, Response
 from iveg.web import problems
 from iveg.web.security.headers import (
     CONTENT_SECURITY_POLICY,
+    MAX_BODY,
     BodyLimit,
     SecurityHeaders,
 )
-
-LIMIT = 1000
 
 
 def build_app() -> FastAPI:
@@ -36,7 +35,7 @@ def build_app() -> FastAPI:
 
 @pytest.fixture
 async def client() -> AsyncIterator[httpx.AsyncClient]:
-    app = SecurityHeaders(BodyLimit(build_app(), LIMIT))
+    app = SecurityHeaders(BodyLimit(build_app()))
     transport = httpx.ASGITransport(app)
     async with httpx.AsyncClient(transport=transport, base_url="http://i") as client:
         yield client
@@ -102,16 +101,16 @@ async def test_a_notification_pays_for_no_headers(client: httpx.AsyncClient) -> 
 async def test_a_body_at_the_limit_is_taken(
     client: httpx.AsyncClient, path: str
 ) -> None:
-    answer = await client.post(path, content=b"x" * LIMIT)
+    answer = await client.post(path, content=b"x" * MAX_BODY)
 
-    assert answer.json() == LIMIT
+    assert answer.json() == MAX_BODY
 
 
 @pytest.mark.parametrize("path", ["/api/v1/size", "/ngsi/notifications"])
 async def test_a_declared_body_over_the_limit_is_refused_unread(
     client: httpx.AsyncClient, path: str
 ) -> None:
-    answer = await client.post(path, content=b"x" * (LIMIT + 1))
+    answer = await client.post(path, content=b"x" * (MAX_BODY + 1))
 
     assert answer.status_code == 413
     assert answer.headers["connection"] == "close"
@@ -123,7 +122,7 @@ async def test_a_streamed_body_over_the_limit_is_refused_while_it_comes(
 ) -> None:
     async def stream() -> AsyncIterator[bytes]:
         for _ in range(11):
-            yield b"x" * (LIMIT // 10)
+            yield b"x" * (MAX_BODY // 10)
 
     answer = await client.post("/api/v1/size", content=stream())
 
@@ -135,6 +134,6 @@ async def test_a_streamed_body_under_the_limit_is_taken(
     client: httpx.AsyncClient,
 ) -> None:
     async def stream() -> AsyncIterator[bytes]:
-        yield b"x" * LIMIT
+        yield b"x" * MAX_BODY
 
-    assert (await client.post("/api/v1/size", content=stream())).json() == LIMIT
+    assert (await client.post("/api/v1/size", content=stream())).json() == MAX_BODY
