@@ -59,15 +59,16 @@ def read_press(value: object) -> Press:
         return Press()
     press_id = value.get("press_id")
     named = isinstance(press_id, str) and 0 < len(press_id) <= _LONGEST_ID
-    return Press(press_id if named else None, _moment(value.get("pressed_at")))
+    return Press(press_id if named else None, read_number(value.get("pressed_at")))
 
 
-def _moment(value: object) -> float | None:
+def read_number(value: object) -> float | None:
+    """A finite number that a page sent; None for anything else."""
     # True is a number to Python, and not to anybody else.
     if not isinstance(value, int | float) or isinstance(value, bool):
         return None
     try:
-        moment = float(value)
+        number = float(value)
     except OverflowError:
         return None
-    return moment if math.isfinite(moment) else None
+    return number if math.isfinite(number) else None

@@ -14,6 +14,8 @@ goes at once.
 from collections import deque
 from typing import Final, NamedTuple
 
+from iveg.web.presses import read_number
+
 SUBPROTOCOL: Final = "iveg.2"
 """A browser asks for paced telemetry by this WebSocket subprotocol."""
 
@@ -122,7 +124,5 @@ class CreditWindow:
 
 def _bounded(told: object, most: float) -> float | None:
     """A time that a page has told; None where it is none, or longer than possible."""
-    if isinstance(told, bool) or not isinstance(told, int | float):
-        return None
-    # Not true of NaN, and of an integer of any length without an overflow.
-    return told if 0.0 <= told <= most else None
+    number = read_number(told)
+    return number if number is not None and 0.0 <= number <= most else None

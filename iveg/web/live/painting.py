@@ -5,12 +5,12 @@ moment alone; an impossible moment is counted and not used.
 """
 
 from collections import deque
-from math import isfinite
-from typing import Final, TypeGuard
+from typing import Final
 
 from iveg.domain.latency.segments import Data
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.web.live.pacing import FRAMES
+from iveg.web.presses import read_number
 
 TRUSTED_S: Final = 0.1
 """Half the shortest round trip (s): how well a page knows the server's clock."""
@@ -54,17 +54,23 @@ class Painting:
             within: How wrong that may be (s).
             now: When this was heard (monotonic, s).
         """
+        drawn_at, doubt_s = read_number(at), read_number(within)
         while self._on_way and self._on_way[0][0] <= number:
             _, sent_at, samples = self._on_way.popleft()
             if at is not None:
                 for sample in samples:
-                    self._judge(sample, sent_at, at, within, now)
+                    self._judge(sample, sent_at, drawn_at, doubt_s, now)
 
     def _judge(
-        self, sample: _Sample, sent_at: float, at: object, within: object, now: float
+        self,
+        sample: _Sample,
+        sent_at: float,
+        at: float | None,
+        within: float | None,
+        now: float,
     ) -> None:
         robot_id, data, decided_at = sample
-        if not _is_number(at) or not _is_number(within) or within < 0.0:
+        if at is None or within is None or within < 0.0:
             self._watch.not_painted(robot_id, data, "page_nonsense")
         elif within > TRUSTED_S:
             self._watch.not_painted(robot_id, data, "clock_untrusted")
@@ -73,11 +79,6 @@ class Painting:
         else:
             self._watch.pages_within_s = within
             self._watch.painted(robot_id, data, decided_at, at)
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    is_one = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_one and isfinite(value)  # type: ignore[arg-type]
 
 
 def _stream_of(topic: str) -> tuple[str, Data] | None:
