@@ -155,8 +155,7 @@ def _cell(name: str, value: object, reader: Sentences | None) -> str:
     if isinstance(value, float) and (name == "at" or name.endswith("_at")):
         return format_stamp(value)
     if isinstance(value, float) and reader is not None:
-        text = str(value)
-        return text.replace(".", ",") if reader.translations.language == "es" else text
+        return reader.translations.decimal(str(value))
     if isinstance(value, Mapping | list):
         return write_json(value).decode()
     return _safe(value) if isinstance(value, str) else str(value)

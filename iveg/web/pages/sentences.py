@@ -9,9 +9,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from iveg.web.pages.local_time import in_madrid
-from iveg.web.pages.translations import Translations
+from iveg.web.pages.translations import HOLE, Translations
 
-_HOLE = re.compile(r"\{(\w+)(?::(\w+))?\}")
 _TRACK = re.compile(r"([PR])(\d+)")
 _NOTHING: Final = "—"
 _NAMED: Final = {"class": "class", "a": "class.a", "why": "why", "hop": "hop"}
@@ -38,14 +37,9 @@ class Sentences:
         template = self._find(key)
         if template is None:
             return key
-        return _HOLE.sub(
+        return HOLE.sub(
             lambda hole: self._write(slots.get(hole[1]), hole[2], slots), template
         ).strip()
-
-    def number(self, value: float, decimals: int) -> str:
-        """With the decimal sign of the language."""
-        text = f"{value:.{decimals}f}"
-        return text.replace(".", ",") if self.translations.language == "es" else text
 
     def lane(self, label: str) -> str:
         """An aisle in the reader's words; a name that a grower gave stays."""
@@ -72,29 +66,26 @@ class Sentences:
         if form == "lane":
             return self.lane(str(value))
         if form in _NAMED:
-            return self._find_plain(f"{_NAMED[form]}.{value}") or str(value)
+            key = f"{_NAMED[form]}.{value}"
+            return self.translations.sentences.get(key, str(value))
         if isinstance(value, bool) or not isinstance(value, int | float):
             return str(value)
         return self._measure(float(value), form)
 
     def _measure(self, value: float, form: str | None) -> str:
         if form == "percent":
-            sign = "\u00a0%" if self.translations.language == "es" else "%"
-            return f"{100 * value:.0f}{sign}"
+            return self.translations.percent(value)
         if form == "time":
             return f"{in_madrid(value):%H:%M:%S}"
         decimals = int(form) if form and form.isdigit() else 3
-        text = self.number(value, decimals)
+        text = self.translations.decimal(f"{value:.{decimals}f}")
         return text if form else _trimmed(text)
-
-    def _find_plain(self, key: str) -> str | None:
-        return self.translations.sentences.get(key)
 
     def _person(self, track: str) -> str:
         found = _TRACK.fullmatch(track)
         if found:
             return self.say(f"class.track.{found[1]}", {"n": found[2]})
-        return self._find_plain(f"class.{track}") or track
+        return self.translations.sentences.get(f"class.{track}", track)
 
     def _sentence(self, value: object, slots: Slots) -> str:
         if isinstance(value, Mapping):

@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Final
 
 LANGUAGES = ("es", "en")
 """Both complete; the first is the one for readers of neither."""
 
-_HOLE = re.compile(r"\{(\w+)(?::(\w+))?\}")
+HOLE: Final = re.compile(r"\{(\w+)(?::(\w+))?\}")
 
 Slot = str | int | float
 
@@ -36,16 +37,22 @@ class Translations:
         def fill(hole: re.Match[str]) -> str:
             return self._write(slots[hole[1]], hole[2])
 
-        return _HOLE.sub(fill, self.sentences[key])
+        return HOLE.sub(fill, self.sentences[key])
 
     def _write(self, value: Slot, form: str | None) -> str:
         if isinstance(value, str) or form is None:
             return str(value)
         if form == "percent":
-            # As browsers write it: Spanish keeps the sign on the number's line.
-            sign = "\u00a0%" if self.language == "es" else "%"
-            return f"{value * 100:.0f}{sign}"
-        number = f"{value:.{int(form)}f}"
+            return self.percent(value)
+        return self.decimal(f"{value:.{int(form)}f}")
+
+    def percent(self, share: float) -> str:
+        """A share as browsers write it: Spanish keeps the sign on the number's line."""
+        sign = "\u00a0%" if self.language == "es" else "%"
+        return f"{100 * share:.0f}{sign}"
+
+    def decimal(self, number: str) -> str:
+        """A number with the decimal sign of the language."""
         return number.replace(".", ",") if self.language == "es" else number
 
 

@@ -17,7 +17,7 @@ def test_formats_are_those_of_the_page() -> None:
     assert EN.say("log.speed_down.default", slots) == (
         "AGII slowed to 50% (person near)"
     )
-    assert ES.number(1.43, 2) == "1,43"
+    assert ES.translations.decimal("1.43") == "1,43"
     assert ES.lane("Cabecera norte") == "Cabecera norte"
     assert EN.lane("Pasillo 3") == "Aisle 3"
     assert EN.lane("Tomates de Ana") == "Tomates de Ana"
