@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, Generic, TypeVar
 
-import orjson
 from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from orjson import Fragment
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
@@ -279,13 +279,14 @@ async def _charts(
     )
 
     def draw() -> bytes:
-        parts = (
-            orjson.dumps(_library()).removesuffix(b"}"),
-            b'"speed":' + charts.speed_figure(speeds, fleet),
-            b'"detections":' + charts.confidence_figure(counts, threshold),
-            b'"stops":' + charts.stop_figure(stops) + b"}",
+        return write_json(
+            {
+                **_library(),
+                "speed": Fragment(charts.speed_figure(speeds, fleet)),
+                "detections": Fragment(charts.confidence_figure(counts, threshold)),
+                "stops": Fragment(charts.stop_figure(stops)),
+            }
         )
-        return b",".join(parts)
 
     body = await asyncio.to_thread(draw)
     return Response(body, media_type=MEDIA_TYPES["json"])
@@ -295,18 +296,17 @@ async def _climate(queries: Queries, since: float, until: float) -> Response:
     series = await queries.climate_series(since, until)
 
     def draw() -> bytes:
-        head = write_json(
+        figures = charts.climate_figures(series)
+        return write_json(
             {
                 "since": format_stamp(since),
                 "until": format_stamp(until),
                 "slice_s": round(series.slice_s, 3),
                 "items": _readings(series),
                 **_library(),
+                "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
             }
         )
-        figures = charts.climate_figures(series).items()
-        parts = (b'"%s":%s' % (name.encode(), figure) for name, figure in figures)
-        return head.removesuffix(b"}") + b',"figures":{' + b",".join(parts) + b"}}"
 
     body = await asyncio.to_thread(draw)
     return Response(body, media_type=MEDIA_TYPES["json"])
