@@ -124,8 +124,12 @@ def _latency(parts: _Parts) -> Iterator[str]:
         labels = _labels(robot=robot, data=data, hop=hop)
         counts.append((labels, count))
         sums.append((labels, total))
-    told = "What a hop took; quantiles of the last minute."
-    yield from _family("latency_seconds", "summary", told, quantiles)
+    yield from _family(
+        "latency_seconds",
+        "summary",
+        "What a hop took; quantiles of the last minute.",
+        quantiles,
+    )
     # Of one family in the text format: no header of their own.
     for name, samples in (("sum", sums), ("count", counts)):
         yield from (
@@ -154,8 +158,12 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
         for one in streams
         for (hop, why), count in one.excluded.items()
     )
-    told = "Messages that are in no statistics."
-    yield from _family("messages_excluded_total", "counter", told, excluded)
+    yield from _family(
+        "messages_excluded_total",
+        "counter",
+        "Messages that are in no statistics.",
+        excluded,
+    )
     rates = (
         (_labels(robot=one.robot_id, data=one.data, way=way), getattr(one.rates, way))
         for one in streams
@@ -173,45 +181,63 @@ def _streams(watch: LatencyWatch) -> Iterator[str]:
 def _clocks(watch: LatencyWatch) -> Iterator[str]:
     clocks = [(_labels(robot=name), one) for name, one in watch.clocks.items()]
     offsets = ((labels, one.offset_s) for labels, one in clocks)
-    told = "Robot's clock less ours."
-    yield from _family("clock_offset_seconds", "gauge", told, offsets)
+    yield from _family(
+        "clock_offset_seconds", "gauge", "Robot's clock less ours.", offsets
+    )
     within = ((labels, one.uncertainty_s) for labels, one in clocks)
-    told = "How wrong that may be."
-    yield from _family("clock_uncertainty_seconds", "gauge", told, within)
+    yield from _family(
+        "clock_uncertainty_seconds", "gauge", "How wrong that may be.", within
+    )
 
 
 def _queues(queues: Queues) -> Iterator[str]:
-    depths = ((_labels(queue=name), n) for name, n in queues.depths.items())
-    yield from _family("queue_depth", "gauge", "What waits.", depths)
-    dropped = ((_labels(queue=name), n) for name, n in queues.dropped.items())
-    yield from _family("dropped_total", "counter", "What gave way.", dropped)
-    retries = ((_labels(what=name), n) for name, n in queues.retries.items())
-    yield from _family("retries_total", "counter", "What was done again.", retries)
+    for name, kind, told, label, counts in (
+        ("queue_depth", "gauge", "What waits.", "queue", queues.depths),
+        ("dropped_total", "counter", "What gave way.", "queue", queues.dropped),
+        ("retries_total", "counter", "What was done again.", "what", queues.retries),
+    ):
+        samples = ((_labels(**{label: key}), count) for key, count in counts.items())
+        yield from _family(name, kind, told, samples)
 
 
 def _safety(safety: Safety) -> Iterator[str]:
-    latency, asked = safety.alert_latency, safety.not_echoed
-    quantiles: list[tuple[str, float | None]] = [
-        (_labels(quantile="0.5"), _seconds(latency.p50_ms)),
-        (_labels(quantile="0.95"), _seconds(latency.p95_ms)),
-        (_labels(quantile="0.99"), _seconds(latency.p99_ms)),
-    ]
-    told = "Look at a person to the robot's own report, last five minutes."
-    yield from _family("alert_latency_seconds", "gauge", told, quantiles)
-    told = "Alerts not answered within a second, last five minutes."
-    yield from _family("alerts_not_echoed", "gauge", told, [("", asked.count)])
-    told = "Alerts that should have been answered."
-    yield from _family("alerts_asked", "gauge", told, [("", asked.of)])
-    margin = safety.negative_margin
-    told = "Share of today's known time with a margin below zero."
-    yield from _family("negative_margin_ratio", "gauge", told, [("", margin.share)])
-    told = "Today's time in which margins were known."
-    known = [("", margin.known_s)]
-    yield from _family("margin_known_seconds", "gauge", told, known)
+    latency = safety.alert_latency
+    asked, margin = safety.not_echoed, safety.negative_margin
     worst = safety.worst_margin.margin
-    told = "Least margin of today."
-    least = None if worst is None else worst.margin_m
-    yield from _family("worst_margin_metres", "gauge", told, [("", least)])
+    yield from _family(
+        "alert_latency_seconds",
+        "gauge",
+        "Look at a person to the robot's own report, last five minutes.",
+        [
+            (_labels(quantile="0.5"), _seconds(latency.p50_ms)),
+            (_labels(quantile="0.95"), _seconds(latency.p95_ms)),
+            (_labels(quantile="0.99"), _seconds(latency.p99_ms)),
+        ],
+    )
+    for name, told, value in (
+        (
+            "alerts_not_echoed",
+            "Alerts not answered within a second, last five minutes.",
+            asked.count,
+        ),
+        ("alerts_asked", "Alerts that should have been answered.", asked.of),
+        (
+            "negative_margin_ratio",
+            "Share of today's known time with a margin below zero.",
+            margin.share,
+        ),
+        (
+            "margin_known_seconds",
+            "Today's time in which margins were known.",
+            margin.known_s,
+        ),
+        (
+            "worst_margin_metres",
+            "Least margin of today.",
+            None if worst is None else worst.margin_m,
+        ),
+    ):
+        yield from _family(name, "gauge", told, [("", value)])
 
 
 def _seconds(ms: float | None) -> float | None:
