@@ -5,7 +5,6 @@ alone, since TCP and QoS 1 deliver all other messages once and in order; delay a
 all messages.
 """
 
-from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,12 +63,10 @@ class Radio:
 
     Attributes:
         faults: Faults at present.
-        counters: Packets dropped, duplicated, reordered, repeated, muted.
     """
 
     def __init__(self, odometry: frozenset[str], rng: np.random.Generator) -> None:
         self.faults = LinkFaults()
-        self.counters: Counter[str] = Counter()
         self._odometry = odometry
         self._rng = rng
         self._last: dict[str, Packet] = {}
@@ -81,7 +78,6 @@ class Radio:
         if packet.topic is None:
             return [(now, packet.raw)]
         if self.faults.mute:
-            self.counters["muted"] += 1
             return []
         if not packet.is_telemetry:
             return [(self._due(now), packet.raw)]
@@ -93,7 +89,6 @@ class Radio:
         if topic not in self._odometry:
             return packet
         if self.faults.repeats_odometry and topic in self._last:
-            self.counters["repeated"] += 1
             return self._last[topic]
         self._last[topic] = packet
         return packet
@@ -103,14 +98,11 @@ class Radio:
         dropped, doubled, overtaken = (self._rng.random(3) * 100.0).tolist()
         waiting = self._overtaken.pop(topic, [])
         if dropped < faults.drop_percent:
-            self.counters["dropped"] += 1
             return waiting
         out = [packet]
         if doubled < faults.duplicate_percent:
-            self.counters["duplicated"] += 1
             out.append(packet)
         if overtaken < faults.reorder_percent and not waiting:
-            self.counters["reordered"] += 1
             self._overtaken[topic] = out
             return []
         return out + waiting

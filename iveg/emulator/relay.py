@@ -124,9 +124,7 @@ class Relay:
             for due, raw in passed:
                 if packet.topic is None:
                     up.write(raw)
-                elif waiting.full():
-                    self.radio.counters["overflowed"] += 1
-                else:
+                elif not waiting.full():
                     waiting.put_nowait((due, raw))
             await up.drain()
 

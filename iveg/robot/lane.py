@@ -51,8 +51,6 @@ class SafetyLane:
         self._keep_wake, self._send_wake = asyncio.Event(), asyncio.Event()
         self._room = asyncio.Semaphore(_UNDER_WAY)
         self._disk_fails = False
-        self.unsent = 0
-        """Answers and reports lost without a broker; the next report has the state."""
 
     def persist(self, holds: HoldSet) -> None:
         """Store this set; only the newest is pending, since it replaces all before."""
@@ -116,6 +114,6 @@ class SafetyLane:
         try:
             await self._publish(message.topic, message.payload)
         except HopError:
-            self.unsent += 1
+            pass  # lost without a broker; the next report has the state
         finally:
             self._room.release()

@@ -7,7 +7,6 @@ command first; disk and broker have a queue of their own and are never waited fo
 import asyncio
 import logging
 import secrets
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -100,7 +99,6 @@ class RobotNode:
     ) -> None:
         self._read_clock = read_clock
         self.boot = secrets.token_hex(4)
-        self.counters: Counter[str] = Counter()
         self._id = robot_id
         self._drive = drive
         self._started = self._read_clock().mono
@@ -274,10 +272,8 @@ class RobotNode:
     def _on_feedback(self, topic: str, payload: bytes, now: float) -> None:
         try:
             feedback = read_feedback(payload)
-        except UnreadableError as error:
-            # Counts as no feedback: the watchdog does the rest.
-            self.counters[error.reason] += 1
-            return
+        except UnreadableError:
+            return  # Counts as no feedback: the watchdog does the rest.
         self._echo.take(feedback.origin)
         self._uplink.rates.take_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
@@ -310,7 +306,6 @@ class RobotNode:
         self._drive(twist)
 
     def _answer(self, answer: CommandAnswer) -> None:
-        self.counters[answer.result] += 1
         _log.info(
             "%s: %s %s %s", self._id, answer.result, answer.id or "", answer.why or ""
         )

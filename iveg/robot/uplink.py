@@ -92,10 +92,6 @@ class Uplink:
         self._looked: tuple[tuple[str, int], ...] = ()
         self._stamp = math.nan, ""
         self.rates = UplinkRates()
-        self.sent: Counter[str] = Counter()
-        """Measures made, by device suffix; the single payload's is empty."""
-        self.spared: Counter[str] = Counter()
-        """Messages sent to iVeg directly instead, by device suffix."""
 
     def send(self, observation: Sensed, at: Instant) -> None:
         """Send an observation of this moment."""
@@ -130,14 +126,12 @@ class Uplink:
         payload = codec.write_safety(replace(report, origin=origin))
         messages = [LaneMessage(names.direct_topic(self._id, "_safety"), payload)]
         if is_measure:
-            self.sent["_safety"] += 1
             messages.append(LaneMessage(self._topic("_safety"), payload))
         return origin.seq or 0, messages
 
     def answer(self, answer: CommandAnswer, at: Instant) -> LaneMessage:
         """The message of an answer on ``cmdexe``."""
         origin = self._origin(_ANSWERS, at)
-        self.sent[_ANSWERS] += 1
         topic = names.answer_topic(self._apikey, self._id)
         return LaneMessage(topic, codec.write_answer(replace(answer, origin=origin)))
 
@@ -157,10 +151,8 @@ class Uplink:
         self, suffix: str, payload: bytes, now: float, *, news: bool = False
     ) -> None:
         if self.rates.is_measure(suffix, now, news=news):
-            self.sent[suffix] += 1
             self._offer(self._topic(suffix), payload)
         else:
-            self.spared[suffix] += 1
             self._offer(names.direct_topic(self._id, suffix), payload)
 
     def _stamp_of(self, wall: float) -> str:

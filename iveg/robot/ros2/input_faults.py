@@ -1,10 +1,9 @@
-"""Faults of a robot's ROS 2 inputs: name, count and effect on the speed.
+"""Faults of a robot's ROS 2 inputs: name and effect on the speed.
 
 A fault lasts as long as it is noted, and two seconds more; while it lasts the robot is
 slow, or halts where driving on would be a guess.
 """
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -35,8 +34,6 @@ class InputFaults:
 
     def __init__(self) -> None:
         self._noted: dict[tuple[str, str], _Noted] = {}
-        self.counters: Counter[str] = Counter()
-        """Number of notes by code."""
 
     def note(
         self, code: str, about: str, now: float, for_s: float | None = None
@@ -49,7 +46,6 @@ class InputFaults:
             now: Monotonic (s).
             for_s: Duration so far, where known from elsewhere (s).
         """
-        self.counters[code] += 1
         key = clean(code), clean(about)
         before = self._noted.get(key)
         fresh = before is None or now - before.last > LASTS_S

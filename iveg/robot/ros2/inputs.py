@@ -162,11 +162,6 @@ class SensorInputs:
         """Newest pose of the robot in ``map``."""
         return None if self._here is None else self._here.in_map
 
-    @property
-    def transforms(self) -> TransformBuffer:
-        """Present transforms."""
-        return self._transforms
-
     # --- messages -----------------------------------------------------------------
 
     def hear(
@@ -186,8 +181,7 @@ class SensorInputs:
     def _hear_transforms(self, topic: str, payload: bytes, now: float) -> None:
         message = self._read(topic, m.TFMessage, payload, now)
         if message is not None:
-            refused = self._transforms.add(message, static=topic == "tf_static")
-            self.input_faults.counters["transforms_refused"] += refused
+            self._transforms.add(message, static=topic == "tf_static")
 
     def tick(self, now: Instant) -> list[Sensed]:
         """New observations, odometry first."""

@@ -154,13 +154,6 @@ class TransformBuffer:
         part = (stamp - before.stamp) / (after.stamp - before.stamp)
         return before.rigid.towards(after.rigid, part)
 
-    def age(self, child: str, stamp: float) -> float | None:
-        """Age of a frame's newest transform (s); 0 for a static one."""
-        link = self._links.get(child)
-        if link is None:
-            return None
-        return 0.0 if link.static else stamp - link.known[-1].stamp
-
     def chain(self, inner: str) -> tuple[str, ...]:
         """A frame and all its ancestors."""
         return tuple(self._ancestors(inner))

@@ -113,7 +113,6 @@ def test_a_report_for_iveg_alone_goes_past_the_agent_in_the_same_count() -> None
     second, _ = wire.uplink.report(report, AT)
     assert [one.topic for one in messages] == ["/AGI/iveg/safety"]
     assert (first, second) == (700, 701)
-    assert wire.uplink.sent == {"_safety": 1}
 
 
 def test_an_answer_goes_to_cmdexe_with_its_origin() -> None:
@@ -169,13 +168,6 @@ def test_a_recording_proves_nothing() -> None:
     assert not said.origin.acknowledgements
 
 
-def test_counters_tell_what_left() -> None:
-    wire = Wire()
-    wire.uplink.send(odometry(origin=BLANK), AT)
-    wire.uplink.report(SafetyReport("AGI", BLANK, 1.0, "clear"), AT)
-    assert wire.uplink.sent == {"_odom": 1, "_safety": 1}
-
-
 @pytest.mark.parametrize("form", ["per-topic", "single"])
 def test_a_scan_travels_with_every_digit_of_its_float32_even_through_orion(
     form: str,
@@ -204,7 +196,7 @@ def test_what_the_agent_is_spared_goes_straight_to_iveg_in_the_same_count() -> N
     topics = [topic for topic, _ in wire.sent]
     assert set(topics) == {"/iveg/AGI_odom/attrs", "/AGI/iveg/odom"}
     assert topics.count("/iveg/AGI_odom/attrs") in (5, 6)
-    assert wire.uplink.sent["_odom"] + wire.uplink.spared["_odom"] == 30
+    assert len(topics) == 30
     read = [
         observation
         for _, payload in wire.sent

@@ -149,7 +149,6 @@ async def test_who_is_near_goes_out_for_the_costmap_and_for_rviz(site: Site) -> 
 async def test_what_is_wrong_goes_out_with_the_next_report(site: Site) -> None:
     await until(lambda: "no_data" in site.faults())
 
-    assert site.robot.inputs.input_faults.counters["no_data"] > 0
     await until(lambda: site.robot.node.speed_factor < 1.0)
 
 
