@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.observations import Battery as BatterySaid
 from iveg.domain.observations import (
     Detection,
     DetectionFrame,
@@ -23,7 +22,7 @@ from iveg.robot.grounding.locate import Grounding
 from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
-from iveg.robot.ros2.reading import UNSAID, Battery
+from iveg.robot.ros2.reading import UNSAID
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
@@ -152,8 +151,6 @@ class SensorInputs:
         self._masks: deque[m.Image] = deque(maxlen=_PICTURES)
         self._camera: m.CameraInfo | None = None
         self._look: tuple[m.Detection2DArray, float] | None = None
-        self.battery: Battery | None = None
-        """Newest state of the battery."""
         self._battery_told = float("-inf")
         self.input_faults = InputFaults()
 
@@ -373,12 +370,10 @@ class SensorInputs:
         message = self._read("battery", m.BatteryState, payload, now.mono)
         if message is None:
             return []
-        self.battery = said = reading.read_battery(message)
         if now.mono - self._battery_told < BATTERY_EVERY_S:
             return []
         self._battery_told = now.mono
-        share, charging, volts = said.percentage, said.charging, said.voltage
-        return [BatterySaid("", UNSAID, share, charging, volts)]
+        return [reading.read_battery(message)]
 
     # --- pictures -----------------------------------------------------------------
 

@@ -5,14 +5,19 @@ Each message is interpreted by one function.  Numbers that are not finite raise
 """
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
-from iveg.domain.observations import Detection, LaserScan, Navigation, Origin
+from iveg.domain.observations import (
+    Battery,
+    Detection,
+    LaserScan,
+    Navigation,
+    Origin,
+)
 from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
@@ -207,21 +212,6 @@ def read_path(
     return Navigation("", UNSAID, task, way[-1], way)
 
 
-@dataclass(frozen=True, slots=True)
-class Battery:
-    """Content of ``sensor_msgs/BatteryState`` that iVeg uses.
-
-    Attributes:
-        percentage: 0 to 1; None when unknown.
-        voltage: (V); None when unknown.
-        charging: None when unknown.
-    """
-
-    percentage: float | None
-    voltage: float | None
-    charging: bool | None
-
-
 def read_battery(state: m.BatteryState) -> Battery:
     """Read the state of the battery.
 
@@ -234,7 +224,8 @@ def read_battery(state: m.BatteryState) -> Battery:
         share /= 100.0
     volts = state.voltage if math.isfinite(state.voltage) else None
     charging = {1: True, 2: False, 3: False, 4: False}
-    return Battery(share, volts, charging.get(state.power_supply_status))
+    status = charging.get(state.power_supply_status)
+    return Battery("", UNSAID, share, status, volts)
 
 
 @lru_cache(1024)

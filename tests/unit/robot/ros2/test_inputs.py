@@ -7,6 +7,7 @@ import pytest
 
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import (
+    Battery,
     DetectionFrame,
     LaserScan,
     Navigation,
@@ -376,10 +377,10 @@ def test_an_empty_plan_is_an_idle_robot() -> None:
 )
 def test_a_battery_is_read_as_a_share(told: float, share: float | None) -> None:
     bench = Bench().hear("battery", m.BatteryState(percentage=told, voltage=25.5))
-    bench.tick()
 
-    battery = bench.inputs.battery
-    assert battery is not None
+    (battery,) = bench.tick()
+
+    assert isinstance(battery, Battery)
     assert battery.percentage == (None if share is None else pytest.approx(share))
     assert battery.voltage == 25.5
 
