@@ -8,7 +8,7 @@ more than its bytes.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
@@ -49,6 +49,8 @@ Transforms come last: after a pause each datum then finds the transform that was
 published before it, though both arrive while the topics are being read.
 """
 _TREE = frozenset({"tf_static", "tf"})
+_ORDERED = frozenset({"odometry", "scan", "detections_3d", "detections_2d"})
+"""Topics whose old messages do not count."""
 _UNREAD = frozenset(
     {
         (m.PoseWithCovariance, "covariance"),
@@ -66,9 +68,6 @@ _SAME_PICTURE_S = 0.05
 _DEPTH_LATE_S = 0.3
 BATTERY_EVERY_S = 5.0
 """Least time between two reports of the battery (s)."""
-
-_M = TypeVar("_M", bound=Message)
-
 
 PICTURES = ("depth", "mask")
 """Topics of large messages, of which few may be pending."""
@@ -176,7 +175,7 @@ class SensorInputs:
             self._newest[topic] = arrived[-1]
 
     def _hear_transforms(self, topic: str, payload: bytes, now: float) -> None:
-        message = self._read(topic, m.TFMessage, payload, now)
+        message = self._read(topic, payload, now)
         if message is not None:
             self._transforms.add(message, static=topic == "tf_static")
 
@@ -217,33 +216,33 @@ class SensorInputs:
     def _attempt(
         self,
         topic: str,
-        work: Callable[[bytes, Instant], list[Sensed]],
+        work: Callable[[Any, Instant], list[Sensed]],
         payload: bytes,
         now: Instant,
     ) -> list[Sensed]:
+        """What follows from a message of a topic, unless it is unusable or old."""
+        message = self._read(topic, payload, now.mono)
+        if message is None:
+            return []
+        if topic in _ORDERED and not self._is_new(topic, message, now):
+            return []
         try:
-            return work(payload, now)
+            return work(message, now)
         except UnreadableError as error:
             self.input_faults.note(error.reason, self._name(topic), now.mono)
             return []
 
-    def _read(
-        self, topic: str, message: type[_M], payload: bytes, now: float
-    ) -> _M | None:
+    def _read(self, topic: str, payload: bytes, now: float) -> Any:
+        """A message of a topic; None for one that cannot be read."""
         try:
-            return cdr.read(message, payload, _UNREAD)
+            return cdr.read(TOPICS[topic], payload, _UNREAD)
         except UnreadableError:
             self.input_faults.note("unreadable", self._name(topic), now)
             return None
 
-    def _stamped(
-        self, topic: str, message: type[_M], payload: bytes, now: Instant
-    ) -> tuple[_M, float] | None:
-        """A message and its stamp (s); None for an old one."""
-        read = self._read(topic, message, payload, now.mono)
-        if read is None:
-            return None
-        stamp = read.header.stamp.seconds  # type: ignore[attr-defined]
+    def _is_new(self, topic: str, message: Any, now: Instant) -> bool:
+        """Whether a message counts by its stamp."""
+        stamp: float = message.header.stamp.seconds
         verdict = self._stamps.setdefault(topic, _Stamps()).verdict(stamp)
         if verdict in ("back", "reset"):
             self.input_faults.note("time_back", self._name(topic), now.mono)
@@ -252,7 +251,7 @@ class SensorInputs:
             self._here = None
         if not self._sim_time and abs(stamp - now.wall) > _CLOCK_OFF_S:
             self.input_faults.note("clock_off", self._name(topic), now.mono)
-        return None if verdict in ("back", "same") else (read, stamp)
+        return verdict in ("new", "reset")
 
     def _name(self, topic: str) -> str:
         return str(getattr(self._names, topic))
@@ -282,11 +281,8 @@ class SensorInputs:
 
     # --- topics -------------------------------------------------------------------
 
-    def _odometry(self, payload: bytes, now: Instant) -> list[Sensed]:
-        read = self._stamped("odometry", m.Odometry, payload, now)
-        if read is None:
-            return []
-        message, stamp = read
+    def _odometry(self, message: m.Odometry, now: Instant) -> list[Sensed]:
+        stamp = message.header.stamp.seconds
         twist = reading.read_twist(message.twist.twist)
         odom = message.header.frame_id.lstrip("/") or self._frames.odom
         in_odom = self._base_in_odom(message, stamp, now.mono)
@@ -308,11 +304,8 @@ class SensorInputs:
         base = self._lookup(child, self._frames.base_link, stamp, now)
         return None if base is None else pose.compose(base)
 
-    def _scan(self, payload: bytes, now: Instant) -> list[Sensed]:
-        read = self._stamped("scan", m.LaserScan, payload, now)
-        if read is None:
-            return []
-        message, stamp = read
+    def _scan(self, message: m.LaserScan, now: Instant) -> list[Sensed]:
+        stamp = message.header.stamp.seconds
         here = self._here
         late = here is None or abs(stamp - here.stamp) > self._tf_max_age_s
         laser = self._laser(message.header.frame_id, stamp, now.mono)
@@ -331,11 +324,8 @@ class SensorInputs:
                 pass  # odometry may be missing in the tree; the mount must be there
         return self._lookup(self._frames.base_link, frame, stamp, now)
 
-    def _detections(self, payload: bytes, now: Instant) -> list[Sensed]:
-        read = self._stamped("detections_3d", m.Detection3DArray, payload, now)
-        if read is None:
-            return []
-        message, stamp = read
+    def _detections(self, message: m.Detection3DArray, now: Instant) -> list[Sensed]:
+        stamp = message.header.stamp.seconds
         found: list[Detection] = []
         places: dict[str, RigidTransform | None] = {}
         lost = 0
@@ -356,20 +346,14 @@ class SensorInputs:
                 lost += 1
         return [DetectionFrame("", UNSAID, tuple(found), lost)]
 
-    def _path(self, payload: bytes, now: Instant) -> list[Sensed]:
-        message = self._read("path", m.Path, payload, now.mono)
-        if message is None:
-            return []
+    def _path(self, message: m.Path, now: Instant) -> list[Sensed]:
         frame = message.header.frame_id or self._frames.map
         # A path is old by nature: it is placed by the present transform.
         stamp = self._here.stamp if self._here else message.header.stamp.seconds
         place = self._in_map(frame, stamp, now.mono)
         return [] if place is None else [reading.read_path(message, place)]
 
-    def _battery(self, payload: bytes, now: Instant) -> list[Sensed]:
-        message = self._read("battery", m.BatteryState, payload, now.mono)
-        if message is None:
-            return []
+    def _battery(self, message: m.BatteryState, now: Instant) -> list[Sensed]:
         if now.mono - self._battery_told < BATTERY_EVERY_S:
             return []
         self._battery_told = now.mono
@@ -377,27 +361,20 @@ class SensorInputs:
 
     # --- pictures -----------------------------------------------------------------
 
-    def _depth(self, payload: bytes, now: Instant) -> list[Sensed]:
-        message = self._read("depth", m.Image, payload, now.mono)
-        if message is not None:
-            self._depths.append(message)
+    def _depth(self, message: m.Image, _: Instant) -> list[Sensed]:
+        self._depths.append(message)
         return []
 
-    def _mask(self, payload: bytes, now: Instant) -> list[Sensed]:
-        message = self._read("mask", m.Image, payload, now.mono)
-        if message is not None:
-            self._masks.append(message)
+    def _mask(self, message: m.Image, _: Instant) -> list[Sensed]:
+        self._masks.append(message)
         return []
 
-    def _camera_info(self, payload: bytes, now: Instant) -> list[Sensed]:
-        message = self._read("camera_info", m.CameraInfo, payload, now.mono)
-        self._camera = message or self._camera
+    def _camera_info(self, message: m.CameraInfo, _: Instant) -> list[Sensed]:
+        self._camera = message
         return []
 
-    def _picture(self, payload: bytes, now: Instant) -> list[Sensed]:
-        read = self._stamped("detections_2d", m.Detection2DArray, payload, now)
-        if read is not None:
-            self._look = read[0], now.mono
+    def _picture(self, message: m.Detection2DArray, now: Instant) -> list[Sensed]:
+        self._look = message, now.mono
         return []
 
     def _grounded(self, now: Instant) -> list[Sensed]:
@@ -405,29 +382,34 @@ class SensorInputs:
         if self._look is None:
             return []
         look, since = self._look
-        stamp = look.header.stamp.seconds
-        depth, camera = pictures.nearest(self._depths, stamp, _SAME_PICTURE_S), None
-        if depth is not None:
-            camera = self._camera
-        if (depth is None or camera is None) and now.mono - since < _DEPTH_LATE_S:
+        depth = pictures.nearest(
+            self._depths, look.header.stamp.seconds, _SAME_PICTURE_S
+        )
+        incomplete = depth is None or self._camera is None
+        if incomplete and now.mono - since < _DEPTH_LATE_S:
             return []
         self._look = None
         if not look.detections:
             return [DetectionFrame("", UNSAID, ())]
-        frame = depth.header.frame_id if depth is not None else ""
-        place = self._in_map(frame, stamp, now.mono) if depth is not None else None
-        if depth is None or camera is None:
+        frame = None if depth is None else self._located(look, depth, now.mono)
+        if incomplete:
             self.input_faults.note("no_depth", self._name("detections_2d"), now.mono)
-        if depth is None or camera is None or place is None:
-            return [DetectionFrame("", UNSAID, (), len(look.detections))]
+        return [frame or DetectionFrame("", UNSAID, (), len(look.detections))]
+
+    def _located(
+        self, look: m.Detection2DArray, depth: m.Image, now: float
+    ) -> DetectionFrame | None:
+        """Boxes of a detection frame; None where nothing of it can be located."""
+        stamp = look.header.stamp.seconds
+        place = self._in_map(depth.header.frame_id, stamp, now)
+        if place is None or self._camera is None:
+            return None
         mask = pictures.nearest(self._masks, stamp, _SAME_PICTURE_S)
         try:
-            picture = pictures.read_depth(depth, camera)
-            return [
-                pictures.grounded(
-                    look, picture, mask, place, self._classes, self._grounding
-                )
-            ]
+            picture = pictures.read_depth(depth, self._camera)
+            return pictures.grounded(
+                look, picture, mask, place, self._classes, self._grounding
+            )
         except UnreadableError as error:
-            self.input_faults.note(error.reason, self._name("depth"), now.mono)
-            return [DetectionFrame("", UNSAID, (), len(look.detections))]
+            self.input_faults.note(error.reason, self._name("depth"), now)
+            return None
