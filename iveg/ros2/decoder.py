@@ -56,7 +56,7 @@ def decoder_of(message: type[Message], order: ByteOrder, left_out: Fields) -> De
 @cache
 def _draft_of(message: type[Message]) -> type:
     slots = tuple(name for name, _ in fields_of(message))
-    return type(f"{message.__name__}Draft", (), {"__slots__": slots})
+    return type(f"{message.__name__}Draft", (Message,), {"__slots__": slots})
 
 
 def layout(run: list[tuple[str, int, int]], start: int) -> str:

@@ -11,7 +11,16 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.ros2.schema import Boolean, Float32, Float64, Int32, Many, Uint8, Uint32
+from iveg.ros2.schema import (
+    Boolean,
+    Float32,
+    Float64,
+    Int32,
+    Many,
+    Message,
+    Uint8,
+    Uint32,
+)
 
 Floats = Annotated[NDArray[np.float32], Many("float32")]
 Doubles = Annotated[NDArray[np.float64], Many("float64")]
@@ -33,10 +42,9 @@ def _none() -> NDArray[np.float32]:
 
 
 @dataclass(frozen=True, slots=True)
-class Time:
+class Time(Message, package="builtin_interfaces"):
     """Seconds and nanoseconds since 1970."""
 
-    ROS: ClassVar[str] = "builtin_interfaces/msg/Time"
     sec: Int32 = 0
     nanosec: Uint32 = 0
 
@@ -53,28 +61,25 @@ class Time:
 
 
 @dataclass(frozen=True, slots=True)
-class Duration:
+class Duration(Message, package="builtin_interfaces"):
     """A duration (s, ns)."""
 
-    ROS: ClassVar[str] = "builtin_interfaces/msg/Duration"
     sec: Int32 = 0
     nanosec: Uint32 = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Header:
+class Header(Message, package="std_msgs"):
     """Time of measurement, and frame."""
 
-    ROS: ClassVar[str] = "std_msgs/msg/Header"
     stamp: Time = Time()
     frame_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class ColorRGBA:
+class ColorRGBA(Message, package="std_msgs"):
     """Each 0 to 1."""
 
-    ROS: ClassVar[str] = "std_msgs/msg/ColorRGBA"
     r: Float32 = 0.0
     g: Float32 = 0.0
     b: Float32 = 0.0
@@ -85,30 +90,27 @@ class ColorRGBA:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class Point(Message, package="geometry_msgs"):
     """(m)."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Point"
     x: Float64 = 0.0
     y: Float64 = 0.0
     z: Float64 = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Vector3:
+class Vector3(Message, package="geometry_msgs"):
     """(m), (m/s) or (rad/s)."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Vector3"
     x: Float64 = 0.0
     y: Float64 = 0.0
     z: Float64 = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Quaternion:
+class Quaternion(Message, package="geometry_msgs"):
     """A rotation; the default is the identity."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Quaternion"
     x: Float64 = 0.0
     y: Float64 = 0.0
     z: Float64 = 0.0
@@ -116,83 +118,74 @@ class Quaternion:
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(Message, package="geometry_msgs"):
     """Position and orientation."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Pose"
     position: Point = Point()
     orientation: Quaternion = Quaternion()
 
 
 @dataclass(frozen=True, slots=True)
-class PoseStamped:
+class PoseStamped(Message, package="geometry_msgs"):
     """A pose in the header's frame."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/PoseStamped"
     header: Header = Header()
     pose: Pose = Pose()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PoseWithCovariance:
+class PoseWithCovariance(Message, package="geometry_msgs"):
     """A pose with its covariance."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/PoseWithCovariance"
     pose: Pose = Pose()
     covariance: Covariance = field(default_factory=lambda: _zeros(36))
 
 
 @dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(Message, package="geometry_msgs"):
     """Velocities: along and about the axes."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Twist"
     linear: Vector3 = Vector3()
     angular: Vector3 = Vector3()
 
 
 @dataclass(frozen=True, slots=True)
-class TwistStamped:
+class TwistStamped(Message, package="geometry_msgs"):
     """A twist in the header's frame."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/TwistStamped"
     header: Header = Header()
     twist: Twist = Twist()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwistWithCovariance:
+class TwistWithCovariance(Message, package="geometry_msgs"):
     """A twist with its covariance."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/TwistWithCovariance"
     twist: Twist = Twist()
     covariance: Covariance = field(default_factory=lambda: _zeros(36))
 
 
 @dataclass(frozen=True, slots=True)
-class Transform:
+class Transform(Message, package="geometry_msgs"):
     """Pose of a frame in another."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/Transform"
     translation: Vector3 = Vector3()
     rotation: Quaternion = Quaternion()
 
 
 @dataclass(frozen=True, slots=True)
-class TransformStamped:
+class TransformStamped(Message, package="geometry_msgs"):
     """Pose of ``child_frame_id`` in the header's frame."""
 
-    ROS: ClassVar[str] = "geometry_msgs/msg/TransformStamped"
     header: Header = Header()
     child_frame_id: str = ""
     transform: Transform = Transform()
 
 
 @dataclass(frozen=True, slots=True)
-class TFMessage:
+class TFMessage(Message, package="tf2_msgs"):
     """Content of ``/tf`` and ``/tf_static``."""
 
-    ROS: ClassVar[str] = "tf2_msgs/msg/TFMessage"
     transforms: tuple[TransformStamped, ...] = ()
 
 
@@ -200,10 +193,9 @@ class TFMessage:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Odometry:
+class Odometry(Message, package="nav_msgs"):
     """Pose of ``child_frame_id`` in the header's frame; the twist in the child's."""
 
-    ROS: ClassVar[str] = "nav_msgs/msg/Odometry"
     header: Header = Header()
     child_frame_id: str = ""
     pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
@@ -211,10 +203,9 @@ class Odometry:
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class Path(Message, package="nav_msgs"):
     """Planned path of navigation."""
 
-    ROS: ClassVar[str] = "nav_msgs/msg/Path"
     header: Header = Header()
     poses: tuple[PoseStamped, ...] = ()
 
@@ -223,10 +214,9 @@ class Path:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LaserScan:
+class LaserScan(Message, package="sensor_msgs"):
     """One sweep; ``ranges`` of shape (n,), (m)."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/LaserScan"
     header: Header = Header()
     angle_min: Float32 = 0.0
     angle_max: Float32 = 0.0
@@ -240,10 +230,9 @@ class LaserScan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BatteryState:
+class BatteryState(Message, package="sensor_msgs"):
     """Volts, °C, amperes, ampere hours; ``percentage`` 0 to 1, NaN when unknown."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/BatteryState"
     header: Header = Header()
     voltage: Float32 = 0.0
     temperature: Float32 = 0.0
@@ -263,10 +252,9 @@ class BatteryState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Image:
+class Image(Message, package="sensor_msgs"):
     """Rows of ``step`` bytes each; depth pictures are ``16UC1`` (mm), ``32FC1`` (m)."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/Image"
     header: Header = Header()
     height: Uint32 = 0
     width: Uint32 = 0
@@ -277,10 +265,9 @@ class Image:
 
 
 @dataclass(frozen=True, slots=True)
-class RegionOfInterest:
+class RegionOfInterest(Message, package="sensor_msgs"):
     """A part of a picture (pixels)."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/RegionOfInterest"
     x_offset: Uint32 = 0
     y_offset: Uint32 = 0
     height: Uint32 = 0
@@ -289,10 +276,9 @@ class RegionOfInterest:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraInfo:
+class CameraInfo(Message, package="sensor_msgs"):
     """Calibration of a camera; ``p`` is the projection of the rectified picture."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
     header: Header = Header()
     height: Uint32 = 0
     width: Uint32 = 0
@@ -307,10 +293,9 @@ class CameraInfo:
 
 
 @dataclass(frozen=True, slots=True)
-class PointField:
+class PointField(Message, package="sensor_msgs"):
     """One field of each point; ``datatype`` 7 is float32."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/PointField"
     name: str = ""
     offset: Uint32 = 0
     datatype: Uint8 = 7
@@ -318,10 +303,9 @@ class PointField:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PointCloud2:
+class PointCloud2(Message, package="sensor_msgs"):
     """``width`` × ``height`` points of ``point_step`` bytes each."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/PointCloud2"
     header: Header = Header()
     height: Uint32 = 1
     width: Uint32 = 0
@@ -334,10 +318,9 @@ class PointCloud2:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CompressedImage:
+class CompressedImage(Message, package="sensor_msgs"):
     """A part of ``Marker`` that iVeg leaves empty."""
 
-    ROS: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
     header: Header = Header()
     format: str = ""
     data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
@@ -347,37 +330,33 @@ class CompressedImage:
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectHypothesis:
+class ObjectHypothesis(Message, package="vision_msgs"):
     """Class hypothesis; ``score`` 0 to 1."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesis"
     class_id: str = ""
     score: Float64 = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ObjectHypothesisWithPose:
+class ObjectHypothesisWithPose(Message, package="vision_msgs"):
     """Class hypothesis with pose."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/ObjectHypothesisWithPose"
     hypothesis: ObjectHypothesis = ObjectHypothesis()
     pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
 
 
 @dataclass(frozen=True, slots=True)
-class BoundingBox3D:
+class BoundingBox3D(Message, package="vision_msgs"):
     """A box about its centre; ``size`` (m)."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/BoundingBox3D"
     center: Pose = Pose()
     size: Vector3 = Vector3()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection3D:
+class Detection3D(Message, package="vision_msgs"):
     """One detected object."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/Detection3D"
     header: Header = Header()
     results: tuple[ObjectHypothesisWithPose, ...] = ()
     bbox: BoundingBox3D = BoundingBox3D()
@@ -385,25 +364,23 @@ class Detection3D:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection3DArray:
+class Detection3DArray(Message, package="vision_msgs"):
     """Detections of one picture, with depth."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
     header: Header = Header()
     detections: tuple[Detection3D, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Point2D:
+class Point2D(Message, package="vision_msgs"):
     """(pixels)."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/Point2D"
     x: Float64 = 0.0
     y: Float64 = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class PicturePose:
+class PicturePose(Message):
     """``vision_msgs/Pose2D``: pixels and a turn (rad)."""
 
     ROS: ClassVar[str] = "vision_msgs/msg/Pose2D"
@@ -412,20 +389,18 @@ class PicturePose:
 
 
 @dataclass(frozen=True, slots=True)
-class BoundingBox2D:
+class BoundingBox2D(Message, package="vision_msgs"):
     """A box about its centre (pixels)."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/BoundingBox2D"
     center: PicturePose = PicturePose()
     size_x: Float64 = 0.0
     size_y: Float64 = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection2D:
+class Detection2D(Message, package="vision_msgs"):
     """One object detected in a picture."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/Detection2D"
     header: Header = Header()
     results: tuple[ObjectHypothesisWithPose, ...] = ()
     bbox: BoundingBox2D = BoundingBox2D()
@@ -433,10 +408,9 @@ class Detection2D:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Detection2DArray:
+class Detection2DArray(Message, package="vision_msgs"):
     """Detections of one picture, without depth."""
 
-    ROS: ClassVar[str] = "vision_msgs/msg/Detection2DArray"
     header: Header = Header()
     detections: tuple[Detection2D, ...] = ()
 
@@ -445,28 +419,25 @@ class Detection2DArray:
 
 
 @dataclass(frozen=True, slots=True)
-class UVCoordinate:
+class UVCoordinate(Message, package="visualization_msgs"):
     """A part of ``Marker`` that iVeg leaves empty."""
 
-    ROS: ClassVar[str] = "visualization_msgs/msg/UVCoordinate"
     u: Float32 = 0.0
     v: Float32 = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MeshFile:
+class MeshFile(Message, package="visualization_msgs"):
     """A part of ``Marker`` that iVeg leaves empty."""
 
-    ROS: ClassVar[str] = "visualization_msgs/msg/MeshFile"
     filename: str = ""
     data: Octets = field(default_factory=lambda: np.zeros(0, np.uint8))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Marker:
+class Marker(Message, package="visualization_msgs"):
     """A shape in RViz; ``type`` 3 is a cylinder, 9 a text."""
 
-    ROS: ClassVar[str] = "visualization_msgs/msg/Marker"
     header: Header = Header()
     ns: str = ""
     id: Int32 = 0
@@ -489,8 +460,7 @@ class Marker:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MarkerArray:
+class MarkerArray(Message, package="visualization_msgs"):
     """Shapes in RViz."""
 
-    ROS: ClassVar[str] = "visualization_msgs/msg/MarkerArray"
     markers: tuple[Marker, ...] = ()

@@ -12,13 +12,13 @@ A message is a frozen dataclass whose annotations define the wire format::
 ``cdr`` makes codecs from them, ``adapters/dds`` the types that DDS announces.
 """
 
+from abc import ABC
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import (
     Annotated,
     Any,
     ClassVar,
-    Protocol,
     get_args,
     get_origin,
     get_type_hints,
@@ -38,12 +38,24 @@ PRIMITIVES: dict[str, tuple[str, int]] = {
 """IDL name → code of ``struct`` and size, which is its alignment too (bytes)."""
 
 
-class Message(Protocol):
-    """A frozen dataclass that represents a ROS message."""
+class Message(ABC):
+    """A ROS message: base of frozen dataclasses with ROS's names and fields.
 
-    ROS: ClassVar[str]
-    """Its ROS name, such as ``nav_msgs/msg/Odometry``."""
+    Args:
+        package: ROS package of the message.
+
+    Attributes:
+        ROS: Its ROS name, such as ``nav_msgs/msg/Odometry``.
+    """
+
+    __slots__ = ()
     __dataclass_fields__: ClassVar[dict[str, Any]]
+    ROS: ClassVar[str]
+
+    def __init_subclass__(cls, package: str | None = None) -> None:
+        # A dataclass with slots is made a second time, then without the package.
+        if package is not None:
+            cls.ROS = f"{package}/msg/{cls.__name__}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
+from iveg.ros2.decoder import Fields
 from iveg.ros2.schema import Message
 
 TOPICS: dict[str, type[Message]] = {
@@ -51,7 +52,7 @@ published before it, though both arrive while the topics are being read.
 _TREE = frozenset({"tf_static", "tf"})
 _ORDERED = frozenset({"odometry", "scan", "detections_3d", "detections_2d"})
 """Topics whose old messages do not count."""
-_UNREAD = frozenset(
+_UNREAD: Fields = frozenset(
     {
         (m.PoseWithCovariance, "covariance"),
         (m.TwistWithCovariance, "covariance"),
