@@ -14,10 +14,10 @@ reads them so.
 import itertools
 import operator
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -70,32 +70,27 @@ def read(message: type[_M], payload: bytes, left_out: Fields = _ALL) -> _M:
 def write(message: Message, order: ByteOrder = "<") -> bytes:
     """The bytes of one message, with its encapsulation."""
     out = _Out(order)
-    _codec_of(type(message)).write(out, message)
+    _writer_of(type(message))(out, message)
     return _HEADS[order] + bytes(out.data)
-
-
-@cache
-def _codec_of(message: type[Message]) -> "_Codec":
-    return _Codec(message)
 
 
 # --- a message ---------------------------------------------------------------------
 
 
-class _Codec:
-    """Encoding steps of a message, and its decomposition into values."""
+@cache
+def _writer_of(message: type[Message]) -> "Callable[[_Out, Message], None]":
+    """The function that writes a message of this type."""
+    leaves = list(_leaves(message))
+    steps = _merged(kind for _, kind in leaves)
+    # With a name too many it gives a tuple of one leaf as well.
+    values_of = operator.attrgetter(*(name for name, _ in leaves), "ROS")
 
-    def __init__(self, message: type[Message]) -> None:
-        leaves = list(_leaves(message))
-        self._steps = _merged(kind for _, kind in leaves)
-        # With a name too many it gives a tuple of one leaf as well.
-        self._values = operator.attrgetter(*(name for name, _ in leaves), "ROS")
+    def write(out: _Out, message: Message) -> None:
+        values = iter(values_of(message))
+        for step in steps:
+            step(out, values)
 
-    def write(self, out: "_Out", message: Message) -> None:
-        """Write its values in order."""
-        values = iter(self._values(message))
-        for step in self._steps:
-            step.write(out, values)
+    return write
 
 
 def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kind]]:
@@ -108,10 +103,6 @@ def _leaves(message: type[Message], within: str = "") -> Iterator[tuple[str, Kin
 
 
 # --- steps over the wire -----------------------------------------------------------
-
-
-class _Step(Protocol):
-    def write(self, out: "_Out", values: Iterator[Any]) -> None: ...
 
 
 @dataclass(slots=True)
@@ -131,69 +122,70 @@ class _Out:
         self.data += _COUNT[self.order].pack(count)
 
 
-class _Run:
+_Step = Callable[[_Out, Iterator[Any]], None]
+"""Writes the next one or more of the values."""
+
+
+def _run(primitives: list[str]) -> _Step:
     """Primitives that follow each other in every message of a type."""
+    run = [(*PRIMITIVES[one], 1) for one in primitives]
+    layouts = {
+        order: [struct.Struct(order + layout(run, n)) for n in range(8)]
+        for order in _HEADS
+    }
 
-    def __init__(self, primitives: list[str]) -> None:
-        self._size = len(primitives)
-        run = [(*PRIMITIVES[one], 1) for one in primitives]
-        self._layouts = {
-            order: [struct.Struct(order + layout(run, n)) for n in range(8)]
-            for order in _HEADS
-        }
+    def write(out: _Out, values: Iterator[Any]) -> None:
+        prepared = layouts[out.order][len(out.data) % 8]
+        out.data += prepared.pack(*itertools.islice(values, len(run)))
 
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
-        prepared = self._layouts[out.order][len(out.data) % 8]
-        out.data += prepared.pack(*itertools.islice(values, self._size))
-
-
-class _String:
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
-        raw = str(next(values)).encode() + b"\x00"
-        out.count(len(raw))
-        out.data += raw
+    return write
 
 
-class _Numbers:
+def _text(out: _Out, values: Iterator[Any]) -> None:
+    raw = str(next(values)).encode() + b"\x00"
+    out.count(len(raw))
+    out.data += raw
+
+
+def _numbers(kind: Many) -> _Step:
     """Primitives of one kind, as a numpy array: ``count`` of them, or a sequence."""
+    code, size = PRIMITIVES[kind.primitive]
+    types = {order: np.dtype(order + code) for order in _HEADS}
 
-    def __init__(self, kind: Many) -> None:
-        code, self._size = PRIMITIVES[kind.primitive]
-        self._count = kind.count
-        self._types = {order: np.dtype(order + code) for order in _HEADS}
-
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
-        numbers = np.asarray(next(values), self._types[out.order])
-        if self._count is None:
+    def write(out: _Out, values: Iterator[Any]) -> None:
+        numbers = np.asarray(next(values), types[out.order])
+        if kind.count is None:
             out.count(numbers.size)
-        elif numbers.size != self._count:
-            raise ValueError(f"{numbers.size} numbers instead of {self._count}")
+        elif numbers.size != kind.count:
+            raise ValueError(f"{numbers.size} numbers instead of {kind.count}")
         if numbers.size:
-            out.align(self._size)
+            out.align(size)
         out.data += numbers.tobytes()
 
+    return write
 
-class _Messages:
+
+def _messages(kind: Structure) -> _Step:
     """A sequence of structures."""
+    write_one = _writer_of(kind.message)
 
-    def __init__(self, kind: Structure) -> None:
-        self._codec = _codec_of(kind.message)
-
-    def write(self, out: _Out, values: Iterator[Any]) -> None:
+    def write(out: _Out, values: Iterator[Any]) -> None:
         items = next(values)
         out.count(len(items))
         for item in items:
-            self._codec.write(out, item)
+            write_one(out, item)
+
+    return write
 
 
 def _step(kind: Many | Text | Structure) -> _Step:
     match kind:
         case Many():
-            return _Numbers(kind)
+            return _numbers(kind)
         case Text():
-            return _String()
+            return _text
         case Structure():
-            return _Messages(kind)
+            return _messages(kind)
 
 
 def _merged(kinds: Iterable[Kind]) -> list[_Step]:
@@ -204,9 +196,9 @@ def _merged(kinds: Iterable[Kind]) -> list[_Step]:
             run.append(kind.primitive)
             continue
         if run:
-            steps.append(_Run(run))
+            steps.append(_run(run))
             run = []
         steps.append(_step(kind))
     if run:
-        steps.append(_Run(run))
+        steps.append(_run(run))
     return steps
