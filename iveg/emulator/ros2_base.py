@@ -8,7 +8,6 @@ whatever the last command was.
 import asyncio
 import logging
 import math
-from typing import Protocol
 
 from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
@@ -19,7 +18,7 @@ from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
 from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
-from iveg.robot.ros2.rig import Network
+from iveg.robot.ros2.rig import Network, Writer
 from iveg.ros2 import cdr
 from iveg.ros2 import messages as m
 from iveg.ros2.schema import Message
@@ -72,14 +71,6 @@ class DriveWatchdog:
     def command(self, now: float) -> Twist2D:
         """Command for the wheels; zero when none came for half a second."""
         return self._command if now - self._at <= TIMEOUT_S else REST
-
-
-class Writer(Protocol):
-    """A publication."""
-
-    def write(self, payload: bytes) -> None:
-        """Send it."""
-        ...
 
 
 class Ros2Base:
