@@ -7,9 +7,10 @@ reason.
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
+from iveg.adapters.toml_positions import place_of
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.ros2 import names
 from iveg.ros2.names import Qos
@@ -47,20 +48,6 @@ class Topics:
     cmd_vel_out: str = "cmd_vel"
     obstacles: str = "iveg/obstacles"
     markers: str = "iveg/markers"
-
-    def within(self, namespace: str) -> "Topics":
-        """All names as full names.
-
-        Raises:
-            UnreadableError: a name is not a ROS topic.
-        """
-        return Topics(
-            **{
-                one.name: names.full_name(name, namespace) if name else ""
-                for one in fields(self)
-                for name in (getattr(self, one.name),)
-            }
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +123,17 @@ class RobotConfig:
 
     @property
     def full_topics(self) -> Topics:
-        """The topics with the namespace."""
-        return self.topics.within(self.namespace)
+        """The topics by their full names.
+
+        Raises:
+            UnreadableError: a name is not a ROS topic.
+        """
+        return Topics(
+            **{
+                topic: names.full_name(name, self.namespace) if name else ""
+                for topic, name in asdict(self.topics).items()
+            }
+        )
 
 
 def read_config(text: str, file: str) -> RobotConfig:
@@ -174,7 +170,7 @@ def _read(page: "_Page", raw: Mapping[str, Any]) -> RobotConfig:
     )
     return RobotConfig(
         domain=int(ros.number("domain", 0, 232, 0, whole=True)),
-        namespace=ros.get("namespace", "", _namespace),
+        namespace=ros.get("namespace", "", _topic),
         interface=ros.get("interface", "", _maybe_text),
         peers=ros.get("peers", (), _peers),
         topics=Topics(**_texts(page, raw, "topics", Topics, _topic)),
@@ -224,22 +220,9 @@ class _Page:
 
     def refuse(self, section: str, key: str, reason: str) -> DataFileError:
         """The error about one key."""
-        name = f"{section}.{key}" if section else key
-        line = self._line(section, key)
-        return DataFileError(self.file, f"line {line}, {name}", reason)
-
-    def _line(self, section: str, key: str) -> int:
-        here, wanted = "", re.compile(rf"\s*\"?{re.escape(key)}\"?\s*[=.]")
-        for number, line in enumerate(self.text.splitlines(), 1):
-            header = re.match(r"\s*\[+\s*([^\]]+?)\s*\]", line)
-            if header is not None:
-                here = header[1]
-                whole = f"{section}.{key}" if section else key
-                if here.partition(".")[0] == whole or here == whole:
-                    return number
-            elif here == section and wanted.match(line):
-                return number
-        return 1
+        path = (section, key) if section else (key,)
+        line, _ = place_of(self.text, path)
+        return DataFileError(self.file, f"line {line}, {'.'.join(path)}", reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,10 +300,6 @@ def _topic(value: Any) -> str:
     except UnreadableError as error:
         raise ValueError(f"{error.detail}") from error
     return str(value)
-
-
-def _namespace(value: Any) -> str:
-    return _topic(value)
 
 
 def _frame(value: Any) -> str:
