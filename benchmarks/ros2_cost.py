@@ -45,7 +45,7 @@ from tests.ports import free_ports
 from tests.processes import Site, site
 
 RATE_HZ, TWISTS_HZ = 30.0, 15.0
-WARM_UP_S, MEASURED_S = 6.0, 20.0
+WARM_UP_S, MEASURED_S = 6.0, 40.0
 SENSORS: dict[str, type[Message]] = {
     "/odom": m.Odometry,
     "/scan": m.LaserScan,
