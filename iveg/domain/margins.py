@@ -13,14 +13,13 @@ it is at least what is told.  Left out: the intrusion distance C, since nobody r
 through a light curtain here.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.fleet import RobotProfile
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant, Odometry
 from iveg.domain.robot_state import RobotState
@@ -28,6 +27,8 @@ from iveg.domain.tracking.person import Person, Sighting
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
+_Placed = tuple[RobotState, Odometry, float]
+"""A robot, its newest odometry, and the age of that (s)."""
 _UNKNOWN_M = 1e4
 _INSIDE_M = 1e6
 
@@ -42,7 +43,7 @@ class Margin:
         reaction_m: How far the robot drives before its brakes act.
         braking_m: How far it drives after.
         age_s: Of the older of both positions (s).
-        speed: Of the robot (m/s); ``braking`` what the margin counts on (m/s²).
+        braking: What the margin counts on (m/s²).
         known: False where the robot's pose is too old, or the look is and the person
             could be near by now.
     """
@@ -54,7 +55,6 @@ class Margin:
     reaction_m: float
     braking_m: float
     age_s: float
-    speed: float
     braking: float
     known: bool = True
 
@@ -78,42 +78,6 @@ class Margin:
         return "tight" if self.margin_m < LIMITS.margin_clear_m else "clear"
 
 
-def margin_of(robot: RobotState, person: Person, now: Instant) -> Margin | None:
-    """The least margin to any sighting that still protects this person.
-
-    None where there is no pair: the robot was never seen, or the person has not been
-    seen for ten seconds.
-    """
-    looks = [
-        look for look in person.sightings if look.age_s(now) <= LIMITS.ring_lasts_s
-    ]
-    margins = [_to_look(robot, person, look, now) for look in looks]
-    return least(one for one in margins if one is not None)
-
-
-def margins_of(
-    robots: Iterable[RobotState], people: Collection[Person], now: Instant
-) -> Iterator[Margin]:
-    """The margin of every robot with every person, where there is a pair."""
-    for robot in robots:
-        for person in people:
-            margin = margin_of(robot, person, now)
-            if margin is not None:
-                yield margin
-
-
-def least(margins: Iterable[Margin]) -> Margin | None:
-    """The margin to show first: negative ones, then unknown ones."""
-    return min(margins, key=_urgency, default=None)
-
-
-def _urgency(one: Margin) -> float:
-    """Rank of a margin (m); the least is shown first."""
-    if not one.known:
-        return one.margin_m - _UNKNOWN_M
-    return one.margin_m - _INSIDE_M if one.margin_m < 0.0 else one.margin_m
-
-
 def _is_known(pose_age_s: float, look_age_s: float, margin_m: float) -> bool:
     """Whether the margin is known; of a far person the least possible one is."""
     if pose_age_s > LIMITS.pose_lost_s:
@@ -122,7 +86,10 @@ def _is_known(pose_age_s: float, look_age_s: float, margin_m: float) -> bool:
 
 
 class LeastMargins:
-    """The least margin of each robot and each person, all pairs at once.
+    """The margin to show first of each robot and each person, all pairs at once.
+
+    Negative ones come first, then unknown ones, then the least.  Only sightings that
+    still protect a person count.
 
     Args:
         robots: The robots of the pairs.
@@ -133,25 +100,23 @@ class LeastMargins:
         self, robots: Iterable[RobotState], people: Iterable[Person], now: Instant
     ) -> None:
         self._now = now
-        self._robots: list[RobotState] = []
-        facts: list[tuple[float, ...]] = []
-        for one in robots:
-            age = one.age_s(now)
-            if one.odometry is not None and age is not None:
-                self._robots.append(one)
-                facts.append(_facts(one.profile, one.odometry, age))
+        self._robots: list[_Placed] = []
+        for robot in robots:
+            age = robot.age_s(now)
+            if robot.odometry is not None and age is not None:
+                self._robots.append((robot, robot.odometry, age))
         self._detections = [
             (person, look)
             for person in people
             for look in person.sightings
             if look.age_s(now) <= LIMITS.ring_lasts_s
         ]
-        self._row = {one.robot_id: row for row, one in enumerate(self._robots)}
+        self._row = {one.robot_id: row for row, (one, *_) in enumerate(self._robots)}
         self._columns: dict[str, list[int]] = {}
         for column, (person, _) in enumerate(self._detections):
             self._columns.setdefault(person.person_id, []).append(column)
-        self._margins = _all_pairs(facts, [look for _, look in self._detections], now)
-        self._ages = [fact[-1] for fact in facts]
+        looks = [look for _, look in self._detections]
+        self._margins = _all_pairs(self._robots, looks, now)
 
     def of_robot(self, robot_id: str) -> Margin | None:
         """The least margin of this robot to anybody."""
@@ -183,29 +148,30 @@ class LeastMargins:
             ]
         )
         looks = np.array([look.age_s(self._now) for _, look in self._detections])
-        age = np.maximum(np.array(self._ages), looks[nearest])
+        ages = np.array([age for _, _, age in self._robots])
+        age = np.maximum(ages, looks[nearest])
         margins = self._margins[np.arange(len(self._robots)), nearest]
         known = (margins > -_UNKNOWN_M / 2) | (margins < -_INSIDE_M / 2)
         seen = known & (age <= LIMITS.seen_s)
         places = [np.where(seen, margins, np.inf).argmin(), seen.argmin()]
-        told = [
+        return [
             self._pair(place % len(self._robots), int(nearest.flat[place]))
             for place in map(int, places)
         ]
-        return [one for one in told if one is not None]
 
-    def _pair(self, row: int, column: int) -> Margin | None:
+    def _pair(self, row: int, column: int) -> Margin:
         return _to_look(self._robots[row], *self._detections[column], self._now)
 
 
 def _all_pairs(
-    facts: Sequence[tuple[float, ...]], looks: Sequence[Sighting], now: Instant
+    robots: Sequence[_Placed], looks: Sequence[Sighting], now: Instant
 ) -> NDArray[np.float64]:
-    """``_urgency`` of each robot with each look, as ``_to_look`` has it.
+    """Rank of each robot with each look, shape (robots, looks), (m).
 
-    Shape (robots, looks), (m).
+    The margin as ``_to_look`` has it; unknown ones rank before all that are known, and
+    negative ones before those.
     """
-    told = np.array(facts, float)
+    told = np.array([_facts(*one) for one in robots], float)
     x, y, speed, braking, half, age = told.reshape(-1, 6).T[:, :, np.newaxis]
     seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
     to_x, to_y, look_age = seen.reshape(-1, 3).T
@@ -225,20 +191,14 @@ def _all_pairs(
     return found
 
 
-def _facts(
-    profile: RobotProfile, odometry: Odometry, age_s: float
-) -> tuple[float, ...]:
+def _facts(robot: RobotState, odometry: Odometry, age_s: float) -> tuple[float, ...]:
     """x, y (m), speed (m/s), braking (m/s²), half the length (m), age (s)."""
-    place, speed = odometry.pose, abs(odometry.twist.linear_x)
+    place, speed, profile = odometry.pose, abs(odometry.twist.linear_x), robot.profile
     return place.x, place.y, speed, profile.assumed_braking, profile.length / 2, age_s
 
 
-def _to_look(
-    robot: RobotState, person: Person, look: Sighting, now: Instant
-) -> Margin | None:
-    odometry, pose_age = robot.odometry, robot.age_s(now)
-    if odometry is None or pose_age is None:
-        return None
+def _to_look(placed: _Placed, person: Person, look: Sighting, now: Instant) -> Margin:
+    robot, odometry, pose_age = placed
     profile = robot.profile
     braking, speed = profile.assumed_braking, abs(odometry.twist.linear_x)
     age = max(pose_age, look.age_s(now))
@@ -252,7 +212,6 @@ def _to_look(
         reaction_m=speed * reaction,
         braking_m=speed * speed / (2 * braking),
         age_s=age,
-        speed=speed,
         braking=braking,
     )
     known = _is_known(pose_age, look.age_s(now), one.margin_m)

@@ -11,7 +11,7 @@ from iveg.domain.acknowledgements import acknowledgements_of
 from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
-from iveg.domain.margins import LeastMargins, least, margins_of
+from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant, LaserScan, Odometry
 from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
@@ -125,9 +125,9 @@ class Views:
     def _margin(
         self, robot: RobotState, margins: LeastMargins | None, now: Instant
     ) -> margins_.Margin | None:
-        if margins is not None and not robot.is_replay:
-            return margins.of_robot(robot.robot_id)
-        return least(margins_of([robot], self._people(), now))
+        if margins is None or robot.is_replay:
+            margins = LeastMargins([robot], self._people(), now)
+        return margins.of_robot(robot.robot_id)
 
     def _mode(self, robot: RobotState, machine: StopMachine, now: Instant) -> Mode:
         """The mode by the robot's newest report; without one, by its speed limit.

@@ -10,7 +10,7 @@ from iveg.domain.observations import Instant
 from tests.builders import at
 
 # Needs 1.0 + 0.5 + 0.1 + 0.4 = 2.0 m.
-WIDE = Margin("AGI", "P1", 5.0, 1.0, 0.5, 0.1, age_s=0.1, speed=0.5, braking=1.0)
+WIDE = Margin("AGI", "P1", 5.0, 1.0, 0.5, 0.1, age_s=0.1, braking=1.0)
 NEAR = replace(WIDE, gap_m=1.5)
 LOST = replace(NEAR, known=False)
 LONG_AGO = replace(NEAR, age_s=1.1)

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.exposure import Exposure, Exposures
-from iveg.domain.margins import LeastMargins, Margin, least, margin_of, margins_of
+from iveg.domain.margins import LeastMargins, Margin
+from iveg.domain.tracking.person import Person
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 
@@ -20,11 +21,24 @@ def met(distance: float = 10.0, *, linear: float = 1.0, looked_s: float = 0.0) -
     return scene
 
 
-def margin(scene: Scene, robot_id: str = "AGI") -> Margin:
-    (somebody,) = scene.everyone
-    found = margin_of(scene.world.robot(robot_id), somebody, at(scene.now))
+def margins(scene: Scene) -> LeastMargins:
+    return LeastMargins(scene.world.robots.values(), scene.everyone, at(scene.now))
+
+
+def margin(scene: Scene) -> Margin:
+    found = margins(scene).of_robot("AGI")
     assert found is not None
     return found
+
+
+def pairs(scene: Scene, people: list[Person]) -> list[Margin]:
+    """The margin of each robot with each of these, each computed alone."""
+    found = [
+        LeastMargins([robot], [one], at(scene.now)).of_robot(robot.robot_id)
+        for robot in scene.world.robots.values()
+        for one in people
+    ]
+    return [one for one in found if one is not None]
 
 
 @pytest.mark.parametrize(
@@ -49,7 +63,6 @@ def test_the_need_is_that_of_the_table_of_separation_distances(
         reaction_m=speed * reaction,
         braking_m=speed**2 / (2 * braking),
         age_s=age,
-        speed=speed,
         braking=braking,
     )
 
@@ -113,17 +126,15 @@ def test_nobody_is_paired_with_a_robot_that_was_never_seen() -> None:
     scene = Scene()
     scene.drive("AGII", 50.0)
     scene.look("AGII", person(10.0))
-    (somebody,) = scene.everyone
 
-    assert margin_of(scene.world.robot("AGI"), somebody, at(0.0)) is None
+    assert margins(scene).of_robot("AGI") is None
 
 
 def test_whom_nobody_has_seen_for_ten_seconds_is_no_pair() -> None:
     scene = met(looked_s=10.1)
     scene.drive("AGI", 0.0)
-    (somebody,) = scene.everyone
 
-    assert margin_of(scene.world.robot("AGI"), somebody, at(scene.now)) is None
+    assert margins(scene).of_robot("AGI") is None
 
 
 def test_of_two_looks_at_one_person_the_nearer_counts() -> None:
@@ -133,16 +144,22 @@ def test_of_two_looks_at_one_person_the_nearer_counts() -> None:
     assert margin(scene).gap_m == pytest.approx(9.5 - 0.99 / 2 - 0.30)
 
 
-def test_the_least_margin_is_shown_and_before_it_the_unknown_and_the_negative() -> None:
-    one = margin(met())
-    inside = replace(one, gap_m=one.needs_m - 0.1)
-    near, far = (replace(one, gap_m=one.needs_m + left) for left in (0.5, 5.0))
-    unknown = replace(one, gap_m=9.0, known=False)
+@pytest.mark.parametrize(
+    ("fresh", "shown"),
+    [((9.0, 4.0), 4.5), ((9.0, 4.0, 2.0), 2.0)],
+)
+def test_the_least_margin_is_shown_and_before_it_the_unknown_and_the_negative(
+    fresh: tuple[float, ...], shown: float
+) -> None:
+    scene = Scene()
+    scene.drive("AGI", 0.0, linear=0.0)
+    scene.drive("AGII", 50.0)
+    scene.look("AGII", person(0.0, 4.5))
+    scene.now = 1.6
+    scene.drive("AGI", 0.0, linear=0.0)
+    scene.look("AGII", *(person(distance) for distance in fresh))
 
-    assert least([far, near]) is near
-    assert least([far, near, unknown]) is unknown
-    assert least([far, near, unknown, inside]) is inside
-    assert least([]) is None
+    assert margin(scene).gap_m == pytest.approx(shown - 0.99 / 2 - 0.30)
 
 
 def test_13_8_who_was_out_of_sight_for_long_has_a_margin_only_from_afar() -> None:
@@ -171,18 +188,24 @@ def test_all_pairs_at_once_are_the_pairs_one_by_one() -> None:
         scene.look(robot_id, *(person(2.5 + 3.0 * each + number) for each in range(3)))
     scene.now = 1.2
     scene.drive("AGII", 8.0, linear=0.4)
-    for now in (at(1.2), at(2.9)):
-        robots, people = list(scene.world.robots.values()), scene.everyone
-        pairs = list(margins_of(robots, people, now))
-        at_once = LeastMargins(robots, people, now)
+    rank = {"inside": 0, "unknown": 1, "tight": 2, "clear": 2}
+    for scene.now in (1.2, 2.9):
+        looks = [
+            replace(one, sightings=(look,))
+            for one in scene.everyone
+            for look in one.sightings
+        ]
+        ranked = sorted(
+            pairs(scene, looks), key=lambda one: (rank[one.band], one.margin_m)
+        )
 
-        assert len(people) > 1
-        for robot in robots:
-            mine = (one for one in pairs if one.robot_id == robot.robot_id)
-            assert at_once.of_robot(robot.robot_id) == least(mine)
-        for one in people:
-            its = (pair for pair in pairs if pair.person_id == one.person_id)
-            assert at_once.of_person(one.person_id) == least(its)
+        assert len(scene.everyone) > 1
+        for robot_id in scene.robots:
+            mine = [one for one in ranked if one.robot_id == robot_id]
+            assert margins(scene).of_robot(robot_id) == mine[0]
+        for somebody in scene.everyone:
+            its = [one for one in ranked if one.person_id == somebody.person_id]
+            assert margins(scene).of_person(somebody.person_id) == its[0]
 
 
 @pytest.mark.parametrize(
@@ -197,10 +220,9 @@ def test_two_margins_tell_the_account_of_the_day_what_all_of_them_do(
     scene.now = looked_s
     scene.drive("AGI", 0.5, linear=0.3)
     scene.look("AGI", person(30.0))
-    robots, people, now = scene.world.robots.values(), scene.everyone, at(scene.now)
     account = Exposures(Exposure(since=at(-1.0), evaluated_at=at(scene.now - 0.5)))
-    everything = [*margins_of(robots, people, now)]
-    telling = LeastMargins(robots, people, now).telling()
+    everything, telling = pairs(scene, scene.everyone), margins(scene).telling()
+    now = at(scene.now)
 
     assert len(telling) < len(everything)
     assert replace(account).update(telling, now, seen=True) == replace(account).update(
