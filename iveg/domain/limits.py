@@ -6,8 +6,8 @@ here, the pages through values that the server writes into each
 Numbers of an algorithm that nobody outside of it relies on stay where the algorithm is.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -151,25 +151,6 @@ class SafetyLimits:
 
 
 LIMITS = SafetyLimits()
-
-
-@dataclass(frozen=True, slots=True)
-class LimitRow:
-    """One number of the table as documents print it."""
-
-    name: str
-    value: float
-    unit: str
-    source: str
-    says: str
-
-
-def rows() -> Iterator[LimitRow]:
-    """The table, in order."""
-    for one in fields(LIMITS):
-        facts = one.metadata
-        value = getattr(LIMITS, one.name)
-        yield LimitRow(one.name, value, facts["unit"], facts["source"], facts["says"])
 
 
 def ring_radius(

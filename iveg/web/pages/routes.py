@@ -5,6 +5,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import files
 from typing import Annotated, Final
@@ -15,8 +16,8 @@ from markupsafe import Markup, escape
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
-from iveg.domain import limits
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.limits import LIMITS
 from iveg.web.pages.contexts import (
     THEMES,
     AboutPage,
@@ -192,7 +193,7 @@ def _look(request: Request) -> Appearance:
 
 def limits_text() -> str:
     """The table of safety numbers, as ``static/js/core/limits.js`` reads it."""
-    return json.dumps({row.name: row.value for row in limits.rows()})
+    return json.dumps(asdict(LIMITS))
 
 
 def _clock(stamp: str) -> str:
@@ -238,7 +239,7 @@ def _environment(translations: Translations) -> Environment:
         t=translations.say,
         say=say,
         label=label,
-        limits=limits.LIMITS,
+        limits=LIMITS,
         limits_text=limits_text(),
     )
     return environment
