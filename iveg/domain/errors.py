@@ -24,7 +24,6 @@ class SettingsError(IvegError):
 
     def __init__(self, name: str, value: str, allowed: str) -> None:
         super().__init__(f"{name}={value!r} cannot be used: it must be {allowed}.")
-        self.name = name
 
 
 class DataFileError(IvegError):
@@ -43,7 +42,6 @@ class MissingExtraError(IvegError):
             f"{what} needs {library}, which is not installed: "
             f"pip install 'iveg[{extra}]'."
         )
-        self.extra = extra
 
 
 class UnreadableError(IvegError):
@@ -79,7 +77,6 @@ class OutdatedError(IvegError):
 
     def __init__(self, what: str, seen: int, now: int) -> None:
         super().__init__(f"{what} is at version {now}; you have seen version {seen}.")
-        self.now = now
 
 
 class ExperimentRefusedError(IvegError):

@@ -226,7 +226,7 @@ class _Neighbours:
         age, limit = _reach(rule, now, since, reach)
         limit[age > LIMITS.ring_lasts_s] = -1.0
         for row, column in _within(robots, x, y, limit):
-            near.setdefault(names[row], set()).add(spots.owners[column][0])
+            near.setdefault(names[row], set()).add(spots.owners[column])
         x, y, since = robots
         # A peer that has long been silent may speak again.
         for row, column in _within(robots, x, y, _reach(rule, now, since)[1]):

@@ -137,7 +137,6 @@ class Changed:
         commands: The STOP and the order under way, as they are after it.
     """
 
-    robot_id: str
     command_id: str
     state: State
     key: Key
@@ -153,7 +152,6 @@ class Closed:
         key: What closed it; the sentence of that is told by the command that came.
     """
 
-    robot_id: str
     command: Command
     key: Key
 

@@ -102,14 +102,11 @@ class StopStatus(Evidence):
 
     def _changed(self, key: Key, about: Command | None, why: str | None) -> Changed:
         command_id = "" if about is None else about.command_id
-        return Changed(self.robot_id, command_id, self.state, key, why, self.commands)
+        return Changed(command_id, self.state, key, why, self.commands)
 
     def _closed_by(self, key: Key) -> list[Closed]:
         """Effects that close the commands of the ended episode."""
-        return [
-            Closed(self.robot_id, one.ended(key), key)
-            for one in reversed(self.commands)
-        ]
+        return [Closed(one.ended(key), key) for one in reversed(self.commands)]
 
     # --- guards -------------------------------------------------------------------
 

@@ -32,8 +32,6 @@ class Placed:
     Attributes:
         person: The person it belongs to; None when faint, another class, or a peer.
         peer: The fleet member that it is a sighting of.
-        peer_residual_m: How far from that member's own odometry (m).
-        appeared: Whether it made a new person.
         possible: Below the threshold, but seen again and again.
         doubtful: Outside the greenhouse, so nobody knows where it is: where its
             observer stood, and how far that one sees (m).
@@ -45,8 +43,6 @@ class Placed:
     class_: Class | None
     person: Person | None = None
     peer: str | None = None
-    peer_residual_m: float | None = None
-    appeared: bool = False
     possible: bool = False
     doubtful: tuple[Pose2D, float] | None = None
 
@@ -153,7 +149,6 @@ class People:
             for index, one in enumerate(out)
             if one.kind == "alert" and one.peer is None
         ]
-        before = self.known.copy()
         tracks = self._tracker.take(
             [
                 PlacedDetection(
@@ -168,28 +163,19 @@ class People:
         self.turned_away = tracks.count(None)
         for index, track in zip(wanting, tracks, strict=True):
             if track is not None:
-                one, appeared = out[index], track not in before
-                out[index] = Placed(
-                    one.detection,
-                    one.position,
-                    one.kind,
-                    one.class_,
-                    self.known[track],
-                    appeared=appeared,
-                    possible=one.possible,
-                    doubtful=one.doubtful,
-                )
+                out[index] = replace(out[index], person=self.known[track])
         return out
 
     def drop_sighting(self, person_id: str, sighting: Sighting) -> Person:
         """Drop a sighting whose place was seen to be empty."""
         return self._tracker.drop(person_id, sighting)
 
-    def is_suspected(self, person: Person, x: float, y: float, observer: str) -> bool:
-        """Whether a robot's newest frame has such a faint detection near a spot."""
+    def is_suspected(self, person: Person, sighting: Sighting, observer: str) -> bool:
+        """Whether a robot's newest frame has such a faint detection near a sighting."""
+        spot = sighting.x, sighting.y
         return any(
             one.class_ == person.class_
-            and math.hypot(one.position[0] - x, one.position[1] - y) <= _SUSPECT_M
+            and math.dist(one.position[:2], spot) <= _SUSPECT_M
             for one in self._faint.get(observer, ())
         )
 
@@ -230,9 +216,7 @@ def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) ->
         residual = peer.odometry.pose.distance_to(one.position[0], one.position[1])
         if residual <= reach and (nearest is None or residual < nearest[0]):
             nearest = (residual, peer.robot_id)
-    if nearest is None:
-        return one
-    return replace(one, peer=nearest[1], peer_residual_m=nearest[0])
+    return one if nearest is None else replace(one, peer=nearest[1])
 
 
 def _sighting(one: Placed, observer: RobotState, at: Instant) -> Sighting:

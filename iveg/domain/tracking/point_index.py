@@ -20,19 +20,15 @@ class PointIndex:
     """Positions of all sightings.
 
     Attributes:
-        owners: Of each column: its key and which of the key's spots it is.
+        columns: Shape (4, n): x, y, moment and reach; x is infinite in empty columns.
+        owners: Of each column its key.
     """
 
     def __init__(self) -> None:
-        self._columns: Floats = np.empty((4, 0))
+        self.columns: Floats = np.empty((4, 0))
         self._free: list[int] = []
         self._rows: dict[str, list[int]] = {}
-        self.owners: list[tuple[str, int]] = []
-
-    @property
-    def columns(self) -> Floats:
-        """Shape (4, n): x, y, moment and reach; x is infinite in empty columns."""
-        return self._columns
+        self.owners: list[str] = []
 
     def put(self, key: str, spots: Sequence[Spot]) -> None:
         """Keep a key's spots in place of those it had."""
@@ -43,9 +39,9 @@ class PointIndex:
             if not self._free:
                 self._grow()
             rows.append(self._free.pop())
-            self.owners[rows[-1]] = key, len(rows) - 1
+            self.owners[rows[-1]] = key
         for row, spot in zip(rows, spots, strict=True):
-            self._columns[:, row] = spot
+            self.columns[:, row] = spot
 
     def remove(self, key: str) -> None:
         """Forget a key."""
@@ -53,13 +49,13 @@ class PointIndex:
             self._empty(row)
 
     def _empty(self, row: int) -> None:
-        self._columns[:, row] = _NOWHERE
+        self.columns[:, row] = _NOWHERE
         self._free.append(row)
 
     def _grow(self) -> None:
         size = len(self.owners)
         more = max(32, size)
         fresh = np.tile(np.array(_NOWHERE)[:, None], (1, more))
-        self._columns = np.hstack((self._columns, fresh))
-        self.owners += [("", 0)] * more
+        self.columns = np.hstack((self.columns, fresh))
+        self.owners += [""] * more
         self._free += range(size + more - 1, size - 1, -1)

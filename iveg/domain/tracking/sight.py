@@ -53,7 +53,7 @@ class AllClear:
                     robot.robot_id
                     for robot in world.live_robots()
                     if can_see(robot, sighting.x, sighting.y, greenhouse, now)
-                    and not _sees_faintly(robot, people, person, sighting)
+                    and not people.is_suspected(person, sighting, robot.robot_id)
                 ]
                 if self._is_empty(sighting, lookers, now, watched):
                     cleared.append(people.drop_sighting(person.person_id, sighting))
@@ -73,12 +73,6 @@ class AllClear:
             if now.mono - watched[pair] >= CLEAR_S:
                 return True
         return False
-
-
-def _sees_faintly(
-    robot: RobotState, people: People, person: Person, sighting: Sighting
-) -> bool:
-    return people.is_suspected(person, sighting.x, sighting.y, robot.robot_id)
 
 
 def can_see(

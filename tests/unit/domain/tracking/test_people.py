@@ -53,7 +53,7 @@ def test_a_confident_farmer_is_a_new_person() -> None:
 
     (placed,) = scene.look("AGI", person(3.0))
 
-    assert placed.appeared
+    assert placed.person is not None
     (known,) = scene.everyone
     assert (known.person_id, known.class_) == ("P1", "person")
     assert known.newest.class_id == "farmer"
@@ -164,7 +164,6 @@ def test_a_robot_seen_where_a_peer_stands_is_that_peer_and_no_second_robot() -> 
     (placed,) = scene.look("AGI", machine(5.8))
 
     assert placed.peer == "AGII"
-    assert placed.peer_residual_m == pytest.approx(0.8)
     assert scene.everyone == []
 
 
@@ -223,7 +222,7 @@ def test_a_robot_that_is_none_of_the_fleet_is_not_lost() -> None:
 
     (placed,) = scene.look("AGI", machine(9.0))
 
-    assert placed.appeared
+    assert placed.person is not None
     assert [one.class_ for one in scene.everyone] == ["robot"]
 
 
