@@ -11,7 +11,6 @@ from iveg.domain.observations import (
     LaserScan,
     Observation,
     Odometry,
-    kind_of,
 )
 
 Segment = Literal["uplink", "fiware", "robot_orion", "iveg", "screen"]
@@ -56,11 +55,6 @@ _DATA: Final[dict[type, Data]] = {
 }
 
 
-def data_of(observation: Observation) -> Data | None:
-    """The row of the table that an observation belongs to; None for no row."""
-    return data_of_kind(kind_of(observation))
-
-
-def data_of_kind(kind: type[Observation]) -> Data | None:
-    """The same by the observation's type."""
+def data_of(kind: type[Observation]) -> Data | None:
+    """The row of the table that a kind of observation belongs to; None for no row."""
     return _DATA.get(kind)

@@ -17,7 +17,7 @@ from iveg.domain.latency.sketch import Sketch, merged, sketch_of
 
 SLICE_S: Final = 10.0
 SLICES_A_MINUTE: Final = 6
-MINUTES_AN_HOUR: Final = 60
+SLICES_AN_HOUR: Final = 360
 _BUFFER: Final = 512
 
 
@@ -77,7 +77,11 @@ class Series:
             return None
         minute = merged(self._minute)
         self._minute = []
-        self._end_minute(minute, count // SLICES_A_MINUTE)
+        self._minutes.append(minute)
+        self._hour.append(minute)
+        if count % SLICES_AN_HOUR == 0:
+            self._hours.append(merged(self._hour))
+            self._hour = []
         return minute
 
     def remember(self, hour: Sketch) -> None:
@@ -93,16 +97,6 @@ class Series:
         if window == "15min":
             return [*self._minutes, *self._minute, *now]
         return [*self._hours, *self._hour, *self._minute, *now]
-
-    def _end_minute(self, minute: Sketch, count: int) -> None:
-        self._minutes.append(minute)
-        self._hour.append(minute)
-        if count % MINUTES_AN_HOUR == 0:
-            self._end_hour()
-
-    def _end_hour(self) -> None:
-        self._hours.append(merged(self._hour))
-        self._hour = []
 
     def _fold(self) -> None:
         if self._buffer:

@@ -17,12 +17,17 @@ from iveg.domain.latency.segments import (
     Exclusion,
     Segment,
     data_of,
-    data_of_kind,
 )
 from iveg.domain.latency.series import SLICE_S, Series
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
-from iveg.domain.observations import FeedbackRef, Instant, Observation, Received
+from iveg.domain.observations import (
+    FeedbackRef,
+    Instant,
+    Observation,
+    Received,
+    kind_of,
+)
 from iveg.domain.transports import FIWARE
 
 _SECOND_S: Final = 1.0
@@ -85,7 +90,7 @@ class LatencyWatch:
 
     def passed_over(self, robot_id: str, kind: type[Observation], count: int) -> None:
         """So many reached the broker and were not read: newer ones came with them."""
-        data = data_of_kind(kind)
+        data = data_of(kind)
         stream = None if data is None else self._streams.get((robot_id, data))
         if stream is not None:
             stream.passed_over(count)
@@ -109,14 +114,13 @@ class LatencyWatch:
         self, robot_id: str, data: Data, decided_at: float, painted_at: float
     ) -> None:
         """A page has drawn what was decided on then (monotonic, s, the server's)."""
-        stream = self._streams.get((robot_id, data))
         took = painted_at - decided_at
-        if stream is None:
+        if not 0.0 <= took <= LONGEST_S:
+            self.not_painted(robot_id, data, "negative")
             return
-        if 0.0 <= took <= LONGEST_S:
+        stream = self._streams.get((robot_id, data))
+        if stream is not None:
             stream.painted(took, painted_at)
-        else:
-            stream.excluded["screen", "negative"] += 1
 
     def not_painted(self, robot_id: str, data: Data, why: Exclusion) -> None:
         """A page reported an impossible or unusable moment."""
@@ -146,10 +150,10 @@ class LatencyWatch:
                 stream.segments[hop].remember(sketch)
 
     def _begin_slice(self, now: Instant) -> None:
-        if self._slice_at == float("-inf"):
-            self._slice_at = now.mono
-            return
+        is_first = self._slice_at == float("-inf")
         self._slice_at = now.mono
+        if is_first:
+            return
         self._slices += 1
         self._ending = iter(
             [
@@ -173,7 +177,7 @@ class LatencyWatch:
     # --- streams ----------------------------------------------------------------------
 
     def _stream(self, received: Received) -> Stream | None:
-        data = data_of(received.observation)
+        data = data_of(kind_of(received.observation))
         if data is None or received.asked:
             return None
         robot_id: str = received.observation.robot_id  # type: ignore[union-attr]
