@@ -5,7 +5,7 @@ from typing import cast
 from pydantic import Field
 
 from iveg.domain.alerts import alert_book, flood
-from iveg.domain.messages import Channel, Delivery
+from iveg.domain.messages import Channel, Delivery, Priority
 from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
@@ -41,7 +41,7 @@ class Told(Model):
 class Occurrence(Model):
     """One time that an alert was raised."""
 
-    priority: alert_book.Priority
+    priority: Priority
     raised_at: str
     cleared_at: str | None
     acknowledged_at: str | None
@@ -68,7 +68,7 @@ class Occurrence(Model):
         """One that is remembered."""
         by, note = one.get("acknowledged_by"), one.get("note")
         return cls(
-            priority=cast("alert_book.Priority", one.get("priority")),
+            priority=cast("Priority", one.get("priority")),
             raised_at=read_stamp(one.get("raised_at")) or "",
             cleared_at=read_stamp(one.get("cleared_at")),
             acknowledged_at=read_stamp(one.get("acknowledged_at")),
@@ -88,7 +88,7 @@ class Alert(Model):
     """An alert to people: all occurrences of one kind and subject as one."""
 
     alert_id: str
-    priority: alert_book.Priority
+    priority: Priority
     key: str
     slots: Slots
     robot_id: str | None
@@ -131,7 +131,7 @@ class Alert(Model):
         """One alert as it is remembered."""
         return cls(
             alert_id=record.alert_id,
-            priority=cast("alert_book.Priority", record.priority),
+            priority=cast("Priority", record.priority),
             key=record.key,
             slots=read_slots(record.slots),
             robot_id=record.robot_id,

@@ -14,10 +14,9 @@ from iveg.domain.alerts.alert_book import (
     Alert,
     Condition,
     Occurrence,
-    Priority,
 )
 from iveg.domain.errors import HopError
-from iveg.domain.messages import Delivery
+from iveg.domain.messages import Delivery, Priority
 from iveg.domain.observations import Instant
 from iveg.domain.records import (
     AlertRecord,

@@ -10,8 +10,8 @@ from iveg.domain.alerts.alert_book import (
     Alert,
     AlertBook,
     Condition,
-    Priority,
 )
+from iveg.domain.messages import Priority
 from tests.builders import at
 
 priorities = st.sampled_from(["P1", "P2", "P3"])

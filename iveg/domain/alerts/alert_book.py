@@ -8,13 +8,10 @@ than the gravest unacknowledged occurrence: grouping cannot hide an escalation.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 from iveg.domain.events import Slot
-from iveg.domain.messages import Delivery, newest
+from iveg.domain.messages import Delivery, Priority, newest
 from iveg.domain.observations import Instant
-
-Priority = Literal["P1", "P2", "P3"]
 
 GROUPING_S = 600.0
 """A condition that returns within this time is the same alert, counted once more."""

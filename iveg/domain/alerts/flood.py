@@ -31,26 +31,25 @@ class Flood:
 
 
 class FloodGauge:
-    """Counts the alerts that sounded, each occurrence once."""
+    """Counts the alerts that sounded, each occurrence once.
+
+    Attributes:
+        flood: As it stood when it was last read.
+    """
 
     def __init__(self) -> None:
         self._raised: deque[float] = deque(maxlen=_MOST_COUNTED)
-        self._flood = Flood()
-
-    @property
-    def flood(self) -> Flood:
-        """As it stood when it was last read."""
-        return self._flood
+        self.flood = Flood()
 
     def take(self, raised: int, now: Instant) -> Flood:
         """Count the alerts raised now and forget those out of the window."""
         self._raised.extend([now.mono] * raised)
         while self._raised and now.mono - self._raised[0] >= FLOOD_WINDOW_S:
             self._raised.popleft()
-        count, since = len(self._raised), self._flood.since
+        count, since = len(self._raised), self.flood.since
         if since is None and count > FLOOD_LIMIT:
             since = now
         elif count < FLOOD_OVER:
             since = None
-        self._flood = Flood(count, since)
-        return self._flood
+        self.flood = Flood(count, since)
+        return self.flood
