@@ -12,7 +12,6 @@ counts as asked and acknowledged, but its time says nothing of the way.  A robot
 was slow for another reason is not asked.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -61,7 +60,7 @@ def acknowledgements_of(
         p50_s=nearest_rank(took, 0.50) if took else None,
         p95_s=nearest_rank(took, 0.95) if took else None,
         p99_s=nearest_rank(took, 0.99) if took else None,
-        echo_age_s=_age((_answered(one) for one in timed), now),
+        echo_age_s=_age((one.answered_at for one in timed), now),
         asked=len(due),
         missed=sum(not _is_acknowledged(one) for one in due),
         asked_age_s=_age((one.crossing.entered.mono for one in due), now),
@@ -75,12 +74,6 @@ def _counts(decision: Decision, now: Instant) -> bool:
     return asked and now.mono - crossing.entered.mono <= WINDOW_S
 
 
-def _answered(decision: Decision) -> float | None:
-    if decision.answered is not None:
-        return decision.answered
-    return None if decision.applied is None else decision.applied.mono
-
-
 def _is_due(decision: Decision, now: Instant) -> bool:
     """Whether the time to acknowledge is over."""
     waited = now.mono - decision.crossing.entered.mono
@@ -88,12 +81,10 @@ def _is_due(decision: Decision, now: Instant) -> bool:
 
 
 def _is_acknowledged(decision: Decision) -> bool:
-    return decision.crossing.ahead or _waited_s(decision) <= ECHO_S
-
-
-def _waited_s(decision: Decision) -> float:
-    applied, entered = decision.applied, decision.crossing.entered
-    return math.inf if applied is None else applied.mono - entered.mono
+    applied, crossing = decision.applied, decision.crossing
+    return crossing.ahead or (
+        applied is not None and applied.mono - crossing.entered.mono <= ECHO_S
+    )
 
 
 def _age(moments: Iterable[float | None], now: Instant) -> float | None:

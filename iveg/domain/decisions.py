@@ -88,14 +88,21 @@ class Decision:
     places: tuple[Place, ...] = ()
 
     @property
+    def answered_at(self) -> float | None:
+        """When the robot said that it slows for it (monotonic, s); None: never."""
+        if self.answered is not None:
+            return self.answered
+        if self.applied is None or self.crossing.ahead:
+            return None
+        return self.applied.mono
+
+    @property
     def took_s(self) -> float | None:
         """From the frame to the robot's own report (s); None where one is missing."""
-        answered = self.answered
-        if answered is None and self.applied is not None and not self.crossing.ahead:
-            answered = self.applied.mono
-        if answered is None or self.noticed is None:
+        answered_at = self.answered_at
+        if answered_at is None or self.noticed is None:
             return None
-        return answered - self.noticed
+        return answered_at - self.noticed
 
     @property
     def decision_id(self) -> str:
