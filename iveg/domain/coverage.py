@@ -82,11 +82,11 @@ class Coverage:
             start += one.count
         return lanes
 
-    def share(self, now: Instant, within_s: float = RECENT_S) -> float | None:
+    def share(self, now: Instant) -> float | None:
         """Share of the aisles covered lately (0-1); None without aisles."""
         if not len(self._looked_at):
             return None
-        return float(np.mean(now.mono - self._looked_at <= within_s))
+        return float(np.mean(now.mono - self._looked_at <= RECENT_S))
 
 
 def _laid_out(lanes: tuple[Lane, ...]) -> tuple[LaneCells, ...]:

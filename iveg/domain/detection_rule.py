@@ -67,13 +67,9 @@ class DetectionRule:
             return self.threshold
         return self.class_thresholds.get(class_, self.threshold)
 
-    def canonical(self, class_id: str) -> Class | None:
-        """The class that a detector's word stands for."""
-        return self.aliases.get(class_id.strip().lower())
-
     def judge(self, class_id: str, confidence: float) -> RuleVerdict:
         """Judge one detection (Algorithm 2, lines 4-10)."""
-        class_ = self.canonical(class_id)
+        class_ = self.aliases.get(class_id.strip().lower())
         if confidence < self.threshold_of(class_):
             return RuleVerdict("faint", class_)
         return RuleVerdict("other" if class_ is None else "alert", class_)

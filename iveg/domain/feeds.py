@@ -14,6 +14,7 @@ is a fallback and the proof that the chain lives, and Orion may throttle it::
 A robot that is silent on both transports changes nothing.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 from iveg.domain.observations import LaserScan, Odometry
@@ -102,11 +103,10 @@ class Feed:
 class Feeds:
     """The feeds of a fleet, by robot and kind."""
 
-    _known: dict[tuple[str, Copied], Feed] = field(default_factory=dict)
+    _known: defaultdict[tuple[str, Copied], Feed] = field(
+        default_factory=lambda: defaultdict(Feed)
+    )
 
     def of(self, robot_id: str, kind: Copied = Odometry) -> Feed:
         """One feed."""
-        feed = self._known.get((robot_id, kind))
-        if feed is None:
-            feed = self._known[robot_id, kind] = Feed()
-        return feed
+        return self._known[robot_id, kind]

@@ -4,7 +4,7 @@ Nothing here reads a clock: ages come from the ``now`` that is handed in.
 """
 
 from bisect import bisect_left
-from collections import deque
+from collections import defaultdict, deque
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -94,7 +94,9 @@ class RobotState:
     map_frame: str | None = None
     sensed: dict[type[Observation], Sensed] = field(default_factory=dict)
     clock: RobotClock = field(default_factory=RobotClock)
-    _orders: dict[type[Observation], StreamOrder] = field(default_factory=dict)
+    _orders: defaultdict[type[Observation], StreamOrder] = field(
+        default_factory=lambda: defaultdict(StreamOrder)
+    )
     _poses: deque[tuple[float, Pose2D]] = field(
         default_factory=lambda: deque(maxlen=_HISTORY)
     )
@@ -189,10 +191,7 @@ class RobotState:
         A message of an earlier boot that Orion kept must not make the present boot look
         old.
         """
-        kind = kind_of(observation)
-        order = self._orders.get(kind)
-        if order is None:
-            order = self._orders[kind] = StreamOrder()
+        order = self._orders[kind_of(observation)]
         if asked and order.knows_better_than(origin):
             return "late"
         return order.judge(origin)

@@ -139,8 +139,7 @@ class World:
         observation = received.observation
         if getattr(observation, "origin", _UNTOLD).replay is None:
             return False
-        robot_id = getattr(observation, "robot_id", None)
-        robot = None if robot_id is None else self.robots.get(robot_id)
+        robot = self.robots.get(getattr(observation, "robot_id", ""))
         return robot is not None and not robot.is_replay
 
     def _likely_age(

@@ -59,7 +59,8 @@ def zones_of(
     """Every circle that slows robots now."""
     for person in people.known.values():
         yield from _zones_of(person, world, rule, now)
-    yield from _peers(world, rule, now)
+    for peer in world.robots.values():
+        yield from _circle_of(peer, rule, now)
 
 
 def _zones_of(
@@ -79,26 +80,19 @@ def _zones_of(
         )
 
 
-def _peers(world: World, rule: DetectionRule, now: Instant) -> Iterator[Zone]:
-    for peer in world.robots.values():
-        circle = _circle_of(peer, rule, now)
-        if circle is not None:
-            yield circle
-
-
-def _circle_of(peer: RobotState, rule: DetectionRule, now: Instant) -> Zone | None:
-    """The circle of a peer that one gives way to."""
+def _circle_of(peer: RobotState, rule: DetectionRule, now: Instant) -> Iterator[Zone]:
+    """The circle of a peer, if one gives way to it."""
     since = peer.likely_pose_at()
     # A recording cannot yield, and nobody yields to it.
     if peer.odometry is None or since is None or peer.is_replay:
-        return None
+        return
     age = max(0.0, now.mono - since)
     known = peer.age_s(now)
     at_rest = peer.stands and known is not None and known <= LIMITS.silence_s
     if at_rest or age > LIMITS.ring_lasts_s:
-        return None
+        return
     pose, name = peer.odometry.pose, peer.robot_id
-    return Zone("robot", name, name, pose.x, pose.y, rule.radius_at(age))
+    yield Zone("robot", name, name, pose.x, pose.y, rule.radius_at(age))
 
 
 Near = Callable[[RobotState], Iterable[Zone]]
@@ -181,8 +175,7 @@ class _Circles:
 
     def _of_peer(self, robot_id: str) -> list[Zone]:
         peer = self._world.robots[robot_id]
-        circle = _circle_of(peer, self._rule, self._now)
-        return [] if circle is None else [circle]
+        return list(_circle_of(peer, self._rule, self._now))
 
 
 _NOBODY: frozenset[str] = frozenset()

@@ -114,6 +114,4 @@ def _flip(before: Sequence[int], row_of: list[int]) -> None:
     while column:
         previous = before[column]
         row_of[column] = row_of[previous]
-        if previous == 0:
-            return
         column = previous
