@@ -13,11 +13,9 @@ from iveg.domain.rule.overload import Overload
 
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """Time that a robot may take to receive its first feedback (s)."""
-UNREADABLE_SHOWN_S = 10.0
-KIND_SHOWN_S = 10.0
-"""How long after its last message a robot of the wrong kind is reported (s)."""
-STORM_SHOWN_S = 10.0
-"""Hysteresis, so that a detector at its bound is one alert and not one a second."""
+SHOWN_S = 10.0
+"""How long after it was last so a condition is reported (s): one at its bound is one
+alert and not one a second."""
 
 
 def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
@@ -51,8 +49,7 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     if offset is not None:
         slots = {**slots, "offset": round(offset, 2)}
         yield Condition("P3", "alert.clock_offset", name, name, slots)
-    unreadable = robot.unreadable_at
-    if unreadable is not None and now.mono - unreadable < UNREADABLE_SHOWN_S:
+    if _is_recent(robot.unreadable_at, now):
         yield Condition("P3", "alert.unreadable_detection", name, name, slots)
 
 
@@ -67,7 +64,7 @@ def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
 
 
 def _is_recent(moment: float | None, now: Instant) -> bool:
-    return moment is not None and now.mono - moment < KIND_SHOWN_S
+    return moment is not None and now.mono - moment < SHOWN_S
 
 
 def _may_be_late_s(robot: RobotState, now: Instant) -> float:
@@ -91,7 +88,7 @@ def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
     names = [
         name
         for name, at in overload.last.items()
-        if name in overload.since or now.mono - at < STORM_SHOWN_S
+        if name in overload.since or _is_recent(at, now)
     ]
     if names:
         slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}
