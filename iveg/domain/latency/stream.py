@@ -49,7 +49,7 @@ class Stream:
         up: Order of arrival at the broker; ``fiware`` at Orion.
         is_throttled: Orion was told to leave most of it out: Δt₂ is a sample.
         orion_first: How often Orion's copy was here before our reading of the broker.
-        decided_at: When the newest was decided on (monotonic, s).
+        decided_at: When the newest was decided on (monotonic, s); None: never.
     """
 
     def __init__(self, robot_id: str, data: Data, clock: ClockOffset) -> None:
@@ -60,7 +60,7 @@ class Stream:
         self.tracer = Tracer()
         self.is_throttled = False
         self.orion_first = 0
-        self.decided_at = float("-inf")
+        self.decided_at: float | None = None
         self._boot: str | None = None
         self._stamps: dict[Segment, float] = {}
         self._seqs = array("q", [-1]) * RING

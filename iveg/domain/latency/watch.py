@@ -106,9 +106,7 @@ class LatencyWatch:
     def decided_at(self, robot_id: str, data: Data) -> float | None:
         """When the newest was decided on (monotonic, s); None: never."""
         stream = self._streams.get((robot_id, data))
-        if stream is None or stream.decided_at == float("-inf"):
-            return None
-        return stream.decided_at
+        return None if stream is None else stream.decided_at
 
     def painted(
         self, robot_id: str, data: Data, decided_at: float, painted_at: float
