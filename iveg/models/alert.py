@@ -9,7 +9,6 @@ from iveg.domain.messages import Channel, Delivery, Priority
 from iveg.domain.records import AlertRecord, Json, LogRecord
 from iveg.domain.stamps import format_stamp
 from iveg.models.base import Listing, Model, Slots, moment, stamp
-from iveg.models.remembered import read_slots, read_stamp
 
 
 class Told(Model):
@@ -29,12 +28,11 @@ class Told(Model):
     @classmethod
     def of_object(cls, one: Json) -> "Told":
         """One that is remembered."""
-        failed = one.get("failed")
         return cls(
-            channel=cast("Channel", one.get("channel")),
-            to=str(one.get("to")),
-            at=read_stamp(one.get("at")) or "",
-            failed=None if failed is None else str(failed),
+            channel=one["channel"],
+            to=one["to"],
+            at=format_stamp(one["at"]),
+            failed=one.get("failed"),
         )
 
 
@@ -66,22 +64,15 @@ class Occurrence(Model):
     @classmethod
     def of_object(cls, one: Json) -> "Occurrence":
         """One that is remembered."""
-        by, note = one.get("acknowledged_by"), one.get("note")
         return cls(
-            priority=cast("Priority", one.get("priority")),
-            raised_at=read_stamp(one.get("raised_at")) or "",
-            cleared_at=read_stamp(one.get("cleared_at")),
-            acknowledged_at=read_stamp(one.get("acknowledged_at")),
-            acknowledged_by=None if by is None else str(by),
-            note=None if note is None else str(note),
-            told=_told(one),
+            priority=one["priority"],
+            raised_at=format_stamp(one["raised_at"]),
+            cleared_at=stamp(one.get("cleared_at")),
+            acknowledged_at=stamp(one.get("acknowledged_at")),
+            acknowledged_by=one.get("acknowledged_by"),
+            note=one.get("note"),
+            told=[Told.of_object(told) for told in one.get("told", ())],
         )
-
-
-def _told(member: Json) -> list[Told]:
-    found = member.get("told")
-    items = found if isinstance(found, list) else []
-    return [Told.of_object(one) for one in items if isinstance(one, dict)]
 
 
 class Alert(Model):
@@ -129,11 +120,12 @@ class Alert(Model):
     @classmethod
     def of_record(cls, record: AlertRecord) -> "Alert":
         """One alert as it is remembered."""
+        members = [Occurrence.of_object(one) for one in record.members]
         return cls(
             alert_id=record.alert_id,
             priority=cast("Priority", record.priority),
             key=record.key,
-            slots=read_slots(record.slots),
+            slots=dict(record.slots),
             robot_id=record.robot_id,
             raised_at=format_stamp(record.raised_at),
             last_raised_at=format_stamp(record.last_raised_at),
@@ -142,8 +134,8 @@ class Alert(Model):
             acknowledged_by=record.acknowledged_by,
             note=record.note,
             count=record.count,
-            told=_told(record.members[-1]) if record.members else [],
-            members=[Occurrence.of_object(one) for one in record.members],
+            told=members[-1].told if members else [],
+            members=members,
         )
 
 
@@ -193,7 +185,7 @@ class LogEntry(Model):
             kind=record.kind,
             robot_id=record.robot_id,
             key=record.key,
-            slots=read_slots(record.slots),
+            slots=dict(record.slots),
             class_=record.class_,
             decision_id=record.decision_id,
         )

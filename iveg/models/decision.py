@@ -9,7 +9,6 @@ from iveg.domain.stamps import format_stamp
 from iveg.models.base import Model, stamp
 from iveg.models.command import Sentence
 from iveg.models.places import Position
-from iveg.models.remembered import read_stamp
 
 
 class DecisionRule(Model):
@@ -140,7 +139,7 @@ def sentence_of(record: DecisionRecord) -> Sentence:
 def _link(link: Json) -> DecisionLink:
     return DecisionLink(
         link=str(link.get("link")),
-        at=read_stamp(link.get("at")),
+        at=stamp(link.get("at")),
         value=link.get("value"),
         verdict=str(link.get("verdict")),
     )

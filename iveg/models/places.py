@@ -2,7 +2,6 @@
 
 from dataclasses import asdict
 
-from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.models.base import Model
 
@@ -66,11 +65,11 @@ class GreenhouseMap(Model):
         """The greenhouse that is supervised."""
         return cls(
             name=greenhouse.name,
-            bounds=_area(greenhouse.bounds),
+            bounds=Area(**asdict(greenhouse.bounds)),
             lanes=[
                 Lane(label=lane.label, **asdict(lane.area)) for lane in greenhouse.lanes
             ],
-            rows=[_area(row) for row in greenhouse.rows],
+            rows=[Area(**asdict(row)) for row in greenhouse.rows],
             posts=[Post(**asdict(post)) for post in greenhouse.posts],
             obstacles=[
                 Obstacle(kind=one.kind, **asdict(one.area))
@@ -121,7 +120,3 @@ class Coverage(Model):
     share: float | None
     """Share of the cells covered within that time (0-1); null without aisles."""
     lanes: list[LaneCoverage]
-
-
-def _area(of: Rectangle) -> Area:
-    return Area(xmin=of.xmin, ymin=of.ymin, xmax=of.xmax, ymax=of.ymax)

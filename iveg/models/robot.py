@@ -5,7 +5,6 @@ from typing import Any, Literal
 from iveg.domain import feedback, observations
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import Hold as DomainHold
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
 from iveg.domain.transports import TransportId
@@ -50,7 +49,7 @@ class Hold(Model):
     ack: str
 
     @classmethod
-    def of(cls, hold: DomainHold) -> "Hold":
+    def of(cls, hold: observations.Hold) -> "Hold":
         """As the robot reported it."""
         return cls(id=hold.id, source=hold.source, ack=hold.ack)
 
