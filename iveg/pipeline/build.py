@@ -50,7 +50,6 @@ class Ports:
         new_id: A new id, sortable by time.
         rejected: Called for each new kind of unusable message.
         history_state: State of the history.
-        fiware_is_cut: Whether orders get nowhere there; None asks the health monitor.
     """
 
     fleet: FleetPort
@@ -61,7 +60,6 @@ class Ports:
     new_id: Callable[[], str]
     rejected: Callable[[str, str], None] = lambda _source, _reason: None
     history_state: Callable[[], HopState] = lambda: "ok"
-    fiware_is_cut: Callable[[Instant], bool] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +147,6 @@ def build(
         choices.boot,
         health_monitor.probe.lag,
     )
-    fiware_is_cut = ports.fiware_is_cut or health_monitor.is_cut
     commander = Commander(
         fleet.ids,
         ports.transports,
@@ -160,7 +157,7 @@ def build(
         ports.clock,
         drills=choices.drills,
         agent_lag_s=health_monitor.probe.lag,
-        is_cut=lambda way, at: way == FIWARE.id and fiware_is_cut(at),
+        is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
     loop = RuleLoop(
         ingest,

@@ -49,7 +49,6 @@ class Desk:
         also: Mapping[Transport, CommandPort] | None = None,
     ) -> None:
         self.clock = FakeClock()
-        self.is_cut = False
         self.fleet = FakeFleet()
         self.broker = FakeContextBroker()
         self.journal = FakeJournal()
@@ -72,7 +71,6 @@ class Desk:
                 self.clock,
                 self.ids,
                 lambda source, reason: self.rejected.append((source, reason)),
-                fiware_is_cut=lambda _: self.is_cut,
             ),
             Choices(),
         )

@@ -393,7 +393,7 @@ async def test_an_order_remembers_how_far_the_agent_was_behind_when_it_left() ->
 
 async def test_orions_204_while_the_agent_is_cut_off_is_unknown() -> None:
     desk = Desk()
-    desk.is_cut = True
+    desk.health_monitor.agent_error = "cannot be reached"
     desk.fleet.fails = True
 
     command = await press(desk)
