@@ -1,6 +1,7 @@
 """The feedback that iVeg publishes for the fleet, both ways."""
 
 from collections.abc import Mapping
+from operator import is_
 from typing import Any
 
 import orjson
@@ -80,24 +81,19 @@ class FeedbackWriter:
     """Writes feedback; what the messages of one telling share is written once."""
 
     def __init__(self) -> None:
-        self._shared: tuple[object, ...] = ()
+        self._shared: tuple[object, ...] = (None, None, None)
         self._written: dict[str, orjson.Fragment] = {}
 
     def write(self, feedback: Feedback) -> bytes:
         """The bytes of ``/{robot}/mqtt_feedback``."""
         shared = feedback.alerts, feedback.speed_limits, feedback.seen
-        if not _are_same(shared, self._shared):
+        if not all(map(is_, shared, self._shared)):
             self._shared = shared
             self._written = {
                 name: orjson.Fragment(orjson.dumps(value))
                 for name, value in _write_shared(feedback).items()
             }
         return _write(feedback, self._written)
-
-
-def _are_same(some: tuple[object, ...], others: tuple[object, ...]) -> bool:
-    pairs = zip(some, others, strict=False)
-    return len(some) == len(others) and all(one is other for one, other in pairs)
 
 
 def write_feedback(feedback: Feedback) -> bytes:
