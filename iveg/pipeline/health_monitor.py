@@ -195,10 +195,9 @@ class HealthMonitor:
         An agent that measures still pass is not down because it leaves requests
         unanswered: under load it answers them last.
         """
-        age = _age(_newest(self.received_at, self.stored_at), now)
+        age, state = self._passing(now)
         if self.agent_error:
             return HopHealth(Hop.AGENT, "down", age, self.agent_error)
-        state = self._by_age(age, now, self._agent_down_s)
         if broken and state != "ok":
             return HopHealth(Hop.AGENT, "unknown", age)
         lag, growing = self._lag(now)
@@ -245,9 +244,15 @@ class HealthMonitor:
 
     def is_overloaded(self, now: Instant) -> bool:
         """Whether measures pass the agent ever later: nothing may be added to it."""
-        age = _age(_newest(self.received_at, self.stored_at), now)
-        passing = self._by_age(age, now, self._agent_down_s) in ("ok", "late")
+        _, state = self._passing(now)
+        passing = state in ("ok", "late")
         return passing and self._was_behind and self.probe.grows(now)
+
+    def _passing(self, now: Instant) -> tuple[float | None, HopState]:
+        """Age of the newest measure that passed the agent (s), and its verdict."""
+        passed = [at for at in (self.received_at, self.stored_at) if at is not None]
+        age = _age(max(passed, default=None), now)
+        return age, self._by_age(age, now, self._agent_down_s)
 
     def _notifications(self, now: Instant, *, blind: bool) -> HopHealth:
         age = _age(self.notified_at, now)
@@ -273,11 +278,6 @@ class HealthMonitor:
 
     def _starting(self, now: Instant) -> bool:
         return now.mono - self._start.mono < GRACE_S
-
-
-def _newest(one: float | None, other: float | None) -> float | None:
-    known = [at for at in (one, other) if at is not None]
-    return max(known, default=None)
 
 
 def _age(at: float | None, now: Instant) -> float | None:
