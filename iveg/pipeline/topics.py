@@ -100,9 +100,6 @@ class Topic:
         """The topic of one robot or command."""
         return self.name.replace("{id}", key)
 
-    def __str__(self) -> str:
-        return self.name
-
 
 ROBOT = Topic(
     "robots/{id}",

@@ -64,7 +64,7 @@ def test_the_snapshot_has_the_member_of_every_row() -> None:
     ) - own
 
 
-@pytest.mark.parametrize("row", TOPICS, ids=str)
+@pytest.mark.parametrize("row", TOPICS, ids=lambda row: row.name)
 def test_a_topic_is_found_by_what_it_writes(row: Topic) -> None:
     key = "AGI" if "{id}" in row.name else ""
 
