@@ -71,7 +71,7 @@ class Choices:
     """
 
     rule: DetectionRule = field(default_factory=DetectionRule)
-    drills: Drills | None = None
+    drills: Drills = field(default_factory=Drills)
     boot: str = "iveg-boot"
 
 

@@ -84,15 +84,15 @@ class Commander:
         new_id: Ids,
         clock: Clock,
         *,
-        drills: Drills | None = None,
-        agent_lag_s: Callable[[Instant], float | None] = lambda _: None,
-        is_cut: IsCut = lambda _transport, _at: False,
+        drills: Drills,
+        agent_lag_s: Callable[[Instant], float | None],
+        is_cut: IsCut,
     ) -> None:
         self.machines: Mapping[str, StopMachine] = {
             robot_id: StopMachine(robot_id, ports) for robot_id in robots
         }
         self.commands: dict[str, Command] = {}
-        self.drills = drills or Drills()
+        self.drills = drills
         self.counters: Counter[str] = Counter()
         self._mistakes: dict[str, OffTable] = {}
         """Robots whose machine once had no step: shown until iVeg starts again."""
