@@ -63,8 +63,7 @@ def write_ranges(ranges: NDArray[np.float32]) -> NDArray[np.float64]:
     Eleven decimals tell any two float32 of a millimetre or more apart; Orion keeps
     nine, which is as good from a decimetre on.
     """
-    told: NDArray[np.float64] = ranges.astype(np.float64).round(11)
-    return told
+    return ranges.astype(np.float64).round(11)
 
 
 def rounded(value: float | None) -> float | None:
