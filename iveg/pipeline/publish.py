@@ -7,12 +7,13 @@ sent; a browser that lets them pile up is told to come back for a snapshot.
 
 import asyncio
 from collections import Counter, deque
-from typing import Any
+from typing import Any, TypeVar
 
 from iveg.pipeline.topics import is_telemetry
 from iveg.pipeline.waiting import wait_set
 
 MAX_PENDING = 1000
+_Waits = TypeVar("_Waits")
 
 
 class Subscriber:
@@ -61,11 +62,7 @@ class Subscriber:
 
     def take_events(self) -> list[tuple[str, Any]]:
         """Every event since the last time, in order."""
-        if not self.pending:
-            return []
-        events = list(self.pending)
-        self.pending.clear()
-        return events
+        return _taken(self.pending)
 
     def take_topics(self) -> list[str]:
         """The topics that changed and are told at once."""
@@ -76,9 +73,9 @@ class Subscriber:
         return _taken(self.telemetry)
 
 
-def _taken(topics: dict[str, None]) -> list[str]:
-    taken = list(topics)
-    topics.clear()
+def _taken(waiting: dict[_Waits, None] | deque[_Waits]) -> list[_Waits]:
+    taken = list(waiting)
+    waiting.clear()
     return taken
 
 
