@@ -114,14 +114,12 @@ class RuleLoop:
             self._latency.tick(now)
 
     def _watch_chain(self, now: Instant) -> None:
-        changed = False
-        for hop in self._health_monitor.hops(now):
-            if hop.state == self._states.get(hop.name):
-                continue
-            self._states[hop.name] = hop.state
-            changed = True
+        hops = self._health_monitor.hops(now)
+        for hop in hops:
             self._tell(hop, now)
-        if changed or now.mono - self._health_at >= _HEALTH_PERIOD_S:
+        before, self._states = self._states, {hop.name: hop.state for hop in hops}
+        overdue = now.mono - self._health_at >= _HEALTH_PERIOD_S
+        if overdue or self._states != before:
             self._health_at = now.mono
             self._event_log.changed(topics.HEALTH.name)
 
