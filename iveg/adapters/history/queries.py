@@ -7,14 +7,14 @@ up the event loop nor takes the threads that a STOP's journal needs.
 import asyncio
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from sqlalchemy import Connection, and_, func, or_, select
+from sqlalchemy import Connection, Select, and_, func, or_, select
 from sqlalchemy.exc import SQLAlchemyError
 
 from iveg.adapters.history import lists, series
 from iveg.adapters.history.engine import reading_engine
-from iveg.adapters.history.lists import Filter, Page, record_of
+from iveg.adapters.history.lists import Filter, Page, R, record_of
 from iveg.adapters.history.migrate import reason_of
 from iveg.adapters.history.tables import (
     alerts,
@@ -77,22 +77,12 @@ class Queries:
     async def decision(self, decision_id: str) -> DecisionRecord | None:
         """One decision; None when it is not known."""
         wanted = select(decisions).where(decisions.c.decision_id == decision_id)
-
-        def read(connection: Connection) -> DecisionRecord | None:
-            row = connection.execute(wanted).mappings().first()
-            return None if row is None else record_of(DecisionRecord, row)
-
-        return await self._ask(read)
+        return next(iter(await self._records(DecisionRecord, wanted)), None)
 
     async def command(self, command_id: str) -> CommandRecord | None:
         """One command; None when it is not known."""
         wanted = select(commands).where(commands.c.command_id == command_id)
-
-        def read(connection: Connection) -> CommandRecord | None:
-            row = connection.execute(wanted).mappings().first()
-            return None if row is None else record_of(CommandRecord, row)
-
-        return await self._ask(read)
+        return next(iter(await self._records(CommandRecord, wanted)), None)
 
     async def open_commands(self) -> tuple[CommandRecord, ...]:
         """Commands whose last row says that they still go on, oldest first."""
@@ -105,32 +95,17 @@ class Queries:
             .where(or_(stops, and_(c.kind != "stop", c.state == "RELEASING")))
             .order_by(c.requested_at, c.command_id)
         )
-
-        def read(connection: Connection) -> tuple[CommandRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(CommandRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(CommandRecord, wanted)
 
     async def open_decisions(self) -> tuple[DecisionRecord, ...]:
         """Decisions whose last row has no end."""
         wanted = select(decisions).where(decisions.c.ended_at.is_(None))
-
-        def read(connection: Connection) -> tuple[DecisionRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(DecisionRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(DecisionRecord, wanted)
 
     async def open_alerts(self) -> tuple[AlertRecord, ...]:
         """Alerts whose last row says that they are active."""
         wanted = select(alerts).where(alerts.c.cleared_at.is_(None))
-
-        def read(connection: Connection) -> tuple[AlertRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(AlertRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(AlertRecord, wanted)
 
     async def unseen_alerts(self, most: int) -> tuple[AlertRecord, ...]:
         """The newest P1s that nobody has acknowledged, active or over."""
@@ -141,12 +116,7 @@ class Queries:
             .order_by(a.last_raised_at.desc(), a.alert_id.desc())
             .limit(most)
         )
-
-        def read(connection: Connection) -> tuple[AlertRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(AlertRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(AlertRecord, wanted)
 
     async def drills(
         self, robot: str | None = None, most: int = 100
@@ -161,12 +131,7 @@ class Queries:
         )
         if robot is not None:
             wanted = wanted.where(c.robot_id == robot)
-
-        def read(connection: Connection) -> tuple[CommandRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(CommandRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(CommandRecord, wanted)
 
     async def last_drills(self) -> dict[str, float]:
         """Robot → when its last drill that ended in a standstill was asked (Unix s)."""
@@ -182,18 +147,8 @@ class Queries:
 
     async def command_events(self, command_id: str) -> tuple[CommandEventRecord, ...]:
         """The audit trail of a command, oldest first."""
-        events = command_events.c
-        wanted = (
-            select(command_events)
-            .where(events.command_id == command_id)
-            .order_by(events.at, events.row_id)
-        )
-
-        def read(connection: Connection) -> tuple[CommandEventRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(CommandEventRecord, row) for row in rows)
-
-        return await self._ask(read)
+        steps = await self.steps_of([command_id])
+        return tuple(steps.get(command_id, ()))
 
     async def steps_of(
         self, command_ids: Sequence[str]
@@ -205,15 +160,10 @@ class Queries:
             .where(events.command_id.in_(command_ids))
             .order_by(events.at, events.row_id)
         )
-
-        def read(connection: Connection) -> dict[str, list[CommandEventRecord]]:
-            steps: dict[str, list[CommandEventRecord]] = {}
-            for row in connection.execute(wanted).mappings():
-                step = record_of(CommandEventRecord, row)
-                steps.setdefault(step.command_id, []).append(step)
-            return steps
-
-        return await self._ask(read)
+        steps: dict[str, list[CommandEventRecord]] = {}
+        for step in await self._records(CommandEventRecord, wanted):
+            steps.setdefault(step.command_id, []).append(step)
+        return steps
 
     async def newest_lines(self, most: int) -> tuple[LogRecord, ...]:
         """The newest lines of the log, newest first."""
@@ -256,17 +206,21 @@ class Queries:
         """Every minute of every hop from then on (Unix s), oldest first."""
         c = latency.c
         wanted = select(latency).where(c.at >= since).order_by(c.at, c.row_id)
-
-        def read(connection: Connection) -> tuple[LatencyRecord, ...]:
-            rows = connection.execute(wanted).mappings()
-            return tuple(record_of(LatencyRecord, row) for row in rows)
-
-        return await self._ask(read)
+        return await self._records(LatencyRecord, wanted)
 
     def close(self) -> None:
         """Let go of threads and connections."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._engine.dispose()
+
+    async def _records(self, kind: type[R], wanted: Select[Any]) -> tuple[R, ...]:
+        """The rows that a statement finds, as records in its order."""
+
+        def read(connection: Connection) -> tuple[R, ...]:
+            rows = connection.execute(wanted).mappings()
+            return tuple(record_of(kind, row) for row in rows)
+
+        return await self._ask(read)
 
     async def _ask(self, question: Callable[[Connection], _T]) -> _T:
         loop = asyncio.get_running_loop()
