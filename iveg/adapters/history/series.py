@@ -4,15 +4,14 @@ A range with few rows is answered row by row; a longer one in equal slices of ti
 with its mean speed and its strictest factor, so that a short slow-down is never lost.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
     Integer,
-    Select,
     cast,
     func,
     select,
@@ -23,7 +22,6 @@ from iveg.adapters.history.tables import climate, commands, detections, odometry
 from iveg.domain.day import DaySighting, Pose
 from iveg.domain.records import ByTransport, CommandRecord
 
-_Point = tuple[Any, ...]
 MOST_POINTS = 2000
 MOST_READINGS = 288
 """A day of the air in slices of five minutes."""
@@ -47,7 +45,7 @@ class SpeedSeries:
     linear: tuple[float, ...]
     limit: tuple[float, ...]
     applied: tuple[float | None, ...]
-    slice_s: float = 0.0
+    slice_s: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +62,7 @@ class ClimateSeries:
     temperature: tuple[float | None, ...] = ()
     relative_humidity: tuple[float | None, ...] = ()
     co2: tuple[float | None, ...] = ()
-    slice_s: float = 0.0
+    slice_s: float = field(default=0.0, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,23 +123,11 @@ def climate_series(
     values = (c.temperature, c.relative_humidity, c.co2)
     count = connection.scalar(select(func.count()).where(*asked)) or 0
     if count <= most:
-        every = select(c.at, *values).where(*asked).order_by(c.at)
-        return _climate(_points(connection, every), 0.0)
+        return ClimateSeries(*_columns(connection, (c.at, *values), asked))
     slice_s = (until - since) / most
     place = _whole(connection, (c.at - since) / slice_s)
-    means = (func.avg(value) for value in values)
-    slices = (
-        select(func.min(c.at), *means)
-        .where(*asked)
-        .group_by(place)
-        .order_by(func.min(c.at))
-    )
-    return _climate(_points(connection, slices), slice_s)
-
-
-def _climate(rows: list[_Point], slice_s: float) -> ClimateSeries:
-    at, warm, humid, co2 = zip(*rows, strict=True) if rows else ((),) * 4
-    return ClimateSeries(at, warm, humid, co2, slice_s)
+    means = (func.min(c.at), *(func.avg(value) for value in values))
+    return ClimateSeries(*_columns(connection, means, asked, place), slice_s=slice_s)
 
 
 def poses_of(connection: Connection, since: float, until: float) -> tuple[Pose, ...]:
@@ -259,33 +245,32 @@ def _one(
         select(func.min(o.at), func.max(o.at), func.count()).where(*asked)
     ).one()
     if count <= most:
-        columns = (o.at, o.linear, o.limit_factor, o.applied_factor)
-        rows = select(*columns).where(*asked).order_by(o.at)
-        return _series(robot, _points(connection, rows), 0.0)
+        rows = (o.at, o.linear, o.limit_factor, o.applied_factor)
+        return SpeedSeries(robot, *_columns(connection, rows, asked))
     # One slice fewer than asked for: the last row may stand on the last edge.
     slice_s = (last - first) / (most - 1) or 1.0
     place = _whole(connection, (o.at - first) / slice_s)
     slices = (
-        select(
-            func.min(o.at),
-            func.avg(o.linear),
-            func.min(o.limit_factor),
-            func.min(o.applied_factor),
-        )
-        .where(*asked)
-        .group_by(place)
-        .order_by(func.min(o.at))
+        func.min(o.at),
+        func.avg(o.linear),
+        func.min(o.limit_factor),
+        func.min(o.applied_factor),
     )
-    return _series(robot, _points(connection, slices), slice_s)
+    return SpeedSeries(
+        robot, *_columns(connection, slices, asked, place), slice_s=slice_s
+    )
 
 
-def _points(connection: Connection, statement: Select[Any]) -> list[_Point]:
-    return [tuple(row) for row in connection.execute(statement)]
-
-
-def _series(robot: str, rows: list[_Point], slice_s: float) -> SpeedSeries:
-    at, linear, limit, applied = zip(*rows, strict=True) if rows else ((),) * 4
-    return SpeedSeries(robot, at, linear, limit, applied, slice_s)
+def _columns(
+    connection: Connection,
+    wanted: Sequence[ColumnElement[Any]],
+    asked: Iterable[ColumnElement[bool]],
+    *place: ColumnElement[int],
+) -> list[tuple[Any, ...]]:
+    """The values of each column in order of the first; grouped by ``place``."""
+    statement = select(*wanted).where(*asked).group_by(*place).order_by(wanted[0])
+    rows = connection.execute(statement).all()
+    return list(zip(*rows, strict=True)) or [()] * len(wanted)
 
 
 def _whole(connection: Connection, value: ColumnElement[Any]) -> ColumnElement[int]:
