@@ -3,7 +3,7 @@
 import asyncio
 import socket
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import httpx
 import orjson
@@ -17,6 +17,7 @@ _TIMEOUT_S = 6.0
 PROBE_TIMEOUT_S = 3.0
 """For a question that a healthy neighbour answers in milliseconds."""
 _MOST_PAGES = 100
+_COUNTED = {"options": "count"}
 
 Document = dict[str, Any]
 
@@ -107,49 +108,87 @@ class FiwareHttp:
         except ValueError as error:
             raise HopError(self._hop, "answered something that is not JSON") from error
 
+    def read_object(self, response: httpx.Response) -> Document:
+        """The object that is an answer.
+
+        Raises:
+            HopError: it is anything else.
+        """
+        told = self.read(response)
+        if not isinstance(told, dict):
+            raise self._meaningless()
+        return told
+
     def read_list(self, response: httpx.Response, part: str = "") -> list[Document]:
         """The list of objects in an answer, or in one part of it.
 
         Raises:
             HopError: it is anything else.
         """
-        told = self.read(response)
-        if part:
-            told = told.get(part) if isinstance(told, dict) else None
+        told = self.read_object(response).get(part) if part else self.read(response)
         if not isinstance(told, list) or not all(isinstance(one, dict) for one in told):
-            raise HopError(self._hop, "answered JSON that means nothing here")
+            raise self._meaningless()
         return told
 
-    def read_count(self, text: Any) -> int:
-        """The total number, as the neighbour reports it.
-
-        Raises:
-            HopError: it does not.
-        """
-        try:
-            return int(text)
-        except (TypeError, ValueError) as error:
-            raise HopError(self._hop, f"counted {text!r} of something") from error
-
     async def read_all(
-        self, path: str, query: Mapping[str, str] | None = None
+        self, path: str, query: Mapping[str, str] = _COUNTED, part: str = ""
     ) -> list[Document]:
-        """Every object of a list of Orion's, page by page; one without an end is left.
+        """Every object of a list, page by page; one without an end is left.
+
+        Args:
+            path: Where the list is.
+            query: Parameters of each page.
+            part: Of the agent's answer, which holds the total beside it.
 
         Raises:
             HopError: no answer, or none that means anything.
         """
         found: list[Document] = []
-        query = query or {"options": "count"}
         for _ in range(_MOST_PAGES):
             page = {**query, "limit": str(PAGE_SIZE), "offset": str(len(found))}
             response = await self.ask("GET", path, query=page)
-            told = self.read_list(response)
+            told = self.read_list(response, part)
             found += told
-            total = self.read_count(response.headers.get("Fiware-Total-Count", 0))
+            total = self._total(response, of_agent=bool(part))
             if not told or len(found) >= total:
                 break
         return found
+
+    def _total(self, response: httpx.Response, *, of_agent: bool) -> int:
+        """The total number, as the neighbour reports it."""
+        about = self.read(response) if of_agent else response.headers
+        counted = about.get("count" if of_agent else "Fiware-Total-Count", 0)
+        try:
+            return int(counted)
+        except (TypeError, ValueError) as error:
+            raise HopError(self._hop, f"counted {counted!r} of something") from error
+
+    def _meaningless(self) -> HopError:
+        return HopError(self._hop, "answered JSON that means nothing here")
+
+
+class FiwareClient:
+    """A client of one FIWARE service; ``async with`` closes its connections.
+
+    Args:
+        hop: Names the neighbour in errors.
+        url: Address without a path.
+        service: ``Fiware-Service``.
+        path: ``Fiware-ServicePath``.
+    """
+
+    def __init__(self, hop: str, url: str, service: str, path: str) -> None:
+        self.http = FiwareHttp(hop, url, service, path)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the kept connections."""
+        await self.http.close()
 
 
 def _complaint(method: str, path: str, response: httpx.Response) -> str:

@@ -7,18 +7,17 @@ It keeps the way of commands to the robot clear; the traps are in docs/fiware.md
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
-from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareHttp
+from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
 from iveg.adapters.orphan_entities import Entities, remove_orphans
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
 RESOURCE = "/iot/json"
-_PAGE, _MOST_PAGES = 100, 100
 
 
-class IotAgentClient:
+class IotAgentClient(FiwareClient):
     """Requests to the IoT Agent JSON.
 
     Args:
@@ -28,17 +27,7 @@ class IotAgentClient:
     """
 
     def __init__(self, url: str, service: str, path: str) -> None:
-        self.http = FiwareHttp("iot_agent", url, service, path)
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
-
-    async def close(self) -> None:
-        """Close the kept connections."""
-        await self.http.close()
+        super().__init__("iot_agent", url, service, path)
 
     async def version(self) -> str:
         """The agent's version.
@@ -47,9 +36,7 @@ class IotAgentClient:
             HopError: the agent does not answer.
         """
         response = await self.http.ask("GET", "/iot/about", timeout_s=PROBE_TIMEOUT_S)
-        told = self.http.read(response)
-        if not isinstance(told, dict):
-            raise HopError("iot_agent", "answered JSON that means nothing here")
+        told = self.http.read_object(response)
         return str(told.get("version", "unknown"))
 
     async def read_groups(self) -> list[Document]:
@@ -58,7 +45,7 @@ class IotAgentClient:
         Raises:
             HopError: the agent does not answer.
         """
-        return await self._all("/iot/services", "services")
+        return await self.http.read_all("/iot/services", {}, "services")
 
     async def create_group(self, group: Document) -> bool:
         """Make a group; False where there is one with this key already.
@@ -85,7 +72,7 @@ class IotAgentClient:
         Raises:
             HopError: the agent does not answer.
         """
-        return await self._all("/iot/devices", "devices")
+        return await self.http.read_all("/iot/devices", {}, "devices")
 
     async def create_device(self, device: Document) -> bool:
         """Make a device; False where there is one with this id already.
@@ -106,18 +93,6 @@ class IotAgentClient:
         path = f"/iot/devices/{device_id}"
         response = await self.http.ask("DELETE", path, also=(404,))
         return response.status_code != 404
-
-    async def _all(self, path: str, part: str) -> list[Document]:
-        found: list[Document] = []
-        for _ in range(_MOST_PAGES):
-            query = {"limit": str(_PAGE), "offset": str(len(found))}
-            response = await self.http.ask("GET", path, query=query)
-            page = self.http.read_list(response, part)
-            found += page
-            total = self.http.read_count(self.http.read(response).get("count", 0))
-            if not page or len(found) >= total:
-                break
-        return found
 
 
 class CommandRegistrations(Entities, Protocol):

@@ -6,13 +6,12 @@ nowhere (docs/fiware.md).  The evidence is the robot's own answer.
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any, Self
+from typing import Any
 
 from iveg.adapters.fiware_http import (
     PAGE_SIZE,
     PROBE_TIMEOUT_S,
     Document,
-    FiwareHttp,
 )
 from iveg.adapters.orion_subscriptions import OrionSubscriptions
 from iveg.domain.errors import HopError
@@ -43,17 +42,7 @@ class OrionClient(OrionSubscriptions):
     """
 
     def __init__(self, url: str, service: str, path: str) -> None:
-        super().__init__(FiwareHttp("orion", url, service, path))
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        await self.close()
-
-    async def close(self) -> None:
-        """Close the kept connections."""
-        await self.http.close()
+        super().__init__("orion", url, service, path)
 
     async def version(self) -> str:
         """Orion's version.
@@ -125,9 +114,7 @@ class OrionClient(OrionSubscriptions):
             timeout_s=PROBE_TIMEOUT_S,
             also=(404,),
         )
-        told = self.http.read(response)
-        if not isinstance(told, dict):
-            raise HopError("orion", "answered JSON that means nothing here")
+        told = self.http.read_object(response)
         return None if response.status_code == 404 else told
 
     async def read_probe_times(self) -> tuple[float, float]:

@@ -3,19 +3,12 @@
 from collections.abc import Mapping
 from typing import Any
 
-from iveg.adapters.fiware_http import FiwareHttp
+from iveg.adapters.fiware_http import FiwareClient
 from iveg.domain.errors import HopError
 
 
-class OrionSubscriptions:
-    """Subscriptions and registrations of one tenant.
-
-    Args:
-        http: To Orion, with the tenant's headers.
-    """
-
-    def __init__(self, http: FiwareHttp) -> None:
-        self.http = http
+class OrionSubscriptions(FiwareClient):
+    """Subscriptions and registrations of one tenant."""
 
     async def read_registrations(self) -> list[dict[str, Any]]:
         """Every registration of our tenant.
