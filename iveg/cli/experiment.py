@@ -20,8 +20,8 @@ import httpx
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
-from iveg.adapters.orion import OrionClient
 from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
+from iveg.cli.live_robots import live_robot
 from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
@@ -44,7 +44,6 @@ from iveg.settings import Settings
 
 _STOPS_WITHIN_S = 4.0
 _LIVE_WITHIN_S = 30.0
-_LIVE_ROBOT_S = 10.0
 T = TypeVar("T")
 
 
@@ -300,16 +299,10 @@ async def refuse_live_robots(settings: Settings) -> None:
         DataFileError: Orion had data of one of them a moment ago.
         HopError: Orion does not answer.
     """
-    service = settings.fiware_service, settings.fiware_servicepath
-    orion = OrionClient(settings.orion_url, *service)
-    try:
-        for robot_id in ROBOTS:
-            heard = await orion.modified_at(robot_id)
-            if heard is not None and clock.now().wall - heard < _LIVE_ROBOT_S:
-                reason = f"{robot_id} is live there; stop it first"
-                raise DataFileError("--fiware", settings.orion_url, reason)
-    finally:
-        await orion.close()
+    live = await live_robot(settings, ROBOTS)
+    if live is not None:
+        reason = f"{live} is live there; stop it first"
+        raise DataFileError("--fiware", settings.orion_url, reason)
 
 
 async def _ticks(progress: Progress) -> None:

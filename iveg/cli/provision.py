@@ -12,10 +12,11 @@ def provision_fleet(settings: Settings) -> int:
     """Create or repair the fleet's devices, and print the repairs."""
 
     async def work() -> None:
-        service = settings.fiware_service, settings.fiware_servicepath
-        orion = OrionClient(settings.orion_url, *service)
-        agent = IotAgentClient(settings.iota_url, *service)
-        try:
+        tenant = settings.fiware_service, settings.fiware_servicepath
+        async with (
+            OrionClient(settings.orion_url, *tenant) as orion,
+            IotAgentClient(settings.iota_url, *tenant) as agent,
+        ):
             done = await provision(
                 agent,
                 orion,
@@ -23,9 +24,6 @@ def provision_fleet(settings: Settings) -> int:
                 apikey=settings.apikey,
                 cbroker_url=settings.iota_cb_url or settings.orion_url,
             )
-        finally:
-            await orion.close()
-            await agent.close()
         said = [*done.mended, *done.problems]
         print("\n".join(said) or "Everything was as it should be.")
 

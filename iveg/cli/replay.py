@@ -4,19 +4,16 @@ import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from iveg.adapters import clock
 from iveg.adapters.bags import BagTopics
 from iveg.adapters.fleet_files import load_fleet
-from iveg.adapters.orion import OrionClient
 from iveg.cli.addresses import broker_of
+from iveg.cli.live_robots import live_robot
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.emulator.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
-
-_LIVE_ROBOT_S = 10.0
 
 
 async def replay(options: argparse.Namespace, settings: Settings) -> None:
@@ -62,15 +59,8 @@ async def _refuse_replay(
         raise DataFileError(
             "IVEG_MQTT_URL", host, "is not on loopback; --force if that is meant"
         )
-    orion = OrionClient(
-        settings.orion_url, settings.fiware_service, settings.fiware_servicepath
-    )
-    try:
-        for robot_id in options.robot:
-            heard = await orion.modified_at(robot_id)
-            if heard is not None and clock.now().wall - heard < _LIVE_ROBOT_S:
-                raise DataFileError(
-                    "--robot", robot_id, "was live in the last 10 s; --force if meant"
-                )
-    finally:
-        await orion.close()
+    live = await live_robot(settings, options.robot)
+    if live is not None:
+        raise DataFileError(
+            "--robot", live, "was live in the last 10 s; --force if meant"
+        )
