@@ -7,7 +7,7 @@ from iveg.embedded.entities import Attribute, read_changes
 from iveg.embedded.entity_paths import ask_providers, update
 from iveg.embedded.http_server import Response
 from iveg.embedded.ngsi_request import Call, read_value
-from iveg.embedded.orion_errors import ATTRIBUTE_NOT_FOUND, NgsiError, not_found
+from iveg.embedded.orion_errors import ATTRIBUTE_NOT_FOUND, not_found, too_many
 from iveg.embedded.orion_text import looks_clean
 
 
@@ -29,11 +29,7 @@ async def get_value(broker: ContextBroker, call: Call) -> Response:
         if re.search(call.parts[1], one.id) and (not call.kind or one.type == call.kind)
     ]
     if len(near) > 1:
-        raise NgsiError(
-            409,
-            "TooManyResults",
-            "More than one matching entity. Please refine your query",
-        )
+        raise too_many()
     json = (await _attribute(broker, call, near[0] if near else call.parts[1])).json
     structured = json[:1] in b"[{"
     return Response(

@@ -73,7 +73,7 @@ def _read_item(call: Call, raw: Any) -> _Item:
 
 
 async def _update(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
-    return await broker.try_update(call.scope, item.id, item.kind, item.changes)
+    return await broker.update(call.scope, item.id, item.kind, item.changes)
 
 
 async def _append(broker: ContextBroker, call: Call, item: _Item) -> Outcome:

@@ -13,16 +13,15 @@ from iveg.embedded.entities import (
     EntityChange,
     Touched,
     apply,
-    fresh,
-    touch_all,
 )
 from iveg.embedded.forwarding import providers
 from iveg.embedded.orion_errors import NgsiError, not_found
 from iveg.embedded.outbox import Outbox
 from iveg.embedded.outcomes import Outcome
-from iveg.embedded.registrations import Registration, forward_update
+from iveg.embedded.registrations import forward_update
+from iveg.embedded.scope import Scope
 from iveg.embedded.subscriptions import Subscription
-from iveg.embedded.tenants import Scope, Tenant
+from iveg.embedded.tenants import Tenant
 
 
 class ContextBroker:
@@ -144,14 +143,15 @@ class ContextBroker:
         self, scope: Scope, entity: Entity, changes: Mapping[str, EntityChange]
     ) -> None:
         """Replace all attributes."""
-        fresh(entity, scope.now)
+        entity.attributes = {}
+        entity.modified = scope.now
         self.append(scope, entity, changes)
 
     def delete(self, scope: Scope, entity: Entity) -> None:
         """Delete an entity and notify its subscriptions."""
         tenant = self.tenant(scope.service)
         tenant.entities.remove(entity)
-        self._tell(scope, entity, touch_all(entity), "entityDelete")
+        self._tell(scope, entity, Touched(entity.attributes, all=True), "entityDelete")
 
     def delete_attributes(
         self, scope: Scope, entity: Entity, names: Iterable[str]
@@ -174,27 +174,11 @@ class ContextBroker:
         changes: Mapping[str, EntityChange],
         *,
         forced: bool = False,
-    ) -> None:
+    ) -> Outcome:
         """Change existing attributes; forward registered ones to their providers.
 
-        Raises:
-            NgsiError: 404 or 422, as Orion; the possible part is done.
+        Does the possible part and reports the rest.
         """
-        outcome = await self.try_update(
-            scope, entity_id, entity_type, changes, forced=forced
-        )
-        outcome.raise_for_one()
-
-    async def try_update(
-        self,
-        scope: Scope,
-        entity_id: str,
-        entity_type: str,
-        changes: Mapping[str, EntityChange],
-        *,
-        forced: bool = False,
-    ) -> Outcome:
-        """Do the possible part of ``update``, and report the rest."""
         tenant = self.tenant(scope.service)
         entity = tenant.entities.find(scope.path, entity_id, entity_type)
         kind = entity.type if entity else entity_type
@@ -211,34 +195,27 @@ class ContextBroker:
                     entity_id,
                     kind,
                     {name: rest[name] for name in names},
-                    scope.asking,
+                    scope,
                 )
                 for registration, names in forwards
             )
         )
-        passed = {name for _, names in forwards for name in names}
+        passed: list[str] = []
+        failed: list[str] = []
+        for (_, names), is_taken in zip(forwards, taken, strict=True):
+            (passed if is_taken else failed).extend(names)
         return Outcome(
             entity_id,
             entity_type,
             kind,
             exists=entity is not None,
             updated=tuple(local),
-            passed=tuple(
-                name
-                for (_, names), ok in zip(forwards, taken, strict=True)
-                if ok
-                for name in names
-            ),
-            failed=tuple(
-                name
-                for (_, names), ok in zip(forwards, taken, strict=True)
-                if not ok
-                for name in names
-            ),
-            refused=tuple(name for name in rest if name not in passed),
+            passed=tuple(passed),
+            failed=tuple(failed),
+            refused=tuple(name for name in rest if name not in (*passed, *failed)),
         )
 
-    # --- subscriptions and registrations ----------------------------------------
+    # --- subscriptions ----------------------------------------------------------
 
     def subscribe(self, subscription: Subscription) -> None:
         """Store a subscription; it is notified of later changes."""
@@ -246,25 +223,12 @@ class ContextBroker:
         tenant.subscriptions[subscription.id] = subscription
         tenant.forget_concerned()
 
-    def resubscribe(self, subscription: Subscription) -> None:
-        """Reload a changed subscription."""
-        self.tenant(subscription.service).forget_concerned()
-
     def unsubscribe(self, subscription: Subscription) -> None:
         """Delete a subscription and close its connection."""
         tenant = self.tenant(subscription.service)
         del tenant.subscriptions[subscription.id]
         tenant.forget_concerned()
         self.outbox.forget(subscription.id)
-
-    def register(self, scope: Scope, registration: Registration) -> None:
-        """Store a registration; Orion stores duplicates too."""
-        self.tenant(scope.service).registrations[registration.id] = registration
-
-    def unregister(self, scope: Scope, registration_id: str) -> bool:
-        """Delete a registration; returns whether it existed."""
-        known = self.tenant(scope.service).registrations
-        return known.pop(registration_id, None) is not None
 
     def _tell(
         self, scope: Scope, entity: Entity, touched: Touched, alteration: str

@@ -235,8 +235,8 @@ def apply(
 def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribute:
     kind = change.type or (old.type if old else default_type(change.value))
     value = change.value
-    if isinstance(value, dict) and "$" in "".join(value) and _is_operation(value):
-        value = _operated(orjson.loads(old.json) if old else None, value)
+    if isinstance(value, dict) and "$" in "".join(value):
+        value = _operated(old, value)
     kept = value if isinstance(value, Value) else _value(kind, value)
     if old is None:
         return Attribute(kind, kept, change.metadata or {}, now, now)
@@ -250,19 +250,17 @@ def _value(kind: str, value: Any) -> Value:
     return Value(json=date_text(value)) if kind == "DateTime" else Value(value)
 
 
-def _is_operation(value: Mapping[str, Any]) -> bool:
-    return any(key.startswith("$") for key in value)
-
-
 def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, bytes]:
     return new if old.keys() <= new.keys() else {**old, **new}
 
 
-def _operated(old: Any, operation: Mapping[str, Any]) -> Any:
-    """Orion's update operators; any key that begins with ``$`` is one."""
-    name, argument = next(
-        (key, value) for key, value in operation.items() if key.startswith("$")
-    )
+def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
+    """The value after Orion's update operators; a key that begins with ``$`` is one."""
+    name = next((key for key in value if key.startswith("$")), "")
+    if not name:
+        return value
+    argument = value[name]
+    old = None if attribute is None else orjson.loads(attribute.json)
     number = old if isinstance(old, int | float) else 0
     if name == "$inc" and isinstance(argument, int | float):
         return number + argument
@@ -287,17 +285,6 @@ def default_type(value: Any) -> str:
     if value is None:
         return "None"
     return "Text" if isinstance(value, str) else "StructuredValue"
-
-
-def touch_all(entity: Entity) -> Touched:
-    """Mark all attributes as changed, for a new or a deleted entity."""
-    return Touched(entity.attributes, all=True)
-
-
-def fresh(entity: Entity, now: float) -> None:
-    """Drop all attributes, keep the entity."""
-    entity.attributes = {}
-    entity.modified = now
 
 
 # --- requests ---------------------------------------------------------------------

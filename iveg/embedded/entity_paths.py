@@ -12,7 +12,7 @@ from iveg.embedded.ngsi_request import Call, names, paging, pattern, read_id
 from iveg.embedded.orion_errors import bad_request, not_found
 from iveg.embedded.outcomes import EXISTING
 from iveg.embedded.query import matches_query, ordered
-from iveg.embedded.tenants import Scope
+from iveg.embedded.scope import Scope
 from iveg.embedded.views import write_attributes, write_entity
 
 
@@ -186,14 +186,19 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
 async def update(
     broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
 ) -> None:
-    """Update attributes here or at providers, according to the options."""
-    await broker.update(
+    """Update attributes here or at providers, according to the options.
+
+    Raises:
+        NgsiError: 404 or 422, as Orion; the possible part is done.
+    """
+    outcome = await broker.update(
         call.scope,
         call.parts[1],
         call.kind,
         changes,
         forced="forcedUpdate" in call.options,
     )
+    outcome.raise_for_one()
 
 
 def _ghost(scope: Scope, entity_id: str, kind: str) -> Entity:

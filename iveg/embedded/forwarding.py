@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping
 
 from iveg.embedded.entities import Attribute, under
 from iveg.embedded.registrations import Registration, forward_query
-from iveg.embedded.tenants import Scope, Tenant
+from iveg.embedded.scope import Scope
+from iveg.embedded.tenants import Tenant
 
 Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
 
@@ -60,9 +61,7 @@ async def foreign(
             and (not entity_type or one.get("type") in (entity_type, None))
         ]
         if attrs and entities and under(scope.path, registration.path):
-            asked.append(
-                forward_query(registration, entities, attrs, scope.asking, scope.now)
-            )
+            asked.append(forward_query(registration, entities, attrs, scope))
     told: dict[tuple[str, str], dict[str, Attribute]] = {}
     for answer in await asyncio.gather(*asked):
         for key, attributes in answer.items():

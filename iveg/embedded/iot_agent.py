@@ -29,8 +29,8 @@ from iveg.embedded.measures import read_measures, read_single, status_changes
 from iveg.embedded.mqtt_broker import MqttBroker
 from iveg.embedded.orion_errors import NgsiError
 from iveg.embedded.orion_text import load_json
-from iveg.embedded.registrations import read_registration
-from iveg.embedded.tenants import Scope
+from iveg.embedded.registrations import Registration, read_registration
+from iveg.embedded.scope import Scope
 
 _log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ class IotAgent:
         apikey, device_id, kind, name = spoken
         device = self.registry.device_of(apikey, device_id)
         if device is None:
-            device = self._autoprovision(apikey, device_id, now)
+            device = self._autoprovision(apikey, device_id)
         if device is None:
             return False
         if kind == "cmdexe":
@@ -125,11 +125,7 @@ class IotAgent:
         scope = Scope(tenancy.service, tenancy.subservice, "", now)
         self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
 
-    def _scope(self, tenancy: Tenancy, now: float) -> Scope:
-        correlator = self._broker.outbox.correlator()
-        return Scope(tenancy.service, tenancy.subservice, correlator, now)
-
-    def _autoprovision(self, apikey: str, device_id: str, now: float) -> Device | None:
+    def _autoprovision(self, apikey: str, device_id: str) -> Device | None:
         group = None if apikey == DEFAULT_APIKEY else self.registry.group_of(apikey)
         if group is None or group.document.get("autoprovision") is False:
             return None
@@ -137,7 +133,7 @@ class IotAgent:
         if group.commands:
             raw["commands"] = group.commands
         device = read_device(raw, group.tenancy, group)
-        return self._keep(device, now)
+        return self._keep(device)
 
     # --- devices ----------------------------------------------------------------
 
@@ -156,53 +152,47 @@ class IotAgent:
                 "A device with the same info (DeviceId, ApiKey, Service, Subservice) "
                 f"was found:{device.device_id}",
             )
-        self._keep(device, clock.now().wall)
+        self._keep(device)
 
     def _group_for(self, raw: Any, tenancy: Tenancy) -> Group | None:
         apikey = raw.get("apikey", "") if isinstance(raw, dict) else ""
         return self.registry.group_in(tenancy, apikey or "")
 
-    def _keep(self, device: Device, now: float) -> Device:
+    def _keep(self, device: Device) -> Device:
         if device.commands:
-            device = self._register(device, now)
+            device = self._register(device)
         self.registry.put(device)
         return device
 
-    def _register(self, device: Device, now: float) -> Device:
+    def _register(self, device: Device) -> Device:
         """Register the commands of an entity at the context broker."""
-        scope = self._scope(device.tenancy, now)
         entity = {"type": device.entity_type, "id": device.entity_name}
         document = {
             "dataProvided": {"entities": [entity], "attrs": list(device.commands)},
             "provider": {"http": {"url": self.url}},
         }
         registration = read_registration(document, device.tenancy.subservice)
-        self._broker.register(scope, registration)
+        self._registrations(device)[registration.id] = registration
         return replace(device, registration_id=registration.id)
 
     def change(self, old: Device, new: Device) -> None:
         """Replace a device; new attributes are written as null."""
-        now = clock.now().wall
-        self._unregister(old, now)
-        self.registry.remove(old)
-        self._keep(replace(new, registration_id=""), now)
+        self.forget(old)
+        self._keep(replace(new, registration_id=""))
         gained = dict(new.mapping.values()).items() - dict(old.mapping.values()).items()
         tenant = self._broker.tenant(new.tenancy.service)
         key = (new.tenancy.subservice, new.entity_name, new.entity_type)
         if gained and tenant.entities.get(*key) is not None:
-            self._write(
-                new, {name: EntityChange(kind, None) for name, kind in gained}, now
-            )
+            nothing = {name: EntityChange(kind, None) for name, kind in gained}
+            self._write(new, nothing, clock.wall())
 
     def forget(self, device: Device) -> None:
         """Delete a device and its registration."""
-        self._unregister(device, clock.now().wall)
+        self._registrations(device).pop(device.registration_id, None)
         self.registry.remove(device)
 
-    def _unregister(self, device: Device, now: float) -> None:
-        if device.registration_id:
-            scope = self._scope(device.tenancy, now)
-            self._broker.unregister(scope, device.registration_id)
+    def _registrations(self, device: Device) -> dict[str, Registration]:
+        return self._broker.tenant(device.tenancy.service).registrations
 
     # --- commands ----------------------------------------------------------------
 

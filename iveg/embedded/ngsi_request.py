@@ -9,7 +9,7 @@ from iveg.embedded.entities import EntityChange, read_changes
 from iveg.embedded.http_server import Request
 from iveg.embedded.orion_errors import NgsiError, bad_request, parse_error
 from iveg.embedded.orion_text import check_name, load_json, looks_clean
-from iveg.embedded.tenants import Scope
+from iveg.embedded.scope import Scope
 from iveg.embedded.views import EntityView
 
 MAX_BODY = 1 << 20

@@ -13,7 +13,6 @@ import orjson
 from iveg.embedded.orion_errors import bad_request, parse_error
 
 FORBIDDEN = frozenset("<>\"'=;()")
-_ID_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
 _NAME_FORBIDDEN = re.compile(r"[<>\"'=;()\s?/#&]")
 _MAX_DEPTH = 128
 UNRESTRICTED = "TextUnrestricted"

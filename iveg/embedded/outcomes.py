@@ -49,7 +49,7 @@ class Outcome:
     @property
     def exists_somewhere(self) -> bool:
         """Whether the broker or a provider knows the entity."""
-        return self.exists or bool(self.passed or self.failed)
+        return self.exists or self.forwarded
 
     @property
     def forwarded(self) -> bool:

@@ -23,6 +23,7 @@ from iveg.embedded.entities import (
 from iveg.embedded.notifier import NotificationTarget, exchange
 from iveg.embedded.orion_errors import bad_request
 from iveg.embedded.outbox import AGENT
+from iveg.embedded.scope import Scope
 from iveg.embedded.subscriptions import new_id
 
 PATIENCE_S = 5.0
@@ -104,21 +105,12 @@ def read_registration(raw: Any, path: str) -> Registration:
     return Registration(new_id(), document, path)
 
 
-@dataclass(frozen=True, slots=True)
-class Asking:
-    """Headers of a request to a provider."""
-
-    service: str
-    path: str
-    correlator: str
-
-
 async def forward_update(
     registration: Registration,
     entity_id: str,
     entity_type: str,
     changes: Mapping[str, EntityChange],
-    asking: Asking,
+    scope: Scope,
 ) -> bool:
     """Send attributes to their provider; returns whether it accepted them."""
     written = {
@@ -131,7 +123,7 @@ async def forward_update(
     }
     entity = {"id": entity_id, "type": entity_type, **written}
     body = orjson.dumps({"entities": [entity], "actionType": "update"})
-    status, _ = await _ask(registration.url, "/op/update", body, asking)
+    status, _ = await _ask(registration.url, "/op/update", body, scope)
     return 200 <= status < 300
 
 
@@ -139,8 +131,7 @@ async def forward_query(
     registration: Registration,
     entities: Iterable[Mapping[str, str]],
     names: Iterable[str],
-    asking: Asking,
-    now: float,
+    scope: Scope,
 ) -> dict[tuple[str, str], dict[str, Attribute]]:
     """Query a provider for attributes; empty if it does not answer.
 
@@ -149,7 +140,7 @@ async def forward_query(
     """
     body = orjson.dumps({"entities": list(entities), "attrs": list(names)})
     resource = "/op/query?limit=20&offset=0&options=count"
-    status, answer = await _ask(registration.url, resource, body, asking)
+    status, answer = await _ask(registration.url, resource, body, scope)
     if status != 200:
         return {}
     try:
@@ -157,7 +148,7 @@ async def forward_query(
     except orjson.JSONDecodeError:
         return {}
     return {
-        (one["id"], one["type"]): _read_told(one, now)
+        (one["id"], one["type"]): _read_told(one, scope.now)
         for one in (told if isinstance(told, list) else ())
         if isinstance(one, dict) and {"id", "type"} <= one.keys()
     }
@@ -181,7 +172,7 @@ def _read_told(one: Mapping[str, Any], now: float) -> dict[str, Attribute]:
 
 
 async def _ask(
-    url: str, resource: str, body: bytes, asking: Asking
+    url: str, resource: str, body: bytes, scope: Scope
 ) -> tuple[int, bytes | str]:
     parts = urlsplit(url)
     head = "\r\n".join(
@@ -190,12 +181,12 @@ async def _ask(
             f"POST {parts.path or '/'}{resource} HTTP/1.1",
             f"Host: {parts.netloc}",
             f"User-Agent: {AGENT}",
-            f"Fiware-Service: {asking.service}",
-            f"Fiware-ServicePath: {asking.path}",
+            f"Fiware-Service: {scope.service}",
+            f"Fiware-ServicePath: {scope.path}",
             "Accept: application/json",
             "Content-Type: application/json; charset=utf-8",
             f"Content-Length: {len(body)}",
-            f"Fiware-Correlator: {asking.correlator}; cbfwd=1",
+            f"Fiware-Correlator: {scope.correlator}; cbfwd=1",
             "",
             "",
         )

@@ -5,8 +5,8 @@ from typing import Any
 from iveg.embedded.context_broker import ContextBroker
 from iveg.embedded.http_server import Response, json_response
 from iveg.embedded.ngsi_request import Call, paging
-from iveg.embedded.orion_errors import bad_request, not_found
-from iveg.embedded.registrations import read_registration
+from iveg.embedded.orion_errors import NgsiError, bad_request, not_found
+from iveg.embedded.registrations import Registration, read_registration
 from iveg.embedded.subscriptions import (
     Subscription,
     read_subscription,
@@ -36,7 +36,7 @@ async def patch_subscription(broker: ContextBroker, call: Call) -> Response:
     """``PATCH /v2/subscriptions/{id}``."""
     known = _subscription(broker, call, "subscription id not found")
     update_subscription(known, call.json())
-    broker.resubscribe(known)
+    broker.tenant(known.service).forget_concerned()
     return Response(204)
 
 
@@ -62,30 +62,38 @@ def _subscription(
 
 async def list_registrations(broker: ContextBroker, call: Call) -> Response:
     """``GET /v2/registrations``."""
-    known = broker.tenant(call.scope.service).registrations.values()
+    known = _registrations(broker, call).values()
     return _page(call, [one.show() for one in known])
 
 
 async def create_registration(broker: ContextBroker, call: Call) -> Response:
     """``POST /v2/registrations``."""
     made = read_registration(call.json(), call.scope.path)
-    broker.register(call.scope, made)
+    _registrations(broker, call)[made.id] = made
     return Response(201, headers={"Location": f"/v2/registrations/{made.id}"})
 
 
 async def get_registration(broker: ContextBroker, call: Call) -> Response:
     """``GET /v2/registrations/{id}``."""
-    known = broker.tenant(call.scope.service).registrations
-    if call.parts[1] not in known:
-        raise not_found("The requested registration has not been found. Check id")
-    return json_response(known[call.parts[1]].show())
+    known = _registrations(broker, call).get(call.parts[1])
+    if known is None:
+        raise _no_registration()
+    return json_response(known.show())
 
 
 async def delete_registration(broker: ContextBroker, call: Call) -> Response:
     """``DELETE /v2/registrations/{id}``."""
-    if not broker.unregister(call.scope, call.parts[1]):
-        raise not_found("The requested registration has not been found. Check id")
+    if _registrations(broker, call).pop(call.parts[1], None) is None:
+        raise _no_registration()
     return Response(204)
+
+
+def _registrations(broker: ContextBroker, call: Call) -> dict[str, Registration]:
+    return broker.tenant(call.scope.service).registrations
+
+
+def _no_registration() -> NgsiError:
+    return not_found("The requested registration has not been found. Check id")
 
 
 def _page(call: Call, shown: list[Any]) -> Response:

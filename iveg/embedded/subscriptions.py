@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from iveg.embedded.entities import Touched
 from iveg.embedded.orion_dates import date_iso, date_text
-from iveg.embedded.orion_errors import NgsiError, bad_request
+from iveg.embedded.orion_errors import NgsiError, bad_request, parse_error
 from iveg.embedded.orion_text import FORBIDDEN
 from iveg.embedded.views import EntityView
 
@@ -293,7 +293,7 @@ def update_subscription(subscription: Subscription, raw: Any) -> None:
 
 def _read_document(raw: Any) -> dict[str, Any]:
     if not isinstance(raw, dict):
-        raise NgsiError(400, "ParseError", "Errors found in incoming JSON buffer")
+        raise parse_error()
     document = dict(raw)
     if unknown := document.keys() - _FIELDS:
         raise bad_request(f"invalid field: {sorted(unknown)[0]}")

@@ -1,34 +1,12 @@
-"""Tenants with their data, and the scope of a request."""
+"""Tenants with their data."""
 
 from dataclasses import dataclass, field
 
 from iveg.embedded.entities import Entity, EntityStore, under
-from iveg.embedded.registrations import Asking, Registration
+from iveg.embedded.registrations import Registration
 from iveg.embedded.subscriptions import Subscription
 
 _MOST_CONCERNED = 10_000
-
-
-@dataclass(frozen=True, slots=True)
-class Scope:
-    """Tenant and service path of a request, and its time.
-
-    Attributes:
-        service: Tenant, lower case; empty for the default one.
-        path: Service path, or several, or ``/#`` for reading.
-        correlator: Correlator of the chain of requests.
-        now: Seconds, Unix time.
-    """
-
-    service: str
-    path: str
-    correlator: str
-    now: float
-
-    @property
-    def asking(self) -> Asking:
-        """The same for a request to a provider."""
-        return Asking(self.service, self.path, self.correlator)
 
 
 @dataclass(slots=True)
