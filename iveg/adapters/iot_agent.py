@@ -7,10 +7,11 @@ It keeps the way of commands to the robot clear; the traps are in docs/fiware.md
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from iveg.adapters.fiware_http import PROBE_TIMEOUT_S, Document, FiwareClient
-from iveg.adapters.orphan_entities import Entities, remove_orphans
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.orphan_entities import remove_orphans
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
@@ -95,22 +96,6 @@ class IotAgentClient(FiwareClient):
         return response.status_code != 404
 
 
-class CommandRegistrations(Entities, Protocol):
-    """Registrations in Orion, as provisioning needs them."""
-
-    async def read_registrations(self) -> list[Document]:
-        """All of our tenant, oldest first."""
-
-    async def delete_registration(self, registration_id: str) -> None:
-        """Remove one."""
-
-    async def has_attribute(self, robot_id: str, name: str) -> bool:
-        """Whether Orion itself keeps an attribute."""
-
-    async def delete_attribute(self, robot_id: str, name: str) -> bool:
-        """Remove an attribute."""
-
-
 @dataclass(frozen=True, slots=True)
 class Provisioned:
     """Result of provisioning, as sentences.
@@ -126,7 +111,7 @@ class Provisioned:
 
 async def provision(
     agent: IotAgentClient,
-    orion: CommandRegistrations,
+    orion: OrionClient,
     robots: Sequence[str],
     apikey: str,
     cbroker_url: str,
@@ -199,7 +184,7 @@ async def _remove_doctor(
 
 async def _ensure_robot(
     agent: IotAgentClient,
-    orion: CommandRegistrations,
+    orion: OrionClient,
     known: dict[str, Document],
     robot_id: str,
     apikey: str,
@@ -262,7 +247,7 @@ def _shape(device: Mapping[str, Any]) -> tuple[Any, ...]:
     )
 
 
-async def _clear_registration(orion: CommandRegistrations, robot_id: str) -> list[str]:
+async def _clear_registration(orion: OrionClient, robot_id: str) -> list[str]:
     """Remove whatever at Orion stands between a command and the agent."""
     mended = []
     registered = _registered(await orion.read_registrations(), robot_id)

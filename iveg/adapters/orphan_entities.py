@@ -6,28 +6,18 @@ forgotten our devices, and after a doctor whose measure came when its device was
 Our group forbids that now (``autoprovision``); existing strays are removed here.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterable, Mapping
 
+from iveg.adapters.fiware_http import Document
+from iveg.adapters.orion import OrionClient
 from iveg.ngsi import names
 
-Document = dict[str, Any]
 _AT_ONCE = 50
 """Ids in one question: an address has a longest length."""
 
 
-class Entities(Protocol):
-    """Port to Orion's entities."""
-
-    async def find_entities(self, ids: Sequence[str]) -> list[tuple[str, str]]:
-        """Id and type of those of these entities that are there."""
-
-    async def delete_entity(self, entity_id: str, entity_type: str) -> None:
-        """Remove one."""
-
-
 async def remove_orphans(
-    orion: Entities, devices: Mapping[str, Document], robots: Iterable[str]
+    orion: OrionClient, devices: Mapping[str, Document], robots: Iterable[str]
 ) -> list[str]:
     """Remove the entities that no device of ours feeds; says which.
 
