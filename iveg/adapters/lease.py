@@ -2,50 +2,39 @@
 
 import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 
 from iveg.domain.errors import HopError
 
 
-class Lease:
-    """A lock held within ``with``; the kernel frees the lock of a killed process.
+@contextmanager
+def lease(file: Path, what: str) -> Iterator[None]:
+    """Hold a lock within ``with``; the kernel frees the lock of a killed process.
 
     Args:
         file: Where; its folder is made.
         what: Who is leased, for the refusal.
+
+    Raises:
+        HopError: somebody holds it.
     """
-
-    def __init__(self, file: Path, what: str) -> None:
-        self._file, self._what = file, what
-        self._handle: int | None = None
-
-    def __enter__(self) -> "Lease":
-        """Take it.
-
-        Raises:
-            HopError: somebody holds it.
-        """
-        self._file.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(self._file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            held_by = os.pread(handle, 32, 0).decode(errors="replace").strip()
-            os.close(handle)
-            detail = f"{self._what} is driven already, by process {held_by or '?'}"
-            raise HopError("lease", detail) from error
+    file.parent.mkdir(parents=True, exist_ok=True)
+    handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        _lock(handle, what)
         os.ftruncate(handle, 0)
         os.pwrite(handle, str(os.getpid()).encode(), 0)
-        self._handle = handle
-        return self
+        yield
+    finally:
+        os.close(handle)
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._handle is not None:
-            os.close(self._handle)
-            self._handle = None
+
+def _lock(handle: int, what: str) -> None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        held_by = os.pread(handle, 32, 0).decode(errors="replace").strip()
+        detail = f"{what} is driven already, by process {held_by or '?'}"
+        raise HopError("lease", detail) from error

@@ -68,9 +68,9 @@ def run_robot(
         raise SettingsError(
             "--attended", broker_of(settings).host, "used with a broker on loopback"
         )
-    from iveg.adapters.lease import Lease
+    from iveg.adapters.lease import lease
 
-    with Lease(data / "robots" / f"{options.id}.lease", options.id):
+    with lease(data / "robots" / f"{options.id}.lease", options.id):
         work = _ride(options, settings, data, config, classes, network)
         return run_until_stopped(work, until_eof=options.until_eof)
 

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.lease import Lease
+from iveg.adapters.lease import lease
 from iveg.domain.errors import HopError
 from tests.processes import ROOT
 
 HOLDER = (
     "import sys, threading, pathlib;"
-    "from iveg.adapters.lease import Lease;"
-    "lease = Lease(pathlib.Path(sys.argv[1]), 'AGI').__enter__();"
+    "from iveg.adapters.lease import lease;"
+    "held = lease(pathlib.Path(sys.argv[1]), 'AGI');"
+    "held.__enter__();"
     "print('held', flush=True); threading.Event().wait()"
 )
 
@@ -22,16 +23,16 @@ HOLDER = (
 def test_a_second_holder_is_refused_by_name_and_process(tmp_path: Path) -> None:
     file = tmp_path / "robots" / "AGI.lease"
 
-    with Lease(file, "AGI"), pytest.raises(HopError, match="AGI is driven already"):
-        Lease(file, "AGI").__enter__()
+    with lease(file, "AGI"), pytest.raises(HopError, match="AGI is driven already"):
+        lease(file, "AGI").__enter__()
 
 
 def test_what_was_given_back_is_free(tmp_path: Path) -> None:
     file = tmp_path / "AGI.lease"
-    with Lease(file, "AGI"):
+    with lease(file, "AGI"):
         pass
 
-    with Lease(file, "AGI"):
+    with lease(file, "AGI"):
         assert file.exists()
 
 
@@ -47,10 +48,10 @@ def test_what_a_killed_process_held_is_free_at_once(tmp_path: Path) -> None:
     with holder.stdout:
         assert holder.stdout.readline() == b"held\n"
         with pytest.raises(HopError, match=str(holder.pid)):
-            Lease(file, "AGI").__enter__()
+            lease(file, "AGI").__enter__()
 
         holder.send_signal(signal.SIGKILL)
         holder.wait(10)
 
-    with Lease(file, "AGI"):
+    with lease(file, "AGI"):
         assert file.exists()
