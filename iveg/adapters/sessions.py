@@ -12,7 +12,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from iveg.adapters.files import Form, read_lines, write_lines
 from iveg.domain.errors import DataFileError
@@ -20,6 +20,7 @@ from iveg.domain.errors import DataFileError
 _log = logging.getLogger(__name__)
 
 FORM = Form("sessions")
+_UnixTime = Annotated[float, Field(allow_inf_nan=False)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +33,16 @@ class Session:
         began: Unix time of the sign-in (s); ``seen`` of the last sign of life.
     """
 
-    digest: str
+    digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
     name: str
     role: str
-    began: float
-    seen: float
+    began: _UnixTime
+    seen: _UnixTime
+
+    __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
+
+
+_STORED = TypeAdapter(Session)
 
 
 class FileSessions:
@@ -55,13 +61,11 @@ class FileSessions:
         try:
             for number, line in read_lines(self._path, FORM):
                 try:
-                    stored = _StoredSession.model_validate_json(line)
+                    sessions.append(_STORED.validate_json(line))
                 except ValidationError:
                     _log.warning(
                         "%s, line %d: not readable, skipped", self._path, number
                     )
-                else:
-                    sessions.append(Session(**dict(stored)))
         except (OSError, DataFileError) as error:
             _log.warning("sessions are not remembered: %s", error)
         return tuple(sessions)
@@ -94,15 +98,3 @@ class FileSessions:
             self._failing = True
         else:
             self._failing = False
-
-
-class _StoredSession(BaseModel):
-    """One line of the file."""
-
-    model_config = ConfigDict(strict=True, extra="forbid")
-
-    digest: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-    name: str
-    role: str
-    began: Annotated[float, Field(allow_inf_nan=False)]
-    seen: Annotated[float, Field(allow_inf_nan=False)]
