@@ -4,8 +4,9 @@ import argparse
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from pathlib import Path
+from typing import Any
 
 from iveg.cli.arguments import parser
 from iveg.domain.errors import (
@@ -77,6 +78,31 @@ def _run(options: argparse.Namespace, settings: Settings) -> int:
                 settings, os.environ, data, emulator=emulator, ros2=options.ros2
             )
         case _:
-            from iveg.cli.parts import run_part
+            from iveg.cli.running import run_until_stopped
 
-            return run_part(options, settings, data)
+            work = _part(options, settings, data)
+            return run_until_stopped(work, until_eof=options.until_eof)
+
+
+def _part(
+    options: argparse.Namespace, settings: Settings, data: Path
+) -> Coroutine[Any, Any, None]:
+    """A part as a process; FIWARE and robots start without the page's libraries."""
+    match options.command:
+        case "serve":
+            from iveg.cli.serve import serve
+
+            data.mkdir(parents=True, exist_ok=True)
+            return serve(settings, data, demo=options.demo)
+        case "fiware":
+            from iveg.cli.fiware import fiware
+
+            return fiware(settings)
+        case "emulator":
+            from iveg.cli.emulator import emulator
+
+            return emulator(options, settings)
+        case _:
+            from iveg.cli.replay import replay
+
+            return replay(options, settings)
