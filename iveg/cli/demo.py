@@ -5,7 +5,6 @@ itself.  They watch their standard input, and end when this process has ended.
 """
 
 import asyncio
-import contextlib
 import logging
 import secrets
 import signal
@@ -18,6 +17,7 @@ from urllib.parse import urlsplit
 
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.free_ports import bind_once
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
 from iveg.ros2.names import namespace_of
@@ -56,18 +56,15 @@ def demo(
         data_directory=str(directory),
     )
     # Each demo starts anew: no hold of the last demo's robots remains.
-    with contextlib.suppress(FileNotFoundError):
-        (directory / "commands.jsonl").unlink()
-    child_environment = {
-        **environment,
-        **placed.to_environment(),
-    }
+    (directory / "commands.jsonl").unlink(missing_ok=True)
     parts = [["fiware"], ["serve", "--demo"]]
     if ros2:
         parts += _ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
     elif emulator:
         parts.append(["emulator"])
-    return run_until_stopped(_supervise(parts, placed, child_environment))
+    return run_until_stopped(
+        _supervise(parts, placed, {**environment, **placed.to_environment()})
+    )
 
 
 def _ros2_parts(robots: Sequence[str]) -> list[list[str]]:
@@ -125,7 +122,7 @@ def on_free_ports(
             continue
         if environment.get(one.variable):
             raise SettingsError(one.variable, str(one.port), "a port that is free")
-        port = _free_port(one.host)
+        port = bind_once(one.host, 0)
         changes[one.field] = (
             port
             if one.field == "port"
@@ -135,22 +132,11 @@ def on_free_ports(
 
 
 def _is_free(host: str, port: int) -> bool:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError:
-            return False
+    try:
+        bind_once(host, port)
+    except OSError:
+        return False
     return True
-
-
-def _free_port(host: str) -> int:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        probe.bind((host, 0))
-        port: int = probe.getsockname()[1]
-    return port
 
 
 # --- processes --------------------------------------------------------------------

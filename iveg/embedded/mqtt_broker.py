@@ -8,7 +8,6 @@ saves a third of its CPU time.
 
 import asyncio
 import logging
-import socket
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -17,6 +16,7 @@ from typing import Any
 
 from amqtt.broker import Broker
 
+from iveg.adapters.free_ports import bind_once
 from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_packets import publish_packet
 from iveg.embedded.loopback import require_loopback
@@ -55,7 +55,8 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
         OSError: the port is taken.
     """
     host = require_loopback("IVEG_MQTT_URL", host)
-    _require_free(host, port)
+    # amqtt would log a traceback and raise an error without the port.
+    bind_once(host, port)
     shown = f"[{host}]" if ":" in host else host
     broker = MqttBroker(
         {
@@ -67,20 +68,8 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
     try:
         yield broker
     finally:
-        await _close(broker)
-
-
-def _require_free(host: str, port: int) -> None:
-    # amqtt would log a traceback and raise an error without the port.
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        probe.bind((host, port))
-
-
-async def _close(broker: "MqttBroker") -> None:
-    # A cancelled caller must not leave the broker partly closed.
-    await asyncio.shield(broker.close())
+        # A cancelled caller must not leave the broker partly closed.
+        await asyncio.shield(broker.close())
 
 
 class MqttBroker(Broker):  # type: ignore[misc]
