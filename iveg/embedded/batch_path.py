@@ -83,27 +83,21 @@ async def _append(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
 
 
 async def _append_strict(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
-    known = broker.tenant(call.scope.service).entities.find(
-        call.scope.path, item.id, item.kind
-    )
+    known = broker.known(call.scope, item.id, item.kind)
     if known is None:
         return await _append(broker, call, item)
     return broker.append_new(call.scope, known, item.changes, item.kind)
 
 
 async def _replace(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
-    known = broker.tenant(call.scope.service).entities.find(
-        call.scope.path, item.id, item.kind
-    )
+    known = broker.known(call.scope, item.id, item.kind)
     if known is not None:
         broker.replace(call.scope, known, item.changes)
     return Outcome(item.id, item.kind, item.kind, exists=known is not None)
 
 
 async def _delete(broker: ContextBroker, call: Call, item: _Item) -> Outcome:
-    known = broker.tenant(call.scope.service).entities.find(
-        call.scope.path, item.id, item.kind
-    )
+    known = broker.known(call.scope, item.id, item.kind)
     missing: tuple[str, ...] = ()
     if known is not None and item.changes:
         missing = broker.delete_attributes(call.scope, known, item.changes)

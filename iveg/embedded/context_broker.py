@@ -6,22 +6,62 @@ the operations, which the embedded IoT Agent also calls directly.
 
 import asyncio
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 from iveg.adapters import clock
 from iveg.embedded.entities import (
     Entity,
     EntityChange,
+    EntityStore,
     Touched,
     apply,
+    under,
 )
-from iveg.embedded.forwarding import providers
 from iveg.embedded.orion_errors import NgsiError, not_found
 from iveg.embedded.outbox import Outbox
 from iveg.embedded.outcomes import Outcome
-from iveg.embedded.registrations import forward_update
+from iveg.embedded.registrations import Registration, forward_update, providers
 from iveg.embedded.scope import Scope
 from iveg.embedded.subscriptions import Subscription
-from iveg.embedded.tenants import Tenant
+
+_MOST_CONCERNED = 10_000
+
+
+@dataclass(slots=True)
+class Tenant:
+    """All data of one tenant."""
+
+    entities: EntityStore = field(default_factory=EntityStore)
+    subscriptions: dict[str, Subscription] = field(default_factory=dict)
+    registrations: dict[str, Registration] = field(default_factory=dict)
+    _concerned: dict[object, tuple[Subscription, ...]] = field(default_factory=dict)
+    """By entity and attributes; cleared at every change of a subscription."""
+
+    def concerned(
+        self, entity: Entity, names: tuple[str, ...] | None
+    ) -> tuple[Subscription, ...]:
+        """Subscriptions that a change of an entity may concern.
+
+        Args:
+            entity: The entity.
+            names: Attributes that were named; None for a deleted entity.
+        """
+        known = self._concerned.get(key := (entity.key, names))
+        if known is None:
+            if len(self._concerned) >= _MOST_CONCERNED:
+                self._concerned.clear()
+            known = self._concerned[key] = tuple(
+                one
+                for one in self.subscriptions.values()
+                if one.concerns(entity.id, entity.type)
+                and under(one.path, entity.path)
+                and (names is None or one.may_want(names))
+            )
+        return known
+
+    def forget_concerned(self) -> None:
+        """Clear the cache after a change of the subscriptions."""
+        self._concerned.clear()
 
 
 class ContextBroker:
@@ -49,15 +89,24 @@ class ContextBroker:
 
     # --- entities ---------------------------------------------------------------
 
+    def known(
+        self, scope: Scope, entity_id: str, entity_type: str = ""
+    ) -> Entity | None:
+        """The entity of an id and an optional type, if there is one.
+
+        Raises:
+            NgsiError: 409 several.
+        """
+        entities = self.tenant(scope.service).entities
+        return entities.find(scope.path, entity_id, entity_type)
+
     def find(self, scope: Scope, entity_id: str, entity_type: str = "") -> Entity:
         """Find the entity of an id and an optional type.
 
         Raises:
             NgsiError: 404 none, 409 several.
         """
-        found = self.tenant(scope.service).entities.find(
-            scope.path, entity_id, entity_type
-        )
+        found = self.known(scope, entity_id, entity_type)
         if found is None:
             raise not_found()
         return found
@@ -180,14 +229,14 @@ class ContextBroker:
         Does the possible part and reports the rest.
         """
         tenant = self.tenant(scope.service)
-        entity = tenant.entities.find(scope.path, entity_id, entity_type)
+        entity = self.known(scope, entity_id, entity_type)
         kind = entity.type if entity else entity_type
         own = entity.attributes if entity else {}
         local = {name: change for name, change in changes.items() if name in own}
         if entity is not None and local:
             self.append(scope, entity, local, forced=forced)
         rest = {name: one for name, one in changes.items() if name not in own}
-        forwards = providers(tenant, scope, entity_id, kind, rest)
+        forwards = providers(tenant.registrations, scope, entity_id, kind, rest)
         taken = await asyncio.gather(
             *(
                 forward_update(

@@ -5,13 +5,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from iveg.embedded.context_broker import ContextBroker
-from iveg.embedded.entities import Attribute, Entity, EntityChange
-from iveg.embedded.forwarding import bare_entities, foreign
+from iveg.embedded.entities import Attribute, Entity, EntityChange, read_changes
 from iveg.embedded.http_server import Response
-from iveg.embedded.ngsi_request import Call, names, paging, pattern, read_id
-from iveg.embedded.orion_errors import bad_request, not_found
+from iveg.embedded.ngsi_request import (
+    Call,
+    names,
+    paging,
+    pattern,
+    read_id,
+    read_value,
+)
+from iveg.embedded.orion_errors import (
+    ATTRIBUTE_NOT_FOUND,
+    bad_request,
+    not_found,
+    too_many,
+)
+from iveg.embedded.orion_text import looks_clean
 from iveg.embedded.outcomes import EXISTING
 from iveg.embedded.query import matches_query, ordered
+from iveg.embedded.registrations import bare_entities, foreign
 from iveg.embedded.scope import Scope
 from iveg.embedded.views import write_attributes, write_entity
 
@@ -33,12 +46,12 @@ async def list_entities(broker: ContextBroker, call: Call) -> Response:
     ]
     chosen = ordered(chosen, query.get("orderBy", ""))
     view = call.view()
-    told = await ask_providers(broker, call, "", view.names)
+    told = await _ask_providers(broker, call, "", view.names)
     known = {(one.id, one.type) for one in found}
     strange = [key for key in told if key not in known and wanted.fits(*key)]
     bare = [
         key
-        for key in bare_entities(tenant, call.scope, view.names)
+        for key in bare_entities(tenant.registrations, call.scope, view.names)
         if key not in known and key not in told and wanted.fits(*key)
     ]
     shown = [
@@ -123,27 +136,31 @@ async def _whole(
     """One entity with the attributes of its providers."""
     entity_id, view = call.parts[1], call.view()
     tenant = broker.tenant(call.scope.service)
-    entity = tenant.entities.find(call.scope.path, entity_id, call.kind)
-    told = await ask_providers(broker, call, entity_id, view.names)
+    entity = broker.known(call.scope, entity_id, call.kind)
+    told = await _ask_providers(broker, call, entity_id, view.names)
     if entity is not None:
         return entity, told.get((entity.id, entity.type), {})
     for key, attributes in told.items():
         return _ghost(call.scope, *key), attributes
     # With its type in the request, Orion answers that it does not know the entity.
-    for key in bare_entities(tenant, call.scope, view.names) if not call.kind else ():
+    for key in (
+        bare_entities(tenant.registrations, call.scope, view.names)
+        if not call.kind
+        else ()
+    ):
         if key[0] == entity_id:
             return _ghost(call.scope, *key), {}
     raise not_found()
 
 
-async def ask_providers(
+async def _ask_providers(
     broker: ContextBroker, call: Call, entity_id: str, names: tuple[str, ...]
 ) -> Mapping[tuple[str, str], Mapping[str, Attribute]]:
     """Attributes that providers return for an entity, by its id and type."""
     if "skipForwarding" in call.options:
         return {}
     tenant = broker.tenant(call.scope.service)
-    return await foreign(tenant, call.scope, entity_id, call.kind, names)
+    return await foreign(tenant.registrations, call.scope, entity_id, call.kind, names)
 
 
 async def delete_entity(broker: ContextBroker, call: Call) -> Response:
@@ -171,7 +188,7 @@ async def update_attributes(broker: ContextBroker, call: Call) -> Response:
     changes = call.changes(call.object())
     if not changes:
         raise bad_request("empty payload")
-    await update(broker, call, changes)
+    await _update(broker, call, changes)
     return Response(204)
 
 
@@ -183,7 +200,77 @@ async def replace_attributes(broker: ContextBroker, call: Call) -> Response:
     return Response(204)
 
 
-async def update(
+# --- one attribute or its bare value --------------------------------------------
+
+
+async def get_attribute(broker: ContextBroker, call: Call) -> Response:
+    """``GET /v2/entities/{id}/attrs/{name}``."""
+    attribute = await _attribute(broker, call, call.parts[1])
+    return Response(200, attribute.normalized(call.view().metadata))
+
+
+async def get_value(broker: ContextBroker, call: Call) -> Response:
+    """``GET /v2/entities/{id}/attrs/{name}/value``.
+
+    Orion 4.3 to 4.7 takes the id for a pattern here, so that ``AGI`` is also
+    ``AGI2``; a client must be able to meet that.
+    """
+    near = [
+        one.id
+        for one in broker.tenant(call.scope.service).entities.all(call.scope.path)
+        if re.search(call.parts[1], one.id) and (not call.kind or one.type == call.kind)
+    ]
+    if len(near) > 1:
+        raise too_many()
+    json = (await _attribute(broker, call, near[0] if near else call.parts[1])).json
+    structured = json[:1] in b"[{"
+    return Response(
+        200, json, content_type="application/json" if structured else "text/plain"
+    )
+
+
+async def _attribute(broker: ContextBroker, call: Call, entity_id: str) -> Attribute:
+    name = call.parts[3]
+    entity = broker.known(call.scope, entity_id, call.kind)
+    if entity is not None and name in entity.attributes:
+        return entity.attributes[name]
+    told = await _ask_providers(broker, call, entity_id, (name,))
+    for attributes in told.values():
+        if name in attributes:
+            return attributes[name]
+    raise not_found(ATTRIBUTE_NOT_FOUND) if entity is not None else not_found()
+
+
+async def put_attribute(broker: ContextBroker, call: Call) -> Response:
+    """``PUT /v2/entities/{id}/attrs/{name}``."""
+    await _update(broker, call, call.changes({call.parts[3]: call.json()}))
+    return Response(204)
+
+
+async def put_value(broker: ContextBroker, call: Call) -> Response:
+    """``PUT /v2/entities/{id}/attrs/{name}/value``."""
+    value = read_value(call)
+    changes = read_changes(
+        {call.parts[3]: {"value": value}},
+        key_values=False,
+        clean=looks_clean(call.request.body.strip(b'"')),
+    )
+    await _update(broker, call, changes)
+    return Response(204)
+
+
+async def delete_attribute(broker: ContextBroker, call: Call) -> Response:
+    """``DELETE /v2/entities/{id}/attrs/{name}``."""
+    entity = broker.find(call.scope, call.parts[1], call.kind)
+    if broker.delete_attributes(call.scope, entity, [call.parts[3]]):
+        raise not_found(ATTRIBUTE_NOT_FOUND)
+    return Response(204)
+
+
+# --- what they share --------------------------------------------------------------
+
+
+async def _update(
     broker: ContextBroker, call: Call, changes: Mapping[str, EntityChange]
 ) -> None:
     """Update attributes here or at providers, according to the options.

@@ -4,7 +4,6 @@ from collections.abc import Awaitable, Callable
 
 from iveg.adapters import clock
 from iveg.embedded import (
-    attribute_paths,
     batch_path,
     entity_paths,
     subscription_paths,
@@ -111,14 +110,14 @@ _TABLE: tuple[tuple[tuple[str, ...], dict[str, _Route]], ...] = (
     (
         ("v2", "entities", "*", "attrs", "*"),
         {
-            "GET": attribute_paths.get_attribute,
-            "PUT": attribute_paths.put_attribute,
-            "DELETE": attribute_paths.delete_attribute,
+            "GET": entity_paths.get_attribute,
+            "PUT": entity_paths.put_attribute,
+            "DELETE": entity_paths.delete_attribute,
         },
     ),
     (
         ("v2", "entities", "*", "attrs", "*", "value"),
-        {"GET": attribute_paths.get_value, "PUT": attribute_paths.put_value},
+        {"GET": entity_paths.get_value, "PUT": entity_paths.put_value},
     ),
     (("v2", "op", "update"), {"POST": batch_path.batch_update}),
     (

@@ -5,6 +5,7 @@ a read as ``op/query``; for a provider that is silent, slow or refuses, the clie
 an entity that does not exist.
 """
 
+import asyncio
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from iveg.embedded.entities import (
     Value,
     default_type,
     metadata_json,
+    under,
 )
 from iveg.embedded.notifier import NotificationTarget, exchange
 from iveg.embedded.orion_errors import bad_request
@@ -27,6 +29,7 @@ from iveg.embedded.scope import Scope
 from iveg.embedded.subscriptions import new_id
 
 PATIENCE_S = 5.0
+Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +108,96 @@ def read_registration(raw: Any, path: str) -> Registration:
     return Registration(new_id(), document, path)
 
 
+# --- choosing providers ------------------------------------------------------------
+
+Registrations = Mapping[str, Registration]
+
+
+def providers(
+    registrations: Registrations,
+    scope: Scope,
+    entity_id: str,
+    kind: str,
+    names: Iterable[str],
+) -> list[tuple[Registration, list[str]]]:
+    """Names by registration; the oldest registration of a name gets it."""
+    left = list(names)
+    found = []
+    for registration in registrations.values():
+        mine = [
+            name
+            for name in left
+            if not registration.attributes or name in registration.attributes
+        ]
+        if (
+            mine
+            and under(scope.path, registration.path)
+            and registration.concerns(entity_id, kind)
+        ):
+            found.append((registration, mine))
+            left = [name for name in left if name not in mine]
+    return found
+
+
+async def foreign(
+    registrations: Registrations,
+    scope: Scope,
+    entity_id: str,
+    entity_type: str,
+    names: tuple[str, ...],
+) -> Foreign:
+    """Attributes that providers return for one entity, or for all (empty id).
+
+    Args:
+        registrations: Of the tenant.
+        scope: Whose data.
+        entity_id: One entity; empty for all.
+        entity_type: Its type; empty for any.
+        names: The attributes wanted; none for all.
+    """
+    asked = []
+    for registration in registrations.values():
+        attrs = [n for n in registration.attributes if not names or n in names]
+        entities = [
+            one
+            for one in registration.entities
+            if "id" in one
+            and (not entity_id or one["id"] == entity_id)
+            and (not entity_type or one.get("type") in (entity_type, None))
+        ]
+        if attrs and entities and under(scope.path, registration.path):
+            asked.append(_forward_query(registration, entities, attrs, scope))
+    told: dict[tuple[str, str], dict[str, Attribute]] = {}
+    for answer in await asyncio.gather(*asked):
+        for key, attributes in answer.items():
+            told[key] = {**attributes, **told.get(key, {})}
+    return told
+
+
+def bare_entities(
+    registrations: Registrations, scope: Scope, names: tuple[str, ...]
+) -> list[tuple[str, str]]:
+    """Registered entities whose providers need not be queried, by id and type.
+
+    When no provider has a requested attribute, Orion still lists the entities of its
+    registrations.
+    """
+    if not names or "*" in names:
+        return []
+    return [
+        (one["id"], one.get("type", ""))
+        for registration in registrations.values()
+        if registration.attributes
+        and not set(names) & set(registration.attributes)
+        and under(scope.path, registration.path)
+        for one in registration.entities
+        if "id" in one
+    ]
+
+
+# --- asking them -------------------------------------------------------------------
+
+
 async def forward_update(
     registration: Registration,
     entity_id: str,
@@ -127,7 +220,7 @@ async def forward_update(
     return 200 <= status < 300
 
 
-async def forward_query(
+async def _forward_query(
     registration: Registration,
     entities: Iterable[Mapping[str, str]],
     names: Iterable[str],
