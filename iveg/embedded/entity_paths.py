@@ -11,7 +11,6 @@ from iveg.embedded.ngsi_request import (
     Call,
     names,
     paging,
-    pattern,
     read_id,
     read_value,
 )
@@ -21,7 +20,7 @@ from iveg.embedded.orion_errors import (
     not_found,
     too_many,
 )
-from iveg.embedded.orion_text import looks_clean
+from iveg.embedded.orion_text import looks_clean, read_pattern
 from iveg.embedded.outcomes import EXISTING
 from iveg.embedded.query import matches_query, ordered
 from iveg.embedded.registrations import bare_entities, foreign
@@ -88,8 +87,8 @@ class _Wanted:
         return cls(
             names(query.get("id")),
             names(query.get("type")),
-            pattern(query.get("idPattern"), "idPattern"),
-            pattern(query.get("typePattern"), "typePattern"),
+            read_pattern(query.get("idPattern"), "idPattern"),
+            read_pattern(query.get("typePattern"), "typePattern"),
         )
 
     def fits(self, entity_id: str, kind: str) -> bool:

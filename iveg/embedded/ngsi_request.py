@@ -212,18 +212,6 @@ def names(text: str | None) -> tuple[str, ...]:
     return tuple(name for name in (text or "").split(",") if name)
 
 
-def pattern(text: str | None, name: str) -> re.Pattern[str] | None:
-    """A regular expression from the query.
-
-    Raises:
-        NgsiError: 400.
-    """
-    try:
-        return None if text is None else re.compile(text)
-    except re.error:
-        raise bad_request(f"Invalid regex for entity {name}") from None
-
-
 def read_id(raw: Any) -> tuple[str, str]:
     """Id and type of an entity in a body.
 

@@ -93,6 +93,18 @@ def check_name(name: str, what: str) -> None:
         raise bad_request(f"Invalid characters in {what}")
 
 
+def read_pattern(text: Any, name: str) -> re.Pattern[str] | None:
+    """A regular expression from a client; None where there is none.
+
+    Raises:
+        NgsiError: 400.
+    """
+    try:
+        return None if text is None else re.compile(text)
+    except (re.error, TypeError):
+        raise bad_request(f"Invalid regex for entity {name}") from None
+
+
 @lru_cache(maxsize=4096)
 def quoted(text: str) -> bytes:
     """A short text as JSON, cached, since names and types recur."""

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from iveg.embedded.entities import Touched
 from iveg.embedded.orion_dates import date_iso, date_text
 from iveg.embedded.orion_errors import NgsiError, bad_request, parse_error
-from iveg.embedded.orion_text import FORBIDDEN
+from iveg.embedded.orion_text import FORBIDDEN, read_pattern
 from iveg.embedded.views import EntityView
 
 FORMATS = (
@@ -29,6 +29,7 @@ _UNSUPPORTED = ("mqtt", "mqttCustom", "kafka", "kafkaCustom")
 _CONDITIONS_NOT_DONE = ("expression", "jexlExpression")
 _ALTERATIONS = {"entityChange", "entityUpdate", "entityCreate", "entityDelete"}
 _DEFAULT_TIMEOUT_S = 5.0
+_Matcher = re.Pattern[str] | str
 
 
 @dataclass(slots=True)
@@ -40,6 +41,8 @@ class Subscription:
         path: Service path of its entities.
         service: Tenant, as in the notification's header.
         status: ``active``, ``inactive`` or ``oneshot``; expiry is by the clock.
+        notification: The part of that name in the document, as ``condition`` is.
+        endpoint: The ``http`` or ``httpCustom`` part of the document.
         timeout_s: Time limit of a receiver's response (s).
     """
 
@@ -55,17 +58,18 @@ class Subscription:
     last_failure: float | None = None
     last_failure_reason: str = ""
     fails: int = 0
-    view: EntityView = field(default_factory=EntityView)
-    timeout_s: float = _DEFAULT_TIMEOUT_S
-    _throttling: float = 0.0
-    _watched: frozenset[str] = frozenset()
-    _metadata_too: bool = True
-    _any_update: bool = False
-    _only_changed: bool = False
-    _alterations: Collection[str] | None = None
-    _entities: list[tuple[re.Pattern[str] | str, re.Pattern[str] | str]] = field(
-        default_factory=list
-    )
+    notification: dict[str, Any] = field(init=False)
+    condition: dict[str, Any] = field(init=False)
+    endpoint: dict[str, Any] = field(init=False)
+    view: EntityView = field(init=False)
+    timeout_s: float = field(init=False)
+    _throttling: float = field(init=False)
+    _watched: frozenset[str] = field(init=False)
+    _metadata_too: bool = field(init=False)
+    _any_update: bool = field(init=False)
+    _only_changed: bool = field(init=False)
+    _alterations: Collection[str] | None = field(init=False)
+    _entities: list[tuple[_Matcher, _Matcher]] = field(init=False)
 
     def __post_init__(self) -> None:
         """Prepare the document for fast evaluation at every change."""
@@ -73,7 +77,9 @@ class Subscription:
 
     def prepare(self) -> None:
         """Parse the document again after a change."""
-        notification = self.notification
+        self.notification = notification = self.document["notification"]
+        self.condition = condition = self.document["subject"].get("condition", {})
+        self.endpoint = notification.get("http") or notification["httpCustom"]
         self.view = EntityView(
             notification.get("attrsFormat", "normalized"),
             tuple(notification.get("attrs", ())),
@@ -81,32 +87,12 @@ class Subscription:
         )
         self._only_changed = bool(notification.get("onlyChangedAttrs"))
         self.timeout_s = self.endpoint.get("timeout", 0) / 1000 or _DEFAULT_TIMEOUT_S
-        condition = self.condition
         self._alterations = condition.get("alterationTypes")
         self._throttling = self.document.get("throttling", 0)
         self._watched = frozenset(condition.get("attrs") or ())
         self._metadata_too = condition.get("notifyOnMetadataChange", True)
         self._any_update = "entityUpdate" in (self._alterations or ())
         self._entities = [_matcher(one) for one in self.document["subject"]["entities"]]
-
-    @property
-    def notification(self) -> dict[str, Any]:
-        """The ``notification`` part of the document."""
-        part: dict[str, Any] = self.document["notification"]
-        return part
-
-    @property
-    def condition(self) -> dict[str, Any]:
-        """The ``condition`` part of the document."""
-        part: dict[str, Any] = self.document["subject"].get("condition", {})
-        return part
-
-    @property
-    def endpoint(self) -> dict[str, Any]:
-        """The ``http`` or ``httpCustom`` part of the document."""
-        notification = self.notification
-        part: dict[str, Any] = notification.get("http") or notification["httpCustom"]
-        return part
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
         """Whether an entity is subscribed to."""
@@ -187,50 +173,52 @@ class Subscription:
     def show(self, now: float) -> dict[str, Any]:
         """The subscription as a client gets it."""
         document, condition = self.document, self.condition
-        shown: dict[str, Any] = {"id": self.id}
-        for name in ("description", "expires"):
-            if document.get(name):
-                shown[name] = document[name]
-        shown["status"] = "expired" if self.expired(now) else self.status
-        shown["subject"] = {
-            "entities": document["subject"]["entities"],
-            "condition": {
-                "attrs": [],
-                **condition,
-                "notifyOnMetadataChange": condition.get("notifyOnMetadataChange", True),
+        shown = {
+            "id": self.id,
+            "description": document.get("description") or None,
+            "expires": document.get("expires") or None,
+            "status": "expired" if self.expired(now) else self.status,
+            "subject": {
+                "entities": document["subject"]["entities"],
+                "condition": {
+                    "attrs": [],
+                    **condition,
+                    "notifyOnMetadataChange": self._metadata_too,
+                },
             },
+            "notification": self._show_notification(),
+            "throttling": document.get("throttling") or None,
         }
-        shown["notification"] = self._show_notification()
-        if document.get("throttling"):
-            shown["throttling"] = document["throttling"]
-        return shown
+        return _without_none(shown)
 
     def _show_notification(self) -> dict[str, Any]:
         asked = self.notification
-        shown: dict[str, Any] = {}
-        if self.last_notification is not None:
-            shown["timesSent"] = self.times_sent
-            shown["lastNotification"] = _whole_seconds(self.last_notification)
-        shown["attrs"] = asked.get("attrs", [])
-        shown["onlyChangedAttrs"] = asked.get("onlyChangedAttrs", False)
-        shown["attrsFormat"] = self.view.form
-        for name in ("http", "httpCustom", "metadata", "maxFailsLimit"):
-            if name in asked:
-                shown[name] = asked[name]
-        if self.last_failure is not None:
-            shown["lastFailure"] = _whole_seconds(self.last_failure)
-            shown["lastFailureReason"] = self.last_failure_reason
-        if self.fails:
-            shown["failsCounter"] = self.fails
-        if self.last_success is not None:
-            shown["lastSuccess"] = _whole_seconds(self.last_success)
-            shown["lastSuccessCode"] = self.last_success_code
-        shown["covered"] = asked.get("covered", False)
-        return shown
+        shown = {
+            "timesSent": self.times_sent or None,
+            "lastNotification": _whole_seconds(self.last_notification),
+            "attrs": asked.get("attrs", []),
+            "onlyChangedAttrs": asked.get("onlyChangedAttrs", False),
+            "attrsFormat": self.view.form,
+            "http": asked.get("http"),
+            "httpCustom": asked.get("httpCustom"),
+            "metadata": asked.get("metadata"),
+            "maxFailsLimit": asked.get("maxFailsLimit"),
+            "lastFailure": _whole_seconds(self.last_failure),
+            "lastFailureReason": self.last_failure_reason or None,
+            "failsCounter": self.fails or None,
+            "lastSuccess": _whole_seconds(self.last_success),
+            "lastSuccessCode": self.last_success_code or None,
+            "covered": asked.get("covered", False),
+        }
+        return _without_none(shown)
 
 
-def _whole_seconds(at: float) -> str:
-    return date_iso(int(at))
+def _without_none(shown: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in shown.items() if value is not None}
+
+
+def _whole_seconds(at: float | None) -> str | None:
+    return None if at is None else date_iso(int(at))
 
 
 @lru_cache(maxsize=256)
@@ -238,15 +226,13 @@ def _pattern(text: str) -> re.Pattern[str]:
     return re.compile(text)
 
 
-def _matcher(
-    one: Mapping[str, str],
-) -> tuple[re.Pattern[str] | str, re.Pattern[str] | str]:
+def _matcher(one: Mapping[str, str]) -> tuple[_Matcher, _Matcher]:
     name = one.get("id") or _pattern(one.get("idPattern", ".*"))
     kind = one.get("type") or _pattern(one.get("typePattern", ".*"))
     return name, kind
 
 
-def _matches(matcher: re.Pattern[str] | str, text: str) -> bool:
+def _matches(matcher: _Matcher, text: str) -> bool:
     if isinstance(matcher, str):
         return matcher == text
     return matcher.search(text) is not None
@@ -326,7 +312,7 @@ def _check_subject(subject: Any) -> None:
                     f"/entities/ vector item has both /{name}/ and /{name}Pattern/"
                 )
         for name in ("idPattern", "typePattern"):
-            _check_pattern(one.get(name, ".*"), name)
+            read_pattern(one.get(name, ".*"), name)
     _check_condition(subject.get("condition", {}))
 
 
@@ -344,13 +330,6 @@ def _check_condition(condition: Any) -> None:
     for one in condition.get("alterationTypes", []):
         if one not in _ALTERATIONS:
             raise bad_request(f"unknown alteration type: {one}")
-
-
-def _check_pattern(text: Any, name: str) -> None:
-    try:
-        re.compile(text)
-    except (re.error, TypeError):
-        raise bad_request(f"Invalid regex for entity {name}") from None
 
 
 def _read_notification(raw: Any) -> dict[str, Any]:
