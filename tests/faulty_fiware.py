@@ -52,6 +52,7 @@ class FaultyAgent(IotAgent):
         self._faults = Faults()
         self._unstuck = asyncio.Event()
         self._unstuck.set()
+        self.heard_late = 0
         super().__init__(broker, mqtt)
 
     def fail(self, faults: Faults) -> None:
@@ -67,9 +68,13 @@ class FaultyAgent(IotAgent):
             return
         if self._faults.slow_s > 0:
             loop = asyncio.get_running_loop()
-            loop.call_later(self._faults.slow_s, super().hear, topic, payload)
+            loop.call_later(self._faults.slow_s, self._hear_late, topic, payload)
         else:
             super().hear(topic, payload)
+
+    def _hear_late(self, topic: str, payload: bytes) -> None:
+        super().hear(topic, payload)
+        self.heard_late += 1
 
     async def command(
         self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
@@ -107,6 +112,12 @@ def fail(up: Running, faults: Faults) -> None:
     """From now on, the agent of a faulty FIWARE fails like this."""
     assert isinstance(up.agent, FaultyAgent)
     up.agent.fail(faults)
+
+
+def heard_late(up: Running) -> int:
+    """Messages that the agent of a faulty FIWARE has handled late."""
+    assert isinstance(up.agent, FaultyAgent)
+    return up.agent.heard_late
 
 
 def faulty_fiware() -> AbstractAsyncContextManager[Running]:

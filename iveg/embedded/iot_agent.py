@@ -51,6 +51,17 @@ def _read_topic(topic: str) -> _Topic | None:
     return parts[1], parts[2], parts[3], parts[4] if named else None
 
 
+def _read_answer(
+    device: Device, payload: bytes, now: float
+) -> list[dict[str, EntityChange]]:
+    """Read the payload of a ``cmdexe`` topic; answers to unknown commands are left."""
+    answers = load_json(payload)
+    if not isinstance(answers, dict):
+        return []
+    known = {name: ("OK", answers[name]) for name in answers if name in device.commands}
+    return [status_changes(known, now)] if known else []
+
+
 class IotAgent:
     """Devices with their measures and commands.
 
@@ -65,8 +76,6 @@ class IotAgent:
         self.registry = Registry()
         self.url = ""
         """Address of the north port, for registrations; set when it is known."""
-        self.discarded = 0
-        """Discarded messages; devices get no error."""
         mqtt.listen(self.hear)
 
     # --- measures ---------------------------------------------------------------
@@ -81,41 +90,26 @@ class IotAgent:
         if spoken is None:
             return
         try:
-            taken = self._take_from(spoken, payload, clock.wall())
+            self._take_from(spoken, payload, clock.wall())
         except (NgsiError, AgentError) as error:
+            # Devices get no error.
             _log.debug("a message on %s was discarded: %s", topic, error)
-            taken = False
-        if not taken:
-            self.discarded += 1
 
-    def _take_from(self, spoken: _Topic, payload: bytes, now: float) -> bool:
+    def _take_from(self, spoken: _Topic, payload: bytes, now: float) -> None:
         apikey, device_id, kind, name = spoken
         device = self.registry.device_of(apikey, device_id)
         if device is None:
             device = self._autoprovision(apikey, device_id)
         if device is None:
-            return False
+            return
         if kind == "cmdexe":
-            return self._take_answer(device, payload, now)
-        if name is not None:
-            single = read_single(device, name, payload, now)
-            measures = None if single is None else [single]
-        else:
+            measures = _read_answer(device, payload, now)
+        elif name is None:
             measures = read_measures(device, payload, now)
-        for changes in measures or ():
+        else:
+            measures = read_single(device, name, payload, now)
+        for changes in measures:
             self._write(device, changes, now)
-        return measures is not None
-
-    def _take_answer(self, device: Device, payload: bytes, now: float) -> bool:
-        answers = load_json(payload)
-        if not isinstance(answers, dict):
-            return False
-        known = {
-            name: ("OK", answers[name]) for name in answers if name in device.commands
-        }
-        if known:
-            self._write(device, status_changes(known, now), now)
-        return bool(known)
 
     def _write(
         self, device: Device, changes: Mapping[str, EntityChange], now: float

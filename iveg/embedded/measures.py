@@ -33,11 +33,11 @@ _NOTHING: dict[str, Any] = {"undefined": None}
 
 def read_measures(
     device: Device, payload: bytes, now: float
-) -> list[dict[str, EntityChange]] | None:
+) -> list[dict[str, EntityChange]]:
     """Read the payload of an ``attrs`` topic.
 
     Returns:
-        One set of changes for each measure; None for a discarded payload.
+        One set of changes for each measure; none for a discarded payload.
 
     Raises:
         NgsiError: 400 or 413, what Orion says to the agent about it.
@@ -52,32 +52,36 @@ def read_measures(
         # A list of one is not a list of measures; the agent walks its index instead.
         measures = value if len(value) > 1 else [{"0": value[0]}]
     else:
-        return None
+        return []
     read = []
     for one in measures:
         changes = _read_one(device, one, now, clean=clean)
         if changes is None:
-            return None
+            return []
         read.append(changes)
     return read
 
 
 def read_single(
     device: Device, name: str, payload: bytes, now: float
-) -> dict[str, EntityChange] | None:
+) -> list[dict[str, EntityChange]]:
     """Read the payload of ``attrs/{name}``; invalid JSON is stored as hexadecimal.
+
+    Returns:
+        The changes; none for a discarded payload.
 
     Raises:
         NgsiError: 400 or 413, what Orion says to the agent about it.
     """
     if not payload:
-        return None
+        return []
     try:
         value = orjson.loads(payload)
         clean = _check(payload)
     except orjson.JSONDecodeError:
         value, clean = payload.hex(), True
-    return _read_one(device, {name: value}, now, clean=clean)
+    changes = _read_one(device, {name: value}, now, clean=clean)
+    return [] if changes is None else [changes]
 
 
 def _check(payload: bytes) -> bool:

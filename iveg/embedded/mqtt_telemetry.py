@@ -163,18 +163,14 @@ class BoundedWriter(StreamWriterAdapter):  # type: ignore[misc]
 
     Attributes:
         protocol: Receiver of the same connection.
-        missed: Telemetry messages dropped because the client was too slow.
     """
 
     def __init__(self, writer: asyncio.StreamWriter, protocol: PacketProtocol) -> None:
         super().__init__(writer)
         self.protocol = protocol
         self._line = writer.transport
-        self.missed = 0
 
     def write_telemetry(self, packet: bytes) -> None:
         """Send a whole packet, or nothing to a client that does not read."""
-        if self._line.get_write_buffer_size() > MOST_UNSENT:
-            self.missed += 1
-        elif not self.is_closed:
+        if self._line.get_write_buffer_size() <= MOST_UNSENT and not self.is_closed:
             self._line.write(packet)

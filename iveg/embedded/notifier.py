@@ -72,14 +72,11 @@ class DeliveryLane:
         self._timer: asyncio.TimerHandle | None = None
         self._first_until = 0.0
         """Until when the first delivery under way is awaited (loop time, s)."""
-        self.dropped = 0
-        """Deliveries dropped for newer ones."""
 
     def send(self, delivery: Delivery) -> None:
         """Queue one delivery; beyond a thousand the oldest is dropped."""
         if len(self._waiting) >= _MAX_QUEUED:
             self._waiting.popleft().done(0, TIMED_OUT)
-            self.dropped += 1
             if not self._overflowing:
                 _log.warning("%s reads too slowly; the oldest give way", self._target)
                 self._overflowing = True

@@ -20,7 +20,7 @@ from iveg.domain.hops import Check
 from iveg.embedded.http_server import Request, Response, http_server
 from iveg.embedded.server import Running
 from iveg.settings import Settings
-from tests.faulty_fiware import MODULE, Faults, fail, faulty_fiware
+from tests.faulty_fiware import MODULE, Faults, fail, faulty_fiware, heard_late
 from tests.integration.emulator_cloud import until
 from tests.ports import free_ports
 from tests.processes import Site
@@ -199,10 +199,10 @@ async def test_a_measure_that_comes_after_the_doctor_went_leaves_nothing(
     ):
         await provision(agent, orion, [], "iveg", up.orion_url)
         fail(up, Faults(slow_s=3.0))
-        before = up.agent.discarded
 
         await examine(settings, tmp_path, SHORT_S)
-        await until(lambda: up.agent.discarded > before, LONG_S)
+        before = heard_late(up)
+        await until(lambda: heard_late(up) > before, LONG_S)
 
         made_up = [PROBE_ID, f"Robot:{PROBE_ID}"]
         assert await orion.find_entities(made_up) == []
