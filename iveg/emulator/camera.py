@@ -19,7 +19,7 @@ import numpy as np
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Box3D, Pose2D, wrap_angle
 from iveg.domain.observations import Detection
-from iveg.emulator.greenhouse import Body, Disc, Scenery
+from iveg.emulator.greenhouse import Body, Disc, Scenery, into
 
 PERSON = "farmer"
 PERSON_HEIGHT_M = 1.75
@@ -286,7 +286,7 @@ class Detector:
     ) -> Detection:
         jitter = self._rng.normal(0.0, self._model.jitter, 2)
         moved = target.body.corners() + encounter.offset + jitter
-        corners = [_into(pose, float(x), float(y)) for x, y in moved]
+        corners = [into(pose, float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
         return Detection(target.class_id, self._certainty(encounter, seen), box)
@@ -307,16 +307,9 @@ def upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
     """A box of a person's size at a position in ``map``, given in ``base_link``."""
-    ahead, left = _into(pose, x, y)
+    ahead, left = into(pose, x, y)
     half = 0.25
     box = Box3D(
         ahead - half, ahead + half, left - half, left + half, 0.0, PERSON_HEIGHT_M
     )
     return Detection(class_id, probability, box)
-
-
-def _into(pose: Pose2D, x: float, y: float) -> tuple[float, float]:
-    """A point of ``map`` in ``base_link``."""
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    dx, dy = x - pose.x, y - pose.y
-    return c * dx + s * dy, c * dy - s * dx

@@ -236,11 +236,7 @@ def _paint(rays: _Rays, sensor: Pose2D, thing: Upright, depth: Floats) -> Mask:
 def _footprint_span(across: Floats, sensor: Pose2D, footprint: Disc | Body) -> Span:
     if isinstance(footprint, Disc):
         return _disc_span(across, sensor, footprint)
-    pose = footprint.pose
-    c, s = math.cos(pose.yaw), math.sin(pose.yaw)
-    dx, dy = sensor.x - pose.x, sensor.y - pose.y
-    inner = Pose2D(c * dx + s * dy, c * dy - s * dx, 0.0)
-    turned = np.array(((c, s), (-s, c))) @ across
+    inner, turned = footprint.rays_into(sensor, across)
     x, y = footprint.length / 2, footprint.width / 2
     return _box_span(turned, inner, (-x, -y, x, y))
 

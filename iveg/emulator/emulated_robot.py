@@ -14,7 +14,8 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, in_slots
 from iveg.emulator.relay import Relay
 from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
+from iveg.robot.gate import REST
 from iveg.robot.node import NodeSettings, RobotNode
 
 _NAVIGATION_EVERY_S = 1.0

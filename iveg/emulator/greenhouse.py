@@ -16,6 +16,13 @@ from iveg.domain.greenhouse import Greenhouse
 Floats = NDArray[np.float64]
 
 
+def into(frame: Pose2D, x: float, y: float) -> tuple[float, float]:
+    """A point of ``map`` in a frame with this pose; inverse of its ``transform``."""
+    c, s = math.cos(frame.yaw), math.sin(frame.yaw)
+    dx, dy = x - frame.x, y - frame.y
+    return c * dx + s * dy, c * dy - s * dx
+
+
 @dataclass(frozen=True, slots=True)
 class Disc:
     """A person seen from above (m)."""
@@ -46,15 +53,19 @@ class Body:
         places = (self.pose.transform(along, 0.0) for along in (-reach, 0.0, reach))
         return tuple(Disc(x, y, self.width / 2) for x, y in places)
 
+    def rays_into(self, sensor: Pose2D, rays: Floats) -> tuple[Pose2D, Floats]:
+        """Origin and directions of a sensor's rays, shape (2, n), in its frame."""
+        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
+        x, y = into(self.pose, sensor.x, sensor.y)
+        return Pose2D(x, y, 0.0), np.array(((c, s), (-s, c))) @ rays
+
     def gap_to(self, x: float, y: float) -> tuple[float, float, float]:
         """Distance from a point to the rectangle, and the direction away from it.
 
         Returns:
             Distance (m, 0 inside) and the unit vector from the body to the point.
         """
-        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
-        dx, dy = x - self.pose.x, y - self.pose.y
-        ahead, left = c * dx + s * dy, c * dy - s * dx
+        ahead, left = into(self.pose, x, y)
         out_x = ahead - min(max(ahead, -self.length / 2), self.length / 2)
         out_y = left - min(max(left, -self.width / 2), self.width / 2)
         gap = math.hypot(out_x, out_y)
@@ -62,6 +73,7 @@ class Body:
             out_x, out_y = 0.0, math.copysign(1.0, left)
         size = math.hypot(out_x, out_y)
         out_x, out_y = out_x / size, out_y / size
+        c, s = math.cos(self.pose.yaw), math.sin(self.pose.yaw)
         return gap, c * out_x - s * out_y, s * out_x + c * out_y
 
 

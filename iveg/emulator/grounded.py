@@ -23,7 +23,7 @@ from iveg.emulator.depth import (
     robot_shape,
     take,
 )
-from iveg.emulator.greenhouse import Disc, Scenery
+from iveg.emulator.greenhouse import Disc, Scenery, into
 from iveg.robot.grounding.cloud import Pinhole
 from iveg.robot.grounding.locate import Grounding, Mount, ground_frame
 
@@ -107,9 +107,7 @@ def _shape(target: Target) -> tuple[Upright, ...]:
 def _about(camera: DepthCamera, sensor: Pose2D, target: Target) -> Pinhole | None:
     """Part of the lens that can contain a target; None where it is out of view."""
     lens, body = camera.lens, target.body
-    dx, dy = body.pose.x - sensor.x, body.pose.y - sensor.y
-    c, s = math.cos(sensor.yaw), math.sin(sensor.yaw)
-    ahead, left = c * dx + s * dy, c * dy - s * dx
+    ahead, left = into(sensor, body.pose.x, body.pose.y)
     reach = math.hypot(body.length, body.width) / 2 + _BESIDE_M
     scale = lens.focal / max(ahead - reach, _NEAREST_M)
     columns = _within(

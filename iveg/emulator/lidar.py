@@ -109,10 +109,7 @@ def _boxes(sensor: Pose2D, directions: Floats, boxes: Floats) -> Floats:
 
 def _body(sensor: Pose2D, directions: Floats, body: Body) -> Floats:
     """The same for a rotated box: rays are transformed into its frame."""
-    c, s = math.cos(body.pose.yaw), math.sin(body.pose.yaw)
-    dx, dy = sensor.x - body.pose.x, sensor.y - body.pose.y
-    inner = Pose2D(c * dx + s * dy, c * dy - s * dx, 0.0)
-    turned = np.array(((c, s), (-s, c))) @ directions
+    inner, turned = body.rays_into(sensor, directions)
     half = body.length / 2, body.width / 2
     return _boxes(inner, turned, np.array([(-half[0], -half[1], *half)]))
 

@@ -27,12 +27,12 @@ from iveg.domain.observations import (
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
 from iveg.emulator.recordings import open_recording
+from iveg.robot.gate import REST
 from iveg.robot.node import NodeSettings, RobotNode
 
 TASK = "replay"
 """Task of a replayed robot; iVeg recognises replays by the mark of their messages."""
 
-_REST = Twist2D(0.0, 0.0)
 _PERIOD_S = 0.05
 _SCAN_AGAIN_S = 0.5
 _LOOK_EVERY_S = 0.2
@@ -161,7 +161,7 @@ class ReplayedRobot:
         self._profile = profile
         self._told = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
         self._told_scan: LaserScan | None = None
-        self._command = _REST
+        self._command = REST
         self._pace = 0.0
         self._stood_s = 0.0
         settings.node.directory.mkdir(parents=True, exist_ok=True)
@@ -187,7 +187,7 @@ class ReplayedRobot:
         node, step = self._node, min(dt, _LONGEST_STEP_S)
         full = Twist2D(self._profile.max_speed, 0.0)
         node.request_twist(
-            full if node.may_drive and not self._playback.ended else _REST
+            full if node.may_drive and not self._playback.ended else REST
         )
         self._pace = self._slowed(self._command.linear_x, step)
         self._playback.advance(self._pace * self._speed * step)

@@ -13,9 +13,11 @@ from iveg.adapters import clock
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection
+from iveg.emulator.greenhouse import into
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
-from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
+from iveg.robot.gate import REST
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.reading import read_twist, write_twist
 from iveg.robot.ros2.rig import Network, Writer
@@ -221,9 +223,7 @@ class Ros2Base:
 
 def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
     """A pose of ``map`` in a frame whose pose in ``map`` is ``outer``."""
-    c, s = math.cos(outer.yaw), math.sin(outer.yaw)
-    dx, dy = pose.x - outer.x, pose.y - outer.y
-    return Pose2D(c * dx + s * dy, c * dy - s * dx, pose.yaw - outer.yaw)
+    return Pose2D(*into(outer, pose.x, pose.y), pose.yaw - outer.yaw)
 
 
 def _turned(yaw: float) -> m.Quaternion:

@@ -39,9 +39,9 @@ from iveg.emulator.lidar import LaserModel, sweep
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.people import SimulatedPerson
 from iveg.emulator.scripts import RobotScript
+from iveg.robot.gate import REST
 
 Camera = Literal["boxes", "grounding"]
-REST = Twist2D(0.0, 0.0)
 _LASER = LaserModel()
 _FALSE_PERSON_CONFIDENCE = 0.95
 

@@ -15,12 +15,13 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import DIRECT
 from iveg.emulator.orders import FaultOrder
 from iveg.emulator.scripts import Incident
-from iveg.emulator.world import REST, RobotHardware, SimulatedWorld
+from iveg.emulator.world import RobotHardware, SimulatedWorld
 from iveg.ngsi import codec
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.robot.echo import Echo
 from iveg.robot.effects import Drive, Effect, Report
+from iveg.robot.gate import REST
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
 from iveg.robot.safety import SafetyMachine

@@ -12,10 +12,9 @@ from iveg.domain.feedback import HALF_SPEED, Feedback
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.limits import LIMITS
 from iveg.robot.caps import FREE, AppliedCap, Cap, lowest
+from iveg.robot.gate import REST
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
-
-_REST = Twist2D(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +74,7 @@ class Judgement:
     @property
     def twist(self) -> Twist2D:
         """The measured twist, however old; zero before the first."""
-        return _REST if self._motion is None else self._motion.twist
+        return REST if self._motion is None else self._motion.twist
 
     def motion(self, now: float) -> Motion | None:
         """Newest odometry; None when it is older than 0.5 s."""

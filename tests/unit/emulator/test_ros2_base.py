@@ -15,7 +15,8 @@ from iveg.emulator.orders import FaultOrder
 from iveg.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
 from iveg.emulator.ros2_base import SimulatedNavigation as Nav
 from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import REST, SimulatedWorld
+from iveg.emulator.world import SimulatedWorld
+from iveg.robot.gate import REST
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs
 from iveg.robot.uplink import Sensed
