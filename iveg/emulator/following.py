@@ -49,7 +49,6 @@ class Follower:
         self._index = route.index_of(start.x, start.y)
         self._direction = 1
         self._leaves_at: float | None = None
-        self.waiting_for_clearance = False
 
     @property
     def at_station(self) -> bool:
@@ -77,7 +76,6 @@ class Follower:
             return Twist2D(0.0, 0.0)
         ahead = self._route.ahead(self._index, _HORIZON, self._direction)
         room = min(self._room(ahead, discs), self._way_to_halt() + CLEARANCE_M)
-        self.waiting_for_clearance = room <= CLEARANCE_M
         limit = math.sqrt(2.0 * _COMFORT * max(0.0, room - CLEARANCE_M))
         return self._pursue(pose, ahead, min(self._cruise, limit))
 

@@ -37,7 +37,7 @@ class Segment:
         probability: C_i, 0 to 1.
         x_c: Centre of the 2D box (pixels); ``y_c`` likewise.
         width: Of the box and of the mask that is cropped to it (pixels); ``height``.
-        bits: The mask, one bit a pixel (``mask.belongs_to_mask``).
+        bits: The mask, one bit a pixel (``mask.read_mask``).
     """
 
     class_id: str
@@ -90,7 +90,8 @@ class Grounded:
     """One row of the paper's object table, in the camera's optical frame.
 
     Attributes:
-        box: BB_3D: extremes over the accepted points (m); ``zmin`` is the nearest.
+        box: BB_3D: extremes over the accepted points (m); ``zmin`` is the nearest, and
+            its centre is c_3D.
         points: How many points were accepted.
     """
 
@@ -98,17 +99,6 @@ class Grounded:
     probability: float
     box: Box3D
     points: int
-
-    @property
-    def centre(self) -> tuple[float, float, float]:
-        """c_3D (m)."""
-        return self.box.centre
-
-    @property
-    def dimensions(self) -> tuple[float, float, float]:
-        """d_3D (m)."""
-        box = self.box
-        return box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,18 +30,12 @@ EDGE_LIMIT = 8192
 """Largest accepted edge of a picture (pixels)."""
 
 
-def belongs_to_mask(bits: bytes, width: int, x: int, y: int) -> bool:
-    """Whether column ``x`` of row ``y`` is the target's (the membership equation).
-
-    index = y·w + x, byte b = ⌊index / 8⌋, bit n = 7 - (index mod 8): rows follow each
-    other without padding, the first pixel is a byte's highest bit.
-    """
-    index = y * width + x
-    return bool(bits[index // 8] >> (7 - index % 8) & 1)
-
-
 def read_mask(bits: bytes, width: int, height: int) -> Mask:
-    """Every ``belongs_to_mask`` of a bitset at once.
+    """Whether each pixel is the target's (the membership equation).
+
+    Column x of row y has index = y·w + x, byte b = ⌊index / 8⌋ and bit
+    n = 7 - (index mod 8): rows follow each other without padding, the first pixel is a
+    byte's highest bit.
 
     Returns:
         Shape (height, width).

@@ -102,7 +102,6 @@ def test_a_robot_waits_before_a_person_and_goes_on_when_the_way_is_free() -> Non
 
     assert trip.vehicle.twist.linear_x < 0.01
     assert CLEARANCE_M - 0.1 < nose_to_person < CLEARANCE_M + 0.35
-    assert trip.follower.waiting_for_clearance
 
     trip.discs = ()
     trip.drive(5.0)
