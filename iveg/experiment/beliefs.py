@@ -6,7 +6,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from iveg.domain.costmap import Costmap
+from iveg.domain.costmap import Costmap, Grid
 from iveg.experiment.scoring import Picture, SeenObject
 
 Held = Literal["nobody", "told", "own"]
@@ -30,16 +30,11 @@ def belief_of(own: Costmap, told: Costmap) -> Belief:
 
 def belief_in(answer: Mapping[str, Any]) -> Belief:
     """Belief of an API response, which combines both."""
-    grid = np.asarray(answer["data"], np.int16)
-    cells = grid.reshape(answer["height"], answer["width"])
-
-    def held(x: float, y: float) -> Held:
-        column = math.floor((x - answer["origin"]["x"]) / answer["resolution"])
-        row = math.floor((y - answer["origin"]["y"]) / answer["resolution"])
-        inside = 0 <= column < answer["width"] and 0 <= row < answer["height"]
-        return "told" if inside and cells[row, column] >= _TAKEN else "nobody"
-
-    return held
+    width, height, origin = answer["width"], answer["height"], answer["origin"]
+    grid = Grid(answer["resolution"], origin["x"], origin["y"], width, height)
+    cells = np.asarray(answer["data"], np.int8).reshape(height, width)
+    told = Costmap(grid, cells)
+    return lambda x, y: "told" if _is_taken(told, x, y) else "nobody"
 
 
 def injections(

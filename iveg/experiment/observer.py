@@ -50,26 +50,32 @@ async def watch(url: str, token: str, seconds: float, robot_id: str) -> Observed
         robot_id: Robot whose costmap is requested once a second.
     """
     watched = ObservedRun()
-    beside = [
-        asyncio.create_task(_listen(url, token, watched)),
-        asyncio.create_task(_believe(url, token, robot_id, watched)),
-    ]
-    try:
-        await _measure(url, token, seconds, watched)
-    finally:
-        for task in beside:
-            task.cancel()
-        await asyncio.gather(*beside, return_exceptions=True)
+    bearer = {"Authorization": f"Bearer {token}"}
+    async with httpx.AsyncClient(
+        base_url=f"{url}/api/v1", headers=bearer, trust_env=False
+    ) as api:
+        beside = [
+            asyncio.create_task(_listen(url, bearer, watched)),
+            asyncio.create_task(_believe(api, robot_id, watched)),
+        ]
+        try:
+            await _measure(api, seconds, watched)
+        finally:
+            for task in beside:
+                task.cancel()
+            await asyncio.gather(*beside, return_exceptions=True)
     return watched
 
 
-async def _measure(url: str, token: str, seconds: float, watched: ObservedRun) -> None:
+async def _measure(
+    api: httpx.AsyncClient, seconds: float, watched: ObservedRun
+) -> None:
     """A slice every few seconds, the last one at the end."""
     slices = max(1, math.floor(seconds / _SLICE_S))
-    start = before = await _told(url, token)
+    start = before = await _told(api)
     for _ in range(slices):
         await asyncio.sleep(seconds / slices)
-        now = await _told(url, token)
+        now = await _told(api)
         if before is not None and now is not None:
             watched.slices.append(slice_between(before["rows"], now["rows"]))
         before = now or before
@@ -77,13 +83,11 @@ async def _measure(url: str, token: str, seconds: float, watched: ObservedRun) -
         watched.order = _order_between(start["streams"], before["streams"])
 
 
-async def _told(url: str, token: str) -> Any:
+async def _told(api: httpx.AsyncClient) -> Any:
     """Response of the latency API since iVeg's start; None: none."""
-    bearer = {"Authorization": f"Bearer {token}"}
-    path = f"{url}/api/v1/latency?window=24h&figures=false&bins=true"
+    path = "/latency?window=24h&figures=false&bins=true"
     try:
-        async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
-            return (await client.get(path)).raise_for_status().json()
+        return (await api.get(path)).raise_for_status().json()
     except httpx.HTTPError:
         return None
 
@@ -101,8 +105,7 @@ def _order_between(
     }
 
 
-async def _listen(url: str, token: str, watched: ObservedRun) -> None:
-    bearer = {"Authorization": f"Bearer {token}"}
+async def _listen(url: str, bearer: dict[str, str], watched: ObservedRun) -> None:
     address = url.replace("http", "ws", 1) + "/live"
     # A closed connection ends the recording, which keeps its frames.
     with contextlib.suppress(WebSocketException, OSError):
@@ -118,18 +121,15 @@ def _hear(message: str | bytes, watched: ObservedRun) -> None:
             watched.pictures.append(picture)
 
 
-async def _believe(url: str, token: str, robot_id: str, watched: ObservedRun) -> None:
-    bearer = {"Authorization": f"Bearer {token}"}
-    async with httpx.AsyncClient(headers=bearer, trust_env=False) as client:
-        while True:
-            with contextlib.suppress(httpx.HTTPError):
-                path = f"{url}/api/v1/costmap?robot={robot_id}"
-                answer = await client.get(path)
-                if answer.status_code == 200 and watched.pictures:
-                    # Clock of the detection frames, with which it is compared.
-                    newest = watched.pictures[-1].at
-                    watched.beliefs.append((newest, belief_in(answer.json())))
-            await asyncio.sleep(_MAP_EVERY_S)
+async def _believe(api: httpx.AsyncClient, robot_id: str, watched: ObservedRun) -> None:
+    while True:
+        with contextlib.suppress(httpx.HTTPError):
+            answer = await api.get(f"/costmap?robot={robot_id}")
+            if answer.status_code == 200 and watched.pictures:
+                # Clock of the detection frames, with which it is compared.
+                newest = watched.pictures[-1].at
+                watched.beliefs.append((newest, belief_in(answer.json())))
+        await asyncio.sleep(_MAP_EVERY_S)
 
 
 def picture_of(told: Mapping[str, Any]) -> Picture | None:

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from iveg.domain.latency.account import Cell, LatencySummary, spread_of
 from iveg.domain.latency.segments import DATA, SEGMENTS
-from iveg.domain.latency.sketch import NOTHING, Sketch, from_bins, merged
+from iveg.domain.latency.sketch import Sketch, from_bins, merged
 from iveg.experiment.statistics import Interval
 
 Slice = dict[str, dict[str, dict[str, Any]]]
 """By kind of data and hop: ``edges_ms``, ``counts``, ``total_ms``; empty cells are
 left out."""
+_EMPTY: Final[Mapping[str, Any]] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
 _DRAWS: Final = 1000
 _FEWEST: Final = 4
 """Least number of slices for an interval."""
@@ -31,20 +32,18 @@ def slice_between(before: Sequence[Any], after: Sequence[Any]) -> Slice:
     found: Slice = {}
     for row in after:
         for hop, bins in row["bins"].items():
-            more = _less(bins, old.get(row["data"], {}).get(hop))
+            more = _less(bins, old.get(row["data"], {}).get(hop, _EMPTY))
             if more["counts"]:
                 found.setdefault(row["data"], {})[hop] = more
     return found
 
 
-def _less(after: Mapping[str, Any], before: Mapping[str, Any] | None) -> dict[str, Any]:
-    known: dict[float, int] = {}
-    if before is not None:
-        known = dict(zip(before["edges_ms"], before["counts"], strict=True))
+def _less(after: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    known = dict(zip(before["edges_ms"], before["counts"], strict=True))
     told = zip(after["edges_ms"], after["counts"], strict=True)
     more = [(edge, count - known.get(edge, 0)) for edge, count in told]
     kept = [(edge, count) for edge, count in more if count > 0]
-    total = after["total_ms"] - (before["total_ms"] if before is not None else 0.0)
+    total = after["total_ms"] - before["total_ms"]
     return {
         "edges_ms": [edge for edge, _ in kept],
         "counts": [count for _, count in kept],
@@ -55,12 +54,10 @@ def _less(after: Mapping[str, Any], before: Mapping[str, Any] | None) -> dict[st
 def sketches_of(slices: Iterable[Slice], cell: Cell) -> list[Sketch]:
     """One hop of one kind of data, slice by slice."""
     data, hop = cell
-    return [_sketch(one.get(data, {}).get(hop)) for one in slices]
+    return [_sketch(one.get(data, {}).get(hop, _EMPTY)) for one in slices]
 
 
-def _sketch(bins: Mapping[str, Any] | None) -> Sketch:
-    if bins is None:
-        return NOTHING
+def _sketch(bins: Mapping[str, Any]) -> Sketch:
     edges = [edge / 1000.0 for edge in bins["edges_ms"]]
     return from_bins(edges, bins["counts"], bins["total_ms"] / 1000.0)
 

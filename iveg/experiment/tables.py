@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from statistics import fmean
 from typing import Any, Final
 
-from iveg.domain.latency.paper import PAPER
+from iveg.domain.latency.paper import PAPER, Place
 from iveg.domain.latency.segments import DATA
 from iveg.experiment.paper_tables import (
     CLASSES,
@@ -14,6 +14,7 @@ from iveg.experiment.paper_tables import (
     MEANS,
     P95_BELOW_MS,
     PRINTED,
+    PaperScore,
     disagreements,
 )
 
@@ -25,27 +26,27 @@ DETECTION: Final = ("class", "source", "TP", "FP", "FN", "precision", "recall", 
 
 def detection(result: Result) -> Rows:
     """Per class, in total and in the mean."""
+    real = result["stack"]
     for class_id in CLASSES:
-        yield from _of_class(result, class_id)
+        yield _counts(class_id, "here", result["detection"][class_id])
+        yield _counts(class_id, "here, real time", real["detection"][class_id])
+        for place, rows in PRINTED.items():
+            yield _printed(class_id, place, rows[class_id])
     yield _counts("total", "here", result["global"])
-    yield _counts("total", "here, real time", result["stack"]["global"])
+    yield _counts("total", "here, real time", real["global"])
     for place, row in GLOBAL.items():
-        rates = (f"{row.precision:.2f} %", f"{row.recall:.2f} %")
-        yield "total", f"paper, {place}", row.tp, row.fp, row.fn, *rates, "–"
+        yield _printed("total", place, row)
     yield _means(result)
     for place, (precision, recall, ap) in MEANS.items():
         rates = (f"{precision:.2f} %", f"{recall:.2f} %")
         yield "mean", f"paper, {place}", "", "", "", *rates, ap
 
 
-def _of_class(result: Result, class_id: str) -> Rows:
-    yield _counts(class_id, "here", result["detection"][class_id])
-    real = result["stack"]["detection"][class_id]
-    yield _counts(class_id, "here, real time", real)
-    for place, rows in PRINTED.items():
-        row = rows[class_id]
-        rates = (f"{row.precision:.2f} %", f"{row.recall:.2f} %")
-        yield class_id, f"paper, {place}", row.tp, row.fp, row.fn, *rates, row.ap
+def _printed(name: str, place: Place, row: PaperScore) -> Sequence[object]:
+    """A row of the paper's table."""
+    rates = (f"{row.precision:.2f} %", f"{row.recall:.2f} %")
+    ap = "–" if row.ap is None else row.ap
+    return name, f"paper, {place}", row.tp, row.fp, row.fn, *rates, ap
 
 
 def _counts(name: str, source: str, told: Mapping[str, Any]) -> Sequence[object]:
@@ -118,27 +119,30 @@ def _worst(result: Result) -> str:
 
 
 SIGHT: Final = ("what", "here", "here, real time")
+_SLOWDOWNS: Final = {
+    "decided": "slow-downs decided",
+    "applied": "…applied by the robot, by its own report",
+    "observed": "…observed in its speed",
+    "out_of_sight": "…for somebody whom the robot could not see",
+}
+_INJECTION: Final = {
+    "asked": "moments in which another saw a person and AGII did not",
+    "injected": "…with the person in AGII's costmap",
+    "people": "people whom another saw before AGII's own camera did",
+    "ahead": "…who stood in AGII's costmap before",
+}
 
 
 def out_of_sight(result: Result) -> Rows:
     """Slow-downs, and people out of AGII's sight that were reported to it."""
-    here, real = result, result["stack"]
-    for key, name in (
-        ("decided", "slow-downs decided"),
-        ("applied", "…applied by the robot, by its own report"),
-        ("observed", "…observed in its speed"),
-        ("out_of_sight", "…for somebody whom the robot could not see"),
-    ):
-        slow = [one["slowdowns"].get(key, 0) for one in (here, real)]
-        yield name, *slow
-    for key, name in (
-        ("asked", "moments in which another saw a person and AGII did not"),
-        ("injected", "…with the person in AGII's costmap"),
-        ("people", "people whom another saw before AGII's own camera did"),
-        ("ahead", "…who stood in AGII's costmap before"),
-    ):
-        injected = [one["injection"].get(key, 0) for one in (here, real)]
-        yield name, *injected
+    yield from _both(result, "slowdowns", _SLOWDOWNS)
+    yield from _both(result, "injection", _INJECTION)
+
+
+def _both(result: Result, what: str, names: Mapping[str, str]) -> Rows:
+    """Counts of both halves of the runs, one row for each key of ``names``."""
+    for key, name in names.items():
+        yield name, *(half[what].get(key, 0) for half in (result, result["stack"]))
 
 
 STOPS: Final = ("robot", "robot's answer", "standing")

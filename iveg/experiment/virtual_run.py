@@ -20,7 +20,7 @@ from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, Record
 from iveg.domain.rule.zones import zones_of
 from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import Layout, lay_out
+from iveg.emulator.layout import lay_out
 from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.truth import in_view
 from iveg.emulator.world import RobotHardware, SimulatedWorld
@@ -127,7 +127,8 @@ class VirtualRun:
         self._result = VirtualRunResult()
         self._detections: list[Picture] = []
         self._wire(greenhouse, rule)
-        self._world = _world_of(greenhouse, layout, profile, step.seed)
+        detector = DETECTORS[layout.detector or profile]
+        self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
             layout.incidents,
@@ -224,11 +225,3 @@ class VirtualRun:
             for body in self._world.bodies()
             for one in people
         )
-
-
-def _world_of(
-    greenhouse: Greenhouse, layout: Layout, profile: str, seed: int
-) -> SimulatedWorld:
-    return SimulatedWorld(
-        greenhouse, layout, DETECTORS[layout.detector or profile], seed
-    )
