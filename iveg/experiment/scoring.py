@@ -65,16 +65,6 @@ class Score:
     looks: int = 0
     claims: int = 0
 
-    @property
-    def precision(self) -> float | None:
-        """0 to 1; None without detections."""
-        return self.tp / (self.tp + self.fp) if self.tp + self.fp else None
-
-    @property
-    def recall(self) -> float | None:
-        """0 to 1; None without targets."""
-        return self.tp / (self.tp + self.fn) if self.tp + self.fn else None
-
 
 @dataclass(frozen=True, slots=True)
 class Tally:
