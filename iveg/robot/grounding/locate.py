@@ -101,18 +101,9 @@ class Grounded:
     points: int
 
 
-@dataclass(frozen=True, slots=True)
-class Ungrounded:
-    """A target whose position cannot be computed.
-
-    Attributes:
-        reason: ``unsure``: below p_min, by design; ``empty``: the mask holds nothing of
-            the picture; ``no_depth``: not one point passed the filter.
-    """
-
-    class_id: str
-    probability: float
-    reason: Literal["unsure", "empty", "no_depth"]
+Ungrounded = Literal["unsure", "empty", "no_depth", "unreadable"]
+"""Why a target has no position: its probability is below p_min, by design; the mask
+holds nothing of the picture; not one point passed the filter; or it cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,18 +129,18 @@ def ground(
     """
     _examine(segment)
     if segment.probability < settings.p_min:
-        return Ungrounded(segment.class_id, segment.probability, "unsure")
+        return "unsure"
     index = cloud_index(
         body_of(segment, settings),
         top_left(segment.x_c, segment.y_c, segment.width, segment.height),
         picture.camera,
     )
     if not index.size:
-        return Ungrounded(segment.class_id, segment.probability, "empty")
+        return "empty"
     accepted = index[picture.continuous(index, settings.most_jump)]
     if not accepted.size:
-        return Ungrounded(segment.class_id, segment.probability, "no_depth")
-    box = _hull(picture.points(accepted))
+        return "no_depth"
+    box = hull_of(picture.points(accepted))
     behind = settings.hidden.get(segment.class_id, 0.0)
     box = replace(box, zmax=box.zmax + behind)
     return Grounded(segment.class_id, segment.probability, box, accepted.size)
@@ -175,7 +166,7 @@ def to_detection(
         robot: Pose of ``base_link`` in ``map`` when the picture was taken.
     """
     sensor = mount.pose if robot is None else robot.compose(mount.pose)
-    box = _hull(_to_work(_corners(found.box), sensor, mount.height))
+    box = hull_of(_to_work(corners_of(found.box), sensor, mount.height))
     frame: Literal["map", "base_link"] = "base_link" if robot is None else "map"
     return Detection(found.class_id, found.probability, box, frame)
 
@@ -199,21 +190,17 @@ def ground_frame(
         for answer in answers
         if isinstance(answer, Grounded)
     )
-    lost = sum(
-        isinstance(answer, Ungrounded) and answer.reason != "unsure"
-        for answer in answers
-    )
-    return DetectionFrame(robot_id, origin, found, lost + answers.count(None))
+    lost = len(answers) - len(found) - answers.count("unsure")
+    return DetectionFrame(robot_id, origin, found, lost)
 
 
 def _answer(
     segment: Segment, picture: DepthPicture, settings: Grounding
-) -> Grounded | Ungrounded | None:
-    """Where a target is; None for a segment that cannot be read."""
+) -> Grounded | Ungrounded:
     try:
         return ground(segment, picture, settings)
     except UnreadableError:
-        return None
+        return "unreadable"
 
 
 def _examine(segment: Segment) -> None:
@@ -223,14 +210,14 @@ def _examine(segment: Segment) -> None:
         raise UnreadableError("bad_centre", f"{segment.x_c}, {segment.y_c}")
 
 
-def _hull(points: Floats) -> Box3D:
-    """BB_3D of points, shape (n, 3)."""
+def hull_of(points: Floats) -> Box3D:
+    """BB_3D: the axis-aligned box of points, shape (n, 3)."""
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return Box3D(low[0], high[0], low[1], high[1], low[2], high[2])
 
 
-def _corners(box: Box3D) -> Floats:
-    """Shape (8, 3)."""
+def corners_of(box: Box3D) -> Floats:
+    """The corners of a box, shape (8, 3)."""
     sides = (box.xmin, box.xmax), (box.ymin, box.ymax), (box.zmin, box.zmax)
     return np.stack(np.meshgrid(*sides), axis=-1).reshape(8, 3)
 

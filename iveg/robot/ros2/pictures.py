@@ -16,9 +16,17 @@ from numpy.typing import NDArray
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import Detection, DetectionFrame, Origin
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole, top_left
-from iveg.robot.grounding.locate import Grounded, Grounding, Segment, ground
+from iveg.robot.grounding.locate import (
+    Grounded,
+    Grounding,
+    Segment,
+    Ungrounded,
+    corners_of,
+    ground,
+    hull_of,
+)
 from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
-from iveg.robot.ros2.reading import hull_of, read_hypothesis
+from iveg.robot.ros2.reading import read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
 
@@ -114,7 +122,8 @@ def grounded(
         for number, one in enumerate(look.detections, 1)
     ]
     found = tuple(one for one in answers if isinstance(one, Detection))
-    return DetectionFrame("", Origin(), found, answers.count("lost"))
+    lost = len(answers) - len(found) - answers.count("unsure")
+    return DetectionFrame("", Origin(), found, lost)
 
 
 def _place(
@@ -125,24 +134,15 @@ def _place(
     place: RigidTransform,
     classes: tuple[str, ...],
     settings: Grounding,
-) -> Detection | str:
+) -> Detection | Ungrounded:
     try:
         segment = _segment(number, seen, picture, owners, classes)
         answer = ground(segment, picture, settings)
     except UnreadableError:
-        return "lost"
+        return "unreadable"
     if not isinstance(answer, Grounded):
-        return answer.reason if answer.reason == "unsure" else "lost"
-    box = answer.box
-    sides = np.array(
-        [
-            (x, y, z)
-            for x in (box.xmin, box.xmax)
-            for y in (box.ymin, box.ymax)
-            for z in (box.zmin, box.zmax)
-        ]
-    )
-    hull = hull_of(place.of(sides))
+        return answer
+    hull = within_world(hull_of(place.of(corners_of(answer.box))))
     return Detection(answer.class_id, answer.probability, hull, "map")
 
 

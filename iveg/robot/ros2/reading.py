@@ -137,7 +137,7 @@ def read_detection(
     dx = 0.5 * (abs(a) * along + abs(b) * across + abs(c) * up)
     dy = 0.5 * (abs(d) * along + abs(e) * across + abs(f) * up)
     dz = 0.5 * (abs(g) * along + abs(h) * across + abs(i) * up)
-    hull = _within_world(Box3D(x - dx, x + dx, y - dy, y + dy, z - dz, z + dz))
+    hull = within_world(Box3D(x - dx, x + dx, y - dy, y + dy, z - dz, z + dz))
     det_id = clean(detection.id) or None
     return Detection(class_id, probability, hull, "map", det_id)
 
@@ -169,19 +169,12 @@ def _score(hypothesis: m.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 
 
-def hull_of(points: np.ndarray) -> Box3D:
-    """The axis-aligned box of points, shape (n, 3).
+def within_world(box: Box3D) -> Box3D:
+    """The same box, which lies within the world.
 
     Raises:
-        UnreadableError: ``not_a_number``, ``absurd``.
+        UnreadableError: ``absurd``: not a number, or too far away.
     """
-    (x, y, z), (right, up, far) = points.min(axis=0), points.max(axis=0)
-    return _within_world(
-        Box3D(float(x), float(right), float(y), float(up), float(z), float(far))
-    )
-
-
-def _within_world(box: Box3D) -> Box3D:
     most = _FARTHEST_M
     # Comparisons with NaN are false.
     if (

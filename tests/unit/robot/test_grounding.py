@@ -19,7 +19,6 @@ from iveg.robot.grounding.locate import (
     Grounding,
     Mount,
     Segment,
-    Ungrounded,
     ground,
     ground_frame,
     to_detection,
@@ -62,8 +61,8 @@ def grounded(
 
 def refusal(seen: Segment, depth: NDArray[np.float32]) -> str:
     answer = ground(seen, DepthPicture(LENS, depth), AS_IS)
-    assert isinstance(answer, Ungrounded)
-    return answer.reason
+    assert isinstance(answer, str)
+    return answer
 
 
 def drawn(picture: str) -> Mask:
