@@ -17,6 +17,7 @@ from iveg.ros2.names import Qos
 
 _MOST_PEERS = 64
 _LONGEST = 256
+_LAST_DOMAIN = 232
 _FRAME = re.compile(r"/?[A-Za-z0-9_][A-Za-z0-9_/.-]{0,127}")
 
 
@@ -136,150 +137,32 @@ class RobotConfig:
         )
 
 
-def read_config(text: str, file: str) -> RobotConfig:
-    """Read ``robot.toml``; ``file`` is its name in error messages.
+# --- values -------------------------------------------------------------------------
 
-    Raises:
-        DataFileError: naming line, key and reason.
-    """
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        found = re.search(r"at line (\d+)", str(error))
-        where = f"line {found[1]}" if found else f"line {text.count(chr(10)) + 1}"
-        raise DataFileError(file, where, f"is not TOML: {error}.") from error
-    page = _Page(file, text)
-    for name, value in raw.items():
-        if name not in _SECTIONS:
-            known = ", ".join(_SECTIONS)
-            raise page.refuse("", name, f"is unknown; known are {known}.")
-        if not isinstance(value, dict):
-            raise page.refuse("", name, "must be a table.")
-    return _read(page, raw)
+_Reader = Callable[[Any], Any]
+"""Checks and converts a value; raises ValueError with what it must be."""
 
 
-_SECTIONS = ("ros", "topics", "frames", "drive", "transforms", "detector", "qos")
+def _table(value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError("must be a table")
+    return value
 
 
-def _read(page: "_Page", raw: Mapping[str, Any]) -> RobotConfig:
-    ros = _Table(page, raw, "ros", ("domain", "namespace", "interface", "peers"))
-    transforms = _Table(page, raw, "transforms", ("max_age_s",))
-    detector = _Table(page, raw, "detector", ("classes", "p_min"))
-    drive = _Table(
-        page, raw, "drive", ("stamped_in", "stamped_out", "max_speed", "max_turn")
-    )
-    return RobotConfig(
-        domain=int(ros.number("domain", 0, 232, 0, whole=True)),
-        namespace=ros.get("namespace", "", _topic),
-        interface=ros.get("interface", "", _maybe_text),
-        peers=ros.get("peers", (), _peers),
-        topics=Topics(**_texts(page, raw, "topics", Topics, _topic)),
-        frames=Frames(**_texts(page, raw, "frames", Frames, _frame)),
-        drive=DriveConfig(
-            drive.get("stamped_in", False, _flag),
-            drive.get("stamped_out", False, _flag),
-            drive.maybe("max_speed", 0.05, 5.0),
-            drive.maybe("max_turn", 0.05, 5.0),
-        ),
-        tf_max_age_s=transforms.number("max_age_s", 0.05, 5.0, 0.5),
-        class_list=detector.get("classes", "", _maybe_text),
-        p_min=detector.number("p_min", 0.0, 1.0, 0.8),
-        qualities=_qualities(page, raw),
-    )
+def _number(least: float, most: float) -> _Reader:
+    def read(value: Any) -> float:
+        good = isinstance(value, int | float) and not isinstance(value, bool)
+        if not good or not least <= value <= most:
+            raise ValueError(f"must be a number from {least:g} to {most:g}")
+        return float(value)
+
+    return read
 
 
-def _texts(
-    page: "_Page",
-    raw: Mapping[str, Any],
-    section: str,
-    kind: type[Any],
-    read: Callable[[Any], str],
-) -> dict[str, str]:
-    keys = tuple(one.name for one in fields(kind))
-    table = _Table(page, raw, section, keys)
-    return {key: table.get(key, "", read) for key in keys if key in table.raw}
-
-
-def _qualities(page: "_Page", raw: Mapping[str, Any]) -> dict[str, Qos]:
-    table = _Table(page, raw, "qos", tuple(_QUALITIES))
-    found = dict(_QUALITIES)
-    for topic in table.raw:
-        found[topic] = replace(found[topic], **table.get(topic, {}, _quality))
-    return found
-
-
-# --- one table of the file ---------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class _Page:
-    """Text of the file, to find the line of an error."""
-
-    file: str
-    text: str
-
-    def refuse(self, section: str, key: str, reason: str) -> DataFileError:
-        """The error about one key."""
-        path = (section, key) if section else (key,)
-        line, _ = place_of(self.text, path)
-        return DataFileError(self.file, f"line {line}, {'.'.join(path)}", reason)
-
-
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """One table, read key by key; an unknown key is an error."""
-
-    page: _Page
-    root: Mapping[str, Any]
-    section: str
-    keys: tuple[str, ...]
-
-    def __post_init__(self) -> None:
-        for key in self.raw:
-            if key not in self.keys:
-                known = ", ".join(self.keys)
-                reason = f"is unknown; known are {known}."
-                raise self.page.refuse(self.section, key, reason)
-
-    @property
-    def raw(self) -> Mapping[str, Any]:
-        """Content of the table in the file."""
-        table: Mapping[str, Any] = self.root.get(self.section, {})
-        return table
-
-    def get(self, key: str, default: Any, read: Callable[[Any], Any]) -> Any:
-        """A value converted by ``read``, which raises ValueError for an invalid one."""
-        if key not in self.raw:
-            return default
-        try:
-            return read(self.raw[key])
-        except ValueError as error:
-            raise self.page.refuse(self.section, key, f"{error}.") from error
-
-    def number(
-        self,
-        key: str,
-        least: float,
-        most: float,
-        default: float,
-        *,
-        whole: bool = False,
-    ) -> float:
-        """A number within bounds."""
-        kinds = (int,) if whole else (int, float)
-
-        def read(value: Any) -> float:
-            good = isinstance(value, kinds) and not isinstance(value, bool)
-            if not good or not least <= value <= most:
-                a = "a whole number" if whole else "a number"
-                raise ValueError(f"must be {a} from {least:g} to {most:g}")
-            return float(value)
-
-        return float(self.get(key, default, read))
-
-    def maybe(self, key: str, least: float, most: float) -> float | None:
-        """A number within bounds, or None if absent."""
-        return self.number(key, least, most, 0.0) if key in self.raw else None
+def _domain(value: Any) -> int:
+    if type(value) is not int or not 0 <= value <= _LAST_DOMAIN:
+        raise ValueError(f"must be a whole number from 0 to {_LAST_DOMAIN}")
+    return value
 
 
 def _text(value: Any) -> str:
@@ -330,6 +213,94 @@ def _quality(value: Any) -> dict[str, object]:
     if not 1 <= value.get("depth", 1) <= 1000:
         raise ValueError("depth must be from 1 to 1000")
     return dict(value)
+
+
+_KEYS: dict[str, dict[str, _Reader]] = {
+    "ros": {
+        "domain": _domain,
+        "namespace": _topic,
+        "interface": _maybe_text,
+        "peers": _peers,
+    },
+    "topics": {one.name: _topic for one in fields(Topics)},
+    "frames": {one.name: _frame for one in fields(Frames)},
+    "drive": {
+        "stamped_in": _flag,
+        "stamped_out": _flag,
+        "max_speed": _number(0.05, 5.0),
+        "max_turn": _number(0.05, 5.0),
+    },
+    "transforms": {"max_age_s": _number(0.05, 5.0)},
+    "detector": {"classes": _maybe_text, "p_min": _number(0.0, 1.0)},
+    "qos": dict.fromkeys(_QUALITIES, _quality),
+}
+"""Tables of the file, with their keys."""
+
+# --- the file -----------------------------------------------------------------------
+
+
+def read_config(text: str, file: str) -> RobotConfig:
+    """Read ``robot.toml``; ``file`` is its name in error messages.
+
+    Raises:
+        DataFileError: naming line, key and reason.
+    """
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"at line (\d+)", str(error))
+        where = f"line {found[1]}" if found else f"line {text.count(chr(10)) + 1}"
+        raise DataFileError(file, where, f"is not TOML: {error}.") from error
+    page = _Page(file, text)
+    tables = page.values((), raw, dict.fromkeys(_KEYS, _table))
+    said = {
+        name: page.values((name,), tables.get(name, {}), readers)
+        for name, readers in _KEYS.items()
+    }
+    return RobotConfig(
+        **said["ros"],
+        topics=Topics(**said["topics"]),
+        frames=Frames(**said["frames"]),
+        drive=DriveConfig(**said["drive"]),
+        tf_max_age_s=said["transforms"].get("max_age_s", 0.5),
+        class_list=said["detector"].get("classes", ""),
+        p_min=said["detector"].get("p_min", 0.8),
+        qualities={
+            topic: replace(usual, **said["qos"].get(topic, {}))
+            for topic, usual in _QUALITIES.items()
+        },
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """Text of the file, to find the line of an error."""
+
+    file: str
+    text: str
+
+    def values(
+        self,
+        path: tuple[str, ...],
+        table: Mapping[str, Any],
+        readers: Mapping[str, _Reader],
+    ) -> dict[str, Any]:
+        """Values of the table at ``path``, each by the reader of its key."""
+        found = {}
+        for key, value in table.items():
+            if key not in readers:
+                reason = f"is unknown; known are {', '.join(readers)}"
+                raise self._refusal((*path, key), reason)
+            try:
+                found[key] = readers[key](value)
+            except ValueError as error:
+                raise self._refusal((*path, key), str(error)) from error
+        return found
+
+    def _refusal(self, path: tuple[str, ...], reason: str) -> DataFileError:
+        line, _ = place_of(self.text, path)
+        where = f"line {line}, {'.'.join(path)}"
+        return DataFileError(self.file, where, f"{reason}.")
 
 
 def read_classes(text: str) -> tuple[str, ...]:
