@@ -105,26 +105,24 @@ class TransformBuffer:
         Raises:
             NoTransformError: a link is missing, or old at this stamp.
         """
-        up = self._ancestors(inner)
+        up = self.chain(inner)
         if outer in up:  # the usual case
             return self._climb(up[: up.index(outer)], stamp)
-        down = self._ancestors(outer)
+        down = self.chain(outer)
         shared = next((frame for frame in up if frame in down), None)
         if shared is None:
-            raise NoTransformError(self._gap(up, down), None)
+            # The missing link leads from the root of one tree to that of the other.
+            raise NoTransformError(f"{down[-1]} → {up[-1]}", None)
         here = self._climb(up[: up.index(shared)], stamp)
         there = self._climb(down[: down.index(shared)], stamp)
         return there.inverse().compose(here)
 
-    def _ancestors(self, frame: str) -> list[str]:
+    def chain(self, frame: str) -> list[str]:
+        """A frame and all its ancestors."""
         found = [frame]
         while (link := self._links.get(found[-1])) and len(found) < _DEEPEST:
             found.append(link.parent)
         return found
-
-    def _gap(self, up: Iterable[str], down: Iterable[str]) -> str:
-        """Missing link between two trees: the root of one and the root of the other."""
-        return f"{list(down)[-1]} → {list(up)[-1]}"
 
     def _climb(self, frames: Iterable[str], stamp: float) -> RigidTransform:
         rigid: RigidTransform | None = None
@@ -153,7 +151,3 @@ class TransformBuffer:
         before, after = known[place - 1], known[place]
         part = (stamp - before.stamp) / (after.stamp - before.stamp)
         return before.rigid.towards(after.rigid, part)
-
-    def chain(self, inner: str) -> tuple[str, ...]:
-        """A frame and all its ancestors."""
-        return tuple(self._ancestors(inner))
