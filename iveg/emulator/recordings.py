@@ -1,28 +1,23 @@
 """Recordings of any format as entries in time: logs of JSON lines, ROS bags."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import Protocol
 
-from iveg.adapters.bags import Bag, BagMessage, BagTopics
+from iveg.adapters.bags import Bag, BagTopics
 from iveg.domain.errors import DataFileError
-from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Odometry, Origin
 from iveg.emulator.logs import LogReader, RecordingEntry
+from iveg.robot.gate import REST
 
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap", ".bag")
 _LONGEST_S = 1e7
 
 
-class Recording(Protocol):
-    """One recorded run of one robot."""
-
-    def entries(self) -> Iterator[RecordingEntry]:
-        """All entries from the start; at least one is odometry.
-
-        Raises:
-            DataFileError: the recording is truncated.
-        """
+Recording = Callable[[], Iterator[RecordingEntry]]
+"""Plays one recorded run of one robot from the start; at least one entry is odometry.
+It raises DataFileError when the recording is truncated."""
 
 
 def open_recording(
@@ -47,14 +42,14 @@ def open_recording(
             pose.
     """
     recording = _opened(path, mount, topics, bag_time=bag_time, fixed=pose is not None)
-    if any(isinstance(one.observation, Odometry) for one in recording.entries()):
+    if any(isinstance(one.observation, Odometry) for one in recording()):
         return recording
     if pose is None:
         reason = "holds no odometry that can be used; --pose says where it stands."
         raise DataFileError(str(path), "", reason)
-    if next(recording.entries(), None) is None:
+    if next(recording(), None) is None:
         raise DataFileError(str(path), "", "holds nothing that can be used.")
-    return FixedRecording(recording, pose)
+    return partial(_fixed, recording, pose)
 
 
 def _opened(
@@ -67,54 +62,34 @@ def _opened(
 ) -> Recording:
     if path.is_dir() or path.suffix in _BAGS:
         bag = Bag(path, topics or BagTopics(), mount, needs_odometry=not fixed)
-        return BagRecording(bag, bag_time=bag_time)
+        first = next(bag.messages(), None)
+        unstamped = first is not None and first.stamp_s <= 0.0
+        return partial(_of_bag, bag, bag_time=bag_time or unstamped)
     if path.suffix in _LOGS:
-        return LogReader(path)
+        return LogReader(path).entries
     known = ", ".join((*_LOGS[:1], ".jsonl.gz", *_BAGS))
     reason = f"is none of {known}, and no directory of a bag."
     raise DataFileError(str(path), "", reason)
 
 
-class FixedRecording:
-    """A recording of a static sensor: its pose precedes all other entries.
-
-    Args:
-        recording: Without odometry, and not empty.
-        pose: Its pose in the frame of the recording.
-    """
-
-    def __init__(self, recording: Recording, pose: Pose2D) -> None:
-        self._recording = recording
-        self._stands = Odometry("", Origin(), pose, Twist2D(0.0, 0.0))
-
-    def entries(self) -> Iterator[RecordingEntry]:
-        """All entries, the pose first."""
-        entries = self._recording.entries()
-        first = next(entries)
-        yield RecordingEntry(first.at, self._stands)
-        yield first
-        yield from entries
+def _fixed(recording: Recording, pose: Pose2D) -> Iterator[RecordingEntry]:
+    """Entries of a static sensor: its pose precedes all others."""
+    entries = recording()
+    first = next(entries)
+    yield RecordingEntry(first.at, Odometry("", Origin(), pose, REST))
+    yield first
+    yield from entries
 
 
-class BagRecording:
-    """A bag whose messages are ordered by sensor stamps, or by bag time.
+def _of_bag(bag: Bag, *, bag_time: bool) -> Iterator[RecordingEntry]:
+    """Entries of a bag by sensor stamps, or by bag time; absurd stamps are omitted.
 
     Stamps count unless the first message has none: without stamps, or on request, a bag
     uses bag time throughout, since the two clocks may differ by years.
     """
-
-    def __init__(self, bag: Bag, *, bag_time: bool) -> None:
-        self._bag = bag
-        first = next(bag.messages(), None)
-        self._by_bag = bag_time or (first is not None and first.stamp_s <= 0.0)
-        self._start = 0.0 if first is None else self._time_of(first)
-
-    def entries(self) -> Iterator[RecordingEntry]:
-        """All entries from the start; entries with absurd stamps are omitted."""
-        for message in self._bag.messages():
-            at = self._time_of(message) - self._start
-            if abs(at) <= _LONGEST_S:
-                yield RecordingEntry(at, message.observation)
-
-    def _time_of(self, message: BagMessage) -> float:
-        return message.logged_s if self._by_bag else message.stamp_s
+    start: float | None = None
+    for message in bag.messages():
+        at = message.logged_s if bag_time else message.stamp_s
+        start = at if start is None else start
+        if abs(at - start) <= _LONGEST_S:
+            yield RecordingEntry(at - start, message.observation)

@@ -93,7 +93,7 @@ async def run_replay(
         )
         for file, robot_id, profile in zip(files, robots, profiles, strict=True)
     ]
-    playbacks = [Playback(one.entries, loop=settings.loop) for one in recordings]
+    playbacks = [Playback(one, loop=settings.loop) for one in recordings]
     replayed = [
         ReplayedRobot(robot_id, profile, playback, settings)
         for robot_id, profile, playback in zip(robots, profiles, playbacks, strict=True)

@@ -37,7 +37,7 @@ KINDS = [
 def entries(
     path: Path, topics: BagTopics | None = None, *, bag_time: bool = False
 ) -> list[RecordingEntry]:
-    return list(open_recording(path, MOUNT, topics, bag_time=bag_time).entries())
+    return list(open_recording(path, MOUNT, topics, bag_time=bag_time)())
 
 
 def poses(found: Sequence[RecordingEntry]) -> list[Pose2D]:
@@ -76,7 +76,7 @@ def test_a_recording_is_read_from_its_start_as_often_as_asked(
 ) -> None:
     recording = open_recording(write(tmp_path / name, drive()), MOUNT)
 
-    first, again = list(recording.entries()), list(recording.entries())
+    first, again = list(recording()), list(recording())
 
     assert len(first) == 40
     assert poses(first) == poses(again)
@@ -162,7 +162,7 @@ def test_a_log_of_a_fixed_camera_stands_where_it_was_said(tmp_path: Path) -> Non
     file = tmp_path / "camera.jsonl"
     file.write_text(SAW)
 
-    pose, saw = open_recording(file, MOUNT, pose=Pose2D(3.0, 4.0, 0.5)).entries()
+    pose, saw = open_recording(file, MOUNT, pose=Pose2D(3.0, 4.0, 0.5))()
 
     assert isinstance(pose.observation, Odometry)
     assert pose.observation.pose == Pose2D(3.0, 4.0, 0.5)
@@ -174,7 +174,7 @@ def test_a_bag_of_scans_alone_stands_where_it_was_said(tmp_path: Path) -> None:
     said = [one for one in drive(1.0) if one.kind == SCAN]
     bag = db3_bag(tmp_path / "run", said)
 
-    found = list(open_recording(bag, MOUNT, pose=Pose2D(3.0, 4.0, 0.5)).entries())
+    found = list(open_recording(bag, MOUNT, pose=Pose2D(3.0, 4.0, 0.5))())
 
     assert poses(found) == [Pose2D(3.0, 4.0, 0.5)]
     assert len(found) == len(said) + 1
@@ -183,7 +183,7 @@ def test_a_bag_of_scans_alone_stands_where_it_was_said(tmp_path: Path) -> None:
 def test_what_moves_by_its_own_odometry_is_not_nailed_down(tmp_path: Path) -> None:
     bag = db3_bag(tmp_path / "run", drive(1.0))
 
-    found = open_recording(bag, MOUNT, pose=Pose2D(30.0, 4.0, 0.5)).entries()
+    found = open_recording(bag, MOUNT, pose=Pose2D(30.0, 4.0, 0.5))()
 
     assert max(one.x for one in poses(list(found))) < 3.0
 
@@ -205,8 +205,8 @@ def test_a_message_that_cannot_be_used_is_reported_once_and_skipped(
     recording = open_recording(db3_bag(tmp_path / "run", said), MOUNT)
 
     with caplog.at_level(logging.WARNING):
-        assert len(poses(list(recording.entries()))) == 8
-        assert len(poses(list(recording.entries()))) == 8
+        assert len(poses(list(recording()))) == 8
+        assert len(poses(list(recording()))) == 8
 
     (told,) = caplog.messages
     assert "/odom: unusable messages are skipped" in told
