@@ -5,7 +5,8 @@ import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
 import { LAYERS } from "../../iveg/static/js/map/picture.js";
 import { hiddenSaid } from "../../iveg/static/js/panels/hidden_layers.js";
 import { paintSign, SIGNS } from "../../iveg/static/js/panels/legend.js";
-import { coverageSaid } from "../../iveg/static/js/panels/map_facts.js";
+import { coverageSaid, createMapFacts } from "../../iveg/static/js/panels/map_facts.js";
+import { person } from "./builders.js";
 import { equal, test } from "./harness.js";
 
 const words = /** @type {any} */ ({ t: (/** @type {string} */ key) => key });
@@ -59,6 +60,40 @@ test("13.21: that nobody is seen is never said when no camera looks", () => {
   });
   const old = { ...told, receivedAtMs: now - 7000, cameras: 1, share: 1 };
   equal(said(old).isBlind, true);
+});
+
+test("without news the facts over the map grow old and say so", () => {
+  const facts = ["people-count", "nlos-count", "climate", "costmap-age"].map((id) =>
+    Object.assign(document.createElement("span"), { id }),
+  );
+  document.body.replaceChildren(...facts);
+  const receivedAtMs = performance.now();
+  /** @type {Record<string, any>} */
+  const told = {
+    coverage: { cameras: 1, share: 0.4, receivedAtMs },
+    climate: { temperature: 28, age_s: 0, receivedAtMs },
+  };
+  const acting = [{ robot_id: "AGI", distance_m: 1, in_sight: false }];
+  const seen = { ...person({ acting }), receivedAtMs };
+  const store = {
+    people: () => [seen],
+    get: (/** @type {string} */ topic) => told[topic],
+    subscribe: () => {},
+  };
+  const map = /** @type {any} */ ({ layers: () => [] });
+  const draw = createMapFacts(/** @type {any} */ ({ store, i18n: words }), map);
+  const shown = () =>
+    facts.slice(0, 3).map(({ hidden, textContent }) => (hidden ? "" : textContent));
+
+  draw();
+  equal(shown(), [
+    "map.people_one · map.coverage_share",
+    "map.nlos_one",
+    "climate.temperature",
+  ]);
+  for (const one of [seen, told.coverage, told.climate]) one.receivedAtMs -= 301_000;
+  draw();
+  equal(shown(), ["map.coverage_unknown", "", "climate.temperature · climate.ago_min"]);
 });
 
 test("13.11 layers that are switched off are named on the map", () => {

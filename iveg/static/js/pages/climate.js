@@ -8,6 +8,7 @@
 
 import { readApi } from "../core/api.js";
 import { ageOf } from "../core/clock.js";
+import { CLIMATE_OLD_S, climateAgo } from "../panels/climate_texts.js";
 import { need, setAttribute, setHidden, setText } from "../panels/dom.js";
 import { onThemeChange } from "../panels/theme.js";
 import { drawFigure } from "./history/charts.js";
@@ -17,9 +18,6 @@ const PARTS = ["temperature", "humidity", "co2"];
 const TICK_MS = 1000;
 /** As often as history keeps a reading. */
 const DAY_MS = 60_000;
-/** Air changes slowly; after five minutes a reading still says little of now (s). */
-const OLD_S = 300;
-const MINUTES_FROM_S = 120;
 
 /** @param {import("../core/page.js").Page} page */
 export function start({ store, i18n }) {
@@ -29,7 +27,7 @@ export function start({ store, i18n }) {
     /** @type {import("../core/protocol.js").Climate | null} */
     const climate = store.get("climate") ?? null;
     const age = climate ? ageOf(climate) : Number.POSITIVE_INFINITY;
-    const isOld = age > OLD_S || store.connection.state !== "open";
+    const isOld = age > CLIMATE_OLD_S || store.connection.state !== "open";
     tile("temperature", climate?.temperature, age);
     tile("humidity", climate?.relative_humidity, age);
     tile("co2", climate?.co2, age);
@@ -44,14 +42,16 @@ export function start({ store, i18n }) {
     const isKnown = typeof value === "number";
     const said = isKnown ? i18n.t(`climate.tile.${part}`, { value }) : "—";
     setText(need(`#climate-${part}`), said);
-    setText(need(`#climate-${part}-age`), isKnown ? ago(age, i18n) : "");
+    setText(need(`#climate-${part}-age`), isKnown ? climateAgo(age, i18n) : "");
   }
 
   /** @param {number} age (s) @param {boolean} isOld */
   function sentence(age, isOld) {
     if (!Number.isFinite(age)) return i18n.t("climate.waiting");
     // Without seconds: this line is read out whenever it changes.
-    return i18n.t(isOld ? "climate.old" : "climate.fresh", { ago: ago(age, i18n) });
+    return i18n.t(isOld ? "climate.old" : "climate.fresh", {
+      ago: climateAgo(age, i18n),
+    });
   }
 
   store.subscribe("climate", draw);
@@ -61,13 +61,6 @@ export function start({ store, i18n }) {
   setInterval(draw, TICK_MS);
   draw();
   day.load();
-}
-
-/** @param {number} age (s) @param {import("../core/i18n.js").I18n} i18n */
-function ago(age, i18n) {
-  const minutes = Math.floor(age / 60);
-  if (age < MINUTES_FROM_S) return i18n.t("climate.ago_s", { age });
-  return i18n.t("climate.ago_min", { minutes });
 }
 
 /**

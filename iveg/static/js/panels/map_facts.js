@@ -1,9 +1,13 @@
 /**
  * The facts over the map: people, coverage by cameras, climate, age of the costmap.
+ *
+ * All are drawn anew each second: without news they grow old, and must say so.
  */
 
 import { onBeat } from "../core/beat.js";
 import { ageOf } from "../core/clock.js";
+import { readPerson } from "../map/scene.js";
+import { CLIMATE_OLD_S, climateAgo } from "./climate_texts.js";
 import { need, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Person} Person */
@@ -19,7 +23,8 @@ const COVERAGE_OLD_S = 6;
  */
 export function createMapFacts({ store, i18n }, map) {
   function drawPeople() {
-    const people = store.people().filter(isPresent);
+    const nowMs = performance.now();
+    const people = store.people().filter((person) => isPresent(person, nowMs));
     setText(need("#people-count"), peopleSaid(people.length));
     const unseen = people.flatMap(({ acting }) => acting).filter((it) => !it.in_sight);
     const nlos = need("#nlos-count");
@@ -62,19 +67,23 @@ export function createMapFacts({ store, i18n }, map) {
       .filter(([, value]) => typeof value === "number")
       .map(([name, value]) => i18n.t(`climate.${name}`, { value }));
     setHidden(need("#climate"), said.length === 0);
+    const age = climate ? ageOf(climate) : 0;
+    if (said.length && age > CLIMATE_OLD_S) said.push(climateAgo(age, i18n));
     setText(need("#climate"), said.join(" · "));
   }
 
-  setInterval(onBeat, AGE_MS, drawCostmapAge);
+  function draw() {
+    drawPeople();
+    drawCostmapAge();
+    drawClimate();
+  }
+
+  setInterval(onBeat, AGE_MS, draw);
   store.subscribe("people", drawPeople);
   store.subscribe("coverage", drawPeople);
   store.subscribe("costmap", drawCostmapAge);
   store.subscribe("climate", drawClimate);
-  return () => {
-    drawPeople();
-    drawCostmapAge();
-    drawClimate();
-  };
+  return draw;
 }
 
 /**
@@ -95,5 +104,11 @@ export function coverageSaid(coverage, i18n) {
   return { text: i18n.t("map.coverage_share", { share }), isBlind: false };
 }
 
-/** @param {Person} person */
-const isPresent = (person) => person.class === "person" && person.stage !== "last_seen";
+/**
+ * Whether somebody is still about, as the map shows it: silence makes people of the past.
+ *
+ * @param {Person} person @param {number} nowMs
+ */
+function isPresent(person, nowMs) {
+  return person.class === "person" && readPerson(person, nowMs).stage !== "last_seen";
+}
