@@ -38,6 +38,20 @@ test("13.3: each sign is drawn by its layer", () => {
   );
 });
 
+test("the age of a late robot is written in the ink of its ground", () => {
+  const canvas = document.createElement("canvas");
+  canvas.id = "map";
+  canvas.style.setProperty("--on-alert-2", "#123456");
+  document.body.replaceChildren(canvas);
+  const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  /** @type {unknown[]} */
+  const written = [];
+  ctx.fillText = (text) => written.push([text, ctx.fillStyle]);
+  const late = SIGNS.filter(({ name }) => name === "late");
+  for (const sign of late) paintSign(canvas, sign, createLabels(words.t, "en"));
+  equal(written.at(-1), ["1.8 s", "#123456"]);
+});
+
 test("13.17: the costmap is off until somebody switches it on", () => {
   const choices = createChoices(null, () => {});
   equal([choices.isOn("costmap"), choices.isOn("coverage")], [false, true]);

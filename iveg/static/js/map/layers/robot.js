@@ -265,8 +265,8 @@ function drawTag(paint, robot, length) {
   });
   let x = ctx.measureText(robot.id).width / 2 + 6;
   if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
-  for (const [text, fill] of tagsOf(paint, robot)) {
-    x += pill(paint, text, x, y, fill, theme.bg) + 4;
+  for (const [text, fill, ink] of tagsOf(paint, robot)) {
+    x += pill(paint, text, x, y, fill, ink) + 4;
   }
 }
 
@@ -300,16 +300,17 @@ function heightOfTag(paint, robot, length) {
 /**
  * @param {Paint} paint
  * @param {SceneRobot} robot
- * @returns {[string, string][]} words and their ground
+ * @returns {[string, string, string][]} words, their ground and their ink
  */
 function tagsOf({ theme, labels }, robot) {
-  /** @type {[string, string][]} */
+  const { alert, bg, muted, onAlert2, text } = theme;
+  /** @type {[string, string, string][]} */
   const tags = [];
-  if (robot.link === "LATE") tags.push([labels.age(robot.ageS), theme.alert[1]]);
-  if (robot.link === "LOST") tags.push([labels.ago(robot.ageS), theme.muted]);
+  if (robot.link === "LATE") tags.push([labels.age(robot.ageS), alert[1], onAlert2]);
+  if (robot.link === "LOST") tags.push([labels.ago(robot.ageS), muted, bg]);
   if (robot.mode === "SLOW" && robot.link !== "LOST") {
-    tags.push([labels.percent(LIMITS.slow_factor), theme.text]);
+    tags.push([labels.percent(LIMITS.slow_factor), text, bg]);
   }
-  if (robot.replay) tags.push([labels.replay(), theme.muted]);
+  if (robot.replay) tags.push([labels.replay(), muted, bg]);
   return tags;
 }

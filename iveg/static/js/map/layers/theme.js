@@ -4,7 +4,7 @@
  * @typedef {{
  *   bg: string, lane: string, crop: string, post: string, text: string, grid: string,
  *   person: string, peer: string, ring: string, muted: string,
- *   alert: [string, string, string], robots: string[], font: string,
+ *   alert: [string, string, string], onAlert2: string, robots: string[], font: string,
  * }} Theme `robots[slot - 1]` is a robot's hue
  */
 
@@ -26,6 +26,7 @@ export const PAPER = {
   "--alert-1": "#c62828",
   "--alert-2": "#b26a00",
   "--alert-3": "#51708a",
+  "--on-alert-2": "#ffffff",
   "--robot-1": "#0b6fa4",
   "--robot-2": "#8a3f9e",
   "--robot-3": "#00796b",
@@ -80,6 +81,7 @@ function build(colour, font) {
     ring: colour("--ring"),
     muted: colour("--muted"),
     alert: [colour("--alert-1"), colour("--alert-2"), colour("--alert-3")],
+    onAlert2: colour("--on-alert-2"),
     robots,
     font,
   };
