@@ -52,6 +52,28 @@ test("the age of a late robot is written in the ink of its ground", () => {
   equal(written.at(-1), ["1.8 s", "#123456"]);
 });
 
+test("no words of a sign are cut off", () => {
+  const words = /** @type {any} */ ({
+    t: (/** @type {string} */ key) => (key === "map.ghost" ? "hace 5 s" : "m"),
+  });
+  /** @type {string[]} */
+  const cut = [];
+  for (const sign of SIGNS) {
+    const canvas = document.createElement("canvas");
+    const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    ctx.fillText = (text, x) => {
+      const { a, c, e, d } = ctx.getTransform();
+      if (c !== 0) return;
+      const width = ctx.measureText(text).width;
+      const left = x - (ctx.textAlign === "center" ? width / 2 : 0);
+      const [from, to] = [left * a + e, (left + width) * a + e];
+      if (from < 0 || to > 88 * d) cut.push(`${sign.name}: ${text}`);
+    };
+    paintSign(canvas, sign, createLabels(words.t, "es"));
+  }
+  equal(cut, []);
+});
+
 test("13.17: the costmap is off until somebody switches it on", () => {
   const choices = createChoices(null, () => {});
   equal([choices.isOn("costmap"), choices.isOn("coverage")], [false, true]);

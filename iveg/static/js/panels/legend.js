@@ -115,8 +115,8 @@ export const SIGNS = [
     name: "lost",
     layer: "robot",
     draw: robots.draw,
-    scene: oneRobot({ link: "LOST", ageS: 12 }),
-    right: 0.95,
+    scene: oneRobot({ link: "LOST", ageS: 5 }),
+    right: 1.5,
     up: 0.75,
   },
   {
