@@ -62,10 +62,20 @@ test("13.8 a margin that nobody knows has no number", () => {
   const margin = /** @type {import("../../iveg/static/js/core/protocol.js").Margin} */ (
     /** @type {unknown} */ ({ margin_m: -20.2, band: "unknown", person_id: "P1" })
   );
-  equal(marginSaid(margin, words), "robot.margin_band.unknown");
-  equal(marginSaid(null, words), "robot.margin_nobody");
+  equal(marginSaid(robot({ margin }), words), "robot.margin_band.unknown");
+  equal(marginSaid(robot(), words), "robot.margin_nobody");
   const known = { ...margin, margin_m: 1.2, band: /** @type {const} */ ("clear") };
-  equal(marginSaid(known, words), "robot.margin_value 1.2 robot.margin_band.clear");
+  const near = robot({ margin: known });
+  equal(marginSaid(near, words), "robot.margin_value 1.2 robot.margin_band.clear");
+});
+
+test("a robot that is lost has no margin, and its way is not said to be clear", () => {
+  const margin = { margin_m: 1.2, band: "clear", person_id: "P1" };
+  const lost = robot({ age_s: 9, margin });
+  equal(marginSaid(lost, words), "robot.margin_lost");
+  equal(whySaid(lost, words), "");
+  const limited = { speed_factor: 0.5, reason: "stale", distance_m: null };
+  equal(whySaid(robot({ age_s: 9, speed_limit: limited }), words), "robot.why.stale ");
 });
 
 test("13.5 a robot that was never heard has no speed, no limit and no reason", () => {

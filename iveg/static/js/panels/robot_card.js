@@ -126,12 +126,7 @@ export class RobotCard {
     for (const [field, said] of readoutsSaid(robot, i18n))
       setText(this.#fields[field], said);
     setText(certainty, certaintySaid(store.detections().get(this.#robotId), i18n));
-    setAttribute(
-      this.#parts["margin-line"],
-      "data-band",
-      robot?.margin?.band ?? "none",
-    );
-    setText(margin, marginSaid(robot?.margin ?? null, i18n));
+    setText(margin, marginSaid(robot, i18n));
     setText(task, taskSaid(robot?.navigation?.task, i18n));
     drawReadings(readings, robot, i18n);
   }

@@ -4,13 +4,12 @@
  * An unknown value is said to be unknown: never a clear way, a speed or a margin.
  */
 
-import { ageOf } from "../core/clock.js";
+import { ageOf, linkOfRobot } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
 import { readingOf } from "./gauge.js";
 
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 /** @typedef {import("../core/protocol.js").DetectionFrame} DetectionFrame */
-/** @typedef {import("../core/protocol.js").Margin} Margin */
 /** @typedef {import("../core/protocol.js").Robot} Robot */
 
 /** Shown as 0.00 (m/s, rad/s). */
@@ -59,7 +58,8 @@ export function whySaid(robot, i18n) {
   if (distance === null && (reason === "person" || reason === "robot")) {
     return i18n.t(`why.${reason}`);
   }
-  if (!reason || (reason === "clear" && isWaiting(robot))) return "";
+  const isHollow = isWaiting(robot) || linkOfRobot(robot) === "LOST";
+  if (!reason || (reason === "clear" && isHollow)) return "";
   return i18n.t(`robot.why.${reason}`, { distance });
 }
 
@@ -90,8 +90,10 @@ export function faultsSaid(robot, i18n) {
   });
 }
 
-/** @param {Margin | null} margin @param {I18n} i18n */
-export function marginSaid(margin, i18n) {
+/** @param {Robot | undefined} robot @param {I18n} i18n */
+export function marginSaid(robot, i18n) {
+  if (linkOfRobot(robot) === "LOST") return i18n.t("robot.margin_lost");
+  const margin = robot?.margin;
   if (!margin) return i18n.t("robot.margin_nobody");
   const band = i18n.t(`robot.margin_band.${margin.band}`);
   if (margin.band === "unknown") return band;
