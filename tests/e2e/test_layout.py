@@ -121,6 +121,17 @@ def test_13_19_a_low_screen_is_mostly_map(fleet: Fleet) -> None:
         assert box["height"] >= high, size
 
 
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_a_tablet_shows_the_strip_of_time_above_the_stops(fleet: Fleet) -> None:
+    page = fleet.at((768, 1024))
+    strip = page.locator(".timebar").bounding_box()
+    stops = page.locator("#stops").bounding_box()
+    assert strip is not None
+    assert stops is not None
+    border_px = 1
+    assert strip["y"] + strip["height"] <= stops["y"] + border_px
+
+
 HELD = {"mode": "STOPPED", "holds": [{"id": "x", "source": "hw", "ack": "local"}]}
 SILENT = {"pose": None, "twist": None, "applied": None, "age_s": None}
 STATES: tuple[dict[str, Any], ...] = (
