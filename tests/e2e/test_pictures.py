@@ -67,7 +67,7 @@ CASES = (
     Case("commands", "/commands", 768, 1024, "dark", "en", "#orders-rows tbody tr"),
     Case("fleet", "/fleet", 1440, 900, "light", "en", "#machines tbody tr"),
     Case("climate", "/climate", 768, 1024, "sunlight", "es", "#trend-co2 .main-svg"),
-    Case("history", "/history", 1440, 900, "dark", "es", "#chart-stops .main-svg"),
+    Case("history", "/history", 1440, 900, "sunlight", "es", "#chart-stops .main-svg"),
     Case("settings", "/settings", 390, 844, "light", "es", "#class-save"),
 )
 

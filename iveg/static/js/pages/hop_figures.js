@@ -14,7 +14,7 @@ const COLOURS = /** @type {Record<string, string>} */ ({
   uplink: "--robot-1",
   fiware: "--robot-2",
   iveg: "--text-2",
-  screen: "--line-strong",
+  screen: "--hop-screen",
 });
 const DASHES = /** @type {Record<string, string>} */ ({
   odometry: "solid",

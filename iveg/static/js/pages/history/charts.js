@@ -187,7 +187,7 @@ export function styled(layout, asked, i18n) {
 /** A time in which a robot was to be slow. @param {Record<string, any>} shape */
 function shaded(shape) {
   const [x0, x1] = [wallText(shape.x0), wallText(shape.x1)];
-  return { ...shape, x0, x1, fillcolor: token("--line"), line: { width: 0 } };
+  return { ...shape, x0, x1, fillcolor: token("--gauge"), line: { width: 0 } };
 }
 
 /**
