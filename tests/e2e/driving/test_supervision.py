@@ -35,6 +35,7 @@ def test_a_distance_is_measured_with_two_taps_and_with_keys(page: Page) -> None:
     canvas.focus()
     page.keyboard.press("Enter")
     expect(page.locator("#measured")).to_contain_text("segundo punto")
+    page.locator("#map-measure").focus()
     page.keyboard.press("Escape")
     expect(page.locator("#measured")).to_be_hidden()
 

@@ -96,9 +96,12 @@ export function createMapbox(app, decision) {
   need("#map-measure").addEventListener("click", () =>
     map.setMeasuring(!map.isMeasuring()),
   );
-  canvas.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") map.setMeasuring(false);
-  });
+  // Before the panels hear it: the key that closes a panel ends no measuring.
+  const isPanelOpen = () => document.body.hasAttribute("data-panel");
+  function onKey(/** @type {KeyboardEvent} */ { key }) {
+    if (key === "Escape" && !isPanelOpen()) map.setMeasuring(false);
+  }
+  document.addEventListener("keydown", onKey, { capture: true });
   need("#layers").addEventListener("change", showHidden);
   wireZoom(map);
   document.addEventListener("iveg:follow", (event) => {
