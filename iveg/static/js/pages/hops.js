@@ -188,7 +188,10 @@ function drawStreams({ streams }, i18n) {
     i18n.number(value, decimals);
   const rows = streams.map((one) => {
     const row = make("tr");
-    const kept = one.kept_back === null ? NOTHING : `${number(100 * one.kept_back)} %`;
+    const kept =
+      one.kept_back === null
+        ? NOTHING
+        : i18n.t("hops.kept_back", { share: one.kept_back });
     const texts = [
       number(one.heard_hz, 1),
       number(one.agent_hz, 1),
