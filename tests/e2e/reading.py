@@ -76,6 +76,11 @@ COVERED_STOPS = """() => [...document.querySelectorAll('[data-stop]')]
 """Which visible STOPs a finger at their centre would miss, and what it would hit.
 Those of cards may have to be scrolled to; those of the strip are always in sight."""
 
+RUN_OVER = """() => [...document.querySelectorAll('td')]
+  .filter((cell) => cell.scrollHeight > cell.clientHeight + 1)
+  .map((cell) => cell.innerText)"""
+"""The words of table cells that run into the cell below."""
+
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 """By how much the page is wider than the screen (px)."""
 

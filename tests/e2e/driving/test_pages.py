@@ -11,6 +11,7 @@ from playwright.sync_api import Page, Route, expect
 from tests.e2e.conftest import OpenPage
 from tests.e2e.reading import (
     OVERFLOW,
+    RUN_OVER,
     evaluate,
     serious,
     strip_stop,
@@ -98,6 +99,7 @@ def test_a_new_stop_appears_on_the_commands_page_by_itself(
 
     expect(rows.first).to_contain_text("operator", timeout=30_000)
     assert rows.count() > before
+    assert evaluate(page, RUN_OVER) == []
 
 
 def test_paper_gets_the_table_and_no_stop(open_page: OpenPage, shown: Site) -> None:
@@ -197,6 +199,8 @@ def test_the_latency_page_shows_the_papers_table_live_beside_what_it_printed(
     expect(printed).to_contain_text("16,9 · 103,9")
     expect(page.locator("#hops-bars .main-svg").first).to_be_visible()
     expect(page.locator("#hops-cdf .main-svg").first).to_be_visible()
+    way = re.compile(r"^AGII?, [^,]+, \d\d:\d\d:\d\d: \d+,\d ms del reloj")
+    expect(page.locator("#hops-trace-says")).to_have_text(way)
     expect(page.locator("#hops-clocks")).to_contain_text("AGI: reloj en hora")
 
     page.click('[data-of="AGI"]')
