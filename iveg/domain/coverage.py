@@ -64,8 +64,6 @@ class Coverage:
 
     def update(self, robots: Iterable[RobotState], now: Instant) -> None:
         """Take in what the cameras of these robots look at now."""
-        if not len(self._centres):
-            return
         for robot in robots:
             seen = visible_from(robot, self._centres, self._greenhouse, now)
             self._looked_at[seen] = now.mono

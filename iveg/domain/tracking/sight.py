@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.geometry import Pose2D, wrap_angle
+from iveg.domain.geometry import Pose2D
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -40,55 +40,35 @@ class AllClear:
     ) -> list[Person]:
         """Remove rings whose centre is seen to be empty; returns their persons."""
         watched: dict[_Look, float] = {}
-        cleared: list[Person] = []
-        for person in list(people.known.values()):
-            for sighting in list(person.sightings):
-                if not LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s:
+        empty: set[int] = set()
+        rings = [
+            (person, sighting)
+            for person in people.known.values()
+            for sighting in person.sightings
+            if _may_go(sighting, world, now)
+        ]
+        spots = np.array([(ring.x, ring.y) for _, ring in rings]).reshape(-1, 2)
+        for robot in world.live_robots():
+            for index in visible_from(robot, spots, greenhouse, now).tolist():
+                person, sighting = rings[index]
+                if people.is_suspected(person, sighting, robot.robot_id):
                     continue
-                if sighting.reach_m > 0.0:  # the place is unknown
-                    continue
-                if world.robot(sighting.observer).is_replay:  # no place of today
-                    continue
-                lookers = [
-                    robot.robot_id
-                    for robot in world.live_robots()
-                    if can_see(robot, sighting.x, sighting.y, greenhouse, now)
-                    and not people.is_suspected(person, sighting, robot.robot_id)
-                ]
-                if self._is_empty(sighting, lookers, now, watched):
-                    cleared.append(people.drop_sighting(person.person_id, sighting))
+                pair = sighting.chain, robot.robot_id
+                watched[pair] = self._since.get(pair, now.mono)
+                if now.mono - watched[pair] >= CLEAR_S:
+                    empty.add(index)
         self._since = watched
-        return cleared
-
-    def _is_empty(
-        self,
-        sighting: Sighting,
-        lookers: list[str],
-        now: Instant,
-        watched: dict[_Look, float],
-    ) -> bool:
-        for robot_id in lookers:
-            pair = sighting.chain, robot_id
-            watched[pair] = self._since.get(pair, now.mono)
-            if now.mono - watched[pair] >= CLEAR_S:
-                return True
-        return False
+        return [
+            people.drop_sighting(person.person_id, sighting)
+            for person, sighting in (rings[index] for index in sorted(empty))
+        ]
 
 
-def can_see(
-    robot: RobotState, x: float, y: float, greenhouse: Greenhouse, now: Instant
-) -> bool:
-    """Whether a robot's camera has a spot in view now, with nothing in between."""
-    camera = _camera_of(robot, now)
-    if camera is None:
-        return False
-    profile = robot.profile
-    distance = camera.distance_to(x, y)
-    if not _NEAR_M <= distance <= _RANGE_SHARE * profile.camera_range:
-        return False
-    bearing = wrap_angle(math.atan2(y - camera.y, x - camera.x) - camera.yaw)
-    in_picture = abs(bearing) <= profile.camera_fov / 2 - _EDGE_RAD
-    return in_picture and greenhouse.in_sight(camera.x, camera.y, x, y)
+def _may_go(sighting: Sighting, world: World, now: Instant) -> bool:
+    """Whether a sighting is old enough, of a known place, and of a robot of today."""
+    is_old = LIMITS.seen_s < sighting.age_s(now) <= LIMITS.ring_lasts_s
+    is_placed = sighting.reach_m == 0.0
+    return is_old and is_placed and not world.robot(sighting.observer).is_replay
 
 
 def visible_from(
@@ -102,7 +82,7 @@ def visible_from(
         greenhouse: What stands in between.
         now: This moment.
     """
-    camera = _camera_of(robot, now)
+    camera = _camera_of(robot, now) if len(spots) else None
     if camera is None:
         return _NONE
     profile = robot.profile

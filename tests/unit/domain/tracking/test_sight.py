@@ -1,10 +1,19 @@
 """A ring ends because somebody has looked there in vain, never for one empty frame."""
 
+import numpy as np
 import pytest
 
-from iveg.domain.tracking.sight import can_see
+from iveg.domain.tracking.sight import visible_from
 from tests.builders import at, detection
 from tests.unit.domain.scene import HEDGE, Scene, person
+
+
+def can_see(
+    scene: Scene, x: float, y: float, *, robot_id: str = "AGI", now: float = 0.0
+) -> bool:
+    """Whether a robot's camera has a spot in view."""
+    robot, spots = scene.world.robot(robot_id), np.array([[x, y]])
+    return visible_from(robot, spots, scene.greenhouse, at(now)).size == 1
 
 
 def watched(
@@ -102,7 +111,7 @@ def test_a_robot_that_nobody_described_clears_nothing() -> None:
     scene.drive("AG3", 0.0)
     scene.look("AG3")
 
-    assert not can_see(scene.world.robot("AG3"), 4.0, 0.0, scene.greenhouse, at(1.1))
+    assert not can_see(scene, 4.0, 0.0, robot_id="AG3", now=1.1)
 
 
 def test_only_the_circles_that_were_looked_at_go() -> None:
@@ -134,7 +143,7 @@ def test_a_camera_vouches_for_what_it_sees_well(x: float, y: float, sees: bool) 
     scene.drive("AGI", 0.0)
     scene.look("AGI")
 
-    assert can_see(scene.world.robot("AGI"), x, y, scene.greenhouse, at(0.0)) is sees
+    assert can_see(scene, x, y) is sees
 
 
 @pytest.mark.parametrize(("age", "sees"), [(0.4, True), (0.6, False), (2.0, False)])
@@ -143,13 +152,11 @@ def test_an_old_look_vouches_for_nothing(age: float, sees: bool) -> None:
     scene.drive("AGI", 0.0)
     scene.look("AGI")
 
-    assert (
-        can_see(scene.world.robot("AGI"), 4.0, 0.0, scene.greenhouse, at(age)) is sees
-    )
+    assert can_see(scene, 4.0, 0.0, now=age) is sees
 
 
 def test_a_robot_that_never_looked_vouches_for_nothing() -> None:
     scene = Scene()
     scene.drive("AGI", 0.0)
 
-    assert not can_see(scene.world.robot("AGI"), 4.0, 0.0, scene.greenhouse, at(0.0))
+    assert not can_see(scene, 4.0, 0.0)
