@@ -9,7 +9,7 @@ import time
 
 from iveg.domain.age import FeedbackLedger
 from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.latency.account import collect, merge, spread_of
+from iveg.domain.latency.account import collect, merge
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import (
     FeedbackRef,
@@ -49,7 +49,7 @@ def main() -> None:
     parts = collect(watch.streams, "15min")
     collected = time.thread_time() - began
     for sketch in merge(parts).values():
-        spread_of(sketch)
+        sketch.quantile(0.95)
     answered = time.thread_time() - began
     share = (spent + ticked) / SECONDS
     print("| what | cost |\n|---|---|")

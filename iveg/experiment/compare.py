@@ -8,7 +8,7 @@ from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, Segment
 from iveg.experiment.outcome import slices_of
 from iveg.experiment.paper_tables import CLASSES
-from iveg.experiment.slices import latency_changes, spreads
+from iveg.experiment.slices import latency_changes, whole
 from iveg.experiment.statistics import Interval, difference, verdict
 
 Result = Mapping[str, Any]
@@ -55,12 +55,14 @@ def _rates(before: Result, after: Result) -> Iterator[tuple[str, Interval, Inter
 def _latencies(before: Result, after: Result) -> Iterator[str]:
     """Bootstrapped intervals; a longer time is worse."""
     old, new = slices_of(before), slices_of(after)
-    was, now = spreads(old), spreads(new)
+    was, now = whole(old), whole(new)
     cells: list[Cell] = [(data, hop) for data in DATA for hop in _HOPS]
     for cell in cells:
         for name, between in latency_changes(old, new, cell):
             one, other = was[cell], now[cell]
-            pair = (one.mean, other.mean) if name == "mean" else (one.p95, other.p95)
+            pair = one.mean, other.mean
+            if name == "P95":
+                pair = one.quantile(0.95), other.quantile(0.95)
             shown = "".join(f"{1000.0 * (value or 0.0):>12.2f}" for value in pair)
             better = Interval(-between.share, -between.high, -between.low)
             told = f"{between.low:.2f} to {between.high:.2f}: {verdict(better)}"

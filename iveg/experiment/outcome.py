@@ -11,14 +11,14 @@ from typing import Any
 import orjson
 
 from iveg import __version__
-from iveg.domain.latency.account import LatencySummary
 from iveg.domain.latency.segments import DATA, SEGMENTS
+from iveg.domain.latency.sketch import Sketch
 from iveg.experiment.beliefs import injections
 from iveg.experiment.observer import ObservedRun, slowdowns_of
 from iveg.experiment.paper_tables import CLASSES
 from iveg.experiment.plan import Plan, PlannedRun
 from iveg.experiment.scoring import Picture, SeenObject, Tally, paired, score, tally
-from iveg.experiment.slices import Slice, spreads
+from iveg.experiment.slices import Slice, whole
 from iveg.experiment.statistics import thinned
 from iveg.experiment.virtual_run import VirtualRunResult
 
@@ -146,23 +146,23 @@ def scored(classes: Sequence[str], runs: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def _rows(slices: Sequence[Slice]) -> list[dict[str, Any]]:
-    found = spreads(slices)
+    found = whole(slices)
     return [
         {"data": data, "hops": {hop: _told(found[data, hop]) for hop in SEGMENTS}}
         for data in DATA
     ]
 
 
-def _told(of: LatencySummary) -> dict[str, Any]:
+def _told(of: Sketch) -> dict[str, Any]:
     def ms(seconds: float | None) -> float | None:
         return None if seconds is None else round(1000.0 * seconds, 2)
 
     return {
         "count": of.count,
         "mean_ms": ms(of.mean),
-        "p50_ms": ms(of.p50),
-        "p95_ms": ms(of.p95),
-        "p99_ms": ms(of.p99),
+        "p50_ms": ms(of.quantile(0.50)),
+        "p95_ms": ms(of.quantile(0.95)),
+        "p99_ms": ms(of.quantile(0.99)),
     }
 
 

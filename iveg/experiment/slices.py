@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from iveg.domain.latency.account import Cell, LatencySummary, spread_of
+from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, SEGMENTS
 from iveg.domain.latency.sketch import Sketch, from_bins, merged
 from iveg.experiment.statistics import Interval
@@ -66,11 +66,6 @@ def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
     """All slices combined."""
     cells: list[Cell] = [(data, hop) for data in DATA for hop in SEGMENTS]
     return {cell: merged(sketches_of(slices, cell)) for cell in cells}
-
-
-def spreads(slices: Sequence[Slice]) -> dict[Cell, LatencySummary]:
-    """Statistics of all slices combined."""
-    return {cell: spread_of(sketch) for cell, sketch in whole(slices).items()}
 
 
 def latency_changes(

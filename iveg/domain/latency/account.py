@@ -1,30 +1,16 @@
-"""The numbers of the latency page: each hop of each kind of data over one window.
+"""What the latency page tells: each hop of each kind of data over one window.
 
-Collecting is quick and belongs to the loop, since streams live there; merging and
-summing up need finished sketches alone and may be done in any thread.
+Collecting is quick and belongs to the loop, since streams live there; merging needs
+finished sketches alone and may be done in any thread.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from iveg.domain.latency.segments import DATA, SEGMENTS, Data, Segment, Window
 from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.stream import Stream
 
 Cell = tuple[Data, Segment]
-
-
-@dataclass(frozen=True, slots=True)
-class LatencySummary:
-    """One hop of one kind of data (s); None where nothing was measured."""
-
-    count: int
-    mean: float | None
-    p50: float | None
-    p95: float | None
-    p99: float | None
-    least: float | None
-    most: float | None
 
 
 def collect(
@@ -44,18 +30,3 @@ def collect(
 def merge(parts: Mapping[Cell, list[Sketch]]) -> dict[Cell, Sketch]:
     """One sketch a cell; for any thread."""
     return {cell: merged(sketches) for cell, sketches in parts.items()}
-
-
-def spread_of(sketch: Sketch) -> LatencySummary:
-    """Its numbers."""
-    if not sketch.count:
-        return LatencySummary(0, None, None, None, None, None, None)
-    return LatencySummary(
-        sketch.count,
-        sketch.mean,
-        sketch.quantile(0.50),
-        sketch.quantile(0.95),
-        sketch.quantile(0.99),
-        sketch.least,
-        sketch.most,
-    )

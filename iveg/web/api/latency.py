@@ -12,7 +12,7 @@ from fastapi import APIRouter, Depends, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from iveg.domain.latency.account import Cell, LatencySummary, collect, merge, spread_of
+from iveg.domain.latency.account import Cell, collect, merge
 from iveg.domain.latency.offset import ClockOffset
 from iveg.domain.latency.paper import PAPER
 from iveg.domain.latency.segments import DATA, SEGMENTS, WINDOW_S, Data, Segment, Window
@@ -128,23 +128,21 @@ def _finished(
 ) -> bytes:
     """The whole answer; in a thread of its own."""
     sketches = merge(parts)
-    spreads = {cell: spread_of(sketch) for cell, sketch in sketches.items()}
     traced, newest = told.pop("traced"), told.pop("newest")
     sampled = told.pop("sampled")
     figures = {}
     if asked.figures:
         figures = {
-            "bars": bars_figure(spreads),
+            "bars": bars_figure(sketches),
             "cdf": cdf_figure(sketches),
             "trace": trace_figure(newest),
         }
     library = charts.library()
     answer = LatencyTable(
         **told,
-        direct=any(spreads[data, "uplink"].count for data in DATA),
+        direct=any(sketches[data, "uplink"].count for data in DATA),
         rows=[
-            _row(data, spreads, sampled[data], sketches if asked.bins else None)
-            for data in DATA
+            _row(data, sketches, sampled[data], with_bins=asked.bins) for data in DATA
         ],
         trace=None if traced is None else _trace(traced, newest),
         library=f"/vendor/{library.name}",
@@ -164,17 +162,17 @@ def _trace(of: tuple[str, Data], newest: Trace) -> LatencyTrace:
 
 def _row(
     data: Data,
-    spreads: Mapping[Cell, LatencySummary],
+    sketches: Mapping[Cell, Sketch],
     sampled: list[Segment],
-    sketches: Mapping[Cell, Sketch] | None,
+    *,
+    with_bins: bool,
 ) -> LatencyRow:
+    hops = {hop: sketches[data, hop] for hop in SEGMENTS}
     return LatencyRow(
         data=data,
-        hops={hop: _spread(spreads[data, hop]) for hop in SEGMENTS},
+        hops={hop: _spread(sketch) for hop, sketch in hops.items()},
         sampled=list(sampled),
-        bins=None
-        if sketches is None
-        else {hop: _bins(sketches[data, hop]) for hop in SEGMENTS},
+        bins={hop: _bins(one) for hop, one in hops.items()} if with_bins else None,
     )
 
 
@@ -196,15 +194,15 @@ def _sampled(streams: Iterable[Stream]) -> dict[Data, list[Segment]]:
     }
 
 
-def _spread(of: LatencySummary) -> SegmentSpread:
+def _spread(of: Sketch) -> SegmentSpread:
     return SegmentSpread(
         count=of.count,
         mean_ms=_ms(of.mean),
-        p50_ms=_ms(of.p50),
-        p95_ms=_ms(of.p95),
-        p99_ms=_ms(of.p99),
-        least_ms=_ms(of.least),
-        most_ms=_ms(of.most),
+        p50_ms=_ms(of.quantile(0.50)),
+        p95_ms=_ms(of.quantile(0.95)),
+        p99_ms=_ms(of.quantile(0.99)),
+        least_ms=_ms(of.least if of.count else None),
+        most_ms=_ms(of.most if of.count else None),
     )
 
 
@@ -254,7 +252,7 @@ def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
     names = list(SegmentSpread.model_fields)
     lines.writerow(["data", "hop", *names])
     for (data, hop), sketch in sketches.items():
-        told = vars(_spread(spread_of(sketch)))
+        told = vars(_spread(sketch))
         cells = ("" if told[name] is None else told[name] for name in names)
         lines.writerow([data, hop, *cells])
     return text.getvalue().encode()

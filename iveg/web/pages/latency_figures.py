@@ -6,7 +6,7 @@ Traces name what they show in ``meta``; the page gives them words and colours.
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from iveg.domain.latency.account import Cell, LatencySummary
+from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, Segment
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.trace import Trace
@@ -18,9 +18,9 @@ _Trace = Mapping[str, object]
 _MOST_POINTS = 200
 
 
-def bars_figure(spreads: Mapping[Cell, LatencySummary]) -> bytes:
+def bars_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
     """Mean of each hop (ms), stacked by kind of data, with a whisker to its P95."""
-    traces = [trace for hop in STEPS for trace in _bars(spreads, hop)]
+    traces = [trace for hop in STEPS for trace in _bars(sketches, hop)]
     return figure_of(traces, ("data", "ms"), {"barmode": "stack"})
 
 
@@ -78,8 +78,8 @@ def steps_of(trace: Trace | None) -> list[SegmentStep]:
     ]
 
 
-def _bars(spreads: Mapping[Cell, LatencySummary], hop: Segment) -> Iterator[_Trace]:
-    found = {data: spreads[data, hop] for data in DATA}
+def _bars(sketches: Mapping[Cell, Sketch], hop: Segment) -> Iterator[_Trace]:
+    found = {data: sketches[data, hop] for data in DATA}
     measured = {data: one for data, one in found.items() if one.mean is not None}
     if not measured:
         return
@@ -94,7 +94,7 @@ def _bars(spreads: Mapping[Cell, LatencySummary], hop: Segment) -> Iterator[_Tra
             "type": "data",
             "symmetric": False,
             "array": [
-                round(max(0.0, 1000.0 * (one.p95 or 0.0) - means[data]), 3)
+                round(max(0.0, 1000.0 * (one.quantile(0.95) or 0.0) - means[data]), 3)
                 for data, one in measured.items()
             ],
             "arrayminus": [0.0] * len(measured),
