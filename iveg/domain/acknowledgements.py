@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from iveg.domain.decisions import Decision
 from iveg.domain.observations import Instant
-from iveg.domain.stop.latency import nearest_rank
+from iveg.domain.ranks import nearest_rank
 
 WINDOW_S = 300.0
 ECHO_S = 1.0
@@ -57,9 +57,9 @@ def acknowledgements_of(
     took = sorted(one.took_s for one in timed if one.took_s is not None)
     return Acknowledgements(
         timed=len(took),
-        p50_s=nearest_rank(took, 0.50) if took else None,
-        p95_s=nearest_rank(took, 0.95) if took else None,
-        p99_s=nearest_rank(took, 0.99) if took else None,
+        p50_s=nearest_rank(took, 0.50),
+        p95_s=nearest_rank(took, 0.95),
+        p99_s=nearest_rank(took, 0.99),
         echo_age_s=_age((one.answered_at for one in timed), now),
         asked=len(due),
         missed=sum(not _is_acknowledged(one) for one in due),

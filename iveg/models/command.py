@@ -1,17 +1,17 @@
 """STOP, release and resume as people follow them, live and remembered."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from typing import Literal
 
 from iveg.domain import stop
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.ranks import nearest_rank
 from iveg.domain.records import ByTransport, CommandEventRecord, CommandRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import StopMachine
 from iveg.domain.stop.commands import Times
-from iveg.domain.stop.latency import StopLatency
 from iveg.domain.stop.outcome import Outcome, outcome_of, was_loud
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from iveg.models.base import Model, Slots, rounded, stamp
@@ -239,13 +239,14 @@ class LatencySpread(Model):
     max_ms: float | None
 
     @classmethod
-    def of(cls, of: StopLatency) -> "LatencySpread":
-        """Rounded to a tenth of a millisecond."""
+    def of(cls, values: Iterable[float | None]) -> "LatencySpread":
+        """Of measured times, to a tenth of a millisecond; missing ones do not count."""
+        known = sorted(value for value in values if value is not None)
         return cls(
-            count=of.count,
-            p50_ms=rounded(of.p50, 1),
-            p95_ms=rounded(of.p95, 1),
-            max_ms=rounded(of.longest, 1),
+            count=len(known),
+            p50_ms=rounded(nearest_rank(known, 0.50), 1),
+            p95_ms=rounded(nearest_rank(known, 0.95), 1),
+            max_ms=rounded(nearest_rank(known, 1.0), 1),
         )
 
 

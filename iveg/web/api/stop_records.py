@@ -15,7 +15,6 @@ from iveg.adapters.history.series import CommandLatency
 from iveg.domain.observations import Instant
 from iveg.domain.records import ByTransport, CommandRecord
 from iveg.domain.stamps import format_stamp
-from iveg.domain.stop.latency import spread
 from iveg.domain.transports import DIRECT, FIWARE, TRANSPORTS, TransportId
 from iveg.models.base import Listing, rounded
 from iveg.models.command import (
@@ -93,14 +92,14 @@ def _robot(robot_id: str, stops: list[CommandLatency]) -> RobotLatency:
     return RobotLatency(
         robot_id=robot_id,
         stops=len(stops),
-        accepted=LatencySpread.of(spread(one.accepted_ms for one in stops)),
+        accepted=LatencySpread.of(one.accepted_ms for one in stops),
         sent=sent,
         answer=answer,
         sent_direct=sent[DIRECT.id],
         sent_fiware=sent[FIWARE.id],
         answer_direct=answer[DIRECT.id],
         answer_fiware=answer[FIWARE.id],
-        standing=LatencySpread.of(spread(one.standstill_ms for one in stops)),
+        standing=LatencySpread.of(one.standstill_ms for one in stops),
     )
 
 
@@ -109,7 +108,7 @@ def _by_transport(took: list[ByTransport]) -> dict[TransportId, LatencySpread]:
     known = dict.fromkeys(one.id for one in TRANSPORTS)
     known |= dict.fromkeys(transport for one in took for transport in one)
     return {
-        transport: LatencySpread.of(spread(one.get(transport) for one in took))
+        transport: LatencySpread.of(one.get(transport) for one in took)
         for transport in known
     }
 

@@ -9,7 +9,7 @@ import pytest
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
 from iveg.domain.records import CommandRecord
-from iveg.domain.stop.latency import StopLatency, spread
+from iveg.models.command import LatencySpread
 from iveg.web.api import stop_records
 from tests.builders import START
 from tests.unit.web.desk import WebDesk
@@ -101,5 +101,6 @@ async def test_a_command_of_an_earlier_run_is_found_in_the_history(
 def test_a_spread_is_of_what_was_measured() -> None:
     values = [float(number) for number in range(1, 101)]
 
-    assert spread([*values, None]) == StopLatency(100, 50.0, 95.0, 100.0)
-    assert spread([None]) == StopLatency(0, None, None, None)
+    some, none = LatencySpread.of([*values, None]), LatencySpread.of([None])
+    assert (some.count, some.p50_ms, some.p95_ms, some.max_ms) == (100, 50, 95, 100)
+    assert (none.count, none.p50_ms, none.p95_ms, none.max_ms) == (0, None, None, None)
