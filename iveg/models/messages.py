@@ -102,28 +102,24 @@ class MessageTest(Model):
 
 
 def _push(push: messages.Push, public_key: str | None, last: list[Told]) -> PushChannel:
-    devices = [
-        PushDevice(
-            device_id=one.device_id,
-            who=one.who,
-            language=one.language,
-            since=format_stamp(one.since),
-        )
-        for one in push.devices
-    ]
     return PushChannel(
         on=push.on,
         contact=push.contact,
         public_key=public_key,
-        devices=devices,
+        devices=[
+            PushDevice(
+                device_id=one.device_id,
+                who=one.who,
+                language=one.language,
+                since=format_stamp(one.since),
+            )
+            for one in push.devices
+        ],
         last=last,
     )
 
 
 def _email(email: messages.Email, last: list[Told]) -> EmailChannel:
-    recipients = [
-        Recipient(who=one.who, address=one.address) for one in email.recipients
-    ]
     return EmailChannel(
         on=email.on,
         server=email.server,
@@ -132,7 +128,9 @@ def _email(email: messages.Email, last: list[Told]) -> EmailChannel:
         user=email.user,
         has_password=bool(email.password),
         sender=email.sender,
-        recipients=recipients,
+        recipients=[
+            Recipient(who=one.who, address=one.address) for one in email.recipients
+        ],
         least=email.least,
         language=email.language,
         last=last,

@@ -131,10 +131,7 @@ class AlertBook:
     ) -> Alert | None:
         """Acknowledge all occurrences; None when there is no such alert."""
         alert = self.find(alert_id)
-        if alert is not None:
-            alert = _see(alert, by, note, now)
-            self._alerts[alert.condition.key, alert.condition.subject] = alert
-        return alert
+        return None if alert is None else self._keep(_see(alert, by, note, now))
 
     def told(
         self, alert_id: str, raised: Instant, deliveries: Iterable[Delivery]
@@ -149,9 +146,7 @@ class AlertBook:
             else one
             for one in alert.members
         )
-        alert = replace(alert, members=members)
-        self._alerts[alert.condition.key, alert.condition.subject] = alert
-        return alert
+        return self._keep(replace(alert, members=members))
 
     def remember(self, alerts: Iterable[Alert]) -> None:
         """Take up cleared, unacknowledged alerts of an earlier run; known ones stay.
@@ -170,6 +165,11 @@ class AlertBook:
         """An alert that is active or recently cleared."""
         found = (one for one in self._alerts.values() if one.alert_id == alert_id)
         return next(found, None)
+
+    def _keep(self, alert: Alert) -> Alert:
+        """Store the new value of an alert."""
+        self._alerts[alert.condition.key, alert.condition.subject] = alert
+        return alert
 
     def _forget(self, now: Instant) -> None:
         for key, alert in list(self._alerts.items()):
