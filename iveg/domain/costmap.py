@@ -55,11 +55,11 @@ class Grid:
     height: int
 
     @classmethod
-    def over(cls, area: Rectangle, resolution: float = RESOLUTION_M) -> "Grid":
+    def over(cls, area: Rectangle) -> "Grid":
         """The grid that covers an area with at most ``MAX_CELLS``."""
         wide, high = area.xmax - area.xmin, area.ymax - area.ymin
-        coarse = math.ceil(math.sqrt(wide * high / MAX_CELLS) / resolution)
-        side = resolution * max(1, coarse)
+        coarse = math.ceil(math.sqrt(wide * high / MAX_CELLS) / RESOLUTION_M)
+        side = RESOLUTION_M * max(1, coarse)
         width, height = (max(1, math.floor(s / side + 1e-9)) for s in (wide, high))
         return cls(side, area.xmin, area.ymin, width, height)
 

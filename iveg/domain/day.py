@@ -5,7 +5,7 @@ the way that a person and a robot move within that second.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import hypot
 
@@ -143,10 +143,3 @@ def _passing(pose: Pose, one: DaySighting, greenhouse: Greenhouse) -> Passing:
 
 def _is_same(one: Passing, other: Passing) -> bool:
     return one.robot_id == other.robot_id and abs(one.at - other.at) < _APART_S
-
-
-def due_drills(last: Mapping[str, float], days: float, by: float) -> list[str]:
-    """Robots whose last drill will be older than ``days`` at ``by`` (Unix s)."""
-    if days <= 0:
-        return []
-    return sorted(robot for robot, at in last.items() if by - at > days * 86_400.0)

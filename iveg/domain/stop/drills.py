@@ -35,8 +35,14 @@ class Drills:
 
     def conditions(self, now: Instant) -> Iterable[Condition]:
         """Conditions of robots whose last drill is older than the configured days."""
-        for robot_id, at in self.last.items():
-            age_days = (now.wall - at) / _DAY_S
-            if 0 < self._days < age_days:
-                slots: dict[str, Slot] = {"robot": robot_id, "days": int(age_days)}
-                yield Condition("P3", "alert.drill_due", robot_id, robot_id, slots)
+        for robot_id in due_drills(self.last, self._days, now.wall):
+            days = int((now.wall - self.last[robot_id]) / _DAY_S)
+            slots: dict[str, Slot] = {"robot": robot_id, "days": days}
+            yield Condition("P3", "alert.drill_due", robot_id, robot_id, slots)
+
+
+def due_drills(last: Mapping[str, float], days: float, by: float) -> list[str]:
+    """Robots whose last drill will be older than ``days`` at ``by`` (Unix s)."""
+    if days <= 0:
+        return []
+    return sorted(robot for robot, at in last.items() if by - at > days * _DAY_S)

@@ -14,7 +14,6 @@ from iveg.domain.alerts.alert_book import MOST_KEPT
 from iveg.domain.day import (
     Passing,
     closest_passes,
-    due_drills,
     slowed_minutes,
     worked_minutes,
 )
@@ -22,6 +21,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
+from iveg.domain.stop.drills import due_drills
 from iveg.models.base import write_json
 from iveg.models.command import Command
 from iveg.models.day import Day, Pass, Slowed, Worked

@@ -6,12 +6,12 @@ from iveg.domain.day import (
     DaySighting,
     Pose,
     closest_passes,
-    due_drills,
     slowed_minutes,
     worked_minutes,
 )
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane
+from iveg.domain.stop.drills import due_drills
 from tests.fakes.records import NOON, decision_record
 
 GREENHOUSE = Greenhouse(
