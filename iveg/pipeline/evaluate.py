@@ -89,7 +89,7 @@ class Evaluator:
         self._applied: dict[str, tuple[float, str]] = {}
         self._first_reports = FirstReports()
         self._low = LowValues()
-        self._moved: set[str] = set()
+        self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
         self._untold = False
 
@@ -161,10 +161,10 @@ class Evaluator:
         if at is None:
             return
         self._judge(at)
-        for robot_id in self._moved:
+        for robot_id, odometry in self._moved.items():
             robot, speed_limit = self.world.robot(robot_id), self.speed_limits[robot_id]
             self._event_log.odometry(
-                robot, speed_limit.speed_factor, robot.link(at), at
+                odometry, robot, speed_limit.speed_factor, robot.link(at), at
             )
         self._moved.clear()
 
@@ -172,7 +172,7 @@ class Evaluator:
         for decision in self.decisions.open_of(odometry.robot_id):
             self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
         self._unjudged = _later(self._unjudged, at)
-        self._moved.add(odometry.robot_id)
+        self._moved[odometry.robot_id] = odometry
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):

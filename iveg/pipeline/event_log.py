@@ -12,7 +12,7 @@ from typing import Any
 from iveg.domain.alerts.alert_book import Alert, Occurrence
 from iveg.domain.decisions import Decision
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import Climate, Instant, Observation
+from iveg.domain.observations import Climate, Instant, Observation, Odometry
 from iveg.domain.records import (
     AlertRecord,
     ClimateRecord,
@@ -127,11 +127,11 @@ class EventLog:
             )
         )
 
-    def odometry(self, robot: RobotState, limit: float, link: str, at: Instant) -> None:
+    def odometry(
+        self, read: Odometry, robot: RobotState, limit: float, link: str, at: Instant
+    ) -> None:
         """Record a pose, if it is one of the two a second that are kept."""
-        if robot.odometry is None:
-            return
-        pose, twist = robot.odometry.pose, robot.odometry.twist
+        pose, twist = read.pose, read.twist
         record = self._thinner.take(
             OdometryRecord(
                 at=at.wall,
