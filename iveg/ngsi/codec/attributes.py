@@ -50,26 +50,21 @@ def read_attributes(
         is_past: Tells by its identity what need not be read; None reads all.
     """
     readings = []
-    known = [name for name in attributes if name in _READERS]
+    known = attributes.keys() & _READERS.keys()
     # In the order of the table: where a robot is counts for what it sees there.
-    known.sort(key=_RANK.__getitem__)
-    for name in known:
+    for name in sorted(known, key=_RANK.__getitem__):
         if attributes[name] is None:
             continue
-        reader = _READERS[name]
         old = (
             None if is_past is None else _overtaken(robot_id, name, attributes, is_past)
         )
-        if old is None:
-            readings.append(read_one(robot_id, reader, attributes, name))
-        else:
-            readings.append(ReadResult((old,)))
+        readings.append(old or read_one(robot_id, _READERS[name], attributes, name))
     return readings[0] if len(readings) == 1 else merge(readings)
 
 
 def _overtaken(
     robot_id: str, name: str, attributes: Mapping[str, Any], is_past: IsPast
-) -> Overtaken | None:
+) -> ReadResult | None:
     """Remains of a message that is older than its stream; None where it may be new."""
     if name not in _IDENTITY:
         return None
@@ -86,7 +81,7 @@ def _overtaken(
         origin = read_origin(payloads.OriginFields.model_validate(raw))
     except ValidationError:
         return None
-    return Overtaken(robot_id, origin, kind)
+    return ReadResult((Overtaken(robot_id, origin, kind),))
 
 
 def read_one(
