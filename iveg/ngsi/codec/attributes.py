@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -279,24 +280,23 @@ def _single_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
     return _scan_of(robot_id, attributes["laser_scan"], attributes.get("lidar_header"))
 
 
-_POINT_HALF_SIZE = 0.25
+_HALF_M = 0.25
 """Algorithm 1 sends a point; it is drawn as a box of half a metre."""
 
 
 def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
     point = payloads.PointValue.model_validate(attributes.get("position_3D"))
-    size = _POINT_HALF_SIZE
     box = {
         "class_id": attributes["class"],
         "probability": attributes.get("conf"),
         "frame_id": "map",
         "position": {
-            "xmin": point.x - size,
-            "xmax": point.x + size,
-            "ymin": point.y - size,
-            "ymax": point.y + size,
-            "zmin": point.z - size,
-            "zmax": point.z + size,
+            "xmin": point.x - _HALF_M,
+            "xmax": point.x + _HALF_M,
+            "ymin": point.y - _HALF_M,
+            "ymax": point.y + _HALF_M,
+            "zmin": point.z - _HALF_M,
+            "zmax": point.z + _HALF_M,
         },
     }
     detection = _detection(box)
@@ -317,12 +317,11 @@ def _stamped(attributes: Mapping[str, Any]) -> Origin:
     return read_origin(payloads.OriginFields.model_validate(fields))
 
 
-def _reader_of(sensor: Sensor) -> _Reader:
-    def read(robot_id: str, attributes: Mapping[str, Any]) -> Observation:
-        value = sensor.value.model_validate(attributes[sensor.attribute])
-        return sensor.read(robot_id, read_origin(value), value)
-
-    return read
+def _sensed(
+    sensor: Sensor, robot_id: str, attributes: Mapping[str, Any]
+) -> Observation:
+    value = sensor.value.model_validate(attributes[sensor.attribute])
+    return sensor.read(robot_id, read_origin(value), value)
 
 
 _READERS: Mapping[str, _Reader] = {
@@ -336,7 +335,7 @@ _READERS: Mapping[str, _Reader] = {
     "pose": _single_pose,
     "laser_scan": _single_scan,
     "class": _single_detection,
-    **{sensor.attribute: _reader_of(sensor) for sensor in SENSORS},
+    **{sensor.attribute: partial(_sensed, sensor) for sensor in SENSORS},
 }
 
 _RANK = {name: rank for rank, name in enumerate(_READERS)}
