@@ -86,7 +86,7 @@ class Evaluator:
         )
         self._event_log = event_log
         self._new_id = new_id
-        self._applied: dict[str, tuple[float, str]] = {}
+        self._applied: dict[str, float] = {}
         self._first_reports = FirstReports()
         self._low = LowValues()
         self._moved: dict[str, Odometry] = {}
@@ -178,12 +178,9 @@ class Evaluator:
         for decision in self.decisions.open_of(report.robot_id):
             self._advance(decision, decision.reported(report, at), at)
         self._first_reports.reported(report, self._feedback_publisher.published_at, at)
-        applied = report.speed_factor, report.reason
-        before = self._applied.get(report.robot_id)
-        if applied != before:
-            self._applied[report.robot_id] = applied
-            if before is None or before[0] != applied[0]:
-                self._log_speed(report, at)
+        if report.speed_factor != self._applied.get(report.robot_id):
+            self._applied[report.robot_id] = report.speed_factor
+            self._log_speed(report, at)
 
     def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
         if after is not before:
