@@ -106,13 +106,12 @@ class DetectionTracking:
         subject = one.peer or (one.person.person_id if one.person else "")
         subject = subject or f"{one.kind}:{one.detection.class_id}"
         last = self._told.get((robot_id, subject))
-        self._told[robot_id, subject] = at.mono
         if one.kind == "other":
             self.other[robot_id] = at
         if last is not None and at.mono - last < _LOGGED_S:
-            # Keep the first moment, so that a long sighting gets a row every so often.
-            self._told[robot_id, subject] = last
+            # The first moment stays, so that a long sighting gets a row every so often.
             return
+        self._told[robot_id, subject] = at.mono
         self._event_log.detection(
             one, robot_id, frame.origin.stamp, at, received.transport
         )
