@@ -19,6 +19,7 @@ from iveg.domain.rule.speed_limits import Crossing
 FRESH_S = 0.25
 """Without a newer frame a ring was known: a robot that enters it is not timed."""
 _KEPT = 16
+_UNTIMED = "", 0.0, 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +42,7 @@ class FirstReports:
 
     _detections: dict[str, deque[float]] = field(default_factory=dict)
     _ahead: dict[str, tuple[str, float, float]] = field(default_factory=dict)
-    """Robot → alert, when it first said so, when feedback had gone out before."""
-    _slow: set[str] = field(default_factory=set)
+    """Slow robot → alert, when it first said so, when feedback had gone out before."""
 
     def seen(self, person_id: str, at: Instant) -> None:
         """Note the notification of a frame that shows this person."""
@@ -52,17 +52,13 @@ class FirstReports:
     def reported(self, report: SafetyReport, published_at: float, at: Instant) -> None:
         """Note a safety report; feedback last went out at ``published_at``."""
         robot_id, alert = report.robot_id, report.decision_id or ""
-        was_slow = robot_id in self._slow
         if report.speed_factor > HALF_SPEED:
-            self._slow.discard(robot_id)
             self._ahead.pop(robot_id, None)
-            return
-        self._slow.add(robot_id)
-        if not was_slow:
+        elif robot_id not in self._ahead:
             self._ahead[robot_id] = alert, at.mono, published_at
-        elif robot_id in self._ahead and self._ahead[robot_id][0] != alert:
+        elif self._ahead[robot_id][0] != alert:
             # Slow for something else already: that it names this too tells no time.
-            del self._ahead[robot_id]
+            self._ahead[robot_id] = _UNTIMED
 
     def of(self, crossing: Crossing) -> FirstReport | None:
         """The notice of a crossing; None where there is none."""
@@ -71,9 +67,7 @@ class FirstReports:
             return None
         if not crossing.ahead:
             return self._notice(zone.cause, crossing.entered.mono)
-        alert, answered, published_at = self._ahead.get(
-            crossing.robot_id, ("", 0.0, 0.0)
-        )
+        alert, answered, published_at = self._ahead.get(crossing.robot_id, _UNTIMED)
         if alert != zone.alert_id:
             return None
         return self._notice(zone.cause, published_at, answered)
