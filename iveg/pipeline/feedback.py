@@ -46,23 +46,22 @@ class FeedbackPublisher:
         self._boot = boot
         self._backlog = backlog
         self._seq = 0
-        self._left, self._left_at = BURST, float("-inf")
+        self._left = BURST
 
     def may_publish(self, now: Instant) -> bool:
         """Whether robots can use one more: 30 Hz in the mean, a few close together."""
         return self._allowance(now) >= 1.0
 
     def _allowance(self, now: Instant) -> float:
-        since = max(0.0, now.mono - self._left_at)
+        since = max(0.0, now.mono - self.published_at)
         return min(BURST, self._left + USED_HZ * since)
 
     def tell(
         self, speed_limits: Mapping[str, SpeedLimit], rule: DetectionRule, now: Instant
     ) -> None:
         """Send every robot what the fleet must know."""
-        self.published_at = now.mono
         self._left = max(0.0, self._allowance(now) - 1.0)
-        self._left_at = now.mono
+        self.published_at = now.mono
         alerts = _newest(tuple(self._alerts(rule, now)))
         seen = {
             robot.robot_id: robot.safety.origin.seq
