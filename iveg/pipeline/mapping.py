@@ -42,8 +42,8 @@ class Mapper:
         wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
         self._is_open = wide > _WIDEST_M
         self._grid = None if self._is_open else Grid.over(bounds)
-        self._shared: Occupancy | None = None
-        self._own: dict[str, Occupancy] = {}
+        # By robot; the fleet shares that of None.
+        self._drawn: dict[str | None, Occupancy] = {}
         self._read: dict[str, LaserScan] = {}
         self._read_at: dict[str, float] = {}
 
@@ -61,7 +61,7 @@ class Mapper:
 
     def shared(self, zones: Iterable[Zone], now: Instant) -> Costmap | None:
         """The fleet's costmap; None before the first scan."""
-        return _costs(self._shared, zones, now)
+        return _costs(self._drawn.get(None), zones, now)
 
     def age_s(self, robot_id: str | None, now: Instant) -> float | None:
         """Since the newest scan of one robot, or of any, was drawn (s); None: never."""
@@ -73,7 +73,7 @@ class Mapper:
     def of(self, robot_id: str, zones: Iterable[Zone], now: Instant) -> Costmap | None:
         """Costmap of one robot: its own scans, people and peers of its feedback."""
         others = [zone for zone in zones if zone.cause != robot_id]
-        return _costs(self._own.get(robot_id), others, now)
+        return _costs(self._drawn.get(robot_id), others, now)
 
     def _is_due(self, robot: RobotState, now: Instant) -> bool:
         scan = robot.scan
@@ -92,9 +92,8 @@ class Mapper:
             return
         self._read[robot.robot_id], self._read_at[robot.robot_id] = scan, now.mono
         sweep = sweep_of(scan, pose, self._grid)
-        self._shared = _added(self._shared, self._grid, sweep, now)
-        own = self._own.get(robot.robot_id)
-        self._own[robot.robot_id] = _added(own, self._grid, sweep, now)
+        for key in (None, robot.robot_id):
+            self._drawn[key] = _added(self._drawn.get(key), self._grid, sweep, now)
 
     def _place(self) -> None:
         """In an open field the grids move with the robots."""
