@@ -16,6 +16,7 @@ import contextlib
 import secrets
 from collections.abc import Awaitable, Callable
 from contextlib import AsyncExitStack
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,10 @@ class Examination:
 
     async def run(self) -> None:
         """Test every hop; clean up also when cancelled."""
+        look_at_database = partial(asyncio.to_thread, check_database, self._database)
+        look_at_page = partial(
+            self._page.ask, "GET", "/healthz", timeout_s=self._patience_s
+        )
         async with AsyncExitStack() as stack:
             for client in (self._orion, self._agent, self._page):
                 stack.push_async_callback(client.close)
@@ -151,8 +156,8 @@ class Examination:
                     (Check.BROKER, lambda: self._connect(stack)),
                     (Check.ORION, self._orion.version),
                     (Check.AGENT, self._agent.version),
-                    (Check.DATABASE, self._look_at_database),
-                    (Check.PAGE, self._look_at_page),
+                    (Check.DATABASE, look_at_database),
+                    (Check.PAGE, look_at_page),
                 ):
                     tasks.create_task(self._try(check, step), name=check.name)
             told = await self._ask_iveg()
@@ -302,12 +307,6 @@ class Examination:
         mark = self._connected.ear.mark()
         await self._publish(names.COMMAND, {names.COMMAND: {"probe": mark}})
         await self._connected.ear.heard(mark, self._patience_s)
-
-    async def _look_at_database(self) -> None:
-        await asyncio.to_thread(check_database, self._database)
-
-    async def _look_at_page(self) -> None:
-        await self._page.ask("GET", "/healthz", timeout_s=self._patience_s)
 
     # --- what hops do -------------------------------------------------------------
 

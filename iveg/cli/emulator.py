@@ -1,10 +1,8 @@
 """Simulated robots as a process."""
 
 import argparse
-import asyncio
-import contextlib
 import os
-from collections.abc import Iterator
+from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -37,56 +35,41 @@ async def emulator(options: argparse.Namespace, settings: Settings) -> None:
         _network(options) as network,
         _truth(options.truth) as truth,
     ):
-        running = asyncio.create_task(
-            run_emulator(
-                robots,
-                load_greenhouse(settings.greenhouse),
-                FleetSettings(
-                    node_settings(settings, Path(directory)),
-                    options.held,
-                    options.hz,
-                    truth,
-                ),
-                scenario=options.scenario,
-                seed=options.seed,
-                profile=options.profile,
-                faults=read_fault_arguments(options.fault, robots),
-                fault_port=options.fault_port,
-                network=network,
-                description=fleet,
-                camera=options.camera,
+        work = run_emulator(
+            robots,
+            load_greenhouse(settings.greenhouse),
+            FleetSettings(
+                node_settings(settings, Path(directory)),
+                options.held,
+                options.hz,
+                truth,
             ),
-            name="emulator",
+            scenario=options.scenario,
+            seed=options.seed,
+            profile=options.profile,
+            faults=read_fault_arguments(options.fault, robots),
+            fault_port=options.fault_port,
+            network=network,
+            description=fleet,
+            camera=options.camera,
         )
         report_ready()
-        try:
-            await running
-        finally:
-            running.cancel()
-            await asyncio.gather(running, return_exceptions=True)
+        await work
 
 
-@contextlib.contextmanager
-def _truth(file: Path | None) -> Iterator[TruthLog | None]:
+def _truth(file: Path | None) -> AbstractContextManager[TruthLog | None]:
     """Log of the targets really in view, if requested."""
-    if file is None:
-        yield None
-        return
-    with contextlib.closing(TruthLog(file)) as log:
-        yield log
+    return nullcontext() if file is None else closing(TruthLog(file))
 
 
-@contextlib.contextmanager
-def _network(options: argparse.Namespace) -> Iterator["Dds | None"]:
+def _network(options: argparse.Namespace) -> "AbstractContextManager[Dds | None]":
     """DDS for robots that speak ROS 2, if requested."""
     if not options.dds:
-        yield None
-        return
+        return nullcontext()
     from iveg.cli.robot import load_config, network_of
 
     config, _ = load_config(options, os.environ)
     network = network_of(config, os.environ, "iveg emulator --dds")
     from iveg.adapters.dds import Dds
 
-    with Dds(network) as dds:
-        yield dds
+    return Dds(network)

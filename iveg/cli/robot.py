@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 UNUSABLE = 2
 _CHECK_S = 3.0
+_DOMAINS = "a whole number from 0 to 232"
 
 
 def run_robot(
@@ -94,13 +95,8 @@ async def _ride(
         if options.attended:
             robot.node.release_locally()
         tune_garbage_collection()
-        running = asyncio.create_task(robot.run(), name=f"robot-{options.id}")
-        try:
-            report_ready()
-            await running
-        finally:
-            running.cancel()
-            await asyncio.gather(running, return_exceptions=True)
+        report_ready()
+        await robot.run()
 
 
 def _node(
@@ -198,28 +194,30 @@ def _domain_of(environment: Mapping[str, str]) -> int | None:
     if not said:
         return None
     if not said.isdecimal():
-        raise SettingsError("ROS_DOMAIN_ID", said, "a whole number from 0 to 232")
+        raise SettingsError("ROS_DOMAIN_ID", said, _DOMAINS)
     return int(said)
 
 
 def _with_words(config: RobotConfig, options: argparse.Namespace) -> RobotConfig:
-    topics = {
-        key: value
-        for key in ("cmd_vel_in", "cmd_vel_out")
-        if (value := getattr(options, key, None)) is not None
+    domain, peers = options.ros_domain, options.ros_peer
+    if domain is not None and not 0 <= domain <= 232:
+        raise SettingsError("--ros-domain", str(domain), _DOMAINS)
+    said = {
+        "domain": domain,
+        "namespace": getattr(options, "namespace", None),
+        "interface": options.ros_interface,
+        "peers": None if peers is None else tuple(peers),
     }
-    if options.ros_domain is not None:
-        if not 0 <= options.ros_domain <= 232:
-            said = str(options.ros_domain)
-            raise SettingsError("--ros-domain", said, "a whole number from 0 to 232")
-        config = replace(config, domain=options.ros_domain)
-    if getattr(options, "namespace", None) is not None:
-        config = replace(config, namespace=options.namespace)
-    if options.ros_interface is not None:
-        config = replace(config, interface=options.ros_interface)
-    if options.ros_peer is not None:
-        config = replace(config, peers=tuple(options.ros_peer))
-    return replace(config, topics=replace(config.topics, **topics))
+    topics = {key: getattr(options, key, None) for key in ("cmd_vel_in", "cmd_vel_out")}
+    return replace(
+        config,
+        topics=replace(config.topics, **_without_none(topics)),
+        **_without_none(said),
+    )
+
+
+def _without_none(said: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in said.items() if value is not None}
 
 
 def _text_of(file: Path) -> str:

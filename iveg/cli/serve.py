@@ -62,7 +62,9 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
             timeout_graceful_shutdown=2,
             server_header=False,
         ),
-        on_start=report_ready if demo else lambda: _print_link(settings, dss),
+        on_start=report_ready
+        if demo
+        else lambda: print_sign_in_link(settings, dss.sign_in_token),
     )
     tune_garbage_collection()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
@@ -80,10 +82,6 @@ async def _upgrade_history(settings: Settings, data: Path) -> None:
         await asyncio.to_thread(upgrade, history_url(settings.database_url, data))
     except HopError as error:
         _log.warning("the history starts without its database: %s", error)
-
-
-def _print_link(settings: Settings, dss: Dss) -> None:
-    print_sign_in_link(settings, dss.sign_in_token)
 
 
 def upgrade_database(settings: Settings, data: Path) -> int:
