@@ -179,7 +179,7 @@ class Dds:
     def _topic(self, name: str, message: type[Message]) -> Topic:
         key = name, message.ROS
         if key not in self._topics:
-            kind = _announced(message)
+            kind = announced(message)
             self._topics[key] = Topic(self._participant, dds_topic(name), kind)
         return self._topics[key]
 
@@ -288,10 +288,6 @@ def _configure(network: DdsNetwork) -> None:
 
 
 @cache
-def _announced(message: type[Message]) -> type[IdlStruct]:
-    return announced(message)
-
-
 def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruct]:
     """The type that DDS announces for a message.
 
@@ -307,11 +303,6 @@ def announced(message: type[Message], *, decodes: bool = False) -> type[IdlStruc
     return kind
 
 
-@cache
-def _nested(message: type[Message], decodes: bool) -> type[IdlStruct]:
-    return announced(message, decodes=decodes)
-
-
 def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> Any:
     match kind:
         case One("boolean"):
@@ -325,7 +316,7 @@ def _idl_type(kind: One | Many | Text | Structure, decodes: bool) -> Any:
         case Text():
             return str
         case Structure(message, many):
-            nested = _nested(message, decodes)
+            nested = announced(message, decodes=decodes)
             return types.sequence[nested] if many else nested
 
 
