@@ -6,22 +6,18 @@ They report the reason of a failure where a running iVeg tries again.
 import asyncio
 import contextlib
 import secrets
-import socket
 import ssl
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
 import aiomqtt
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from sqlalchemy.exc import DatabaseError
 
 from iveg.adapters.history.engine import reading_engine, sqlite_file
-from iveg.adapters.history.migrate import alembic_config, reason_of
-from iveg.adapters.mqtt import BrokerAddress
+from iveg.adapters.history.migrate import reason_of, revisions
+from iveg.adapters.mqtt import NODELAY, BrokerAddress
 from iveg.domain.errors import HopError
 
-_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _REFUSED = 128
 """From this code on, a broker's answer to a subscription is a refusal."""
 
@@ -94,7 +90,7 @@ async def probe_device(
         password=address.password,
         timeout=within_s,
         tls_context=ssl.create_default_context() if address.tls else None,
-        socket_options=_NODELAY,
+        socket_options=NODELAY,
     )
     device = ProbeDevice(client, TopicListener())
     async with contextlib.AsyncExitStack() as stack:
@@ -149,9 +145,7 @@ def check_database(database_url: str) -> None:
     engine = reading_engine(database_url)
     try:
         with engine.connect() as connection:
-            found = MigrationContext.configure(connection).get_current_revision()
-            steps = ScriptDirectory.from_config(alembic_config(connection))
-            known = [step.revision for step in steps.walk_revisions()]
+            found, known = revisions(connection)
     except DatabaseError as error:
         raise HopError("database", reason_of(error)) from error
     finally:

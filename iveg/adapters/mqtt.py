@@ -25,7 +25,7 @@ from iveg.domain.errors import HopError
 _log = logging.getLogger(__name__)
 # aiomqtt's own: it complains of every message that finds no room or no confirmation.
 quiet("mqtt")
-_NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
@@ -141,7 +141,7 @@ class MqttLink:
             keepalive=_KEEPALIVE_S,
             timeout=_ANSWERED_WITHIN_S,
             tls_context=ssl.create_default_context() if address.tls else None,
-            socket_options=_NODELAY,
+            socket_options=NODELAY,
             take=self._take,
             apart_s=self._apart_s,
         ) as client:

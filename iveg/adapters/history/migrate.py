@@ -67,6 +67,13 @@ def migrations_directory() -> Path:
     return installed if installed.is_dir() else package.parent / "migrations"
 
 
+def revisions(connection: Connection) -> tuple[str | None, list[str]]:
+    """The revision of a database, and all that this version knows, newest first."""
+    found = MigrationContext.configure(connection).get_current_revision()
+    steps = ScriptDirectory.from_config(alembic_config(connection))
+    return found, [step.revision for step in steps.walk_revisions()]
+
+
 def reason_of(error: Exception) -> str:
     """The driver's error in one line, without statement and parameters."""
     cause = getattr(error, "orig", None) or error
@@ -78,10 +85,7 @@ def _upgrade(connection: Connection, where: str) -> None:
         lock = text("SELECT pg_advisory_xact_lock(:key)")
         connection.execute(lock, {"key": _ONE_AT_A_TIME})
     config = alembic_config(connection)
-    found = MigrationContext.configure(connection).get_current_revision()
-    known = {
-        step.revision for step in ScriptDirectory.from_config(config).walk_revisions()
-    }
+    found, known = revisions(connection)
     if found is not None and found not in known:
         raise DataFileError(
             where,
