@@ -43,8 +43,12 @@ class FileRules:
         """
         self._versions = self._read() or [settings]
         last = self._versions[-1]
-        told = [rule for rule in self._versions if rule.author == _SETTINGS]
-        if not told or not _agree(told[-1], settings):
+        told = [
+            (rule.threshold, rule.radius_m)
+            for rule in self._versions
+            if rule.author == _SETTINGS
+        ]
+        if told[-1:] != [(settings.threshold, settings.radius_m)]:
             changed = replace(
                 last,
                 threshold=settings.threshold,
@@ -109,10 +113,6 @@ def _first(error: ValidationError) -> str:
     told = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in told["loc"])
     return f"{place}: {told['msg']}" if place else told["msg"]
-
-
-def _agree(one: DetectionRule, other: DetectionRule) -> bool:
-    return (one.threshold, one.radius_m) == (other.threshold, other.radius_m)
 
 
 def _fields(rule: DetectionRule) -> dict[str, object]:

@@ -4,11 +4,10 @@ SQLite runs in WAL so that readers never wait for the writer; its driver's own h
 transactions are turned off, so that a transaction begins where we say so.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 
 import orjson
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError
 from sqlalchemy.pool import ConnectionPoolEntry, NullPool, Pool, QueuePool
@@ -77,7 +76,7 @@ def _engine(database_url: str, begin: str, options: str, pool: type[Pool]) -> En
     if url.get_backend_name() == "sqlite":
         engine = create_engine(_with_timeout(url), poolclass=pool)
         event.listen(engine, "connect", _prepare_sqlite)
-        event.listen(engine, "begin", _beginner(begin))
+        event.listen(engine, "begin", lambda one: one.exec_driver_sql(begin))
         return engine
     try:
         return create_engine(
@@ -110,13 +109,6 @@ def _prepare_sqlite(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None
         "foreign_keys=ON",
     ):
         connection.cursor().execute(f"PRAGMA {pragma}")
-
-
-def _beginner(begin: str) -> Callable[[Connection], None]:
-    def start(connection: Connection) -> None:
-        connection.exec_driver_sql(begin)
-
-    return start
 
 
 def _parse(database_url: str) -> URL:
