@@ -16,6 +16,7 @@ from iveg.domain.errors import HopError
 from iveg.ngsi import names
 
 RESOURCE = "/iot/json"
+_COMMAND = {"name": names.COMMAND, "type": "command"}
 
 
 class IotAgentClient(FiwareClient):
@@ -145,18 +146,7 @@ async def provision(
 async def _ensure_group(
     agent: IotAgentClient, apikey: str, cbroker_url: str
 ) -> list[str]:
-    wanted: Document = {
-        "apikey": apikey,
-        "resource": RESOURCE,
-        "cbroker": cbroker_url,
-        "entity_type": names.ROBOT_TYPE,
-        "attributes": [],
-        "lazy": [],
-        "commands": [],
-        "static_attributes": [],
-        # A measure of a device that is not there makes nothing.
-        "autoprovision": False,
-    }
+    wanted = write_group(apikey, cbroker_url)
     if await agent.create_group(wanted):
         return [f"Made the group of API key {apikey}."]
     known = next(
@@ -290,14 +280,13 @@ def _thieves(devices: Iterable[Document], robot_id: str) -> list[str]:
 
 
 def _robot_device(robot_id: str, device: names.Device, apikey: str) -> Document:
-    commands = [{"name": names.COMMAND, "type": "command"}]
-    return _device(
+    return write_device(
         robot_id + device.suffix,
         robot_id,
         names.ROBOT_TYPE,
         device.attributes,
         apikey,
-        commands if device.has_command else [],
+        has_command=device.has_command,
     )
 
 
@@ -305,13 +294,13 @@ def _climate_device(apikey: str) -> Document:
     attributes = tuple(
         (name, "Number") for name in ("temperature", "relativeHumidity", "co2")
     )
-    return _device(
+    return write_device(
         names.CLIMATE_DEVICE, names.CLIMATE_ID, names.CLIMATE_TYPE, attributes, apikey
     )
 
 
 def _heartbeat_device(apikey: str) -> Document:
-    return _device(
+    return write_device(
         names.HEARTBEAT_ID,
         names.HEARTBEAT_ID,
         names.HEARTBEAT_TYPE,
@@ -320,14 +309,32 @@ def _heartbeat_device(apikey: str) -> Document:
     )
 
 
-def _device(
+def write_group(apikey: str, cbroker_url: str) -> Document:
+    """The group of an API key as the agent is told."""
+    return {
+        "apikey": apikey,
+        "resource": RESOURCE,
+        "cbroker": cbroker_url,
+        "entity_type": names.ROBOT_TYPE,
+        "attributes": [],
+        "lazy": [],
+        "commands": [],
+        "static_attributes": [],
+        # A measure of a device that is not there makes nothing.
+        "autoprovision": False,
+    }
+
+
+def write_device(
     device_id: str,
     entity: str,
     kind: str,
     attributes: Sequence[tuple[str, str]],
     apikey: str,
-    commands: Sequence[Mapping[str, str]] = (),
+    *,
+    has_command: bool = False,
 ) -> Document:
+    """A device as the agent is told; ``attributes`` are names and NGSI types."""
     return {
         "device_id": device_id,
         "entity_name": entity,
@@ -338,5 +345,5 @@ def _device(
         "attributes": [
             {"object_id": name, "name": name, "type": kind} for name, kind in attributes
         ],
-        "commands": [dict(one) for one in commands],
+        "commands": [_COMMAND] if has_command else [],
     }

@@ -11,8 +11,9 @@ import signal
 import socket
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from iveg.adapters.extras import require_extra
@@ -26,16 +27,12 @@ from iveg.settings import Settings
 _log = logging.getLogger(__name__)
 _PATIENCE_S = 30.0
 _GRACE_S = 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Listener:
-    """An address that the demo listens on, and the setting that changes it."""
-
-    field: str
-    variable: str
-    host: str
-    port: int
+_FIWARE = (
+    ("mqtt_url", "IVEG_MQTT_URL", 1883),
+    ("orion_url", "IVEG_ORION_URL", 80),
+    ("iota_url", "IVEG_IOTA_URL", 80),
+)
+"""Setting of each address, its variable and its scheme's port."""
 
 
 def demo(
@@ -102,41 +99,32 @@ def on_free_ports(
 
     Without ``fiware`` only the page moves: a running FIWARE stays where it is.
     """
-    listeners = [_Listener("port", "IVEG_PORT", settings.host, settings.port)]
-    places = (
-        ("mqtt_url", "IVEG_MQTT_URL"),
-        ("orion_url", "IVEG_ORION_URL"),
-        ("iota_url", "IVEG_IOTA_URL"),
-    )
-    for field, variable in places if fiware else ():
+    changes: dict[str, Any] = {}
+    page = _moved(environment, "IVEG_PORT", settings.host, settings.port)
+    if page is not None:
+        changes["port"] = page
+    for field, variable, default in _FIWARE if fiware else ():
         parts = urlsplit(getattr(settings, field))
-        default = {"mqtt_url": 1883}.get(field, 80)
-        listeners.append(
-            _Listener(field, variable, parts.hostname or "", parts.port or default)
-        )
-    changes: dict[str, object] = {}
-    for one in listeners:
-        if one.host not in LOOPBACK and one.field != "port":
-            raise SettingsError(one.variable, one.host, "an address on loopback")
-        if _is_free(one.host, one.port):
-            continue
-        if environment.get(one.variable):
-            raise SettingsError(one.variable, str(one.port), "a port that is free")
-        port = bind_once(one.host, 0)
-        changes[one.field] = (
-            port
-            if one.field == "port"
-            else f"{urlsplit(getattr(settings, one.field)).scheme}://{one.host}:{port}"
-        )
-    return replace(settings, **changes)  # type: ignore[arg-type]
+        host = parts.hostname or ""
+        if host not in LOOPBACK:
+            raise SettingsError(variable, host, "an address on loopback")
+        port = _moved(environment, variable, host, parts.port or default)
+        if port is not None:
+            changes[field] = f"{parts.scheme}://{host}:{port}"
+    return replace(settings, **changes)
 
 
-def _is_free(host: str, port: int) -> bool:
+def _moved(
+    environment: Mapping[str, str], variable: str, host: str, port: int
+) -> int | None:
+    """A free port in place of one that is taken; None where it is free itself."""
     try:
         bind_once(host, port)
     except OSError:
-        return False
-    return True
+        if environment.get(variable):
+            raise SettingsError(variable, str(port), "a port that is free") from None
+        return bind_once(host, 0)
+    return None
 
 
 # --- processes --------------------------------------------------------------------

@@ -8,7 +8,12 @@ import asyncio
 from collections.abc import Awaitable
 from typing import Any
 
-from iveg.adapters.iot_agent import RESOURCE, IotAgentClient
+from iveg.adapters.iot_agent import (
+    RESOURCE,
+    IotAgentClient,
+    write_device,
+    write_group,
+)
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
 from iveg.ngsi import names
@@ -55,9 +60,17 @@ class Probe:
         known = [one.get("apikey") for one in await self._agent.read_groups()]
         if self._apikey not in known:
             self._made_group = True
-            await self._agent.create_group(_group(self._apikey, orion_url))
+            await self._agent.create_group(write_group(self._apikey, orion_url))
         await self._agent.delete_device(PROBE_ID)
-        if not await self._agent.create_device(_device(self._apikey)):
+        device = write_device(
+            PROBE_ID,
+            PROBE_ID,
+            PROBE_TYPE,
+            (("probe", "object"),),
+            self._apikey,
+            has_command=True,
+        )
+        if not await self._agent.create_device(device):
             raise HopError("iot_agent", "says that there is such a device already")
 
     async def subscribe(self, url: str) -> str:
@@ -174,33 +187,6 @@ class Probe:
         ids = [PROBE_ID, f"{names.ROBOT_TYPE}:{PROBE_ID}"]
         for entity_id, kind in await self._orion.find_entities(ids):
             await self._orion.delete_entity(entity_id, kind)
-
-
-def _group(apikey: str, orion_url: str) -> dict[str, Any]:
-    return {
-        "apikey": apikey,
-        "resource": RESOURCE,
-        "cbroker": orion_url,
-        "entity_type": names.ROBOT_TYPE,
-        "attributes": [],
-        "lazy": [],
-        "commands": [],
-        "static_attributes": [],
-        "autoprovision": False,
-    }
-
-
-def _device(apikey: str) -> dict[str, Any]:
-    return {
-        "device_id": PROBE_ID,
-        "entity_name": PROBE_ID,
-        "entity_type": PROBE_TYPE,
-        "apikey": apikey,
-        "protocol": "JSON",
-        "transport": "MQTT",
-        "attributes": [{"object_id": "probe", "name": "probe", "type": "object"}],
-        "commands": [{"name": names.COMMAND, "type": "command"}],
-    }
 
 
 def _subscription(url: str) -> dict[str, Any]:

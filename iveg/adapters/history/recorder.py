@@ -94,7 +94,10 @@ class Recorder:
         waiting = self._stamp(record)
         if isinstance(record, CommandRecord | CommandEventRecord):
             self._unflushed.append(waiting)
-        self._take(waiting)
+        self._queue.offer(waiting)
+        self._awake.set()
+        if len(self._queue) >= _BATCH:
+            self._full.set()
 
     async def flushed(self) -> None:
         """Return when every command and audit row so far is in the journal.
@@ -268,12 +271,6 @@ class Recorder:
         # The wall clock orders states across restarts, the count within one run.
         self._revision = max(self._revision + 1, int(now.wall * 1e9))
         return Waiting(record, self._revision, now.mono)
-
-    def _take(self, waiting: Waiting) -> None:
-        self._queue.offer(waiting)
-        self._awake.set()
-        if len(self._queue) >= _BATCH:
-            self._full.set()
 
 
 def journal_file(database_url: str, directory: Path) -> Path:
