@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -45,8 +44,6 @@ from iveg.settings import Settings
 if TYPE_CHECKING:
     from iveg.adapters.dds import DdsNetwork
 
-_log = logging.getLogger(__name__)
-UNUSABLE = 2
 _CHECK_S = 3.0
 _DOMAINS = "a whole number from 0 to 232"
 

@@ -8,7 +8,6 @@ from iveg.domain.errors import IvegError
 from iveg.embedded.subscriptions import new_id
 
 DEFAULT_APIKEY = "1234"
-RESOURCE = "/iot/json"
 
 
 class AgentError(IvegError):
