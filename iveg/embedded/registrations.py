@@ -34,28 +34,22 @@ Foreign = Mapping[tuple[str, str], Mapping[str, Attribute]]
 
 @dataclass(frozen=True, slots=True)
 class Registration:
-    """One context provider with its attributes."""
+    """One context provider with its attributes.
+
+    Attributes:
+        path: Service path.
+        url: Address of the provider.
+        attributes: Names of its attributes; empty means all.
+        entities: Entities with attributes of the provider.
+        described: ``description``, if the client gave one.
+    """
 
     id: str
-    document: dict[str, Any]
     path: str
-
-    @property
-    def url(self) -> str:
-        """Address of the provider."""
-        url: str = self.document["provider"]["http"]["url"]
-        return url
-
-    @property
-    def attributes(self) -> tuple[str, ...]:
-        """Names of its attributes; empty means all."""
-        return tuple(self.document["dataProvided"].get("attrs", ()))
-
-    @property
-    def entities(self) -> list[dict[str, str]]:
-        """Entities with attributes of the provider."""
-        found: list[dict[str, str]] = self.document["dataProvided"]["entities"]
-        return found
+    url: str
+    attributes: tuple[str, ...]
+    entities: list[dict[str, str]]
+    described: Mapping[str, Any]
 
     def concerns(self, entity_id: str, entity_type: str) -> bool:
         """Whether it has attributes of an entity; an unknown type fits none."""
@@ -66,9 +60,6 @@ class Registration:
 
     def show(self) -> dict[str, Any]:
         """The registration as a client gets it."""
-        shown = {
-            key: self.document[key] for key in ("description",) if key in self.document
-        }
         provided = {"entities": self.entities, "attrs": list(self.attributes)}
         provider = {
             "http": {"url": self.url},
@@ -77,7 +68,7 @@ class Registration:
         }
         return {
             "id": self.id,
-            **shown,
+            **self.described,
             "dataProvided": provided,
             "provider": provider,
             "status": "active",
@@ -105,7 +96,14 @@ def read_registration(raw: Any, path: str) -> Registration:
         raise bad_request("/provider/ field missing in registration")
     if not urlsplit(str(provider["http"].get("url", ""))).hostname:
         raise bad_request("/url/ field missing in registration")
-    return Registration(new_id(), document, path)
+    return Registration(
+        new_id(),
+        path,
+        provider["http"]["url"],
+        tuple(provided.get("attrs") or ()),
+        provided["entities"],
+        {name: one for name, one in document.items() if name == "description"},
+    )
 
 
 # --- choosing providers ------------------------------------------------------------
