@@ -48,7 +48,7 @@ class LossFilter(logging.Filter):
         """Whether this complaint is new."""
         said = record.getMessage()
         complaint = _NUMBER.sub("…", said).partition(":")[0].partition(" for ")[0]
-        _count(said)
+        counted.update(name for words, name in _NAMES.items() if words in said)
         flood = self._floods.get(complaint)
         loop = _running_loop()
         if flood is not None:
@@ -73,12 +73,6 @@ class LossFilter(logging.Filter):
         if flood.count > 1:
             over = "%s: over after %d times: %s"
             _log.warning(over, source, flood.count, complaint.rstrip(". "))
-
-
-def _count(said: str) -> None:
-    for words, name in _NAMES.items():
-        if words in said:
-            counted[name] += 1
 
 
 def _running_loop() -> asyncio.AbstractEventLoop | None:

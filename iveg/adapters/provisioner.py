@@ -183,17 +183,10 @@ class Provisioner:
         before = self._clock()
         try:
             await self._agent.version()
-        except NoAnswerError as error:
-            self._health_monitor.agent_silent, self._health_monitor.agent_error = (
-                error.detail,
-                "",
-            )
-            return self._tell("iot_agent", error)
         except HopError as error:
-            self._health_monitor.agent_error, self._health_monitor.agent_silent = (
-                error.detail,
-                "",
-            )
+            is_silent = isinstance(error, NoAnswerError)
+            self._health_monitor.agent_silent = error.detail if is_silent else ""
+            self._health_monitor.agent_error = "" if is_silent else error.detail
             return self._tell("iot_agent", error)
         spent = self._clock().mono - before.mono
         self._health_monitor.agent_slow = self._slow("iot_agent", spent)

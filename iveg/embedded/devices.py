@@ -278,17 +278,14 @@ class Registry:
 
     def group_of(self, apikey: str) -> Group | None:
         """The group of an API key, in any tenant."""
-        for group in self._groups.values():
-            if group.apikey == apikey:
-                return group
-        return None
+        return next(
+            (one for one in self._groups.values() if one.apikey == apikey), None
+        )
 
     def group_in(self, tenancy: Tenancy, apikey: str = "") -> Group | None:
         """A group of a tenant: that of the API key, else the first one."""
-        for group in self._groups.values():
-            if group.tenancy == tenancy and apikey in ("", group.apikey):
-                return group
-        return None
+        found = [one for one in self._groups.values() if one.tenancy == tenancy]
+        return next((one for one in found if apikey in ("", one.apikey)), None)
 
     # --- devices ----------------------------------------------------------------
 
