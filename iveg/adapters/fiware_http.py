@@ -12,7 +12,7 @@ from iveg.domain.errors import HopError, NoAnswerError
 
 _NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
 PAGE_SIZE = 100
-_TIMEOUT_S = 6.0
+TIMEOUT_S = 6.0
 """A little more than the five seconds that Orion waits for a hung agent."""
 PROBE_TIMEOUT_S = 3.0
 """For a question that a healthy neighbour answers in milliseconds."""
@@ -43,7 +43,7 @@ class FiwareHttp:
         self._client = httpx.AsyncClient(
             base_url=url,
             headers=headers,
-            timeout=_TIMEOUT_S,
+            timeout=TIMEOUT_S,
             transport=httpx.AsyncHTTPTransport(socket_options=_NODELAY),
         )
 
@@ -58,7 +58,7 @@ class FiwareHttp:
         *,
         query: Mapping[str, str] | None = None,
         body: Any = None,
-        timeout_s: float = _TIMEOUT_S,
+        timeout_s: float = TIMEOUT_S,
         also: Sequence[int] = (),
     ) -> httpx.Response:
         """One request.

@@ -11,6 +11,7 @@ from typing import Any
 from iveg.adapters.fiware_http import (
     PAGE_SIZE,
     PROBE_TIMEOUT_S,
+    TIMEOUT_S,
     Document,
 )
 from iveg.adapters.orion_subscriptions import OrionSubscriptions
@@ -107,15 +108,11 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer at once.
         """
-        response = await self.http.ask(
-            "GET",
-            f"/v2/entities/{names.HEARTBEAT_ID}",
-            query={"type": names.HEARTBEAT_TYPE, "attrs": "probe"},
-            timeout_s=PROBE_TIMEOUT_S,
-            also=(404,),
+        return await self._read_entity(
+            names.HEARTBEAT_ID,
+            {"type": names.HEARTBEAT_TYPE, "attrs": "probe"},
+            PROBE_TIMEOUT_S,
         )
-        told = self.http.read_object(response)
-        return None if response.status_code == 404 else told
 
     async def read_probe_times(self) -> tuple[float, float]:
         """When the newest heartbeat probe at Orion left iVeg, and when it came there.
@@ -180,20 +177,13 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer.
         """
-        response = await self.http.ask(
-            "GET",
-            f"/v2/entities/{robot_id}",
-            query={
-                "type": names.ROBOT_TYPE,
-                "attrs": names.ODOMETRY,
-                "metadata": "dateModified",
-                "options": "skipForwarding",
-            },
-            also=(404,),
-        )
-        if response.status_code == 404:
-            return None
-        return _date_modified(self.http.read(response), names.ODOMETRY)
+        query = {
+            "type": names.ROBOT_TYPE,
+            "attrs": names.ODOMETRY,
+            "metadata": "dateModified",
+            "options": "skipForwarding",
+        }
+        return _date_modified(await self._read_entity(robot_id, query), names.ODOMETRY)
 
     async def delete_attribute(self, robot_id: str, name: str) -> bool:
         """Delete an attribute of a robot; whether there was one.
@@ -215,20 +205,23 @@ class OrionClient(OrionSubscriptions):
         Raises:
             HopError: Orion does not answer.
         """
+        query = {
+            "type": names.ROBOT_TYPE,
+            "attrs": name,
+            "options": "skipForwarding",
+        }
+        return name in (await self._read_entity(robot_id, query) or {})
+
+    async def _read_entity(
+        self, entity_id: str, query: Mapping[str, str], timeout_s: float = TIMEOUT_S
+    ) -> Document | None:
+        """An entity as Orion has it; None where it has none."""
+        path = f"/v2/entities/{entity_id}"
         response = await self.http.ask(
-            "GET",
-            f"/v2/entities/{robot_id}",
-            query={
-                "type": names.ROBOT_TYPE,
-                "attrs": name,
-                "options": "skipForwarding",
-            },
-            also=(404,),
+            "GET", path, query=query, timeout_s=timeout_s, also=(404,)
         )
-        if response.status_code == 404:
-            return False
-        told = self.http.read(response)
-        return isinstance(told, dict) and name in told
+        told = self.http.read_object(response)
+        return None if response.status_code == 404 else told
 
 
 def _date_modified(entity: Any, attribute: str) -> float | None:
