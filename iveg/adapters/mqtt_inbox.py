@@ -78,7 +78,6 @@ class InboxClient(aiomqtt.Client):
         super().__init__(*args, protocol=aiomqtt.ProtocolVersion.V311, **kwargs)
         self._take = take
         self._apart_s = apart_s
-        self._listens = False
 
     async def lost(self) -> None:
         """Wait for the end of the connection.
@@ -98,7 +97,6 @@ class InboxClient(aiomqtt.Client):
 
     def _listen(self, line: "ReadAhead") -> None:
         """Read as soon as something comes."""
-        self._listens = True
         self._loop.add_reader(line.fileno(), self._read, line)
 
     def _read(self, line: "ReadAhead") -> None:
@@ -117,9 +115,7 @@ class InboxClient(aiomqtt.Client):
         if line.taken == before:
             self._listen(line)
         elif self._apart_s:
-            if self._listens:
-                self._listens = False
-                self._loop.remove_reader(line.fileno())
+            self._loop.remove_reader(line.fileno())
             self._loop.call_later(self._apart_s, self._read_again, line)
 
     def _read_again(self, line: "ReadAhead") -> None:
