@@ -75,9 +75,9 @@ class MqttLink:
         address: BrokerAddress,
         name: str,
         subscriptions: Mapping[str, int] | None = None,
-        on_message: Callable[[str, bytes], None] | None = None,
-        on_connect: Callable[[], None] | None = None,
-        on_loss: Callable[[], None] | None = None,
+        on_message: Callable[[str, bytes], None] = lambda _topic, _payload: None,
+        on_connect: Callable[[], None] = lambda: None,
+        on_loss: Callable[[], None] = lambda: None,
         on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
         apart_s: float = 0.0,
     ) -> None:
@@ -126,8 +126,7 @@ class MqttLink:
             if self._client is not None:
                 self._client = None
                 pause = _FIRST_PAUSE_S
-                if self._on_loss is not None:
-                    self._on_loss()
+                self._on_loss()
             await asyncio.sleep(pause * random.uniform(0.5, 1.0))  # noqa: S311 - jitter
             pause = min(_LONGEST_PAUSE_S, 2 * pause)
 
@@ -153,8 +152,7 @@ class MqttLink:
             self._loss_told = False
             self.connects += 1
             _log.info("%s: connected to the broker", self._name)
-            if self._on_connect is not None:
-                self._on_connect()
+            self._on_connect()
             sender = asyncio.create_task(
                 self._send_offered(client), name=f"mqtt-send-{self._name}"
             )
@@ -169,9 +167,8 @@ class MqttLink:
         try:
             for topic, count in arrived.passed_over.items():
                 self._on_passed_over(topic, count)
-            if self._on_message is not None:
-                for topic, payload in arrived.telemetry.items():
-                    self._on_message(topic, payload)
+            for topic, payload in arrived.telemetry.items():
+                self._on_message(topic, payload)
             if self._client is None:
                 self._early += arrived.qos1
             else:
@@ -181,9 +178,8 @@ class MqttLink:
             raise
 
     def _hand_qos1(self, messages: Iterable[Qos1Message]) -> None:
-        if self._on_message is not None:
-            for message in messages:
-                self._on_message(message.topic, message.payload)
+        for message in messages:
+            self._on_message(message.topic, message.payload)
 
     async def _send_offered(self, client: OutboxClient) -> None:
         while True:
