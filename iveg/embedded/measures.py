@@ -94,14 +94,9 @@ def _read_one(
     device: Device, measure: Mapping[str, Any], now: float, *, clean: bool
 ) -> dict[str, EntityChange] | None:
     given = measure.get(_INSTANT)
-    if given is None:
-        instant = date_json(now)
-    elif isinstance(given, str):
-        try:
-            instant = date_text(given)
-        except NgsiError:
-            return None
-    else:
+    try:
+        instant = date_json(now) if given is None else date_text(given)
+    except NgsiError:
         return None
     metadata = {_INSTANT: b'{"type":"DateTime","value":%b}' % instant}
     changes = {}
