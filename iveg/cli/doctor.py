@@ -279,7 +279,9 @@ class Examination:
             ear.hear(request.body)
             return Response(204)
 
-        host = _notify_host(self._settings)
+        # As an iVeg with these settings names itself to Orion.
+        settings = self._settings
+        host = urlsplit(settings.notify_address).hostname or settings.host
         async with http_server(take, _bind_to(host), 0) as port:
             self._listening_at = f"http://{_in_url(host)}:{port}/"
             subscription = await self._probe.subscribe(self._listening_at)
@@ -338,11 +340,6 @@ def _lag_told(health: Any) -> Lag | None:
         return None
     told_by = ", as the running iVeg says"
     return Lag(lag_s, growing=growing, told_by=told_by) if lag_s > LATE_S else None
-
-
-def _notify_host(settings: Settings) -> str:
-    """Host that an iVeg with these settings names to Orion for notifications."""
-    return urlsplit(settings.notify_address).hostname or settings.host
 
 
 def _bind_to(host: str) -> str:

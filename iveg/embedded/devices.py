@@ -273,7 +273,13 @@ class Registry:
     def _group(self, tenancy: Tenancy, resource: str, apikey: str) -> Group:
         found = self._groups.get((tenancy, resource, apikey))
         if found is None:
-            raise no_group(resource, apikey)
+            raise AgentError(
+                404,
+                "DEVICE_GROUP_NOT_FOUND",
+                "Couldn\t find device group for fields: "
+                '["resource","apikey"] and values: '
+                f'{{"resource":"{resource}","apikey":"{apikey}"}}',
+            )
         return found
 
     def group_of(self, apikey: str) -> Group | None:
@@ -282,10 +288,10 @@ class Registry:
             (one for one in self._groups.values() if one.apikey == apikey), None
         )
 
-    def group_in(self, tenancy: Tenancy, apikey: str = "") -> Group | None:
+    def group_in(self, tenancy: Tenancy, apikey: str | None) -> Group | None:
         """A group of a tenant: that of the API key, else the first one."""
         found = [one for one in self._groups.values() if one.tenancy == tenancy]
-        return next((one for one in found if apikey in ("", one.apikey)), None)
+        return next((one for one in found if not apikey or apikey == one.apikey), None)
 
     # --- devices ----------------------------------------------------------------
 
@@ -342,14 +348,3 @@ class Registry:
             and (one.entity_name, one.entity_type) == (name, kind)
         ]
         return min(found, key=lambda one: (one.apikey, one.device_id), default=None)
-
-
-def no_group(resource: str, apikey: str) -> AgentError:
-    """404 for a group, in the agent's wording."""
-    return AgentError(
-        404,
-        "DEVICE_GROUP_NOT_FOUND",
-        "Couldn\t find device group for fields: "
-        '["resource","apikey"] and values: '
-        f'{{"resource":"{resource}","apikey":"{apikey}"}}',
-    )

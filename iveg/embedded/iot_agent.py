@@ -19,7 +19,6 @@ from iveg.embedded.devices import (
     DEFAULT_APIKEY,
     AgentError,
     Device,
-    Group,
     Registry,
     Tenancy,
     read_device,
@@ -137,8 +136,8 @@ class IotAgent:
         Raises:
             AgentError: 400, or 409 if the device exists.
         """
-        group = self._group_for(raw, tenancy)
-        device = read_device(raw, tenancy, group)
+        apikey = raw.get("apikey") if isinstance(raw, dict) else None
+        device = read_device(raw, tenancy, self.registry.group_in(tenancy, apikey))
         if self.registry.is_known(device):
             raise AgentError(
                 409,
@@ -147,10 +146,6 @@ class IotAgent:
                 f"was found:{device.device_id}",
             )
         self._keep(device)
-
-    def _group_for(self, raw: Any, tenancy: Tenancy) -> Group | None:
-        apikey = raw.get("apikey", "") if isinstance(raw, dict) else ""
-        return self.registry.group_in(tenancy, apikey or "")
 
     def _keep(self, device: Device) -> Device:
         if device.commands:
