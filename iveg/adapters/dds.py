@@ -9,6 +9,7 @@ for messages that must be answered at once and wakes the event loop.
 import asyncio
 import threading
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
 from types import TracebackType
@@ -114,7 +115,7 @@ class Endpoint:
     own: bool
 
 
-class Dds:
+class Dds(AbstractContextManager["Dds"]):
     """One participant of a domain; use it with ``with``.
 
     Args:
@@ -143,18 +144,12 @@ class Dds:
             )
         ]
 
-    def __enter__(self) -> "Dds":
-        return self
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
-
-    def close(self) -> None:
         """Leave; nothing is called afterwards."""
         for watch in self._watches:
             watch.stop()
