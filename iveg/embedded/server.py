@@ -98,7 +98,7 @@ async def serve_fiware(
     orion: Address,
     iota: Address,
     *,
-    notify_ready: Callable[[], None] | None = None,
+    notify_ready: Callable[[], None],
     make_agent: MakeAgent = IotAgent,
     make_api: MakeApi = IotaApi,
 ) -> None:
@@ -120,6 +120,5 @@ async def serve_fiware(
         mqtt, orion, iota, make_agent=make_agent, make_api=make_api
     )
     async with running:
-        if notify_ready is not None:
-            notify_ready()
+        notify_ready()
         await asyncio.Event().wait()
