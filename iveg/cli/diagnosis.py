@@ -142,9 +142,8 @@ def _row(check: Check, findings: Findings, stack: Stack) -> DiagnosisRow:
         )
     if finding.trouble is None:
         late = check == Check.MEASURE and finding.took_s > LATE_S
-        return DiagnosisRow(
-            check, "ok", finding.took_s, _late(finding.took_s) if late else ""
-        )
+        sentence = f"{Lag(finding.took_s).sentence}." if late else ""
+        return DiagnosisRow(check, "ok", finding.took_s, sentence)
     said = finding.trouble or f"nothing came in {finding.took_s:.1f} s"
     away = check == Check.AGENT and not _is_silence(said)
     if stack.lag is not None and check.hop is Hop.AGENT and not away:
@@ -153,10 +152,6 @@ def _row(check: Check, findings: Findings, stack: Stack) -> DiagnosisRow:
     return DiagnosisRow(
         check, "failed", finding.took_s, _SENTENCES[check](said, stack, findings)
     )
-
-
-def _late(took_s: float) -> str:
-    return f"{Lag(took_s).sentence}."
 
 
 def _overloaded(check: Check, said: str, stack: Stack, lag: Lag) -> str:

@@ -235,7 +235,6 @@ def read_value(call: Call) -> Any:
         NgsiError: 400.
     """
     kind = call.request.headers.get("content-type", "")
-    value: Any
     try:
         value = load_json(call.request.body)
     except NgsiError:
