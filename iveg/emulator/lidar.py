@@ -63,9 +63,9 @@ def sweep(
     """
     angles = sensor.yaw - math.pi + model.angle_increment * np.arange(model.beams)
     directions = np.stack((np.cos(angles), np.sin(angles)))
+    slopes = _slopes(directions)
     ranges = np.minimum(
-        _wall(sensor, directions, scenery),
-        _boxes(sensor, directions, scenery.rectangles),
+        _wall(sensor, slopes, scenery), _boxes(sensor, slopes, scenery.rectangles)
     )
     for body in others:
         np.minimum(ranges, _body(sensor, directions, body), out=ranges)
@@ -78,24 +78,24 @@ def sweep(
 
 
 def _slopes(directions: Floats) -> Floats:
+    """One over each direction; both of shape (2, beams)."""
     flat = np.abs(directions) < _LEAST_SLOPE
     return 1.0 / np.where(flat, _LEAST_SLOPE, directions)
 
 
-def _wall(sensor: Pose2D, directions: Floats, scenery: Scenery) -> Floats:
+def _wall(sensor: Pose2D, slopes: Floats, scenery: Scenery) -> Floats:
     """Distance of the outer wall on each ray."""
-    bounds, slopes = scenery.bounds, _slopes(directions)
+    bounds = scenery.bounds
     x = np.where(slopes[0] > 0, bounds.xmax - sensor.x, bounds.xmin - sensor.x)
     y = np.where(slopes[1] > 0, bounds.ymax - sensor.y, bounds.ymin - sensor.y)
     exits: Floats = np.minimum(x * slopes[0], y * slopes[1])
     return exits
 
 
-def _boxes(sensor: Pose2D, directions: Floats, boxes: Floats) -> Floats:
+def _boxes(sensor: Pose2D, slopes: Floats, boxes: Floats) -> Floats:
     """Nearest entry of each ray into axis-aligned boxes, shape (n, 4); inf if none."""
     if not len(boxes):
-        return np.full(directions.shape[1], np.inf)
-    slopes = _slopes(directions)
+        return np.full(slopes.shape[1], np.inf)
     x1 = (boxes[:, 0:1] - sensor.x) * slopes[0]
     x2 = (boxes[:, 2:3] - sensor.x) * slopes[0]
     y1 = (boxes[:, 1:2] - sensor.y) * slopes[1]
@@ -111,7 +111,7 @@ def _body(sensor: Pose2D, directions: Floats, body: Body) -> Floats:
     """The same for a rotated box: rays are transformed into its frame."""
     inner, turned = body.rays_into(sensor, directions)
     half = body.length / 2, body.width / 2
-    return _boxes(inner, turned, np.array([(-half[0], -half[1], *half)]))
+    return _boxes(inner, _slopes(turned), np.array([(-half[0], -half[1], *half)]))
 
 
 def _discs(sensor: Pose2D, model: LaserModel, discs: Floats, ranges: Floats) -> None:
