@@ -171,22 +171,20 @@ class EmulatedRobot:
             self._is_deaf = order.deaf
         if order.clock_offset_s is not None:
             self._clock_offset_s = order.clock_offset_s
-        self._freeze(order)
+        if order.freeze_odometry is not None:
+            self._is_odometry_frozen = order.freeze_odometry in (True, "silent")
         self._disturb(order)
         self._rig.blind(order)
         if order.local_hold is not None:
             node.add_local_hold(order.local_hold)
         if order.release_locally:
             node.release_locally()
-        if order.kill:
-            self._kill_node()
+        if order.kill and self._node_task is not None:
+            self._node_task.cancel()
+            self._node_task = None
         if order.revive and self._node_task is None:
             self._node = self._new_node(held=True)
             self._start_node()
-
-    def _freeze(self, order: FaultOrder) -> None:
-        if order.freeze_odometry is not None:
-            self._is_odometry_frozen = order.freeze_odometry in (True, "silent")
 
     def _disturb(self, order: FaultOrder) -> None:
         """Set the radio's faults; without a relay no order names it."""
@@ -194,20 +192,14 @@ class EmulatedRobot:
             return
         radio = self._relay.radio
         told = order.model_dump(include=LINK_FIELDS, exclude_none=True)
-        radio.faults = replace(radio.faults, **told)
         if order.freeze_odometry is not None:
-            repeats = order.freeze_odometry == "repeat"
-            radio.faults = replace(radio.faults, repeats_odometry=repeats)
+            told["repeats_odometry"] = order.freeze_odometry == "repeat"
+        radio.faults = replace(radio.faults, **told)
 
     def _start_node(self) -> None:
         self._node_task = self._tasks.create_task(
             self._node.run(), name=f"node-{self.robot_id}"
         )
-
-    def _kill_node(self) -> None:
-        if self._node_task is not None:
-            self._node_task.cancel()
-            self._node_task = None
 
 
 def battery_after(driven_s: float) -> Battery:
