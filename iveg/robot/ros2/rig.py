@@ -44,7 +44,6 @@ class Reader(Protocol):
 
     def take(self) -> Sequence[bytes]:
         """All pending messages, oldest first."""
-        ...
 
 
 class Writer(Protocol):
@@ -52,12 +51,10 @@ class Writer(Protocol):
 
     def write(self, payload: bytes) -> None:
         """Publish a message."""
-        ...
 
     @property
     def readers(self) -> int:
         """Number of subscribers."""
-        ...
 
 
 class Known(Protocol):
@@ -66,27 +63,22 @@ class Known(Protocol):
     @property
     def topic(self) -> str:
         """Full ROS name."""
-        ...
 
     @property
     def type(self) -> str:
         """ROS name."""
-        ...
 
     @property
     def qos(self) -> Qos:
         """Quality of service that it offers or requests."""
-        ...
 
     @property
     def writes(self) -> bool:
         """Whether it is a writer, else a reader."""
-        ...
 
     @property
     def own(self) -> bool:
         """Whether it belongs to this process."""
-        ...
 
 
 class Network(Protocol):
@@ -94,19 +86,15 @@ class Network(Protocol):
 
     def reader(self, name: str, message: type[Message], qos: Qos) -> Reader:
         """Subscribe."""
-        ...
 
     def writer(self, name: str, message: type[Message], qos: Qos) -> Writer:
         """Publish."""
-        ...
 
     def endpoints(self) -> Sequence[Known]:
         """All writers and readers on the network."""
-        ...
 
     def watch(self, readers: list[Any], on_data: Callable[[], None]) -> None:
         """Call ``on_data`` soon after new data."""
-        ...
 
 
 NodeMaker = Callable[
@@ -168,13 +156,11 @@ class Ros2Robot:
         qualities, drive = self._config.qualities, self._config.drive
         self._ins: dict[str, _In] = {}
         for topic, (name, message) in listened(self._names).items():
-            qos = qualities[topic]
-            if topic in PICTURES:
-                reader = network.reader(name, message, qos.newest(_PICTURE_DEPTH))
-                self._ins[topic] = _In(reader, 0)
-                continue
-            qos = qos.newest(max(_DEPTH, qos.depth))
-            self._ins[topic] = _In(network.reader(name, message, qos), qos.depth)
+            is_picture = topic in PICTURES
+            usual = max(_DEPTH, qualities[topic].depth)
+            qos = qualities[topic].newest(_PICTURE_DEPTH if is_picture else usual)
+            reader = network.reader(name, message, qos)
+            self._ins[topic] = _In(reader, 0 if is_picture else usual)
         self._wishes = _In(
             network.reader(
                 self._names.cmd_vel_in,
