@@ -11,7 +11,7 @@ from types import TracebackType
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress
-from iveg.adapters.mqtt_packets import puback_packet
+from iveg.adapters.mqtt_packets import packet_bounds, puback_packet
 from iveg.emulator.radio import Packet, Radio
 
 _PUBLISH = 3
@@ -153,20 +153,16 @@ async def read_packet(reader: asyncio.StreamReader) -> Packet:
     Raises:
         asyncio.IncompleteReadError: the sender has closed.
     """
-    head = await reader.readexactly(1)
-    length, shift = 0, 0
-    for _ in range(4):
-        part = await reader.readexactly(1)
-        head += part
-        length |= (part[0] & 0x7F) << shift
-        shift += 7
-        if part[0] < 0x80:
-            break
-    rest = await reader.readexactly(length)
-    if head[0] >> 4 != _PUBLISH:
-        return Packet(None, 0, head + rest)
+    raw = await reader.readexactly(2)
+    begin, end = packet_bounds(raw, 0)
+    while end == 0:
+        raw += await reader.readexactly(1)
+        begin, end = packet_bounds(raw, 0)
+    rest = await reader.readexactly(end - begin)
+    if raw[0] >> 4 != _PUBLISH:
+        return Packet(None, 0, raw + rest)
     size = int.from_bytes(rest[:2], "big")
     topic = rest[2 : 2 + size].decode("utf-8", "replace")
-    qos = head[0] >> 1 & 3
+    qos = raw[0] >> 1 & 3
     receipt = puback_packet(rest[2 + size : 4 + size]) if qos == 1 else b""
-    return Packet(topic, qos, head + rest, receipt)
+    return Packet(topic, qos, raw + rest, receipt)
