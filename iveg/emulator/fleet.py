@@ -54,7 +54,6 @@ async def run_emulator(
     fault_port: int | None = None,
     on_fault_port: Callable[[int], None] = _log_port,
     network: Network | None = None,
-    ros2: Mapping[str, RobotConfig] | None = None,
     description: FleetDescription | None = None,
     camera: Camera = "boxes",
 ) -> None:
@@ -71,9 +70,8 @@ async def run_emulator(
         faults: Faults from the start.
         fault_port: Loopback port for fault orders; 0 takes a free one; None has none.
         on_fault_port: Called with the port in use.
-        network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``.
-        ros2: Topic names of each robot; by default below ``/`` and its id in lower
-            case.
+        network: DDS: the robots are ROS 2 bases there, controlled by ``iveg robot``;
+            topics are below ``/`` and the robot's id in lower case.
         description: Fleet description; None: the built-in one.
         camera: Source of the boxes: drawn about the truth, or by grounding.
 
@@ -92,7 +90,7 @@ async def run_emulator(
     is_radio_bad = bool(incidents) or fault_port is not None
     bases = None
     if network is not None:
-        bases = partial(_base, world, network, ros2 or {}, settings.rate_hz)
+        bases = partial(_base, world, network, settings.rate_hz)
     radio_seed = seed if is_radio_bad and network is None else None
     fleet = SimulatedFleet(world, settings, radio_seed=radio_seed, bases=bases)
     if fault_port is None:
@@ -105,14 +103,9 @@ async def run_emulator(
 
 
 def _base(
-    world: SimulatedWorld,
-    network: Network,
-    configs: Mapping[str, RobotConfig],
-    rate_hz: float,
-    rig: RobotHardware,
+    world: SimulatedWorld, network: Network, rate_hz: float, rig: RobotHardware
 ) -> Ros2Base:
-    usual = RobotConfig(namespace=f"/{namespace_of(rig.robot_id)}")
-    config = configs.get(rig.robot_id, usual)
+    config = RobotConfig(namespace=f"/{namespace_of(rig.robot_id)}")
     return Ros2Base(rig, world, network, config, rate_hz)
 
 

@@ -2,6 +2,7 @@
 
 import os
 import platform
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -172,11 +173,10 @@ def _order(runs: Sequence[Outcome]) -> dict[str, dict[str, int]]:
 
 
 def _sum(counts: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    total: dict[str, int] = {}
+    total: Counter[str] = Counter()
     for one in counts:
-        for key, count in one.items():
-            total[key] = total.get(key, 0) + count
-    return total
+        total.update(one)
+    return dict(total)
 
 
 def read_truth(file: Path) -> list[Picture]:

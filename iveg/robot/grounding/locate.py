@@ -102,8 +102,8 @@ class Grounded:
 
 
 Ungrounded = Literal["unsure", "empty", "no_depth", "unreadable"]
-"""Why a target has no position: its probability is below p_min, by design; the mask
-holds nothing of the picture; not one point passed the filter; or it cannot be read."""
+"""Why a target has no position: ``unsure``: below p_min, by design; ``empty``: the mask
+holds nothing of the picture; ``no_depth``: not one point passed the filter."""
 
 
 @dataclass(frozen=True, slots=True)
