@@ -6,7 +6,6 @@ wire.  The same seed gives the same run on any machine, however busy it is.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import count
 from typing import Final
 
@@ -34,21 +33,6 @@ two messages of navigation."""
 Looked = Callable[[RobotHardware], None]
 
 
-@dataclass
-class Faults:
-    """Faults of a robot.
-
-    Attributes:
-        mute: None of its messages arrives.
-        deaf: It ignores iVeg's speed limits; holds still apply.
-        clock_offset_s: Its wall clock is this far ahead (s).
-    """
-
-    mute: bool = False
-    deaf: bool = False
-    clock_offset_s: float = 0.0
-
-
 class StagedRobot:
     """One rig with its safety machine, whose effects are executed at once.
 
@@ -67,7 +51,7 @@ class StagedRobot:
         scan_every: int = 0,
     ) -> None:
         texts = count(1)
-        self.faults = Faults()
+        self._faults = FaultOrder(robot=rig.robot_id)
         self._rig = rig
         self._hear = hear
         self._looked = looked
@@ -90,7 +74,7 @@ class StagedRobot:
         free = self._machine.may_drive
         requested = self._rig.requested_twist(into_run, world) if free else REST
         self._perform(self._machine.request_twist(requested, now.mono), now)
-        if self.faults.deaf and free:
+        if self._faults.deaf and free:
             self._rig.drive(requested)
         self._rig.move(STEP_S)
         moved = self._rig.odometry()
@@ -107,7 +91,16 @@ class StagedRobot:
 
     def _dated(self, now: Instant) -> Instant:
         """Readings of its own clocks."""
-        return Instant(now.mono, now.wall + self.faults.clock_offset_s)
+        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+
+    def obey(self, order: FaultOrder) -> None:
+        """Take ``mute``, ``deaf`` and ``clock_offset_s`` of an order that has them.
+
+        A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
+        but not holds.
+        """
+        named = order.model_dump(exclude_none=True)
+        self._faults = self._faults.model_copy(update=named)
 
     def listen(self, topic: str, payload: bytes, now: Instant) -> None:
         """Take iVeg's feedback to a robot of the fleet."""
@@ -126,7 +119,7 @@ class StagedRobot:
                     self._say(message.topic, message.payload)
 
     def _say(self, topic: str, payload: bytes) -> None:
-        if not self.faults.mute:
+        if not self._faults.mute:
             self._hear(topic, payload)
 
 
@@ -190,10 +183,7 @@ class Stage:
 
     def happen(self, order: FaultOrder) -> None:
         """Inject a fault into a robot, or end it."""
-        faults = self._robots[order.robot].faults
-        faults.clock_offset_s = order.clock_offset_s or faults.clock_offset_s
-        faults.mute = faults.mute if order.mute is None else order.mute
-        faults.deaf = faults.deaf if order.deaf is None else order.deaf
+        self._robots[order.robot].obey(order)
 
     def _deliver(self) -> None:
         """Deliver new feedback to every robot."""
