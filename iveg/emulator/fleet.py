@@ -143,7 +143,7 @@ class SimulatedFleet:
         self._started = clock.now()
         period = 1.0 / self._settings.rate_hz
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._walk(period), name="people")
+            tasks.create_task(every(period, self._walk), name="people")
             tasks.create_task(self._climate(), name="climate")
             for place, robot in enumerate(self._robots.values()):
                 phase = place * period / SLOTS / len(self._robots)
@@ -153,11 +153,8 @@ class SimulatedFleet:
             for incident in incidents:
                 tasks.create_task(self._happen(incident), name="incident")
 
-    async def _walk(self, period: float) -> None:
-        def step(dt: float) -> None:
-            self._world.walk(min(dt, LONGEST_STEP_S))
-
-        await every(period, step)
+    def _walk(self, dt: float) -> None:
+        self._world.walk(min(dt, LONGEST_STEP_S))
 
     async def _climate(self) -> None:
         link = MqttLink(self._settings.node.address, "climate")

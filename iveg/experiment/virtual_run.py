@@ -12,7 +12,6 @@ from typing import Literal
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.domain.costmap import Costmap
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import Feedback
 from iveg.domain.greenhouse import Greenhouse
@@ -208,15 +207,12 @@ class VirtualRun:
             yield real, Picture(real.robot_id, real.at, tuple(seen))
 
     def _believe(self) -> None:
-        own = self._costmap(told=False)
-        told = self._costmap(told=True)
-        if own is not None and told is not None:
-            self._result.beliefs.append((self._now.mono, belief_of(own, told)))
-
-    def _costmap(self, *, told: bool) -> Costmap | None:
         evaluator, now = self._parts.evaluator, self._now
         zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
-        return self._mapper.of(self._watched, zones if told else (), now)
+        own = self._mapper.of(self._watched, (), now)
+        told = self._mapper.of(self._watched, zones, now)
+        if own is not None and told is not None:
+            self._result.beliefs.append((now.mono, belief_of(own, told)))
 
     def _touches(self) -> int:
         people = self._world.discs()
