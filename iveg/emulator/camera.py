@@ -20,9 +20,9 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Box3D, Pose2D, wrap_angle
 from iveg.domain.observations import Detection
 from iveg.emulator.greenhouse import Body, Disc, Scenery, into
+from iveg.emulator.people import HEIGHT_M, box_of_a_person
 
 PERSON = "farmer"
-PERSON_HEIGHT_M = 1.75
 ROBOT_HEIGHT_M = 1.2
 _NEAREST_M = 0.3
 _LONGEST_S, _SHORTEST_S = 2.0, 0.5
@@ -116,7 +116,7 @@ def person_target(number: int, person: Disc) -> Target:
     """A person as a target."""
     pose, size = Pose2D(person.x, person.y, 0.0), 2 * person.radius
     body = Body(f"person-{number}", pose, size, size)
-    return Target(body.robot_id, PERSON, body, PERSON_HEIGHT_M)
+    return Target(body.robot_id, PERSON, body, HEIGHT_M)
 
 
 def robot_target(body: Body) -> Target:
@@ -307,9 +307,4 @@ def upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
     """A box of a person's size at a position in ``map``, given in ``base_link``."""
-    ahead, left = into(pose, x, y)
-    half = 0.25
-    box = Box3D(
-        ahead - half, ahead + half, left - half, left + half, 0.0, PERSON_HEIGHT_M
-    )
-    return Detection(class_id, probability, box)
+    return Detection(class_id, probability, box_of_a_person(*into(pose, x, y)))

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D
-from iveg.emulator.camera import PERSON_HEIGHT_M, ROBOT_HEIGHT_M
+from iveg.emulator.camera import ROBOT_HEIGHT_M
 from iveg.emulator.greenhouse import Body, Disc, Floats, Scenery
+from iveg.emulator.people import HEIGHT_M
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import Segment
 from iveg.robot.grounding.mask import Mask, write_mask
@@ -126,7 +127,7 @@ def person_shape(person: Disc) -> tuple[Upright, ...]:
     head = Disc(person.x, person.y, _HEAD_RADIUS_M)
     return (
         Upright(person, 0.0, _SHOULDERS_M),
-        Upright(head, _SHOULDERS_M, PERSON_HEIGHT_M),
+        Upright(head, _SHOULDERS_M, HEIGHT_M),
     )
 
 

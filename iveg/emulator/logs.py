@@ -18,8 +18,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
+from iveg.emulator.people import box_of_a_person
 from iveg.ngsi.codec import load_json
 from iveg.ngsi.payloads import (
     LidarPoints,
@@ -32,8 +33,6 @@ from iveg.ngsi.payloads import (
 _log = logging.getLogger(__name__)
 _FORBIDDEN = re.compile(r"[<>\"'=;()]")
 _LONGEST_LINE = 1 << 20
-_HALF_SIZE_M, _HEIGHT_M = 0.25, 1.75
-"""A log has the position of a detection; it is sent as a box of a person's size."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +121,10 @@ class _OdometryLine(_Line):
     v: Speed = 0.0
     w: Speed = 0.0
 
+    def observation(self) -> Odometry:
+        pose = Pose2D(self.x, self.y, self.yaw)
+        return Odometry("", Origin(), pose, Twist2D(self.v, self.w))
+
 
 class _ScanLine(_Line):
     kind: Literal["scan"]
@@ -133,6 +136,20 @@ class _ScanLine(_Line):
     oy: Metres = 0.0
     ranges: LidarPoints
 
+    def observation(self) -> LaserScan:
+        ranges = np.array(self.ranges, np.float32)
+        ranges[np.isnan(ranges)] = np.inf
+        return LaserScan(
+            "",
+            Origin(),
+            self.angle_min,
+            self.angle_increment,
+            self.range_min,
+            self.range_max,
+            Pose2D(self.ox, self.oy, 0.0),
+            ranges,
+        )
+
 
 class _DetectionLine(_Line):
     kind: Literal["detection"]
@@ -140,6 +157,13 @@ class _DetectionLine(_Line):
     probability: Annotated[float, Field(ge=0, le=1)]
     x: Metres
     y: Metres
+
+    def observation(self) -> Detection:
+        # Orion refuses a whole update because of one of these characters.
+        if _FORBIDDEN.search(self.class_):
+            raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
+        box = box_of_a_person(self.x, self.y)
+        return Detection(self.class_, self.probability, box, "map")
 
 
 _LINE: TypeAdapter[_OdometryLine | _ScanLine | _DetectionLine] = TypeAdapter(
@@ -151,38 +175,4 @@ def _read(line: bytes) -> RecordingEntry:
     if len(line) >= _LONGEST_LINE:
         raise UnreadableError("too_long", f"more than {_LONGEST_LINE} bytes")
     value = _LINE.validate_python(load_json(line))
-    match value:
-        case _OdometryLine():
-            pose = Pose2D(value.x, value.y, value.yaw)
-            twist = Twist2D(value.v, value.w)
-            return RecordingEntry(value.t, Odometry("", Origin(), pose, twist))
-        case _ScanLine():
-            return RecordingEntry(value.t, _scan(value))
-        case _DetectionLine():
-            return RecordingEntry(value.t, _detection(value))
-
-
-def _scan(line: _ScanLine) -> LaserScan:
-    ranges = np.array(line.ranges, np.float32)
-    ranges[np.isnan(ranges)] = np.inf
-    return LaserScan(
-        "",
-        Origin(),
-        line.angle_min,
-        line.angle_increment,
-        line.range_min,
-        line.range_max,
-        Pose2D(line.ox, line.oy, 0.0),
-        ranges,
-    )
-
-
-def _detection(line: _DetectionLine) -> Detection:
-    # Orion refuses a whole update because of one of these characters.
-    if _FORBIDDEN.search(line.class_):
-        raise UnreadableError("bad_class", "none of < > \" ' = ; ( ) is allowed")
-    half = _HALF_SIZE_M
-    box = Box3D(
-        line.x - half, line.x + half, line.y - half, line.y + half, 0.0, _HEIGHT_M
-    )
-    return Detection(line.class_, line.probability, box, "map")
+    return RecordingEntry(value.t, value.observation())

@@ -11,16 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from iveg.domain.geometry import Box3D
 from iveg.emulator.greenhouse import Body, Disc, Scenery
 
 WALKING_SPEED = 1.4
 """(m/s), as in the seed paper; ISO 13855 assumes 1.6."""
 
-RADIUS_M = 0.25
+RADIUS_M, HEIGHT_M = 0.25, 1.75
 _KEEPS_OFF_M = 0.45
 """Distance between a person and a robot below which the person steps aside (m)."""
 _STEP_ASIDE_SPEED = 0.8
 _ARRIVED_M = 0.05
+
+
+def box_of_a_person(x: float, y: float) -> Box3D:
+    """A box of a person's size about a position (m)."""
+    r = RADIUS_M
+    return Box3D(x - r, x + r, y - r, y + r, 0.0, HEIGHT_M)
 
 
 @dataclass(frozen=True, slots=True)
