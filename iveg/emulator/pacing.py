@@ -1,6 +1,7 @@
 """Periodic calls."""
 
 import asyncio
+import itertools
 from collections.abc import Callable, Sequence
 
 from iveg.adapters import clock
@@ -27,11 +28,5 @@ async def every(period: float, work: Callable[[float], None]) -> None:
 
 async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> None:
     """Call each of ``work`` once a period (s), evenly spaced, for ever."""
-    turn = 0
-
-    def slot(dt: float) -> None:
-        nonlocal turn
-        work[turn % len(work)](dt)
-        turn += 1
-
-    await every(period / len(work), slot)
+    slots = itertools.cycle(work)
+    await every(period / len(work), lambda dt: next(slots)(dt))

@@ -100,13 +100,9 @@ class RobotHardware:
             place = order.false_person
             self.false_person = None if place is None else (place.x, place.y)
 
-    def body(self) -> Body:
-        """Footprint of the robot."""
-        return self.vehicle.body(self.robot_id)
-
     def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
         """Twist that navigation requests; ``now`` in seconds into the run."""
-        discs = [person.disc for person in around.people]
+        discs = around.discs()
         for body in around.bodies_but(self.robot_id):
             discs.extend(body.discs())
         return self._follower.requested_twist(self.vehicle.pose, now, discs)
@@ -120,8 +116,10 @@ class RobotHardware:
     def scan(self, around: "SimulatedWorld") -> LaserScan:
         """One turn of the laser."""
         sensor = self.vehicle.pose.compose(self.profile.laser)
-        people = [person.disc for person in around.people]
         others = around.bodies_but(self.robot_id)
+        ranges = sweep(
+            sensor, _LASER, around.scenery, around.discs(), others, self._rng
+        )
         return LaserScan(
             self.robot_id,
             Origin(),
@@ -130,7 +128,7 @@ class RobotHardware:
             _LASER.range_min,
             _LASER.range_max,
             self.profile.laser,
-            sweep(sensor, _LASER, around.scenery, people, others, self._rng),
+            ranges,
         )
 
     def detect(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
@@ -205,7 +203,7 @@ class SimulatedWorld:
 
     def bodies(self) -> list[Body]:
         """Footprints of all robots."""
-        return [rig.body() for rig in self.rigs.values()]
+        return [rig.vehicle.body(rig.robot_id) for rig in self.rigs.values()]
 
     def bodies_but(self, robot_id: str) -> list[Body]:
         """The other robots, as obstacles for one of them."""
