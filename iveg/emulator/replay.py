@@ -132,13 +132,10 @@ def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
 
 def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
     """The error about a file among those that ended the tasks."""
-    found = group.subgroup(DataFileError)
-    while found is not None:
-        first = found.exceptions[0]
-        if isinstance(first, DataFileError):
-            return first
-        found = first if isinstance(first, BaseExceptionGroup) else None
-    return None
+    found: BaseException | None = group.subgroup(DataFileError)
+    while isinstance(found, BaseExceptionGroup):
+        found = found.exceptions[0]
+    return found if isinstance(found, DataFileError) else None
 
 
 # --- one replayed robot -----------------------------------------------------------

@@ -220,8 +220,7 @@ def _environment() -> dict[str, str]:
 def _close(directory: Path, code: int, why: str | None, said: str) -> None:
     """Record how it ended if the program could not."""
     told = _progress(directory)
-    died = told.get("state") == "running"
-    if died:
+    if told.get("state") == "running":
         reason = why or f"{said} (exit code {code})".strip()
         _write_partial(directory, reason)
         write_json(directory / PROGRESS, {**told, "state": "broken", "why": reason})
