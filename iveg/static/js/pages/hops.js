@@ -91,7 +91,10 @@ export function start({ i18n }) {
   for (const chip of all("[data-of]")) {
     chip.addEventListener("click", () => ask({ robot: chip.dataset.of }));
   }
-  i18n.onChange(redraw);
+  i18n.onChange(() => {
+    draw();
+    redraw();
+  });
   onThemeChange(redraw);
   document.addEventListener("visibilitychange", load);
   setInterval(load, EVERY_MS);
