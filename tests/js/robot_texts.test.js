@@ -1,3 +1,5 @@
+import { isSilent } from "../../iveg/static/js/core/clock.js";
+import { createLabels } from "../../iveg/static/js/map/layers/labels.js";
 import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
 import {
   certaintySaid,
@@ -74,6 +76,9 @@ test("a robot that is lost has no margin, and its way is not said to be clear", 
   const lost = robot({ age_s: 9, margin });
   equal(marginSaid(lost, words), "robot.margin_lost");
   equal(whySaid(lost, words), "");
+  const restored = robot({ age_s: null, margin });
+  equal(marginSaid(restored, words), "robot.margin_lost");
+  equal(whySaid(restored, words), "");
   const limited = { speed_factor: 0.5, reason: "stale", distance_m: null };
   equal(whySaid(robot({ age_s: 9, speed_limit: limited }), words), "robot.why.stale ");
 });
@@ -133,4 +138,17 @@ test("the most certain detection of a fresh frame is told, an old frame says not
   equal(certaintySaid(fresh, words), "robot.certainty_value person 0.9");
   equal(certaintySaid({ ...fresh, items: [] }, words), "robot.certainty_none");
   equal(certaintySaid(old, words), "robot.certainty_old");
+});
+
+test("what a restart restored has an age that nobody knows, and says so on the map", () => {
+  const links = /** @type {const} */ (["LIVE", "LATE", "LOST", "UNKNOWN"]);
+  equal(
+    links.map((link) => isSilent(link)),
+    [false, false, true, true],
+  );
+  const labels = createLabels(words.t, "en");
+  equal(
+    [labels.ago(12.4), labels.ago(Number.POSITIVE_INFINITY)],
+    ["map.ghost 12", "? s"],
+  );
 });

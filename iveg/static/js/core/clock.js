@@ -52,6 +52,9 @@ export function linkOfRobot(robot, nowMs = performance.now()) {
   return linkOf(ageOf(robot, nowMs));
 }
 
+/** Whether nobody knows what such a robot does now. @param {Link} link */
+export const isSilent = (link) => link === "LOST" || link === "UNKNOWN";
+
 /**
  * The text of an age, marked where it is an estimate without proof from the robot.
  *

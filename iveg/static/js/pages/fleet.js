@@ -3,7 +3,7 @@
  */
 
 import { readApi } from "../core/api.js";
-import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
+import { aboutAge, ageOf, isSilent, linkOfRobot } from "../core/clock.js";
 import {
   all,
   fill,
@@ -25,7 +25,6 @@ import { createTiles } from "./tiles.js";
 
 const TICK_MS = 500;
 const READ_MS = 5000;
-const SILENT = new Set(["LOST", "UNKNOWN"]);
 
 /** @param {import("../core/page.js").Page} page */
 export function start(page) {
@@ -62,7 +61,7 @@ export function start(page) {
     const isOpen = store.connection.state === "open";
     /** @type {import("../core/protocol.js").Health | null} */
     const health = store.get("health") ?? null;
-    const silent = robots.filter((robot) => SILENT.has(linkOfRobot(robot)));
+    const silent = robots.filter((robot) => isSilent(linkOfRobot(robot)));
     const hops = health?.hops ?? [];
     const found = judgeDataPath(
       hops,
@@ -156,7 +155,7 @@ function machineCells(robot, i18n) {
   return [
     make("b", "", robot.robot_id),
     `${i18n.t(`robot.link.${link}`)} · ${age}`,
-    link === "LOST" ? "—" : modeSaid(robot, i18n),
+    isSilent(link) ? "—" : modeSaid(robot, i18n),
     profile && isKnown ? i18n.t("robot.profile", profile) : "—",
     navigation?.task ? taskSaid(navigation.task, i18n) : "—",
     robot.transport && isKnown ? i18n.t(`fleet.transport.${robot.transport}`) : "—",

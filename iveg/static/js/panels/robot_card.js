@@ -15,6 +15,7 @@ import {
   certaintySaid,
   faultsSaid,
   gaugeSaid,
+  isHeard,
   marginSaid,
   modeSaid,
   readoutsSaid,
@@ -115,7 +116,8 @@ export class RobotCard {
     const said = Number.isFinite(ageS)
       ? aboutAge(robot, agoSaid(ageS, i18n), i18n)
       : "";
-    if (!isSmall) for (const age of this.#ages) setText(age, said);
+    const known = said || (isHeard(robot) ? i18n.t("robot.age_unknown") : "");
+    if (!isSmall) for (const age of this.#ages) setText(age, known);
     setText(this.#fields.age, said);
   }
 

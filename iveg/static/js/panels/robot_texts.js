@@ -4,7 +4,7 @@
  * An unknown value is said to be unknown: never a clear way, a speed or a margin.
  */
 
-import { ageOf, linkOfRobot } from "../core/clock.js";
+import { ageOf, isSilent, linkOfRobot } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
 import { readingOf } from "./gauge.js";
 
@@ -58,7 +58,7 @@ export function whySaid(robot, i18n) {
   if (distance === null && (reason === "person" || reason === "robot")) {
     return i18n.t(`why.${reason}`);
   }
-  const isHollow = isWaiting(robot) || linkOfRobot(robot) === "LOST";
+  const isHollow = isWaiting(robot) || isSilent(linkOfRobot(robot));
   if (!reason || (reason === "clear" && isHollow)) return "";
   return i18n.t(`robot.why.${reason}`, { distance });
 }
@@ -92,7 +92,7 @@ export function faultsSaid(robot, i18n) {
 
 /** @param {Robot | undefined} robot @param {I18n} i18n */
 export function marginSaid(robot, i18n) {
-  if (linkOfRobot(robot) === "LOST") return i18n.t("robot.margin_lost");
+  if (isSilent(linkOfRobot(robot))) return i18n.t("robot.margin_lost");
   const margin = robot?.margin;
   if (!margin) return i18n.t("robot.margin_nobody");
   const band = i18n.t(`robot.margin_band.${margin.band}`);

@@ -29,6 +29,7 @@
  *   `serverNowS` Unix time
  */
 
+import { isSilent } from "../core/clock.js";
 import { LIMITS } from "../core/limits.js";
 
 /** @type {Record<string, StopState>} */
@@ -118,7 +119,7 @@ export function viewOfFleet({ connection, isBlind, press, nowMs, robots }) {
     const told = robots.find(({ view }) => view.state === loudest);
     if (told) return told.view;
   }
-  if (total && robots.every(({ link }) => link === "LOST" || link === "UNKNOWN")) {
+  if (total && robots.every(({ link }) => isSilent(link))) {
     return lost(null, nowMs);
   }
   return viewOfQuietFleet(connection, robots);

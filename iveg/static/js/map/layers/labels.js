@@ -55,8 +55,8 @@ export function createLabels(
     percent: (share) => percents.format(share),
     /** An age short enough for a tag; tenths while they matter. @param {number} s */
     age: (s) => `${s < 10 ? tenths.format(s) : plain.format(Math.round(s))} s`,
-    /** @param {number} s */
-    ago: (s) => t("map.ghost", { age: Math.round(s) }),
+    /** @param {number} s Infinity: nobody knows */
+    ago: (s) => (Number.isFinite(s) ? t("map.ghost", { age: Math.round(s) }) : "? s"),
     /** @param {number} s */
     lastSeen: (s) => t("map.last_seen", { age: Math.round(s) }),
     replay: () => t("map.replay"),

@@ -5,6 +5,7 @@
  * it without a line of sight: the point of sharing detections, made visible.
  */
 
+import { isSilent } from "../../core/clock.js";
 import { screenX, screenY } from "../viewport.js";
 import { mayStand } from "./claims.js";
 import { isolated, label } from "./paint.js";
@@ -29,7 +30,7 @@ export function draw(paint) {
       for (const id of person.observers) drawSight(paint, robots.get(id), person);
       for (const act of person.acting) {
         const robot = robots.get(act.robot_id);
-        if (act.in_sight || !robot || robot.link === "LOST") continue;
+        if (act.in_sight || !robot || isSilent(robot.link)) continue;
         drawBlind(paint, robot, person, act.distance_m);
       }
     }
@@ -42,7 +43,7 @@ export function draw(paint) {
  * @param {ScenePerson} person
  */
 function drawSight(paint, robot, person) {
-  if (!robot || robot.link === "LOST") return;
+  if (!robot || isSilent(robot.link)) return;
   const { ctx, theme } = paint;
   ctx.globalAlpha = person.stage === "seen" ? 0.8 : 0.35;
   ctx.strokeStyle = theme.robots[robot.slot - 1];

@@ -5,6 +5,7 @@
  * last pose.  Each kind of drive has its own body, so hue never carries identity alone.
  */
 
+import { isSilent } from "../../core/clock.js";
 import { LIMITS } from "../../core/limits.js";
 import { screenX, screenY } from "../viewport.js";
 import { claim } from "./claims.js";
@@ -92,7 +93,7 @@ function drawFollowed({ ctx, theme }, length) {
  * @param {number} width
  */
 function drawBody({ ctx, theme }, robot, length, width) {
-  const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
+  const isLost = isSilent(robot.link);
   const hue = isLost ? theme.muted : theme.robots[robot.slot - 1];
   outline(ctx, robot.drive, length, width);
   if (robot.link === "LATE") halo(ctx, theme.alert[1]);
@@ -257,7 +258,7 @@ function drawPadlock({ ctx, theme }, x, y) {
 function drawTag(paint, robot, length) {
   const { ctx, theme } = paint;
   const y = heightOfTag(paint, robot, length);
-  const isLost = robot.link === "LOST" || robot.link === "UNKNOWN";
+  const isLost = isSilent(robot.link);
   label(paint, robot.id, 0, y, {
     size: 13,
     weight: 700,
@@ -307,8 +308,8 @@ function tagsOf({ theme, labels }, robot) {
   /** @type {[string, string, string][]} */
   const tags = [];
   if (robot.link === "LATE") tags.push([labels.age(robot.ageS), alert[1], onAlert2]);
-  if (robot.link === "LOST") tags.push([labels.ago(robot.ageS), muted, bg]);
-  if (robot.mode === "SLOW" && robot.link !== "LOST") {
+  if (isSilent(robot.link)) tags.push([labels.ago(robot.ageS), muted, bg]);
+  if (robot.mode === "SLOW" && !isSilent(robot.link)) {
     tags.push([labels.percent(LIMITS.slow_factor), text, bg]);
   }
   if (robot.replay) tags.push([labels.replay(), muted, bg]);
