@@ -15,6 +15,7 @@ from iveg.domain.observations import Instant, Received
 from iveg.domain.transports import FIWARE
 from iveg.ngsi.codec import read_notification
 from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.ports import Clock
 from iveg.web.problems import Problem, problem_of
 from iveg.web.security.authentication import Action, NotifySecret
 from iveg.web.security.headers import MAX_BODY, NOTIFICATIONS_PATH, TOO_LONG
@@ -46,7 +47,7 @@ class NotificationEndpoint:
         self,
         ingest: Ingest,
         secret: NotifySecret,
-        clock: Callable[[], Instant],
+        clock: Clock,
         is_ours: Callable[[str], bool],
         tenant: tuple[str, str],
         heard: Callable[[Instant], None],

@@ -1,16 +1,15 @@
 """Acknowledgement of alerts: by whom, when, and with which note."""
 
-from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Depends
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
-from iveg.domain.observations import Instant
 from iveg.models.alert import Alert
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.evaluate import Evaluator
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.problems import Problem
 from iveg.web.security.authentication import Principal, require
@@ -24,7 +23,7 @@ class Acknowledgement(BaseModel):
     note: Annotated[str, Field(max_length=200)] = ""
 
 
-def router(evaluator: Evaluator, clock: Callable[[], Instant]) -> APIRouter:
+def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
     """Routes of alerts."""
     routes = APIRouter(prefix="/api/v1", tags=["alerts"])
 

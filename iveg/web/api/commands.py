@@ -4,7 +4,6 @@ STOP is accepted from everyone who is signed in, in any state, without limit.  R
 and resume are refused unless the robot stands and its report is fresh.
 """
 
-from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Depends
@@ -12,9 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.requests import Request
 from starlette.responses import Response
 
-from iveg.domain.observations import Instant
 from iveg.models.command import FleetPressed, Pressed
 from iveg.pipeline.command import Commander
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.presses import DESCRIBED, press_of
 from iveg.web.security.authentication import Principal, require
@@ -32,7 +31,7 @@ class ReleaseRequest(BaseModel):
     holds: Annotated[list[HoldId], Field(min_length=1, max_length=64)]
 
 
-def router(commander: Commander, clock: Callable[[], Instant]) -> APIRouter:
+def router(commander: Commander, clock: Clock) -> APIRouter:
     """Commands to robots."""
     routes = APIRouter(prefix="/api/v1", tags=["commands"])
 

@@ -5,7 +5,6 @@ ROS map files use for unknown; its first line is the north.
 """
 
 import asyncio
-from collections.abc import Callable
 from io import BytesIO
 from typing import Annotated
 
@@ -17,13 +16,13 @@ from PIL import Image
 from starlette.responses import Response
 
 from iveg.domain.costmap import UNKNOWN, Costmap
-from iveg.domain.observations import Instant
 from iveg.domain.rule.zones import zones_of
 from iveg.models.base import write_json
 from iveg.models.places import Costmap as CostmapModel
 from iveg.models.places import Point
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.ports import Clock
 from iveg.web.security.authentication import require
 
 _PNG = "image/png"
@@ -33,9 +32,7 @@ _NOTHING = CostmapModel(
 )
 
 
-def router(
-    mapper: Mapper, evaluator: Evaluator, clock: Callable[[], Instant]
-) -> APIRouter:
+def router(mapper: Mapper, evaluator: Evaluator, clock: Clock) -> APIRouter:
     """Routes of the costmap."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]

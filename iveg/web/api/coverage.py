@@ -1,7 +1,5 @@
 """Camera coverage over HTTP: the page shades the aisles by it."""
 
-from collections.abc import Callable
-
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
@@ -11,10 +9,11 @@ from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.places import Coverage, LaneCoverage
 from iveg.pipeline.coverage import CoverageMonitor
+from iveg.pipeline.ports import Clock
 from iveg.web.security.authentication import require
 
 
-def router(monitor: CoverageMonitor, clock: Callable[[], Instant]) -> APIRouter:
+def router(monitor: CoverageMonitor, clock: Clock) -> APIRouter:
     """Routes of the camera coverage."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]

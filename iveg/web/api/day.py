@@ -1,6 +1,5 @@
 """The evening sheet over HTTP: as numbers, and as a page to print."""
 
-from collections.abc import Callable
 from datetime import date, timedelta
 from typing import Annotated, Any
 
@@ -18,7 +17,6 @@ from iveg.domain.day import (
     worked_minutes,
 )
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import Instant
 from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop.drills import due_drills
@@ -26,6 +24,7 @@ from iveg.models.base import write_json
 from iveg.models.command import Command
 from iveg.models.day import Day, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
+from iveg.pipeline.ports import Clock
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.pages.routes import Pages
@@ -117,7 +116,7 @@ def _pass(one: Passing) -> Pass:
     )
 
 
-def router(days: Days, pages: Pages, clock: Callable[[], Instant]) -> APIRouter:
+def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     """The evening sheet."""
     routes = APIRouter()
     who = Depends(require("read"))

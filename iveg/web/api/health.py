@@ -7,12 +7,13 @@ from starlette.responses import PlainTextResponse, Response
 
 from iveg.domain.observations import Instant
 from iveg.models.health import Health
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.authentication import require
 
 
 def router(
-    clock: Callable[[], Instant],
+    clock: Clock,
     health: Callable[[Instant], Health],
 ) -> APIRouter:
     """The endpoints that machines ask."""

@@ -21,7 +21,6 @@ from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import ClimateSeries
 from iveg.domain.alerts.flood import Flood as NoFlood
 from iveg.domain.fleet import NOBODY, FleetDescription
-from iveg.domain.observations import Instant
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
 from iveg.domain.stamps import format_stamp
 from iveg.models.alert import Alert, AlertListing, Flood, LogEntry
@@ -31,6 +30,7 @@ from iveg.models.command import Command
 from iveg.models.decision import Decision
 from iveg.models.people import Detection
 from iveg.models.reading import Reading
+from iveg.pipeline.ports import Clock
 from iveg.web.api import exports
 from iveg.web.api.answers import Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
@@ -69,7 +69,7 @@ def router(
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
     flood: Callable[[], Flood] = lambda: Flood.of(NoFlood()),
     fleet: FleetDescription = NOBODY,
-    read_clock: Callable[[], Instant] = clock.now,
+    read_clock: Clock = clock.now,
 ) -> APIRouter:
     """The routes of the history.
 

@@ -3,7 +3,7 @@
 import asyncio
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
@@ -35,6 +35,7 @@ from iveg.models.latency import (
     SegmentSpread,
 )
 from iveg.ngsi.codec import format_stamp
+from iveg.pipeline.ports import Clock
 from iveg.web.api.exports import form_of
 from iveg.web.pages import charts
 from iveg.web.pages.latency_figures import (
@@ -62,7 +63,7 @@ class Asked(BaseModel):
     )
 
 
-def router(watch: LatencyWatch, clock: Callable[[], Instant]) -> APIRouter:
+def router(watch: LatencyWatch, clock: Clock) -> APIRouter:
     """Routes of the latency table."""
     routes = APIRouter(
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]

@@ -17,11 +17,11 @@ from iveg.adapters import web_push
 from iveg.adapters.outbound import is_public_target
 from iveg.domain import messages
 from iveg.domain.messages import Channel, Contacts, Language, Level, Message, Text
-from iveg.domain.observations import Instant
 from iveg.models.alert import Told
 from iveg.models.messages import Messages, MessageTest
 from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.messenger import Messenger
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import LANGUAGES, read_translations
@@ -166,7 +166,7 @@ class Desk:
 
     messenger: Messenger
     new_id: Callable[[], str]
-    clock: Callable[[], Instant]
+    clock: Clock
 
     @property
     def contacts(self) -> Contacts:
@@ -285,7 +285,7 @@ def _others(push: messages.Push, endpoint: str) -> list[messages.Device]:
 class _Tests:
     """One test at a time, and seldom."""
 
-    def __init__(self, messenger: Messenger, clock: Callable[[], Instant]) -> None:
+    def __init__(self, messenger: Messenger, clock: Clock) -> None:
         self._messenger = messenger
         self._clock = clock
         self._lock = asyncio.Lock()

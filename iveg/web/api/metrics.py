@@ -16,6 +16,7 @@ from iveg.domain.latency.sketch import Sketch, merged
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.models.health import Health, HopHealth, Safety
+from iveg.pipeline.ports import Clock
 from iveg.web.security.authentication import require
 
 _SHARES: Final = (0.5, 0.95, 0.99)
@@ -38,7 +39,7 @@ class Queues:
 
 
 def router(
-    clock: Callable[[], Instant],
+    clock: Clock,
     health: Callable[[Instant], Health],
     watch: LatencyWatch,
     queues: Callable[[], Queues],

@@ -1,11 +1,8 @@
 """REST twins of live topics: robots, people, map, climate (docs/interfaces/http.md)."""
 
-from collections.abc import Callable
-
 from fastapi import APIRouter, Depends
 from starlette.responses import Response
 
-from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.climate import Climate
 from iveg.models.device import Device
@@ -13,12 +10,13 @@ from iveg.models.health import Health
 from iveg.models.people import Person
 from iveg.models.places import GreenhouseMap, Scan
 from iveg.models.robot import Robot
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.security.authentication import require
 from iveg.web.views import Views
 
 
-def router(views: Views, clock: Callable[[], Instant]) -> APIRouter:
+def router(views: Views, clock: Clock) -> APIRouter:
     """Routes of the present state."""
     routes = APIRouter(
         prefix="/api/v1", tags=["live"], dependencies=[Depends(require("read"))]

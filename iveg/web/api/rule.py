@@ -1,6 +1,5 @@
 """The detection rule over HTTP: the version in force, earlier ones, a new one."""
 
-from collections.abc import Callable
 from typing import Annotated, Literal, TypeVar
 
 from fastapi import APIRouter, Depends
@@ -9,10 +8,10 @@ from starlette.responses import Response
 
 from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Instant
 from iveg.models.base import Listing
 from iveg.models.rule import Rule as RuleModel
 from iveg.ngsi.payloads import clean_text
+from iveg.pipeline.ports import Clock
 from iveg.pipeline.rules import Rules
 from iveg.web.api.answers import Json
 from iveg.web.security.authentication import Principal, require
@@ -73,7 +72,7 @@ def _new(wanted: T | None, old: T) -> T:
     return old if wanted is None else wanted
 
 
-def router(rules: Rules, clock: Callable[[], Instant]) -> APIRouter:
+def router(rules: Rules, clock: Clock) -> APIRouter:
     """Read by all, changed by operators; every version keeps its author and time."""
     routes = APIRouter(prefix="/api/v1", tags=["rule"])
     reader = [Depends(require("read"))]

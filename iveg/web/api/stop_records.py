@@ -24,6 +24,7 @@ from iveg.models.command import (
     LatencySpread,
     RobotLatency,
 )
+from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.api.history_filters import Range, range_of
 from iveg.web.security.authentication import require
@@ -35,7 +36,7 @@ _DRILLS_SHOWN = 100
 
 def router(
     queries: Queries,
-    clock: Callable[[], Instant],
+    clock: Clock,
     find: Callable[[str, Instant], Command | None],
 ) -> APIRouter:
     """Routes of past STOPs; ``find`` knows the commands of this run."""

@@ -24,6 +24,7 @@ from iveg.models.base import write_json
 from iveg.models.snapshot import Snapshot
 from iveg.ngsi.codec import load_json
 from iveg.pipeline import topics
+from iveg.pipeline.ports import Clock
 from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.pacing import SUBPROTOCOL
@@ -56,7 +57,7 @@ class Encoder:
         self,
         views: Views,
         hub: Hub,
-        clock: Callable[[], Instant],
+        clock: Clock,
     ) -> None:
         self._views = views
         self._hub = hub
@@ -115,7 +116,7 @@ def router(
     hub: Hub,
     encoder: Encoder,
     snapshot: Callable[[Principal, Instant], Snapshot],
-    clock: Callable[[], Instant],
+    clock: Clock,
     stop: Stop,
     latency: LatencyWatch,
 ) -> APIRouter:
@@ -177,7 +178,7 @@ class Line:
         websocket: WebSocket,
         subscriber: Subscriber,
         encoder: Encoder,
-        clock: Callable[[], Instant],
+        clock: Clock,
         limit_s: float = _SEND_LIMIT_S,
     ) -> None:
         self._websocket = websocket
@@ -285,7 +286,7 @@ class ClientMessages:
         self,
         websocket: WebSocket,
         subscriber: Subscriber,
-        clock: Callable[[], Instant],
+        clock: Clock,
         stop: Stop,
         principal: Principal,
         feed: TelemetryFeed | None,

@@ -14,7 +14,7 @@ STOP outlives the session (SECURITY.md): a person who was signed in once can sti
 import hmac
 import logging
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from fastapi.dependencies.models import Dependant
@@ -24,7 +24,7 @@ from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
 from iveg.domain.errors import NotAllowedError
-from iveg.domain.observations import Instant
+from iveg.pipeline.ports import Clock
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
 from iveg.web.security.rate_limits import FailedAttempts
@@ -68,7 +68,7 @@ class Authenticator:
         *,
         sign_in_token: str,
         api_token: str,
-        clock: Callable[[], Instant],
+        clock: Clock,
         store: SessionStore | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token

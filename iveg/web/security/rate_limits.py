@@ -14,7 +14,7 @@ from typing import Final
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from iveg.domain.observations import Instant
+from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal
 
 SIGN_INS, SIGN_INS_WITHIN_S = 5, 60.0
@@ -117,7 +117,7 @@ class SocketLimits:
         self,
         app: ASGIApp,
         identify: Callable[[HTTPConnection], Principal | None],
-        clock: Callable[[], Instant],
+        clock: Clock,
     ) -> None:
         self._app = app
         self._identify = identify

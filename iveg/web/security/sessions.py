@@ -9,12 +9,12 @@ Ages follow the wall clock, because no other goes on counting while iVeg is down
 
 import hashlib
 import secrets
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol, cast
 
 from iveg.adapters.sessions import Session
-from iveg.domain.observations import Instant
+from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
 IDLE_S, ABSOLUTE_S, STOP_ONLY_S = 12 * 3600.0, 24 * 3600.0, 12 * 3600.0
@@ -47,7 +47,7 @@ class Sessions:
 
     def __init__(
         self,
-        clock: Callable[[], Instant],
+        clock: Clock,
         store: SessionStore | None = None,
         most: int = _MOST_SESSIONS,
     ) -> None:
