@@ -2,9 +2,8 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.responses import Response
 
 from iveg.models.alert import Alert
 from iveg.ngsi.payloads import clean_text

@@ -6,10 +6,8 @@ and resume are refused unless the robot stands and its report is fresh.
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.requests import Request
-from starlette.responses import Response
 
 from iveg.models.command import FleetPressed, Pressed
 from iveg.pipeline.command import Commander

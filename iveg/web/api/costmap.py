@@ -10,10 +10,9 @@ from typing import Annotated
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query, Request, Response
 from numpy.typing import NDArray
 from PIL import Image
-from starlette.responses import Response
 
 from iveg.domain.costmap import UNKNOWN, Costmap
 from iveg.domain.rule.zones import zones_of

@@ -1,7 +1,6 @@
 """Camera coverage over HTTP: the page shades the aisles by it."""
 
-from fastapi import APIRouter, Depends
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, Response
 
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant

@@ -3,9 +3,7 @@
 from datetime import date, timedelta
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query
-from starlette.requests import Request
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
 from iveg.adapters.history.lists import MOST_ROWS, Filter
 from iveg.adapters.history.queries import Queries

@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Annotated, Literal, Protocol
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, HTTPException, Response
 from fastapi import Path as InPath
+from fastapi.responses import FileResponse, HTMLResponse
 from pydantic import BaseModel, ConfigDict
-from starlette.exceptions import HTTPException
-from starlette.responses import FileResponse, HTMLResponse, Response
 
 from iveg.models.experiment import Experiment, Experiments
 from iveg.web.api.answers import Json

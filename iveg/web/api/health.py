@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from fastapi import APIRouter, Depends
-from starlette.responses import PlainTextResponse, Response
+from fastapi import APIRouter, Depends, Response
+from fastapi.responses import PlainTextResponse
 
 from iveg.domain.observations import Instant
 from iveg.models.health import Health

@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any, Generic, TypeVar
 
-from fastapi import APIRouter, Depends, HTTPException, Path, Query
+from fastapi import APIRouter, Depends, HTTPException, Path, Query, Request, Response
+from fastapi.responses import StreamingResponse
 from orjson import Fragment
-from starlette.requests import Request
-from starlette.responses import Response, StreamingResponse
 
 from iveg.adapters import clock
 from iveg.adapters.history import lists

@@ -8,9 +8,8 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.responses import Response
 
 from iveg.domain.latency.account import Cell, collect, merge
 from iveg.domain.latency.offset import ClockOffset

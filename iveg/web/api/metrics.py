@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from fastapi import APIRouter, Depends
-from starlette.responses import PlainTextResponse, Response
+from fastapi import APIRouter, Depends, Response
+from fastapi.responses import PlainTextResponse
 
 from iveg.domain.latency.segments import SEGMENTS, Data, Segment
 from iveg.domain.latency.sketch import Sketch, merged

@@ -1,7 +1,6 @@
 """REST twins of live topics: robots, people, map, climate (docs/interfaces/http.md)."""
 
-from fastapi import APIRouter, Depends
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, Response
 
 from iveg.models.base import Listing
 from iveg.models.climate import Climate

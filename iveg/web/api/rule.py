@@ -2,9 +2,8 @@
 
 from typing import Annotated, Literal, TypeVar
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field, field_validator
-from starlette.responses import Response
 
 from iveg.domain.detection_rule import Class, DetectionRule
 from iveg.domain.limits import LIMITS

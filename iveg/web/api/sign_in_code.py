@@ -7,9 +7,7 @@ asks for it only when somebody presses, and no cache keeps it.
 from ipaddress import ip_address
 
 import segno
-from fastapi import APIRouter, Depends
-from starlette.requests import Request
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, Request, Response
 
 from iveg.models.signing_in import SignInCode
 from iveg.web.api.answers import Json

@@ -7,8 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, HTTPException, Path, Query
-from starlette.responses import Response
+from fastapi import APIRouter, Depends, HTTPException, Path, Query, Response
 
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.series import CommandLatency

@@ -10,11 +10,10 @@ from datetime import datetime
 from importlib.resources import files
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Depends, Path
+from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi.responses import HTMLResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
-from starlette.requests import Request
-from starlette.responses import HTMLResponse, Response
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS

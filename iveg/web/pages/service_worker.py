@@ -3,7 +3,7 @@
 from importlib.resources import files
 
 from fastapi import APIRouter, Depends
-from starlette.responses import FileResponse
+from fastapi.responses import FileResponse
 
 from iveg.web.security.authentication import require
 
