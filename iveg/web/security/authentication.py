@@ -23,13 +23,14 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import RedirectResponse, Response
 from starlette.websockets import WebSocket
 
+from iveg.adapters.sessions import FileSessions
 from iveg.domain.errors import NotAllowedError
 from iveg.pipeline.ports import Clock
 from iveg.web.problems import NotSignedInError, Problem
 from iveg.web.security.csrf import is_own, refuse_forgery, refuse_other_bodies
 from iveg.web.security.rate_limits import FailedAttempts
 from iveg.web.security.roles import MAY, NOBODY, Action, Principal, Role
-from iveg.web.security.sessions import Sessions, SessionStore
+from iveg.web.security.sessions import Sessions
 
 __all__ = [
     "FOREIGN_ORIGIN",
@@ -69,7 +70,7 @@ class Authenticator:
         sign_in_token: str,
         api_token: str,
         clock: Clock,
-        store: SessionStore | None = None,
+        store: FileSessions | None = None,
     ) -> None:
         self._sign_in_token = sign_in_token
         self._api_token = api_token

@@ -9,11 +9,11 @@ Ages follow the wall clock, because no other goes on counting while iVeg is down
 
 import hashlib
 import secrets
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Protocol, cast
+from typing import cast
 
-from iveg.adapters.sessions import Session
+from iveg.adapters.sessions import FileSessions, Session
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal, Role
 
@@ -22,16 +22,6 @@ _MOST_SESSIONS = 1000
 _PEOPLE = frozenset({"viewer", "operator", "admin"})
 _KEEP_SEEN_S = 60.0
 """A crash forgets at most this much of a sign of life."""
-
-
-class SessionStore(Protocol):
-    """Storage of sessions over a restart; implemented by ``adapters.sessions``."""
-
-    def load(self) -> Sequence[Session]:
-        """All that were kept."""
-
-    def save(self, sessions: Iterable[Session]) -> None:
-        """Keep these from now on; must not block."""
 
 
 class Sessions:
@@ -48,7 +38,7 @@ class Sessions:
     def __init__(
         self,
         clock: Clock,
-        store: SessionStore | None = None,
+        store: FileSessions | None = None,
         most: int = _MOST_SESSIONS,
     ) -> None:
         self._clock = clock
@@ -65,7 +55,8 @@ class Sessions:
     def open(self, name: str, role: Role) -> str:
         """Begin a session; returns its token, which is stored nowhere."""
         if len(self._sessions) >= self._most:
-            del self._sessions[min(self._sessions, key=self._last_seen)]
+            idlest = min(self._sessions, key=lambda one: self._sessions[one].seen)
+            del self._sessions[idlest]
         token = secrets.token_urlsafe(32)
         now = self._clock().wall
         digest = _digest(token)
@@ -104,9 +95,6 @@ class Sessions:
             if abs(now - self._kept_at) >= _KEEP_SEEN_S:
                 self._keep()
         return Principal(session.name, role, digest)
-
-    def _last_seen(self, digest: bytes) -> float:
-        return self._sessions[digest].seen
 
     def _remember(self, kept: Iterable[Session]) -> None:
         """Take in those of earlier runs that are not over; the newest of too many."""
