@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from iveg.domain import margins as margins_
 from iveg.domain.acknowledgements import acknowledgements_of
 from iveg.domain.geometry import Pose2D
-from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import Instant, LaserScan, Odometry
@@ -20,7 +19,6 @@ from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Command, StopMachine
 from iveg.domain.tracking.person import Person
 from iveg.domain.transports import alias_of
-from iveg.domain.world import World
 from iveg.models.alert import Alert, Flood, LogEntry
 from iveg.models.base import moment, rounded
 from iveg.models.climate import Climate
@@ -63,18 +61,11 @@ class Views:
         self, parts: Pipeline, counters: Callable[[], Counter[str]] | None = None
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
+        self._world, self._people = parts.world, parts.evaluator.people
+        self._greenhouse = parts.evaluator.greenhouse
         self._event_log = parts.event_log
         self._health_monitor = parts.health_monitor
         self._counters = counters or parts.counters
-
-    @property
-    def _world(self) -> World:
-        return self._evaluator.world
-
-    @property
-    def greenhouse(self) -> Greenhouse:
-        """The greenhouse that is shown."""
-        return self._evaluator.greenhouse
 
     # --- robots -------------------------------------------------------------------
 
@@ -84,7 +75,7 @@ class Views:
 
     def margins(self, now: Instant) -> LeastMargins:
         """Margins of all live robots and people, for callers that need many."""
-        return LeastMargins(self._fleet(), self._people(), now)
+        return LeastMargins(self._world.live_robots(), self._people.known.values(), now)
 
     def robot(
         self, robot_id: str, now: Instant, margins: LeastMargins | None = None
@@ -126,7 +117,7 @@ class Views:
         self, robot: RobotState, margins: LeastMargins | None, now: Instant
     ) -> margins_.Margin | None:
         if margins is None or robot.is_replay:
-            margins = LeastMargins([robot], self._people(), now)
+            margins = LeastMargins([robot], self._people.known.values(), now)
         return margins.of_robot(robot.robot_id)
 
     def _mode(self, robot: RobotState, machine: StopMachine, now: Instant) -> Mode:
@@ -188,10 +179,7 @@ class Views:
     ) -> list[PersonModel]:
         """Every known person."""
         margins = margins or self.margins(now)
-        return [
-            self._person(one, margins, now)
-            for one in self._evaluator.people.known.values()
-        ]
+        return [self._person(one, margins, now) for one in self._people.known.values()]
 
     def _person(
         self, person: Person, margins: LeastMargins, now: Instant
@@ -218,16 +206,10 @@ class Views:
             possible=newest.possible,
             doubtful=newest.reach_m > 0.0,
             decision_id=max((one.decision_id for one in crossings), default=None),
-            lane=self.greenhouse.lane_at(newest.x, newest.y),
+            lane=self._greenhouse.lane_at(newest.x, newest.y),
             acting=[_acting(one) for one in crossings],
             margin=Margin.of(margins.of_person(person.person_id)),
         )
-
-    def _people(self) -> list[Person]:
-        return list(self._evaluator.people.known.values())
-
-    def _fleet(self) -> list[RobotState]:
-        return list(self._world.live_robots())
 
     def frame(self, robot_id: str, now: Instant) -> DetectionFrame | None:
         """One robot's newest detection frame, faint detections included."""
@@ -314,7 +296,7 @@ class Views:
 
     def map(self) -> GreenhouseMap:
         """The greenhouse as the page draws it."""
-        return GreenhouseMap.of(self.greenhouse)
+        return GreenhouseMap.of(self._greenhouse)
 
     def rule(self) -> Rule:
         """The version of the rule that is in force."""

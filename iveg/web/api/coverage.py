@@ -5,10 +5,10 @@ from fastapi import APIRouter, Depends, Response
 from iveg.domain.coverage import RECENT_S
 from iveg.domain.observations import Instant
 from iveg.domain.stamps import format_stamp
-from iveg.models.base import write_json
 from iveg.models.places import Coverage, LaneCoverage
 from iveg.pipeline.coverage import CoverageMonitor
 from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Json
 from iveg.web.security.authentication import require
 
 
@@ -34,7 +34,7 @@ def router(monitor: CoverageMonitor, clock: Clock) -> APIRouter:
             share=None if share is None else round(share, 4),
             lanes=_lanes(monitor, now),
         )
-        return Response(write_json(told), media_type="application/json")
+        return Json(told)
 
     return routes
 

@@ -18,11 +18,11 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.records import CommandRecord, DecisionRecord
 from iveg.domain.stamps import format_stamp
 from iveg.domain.stop.drills import due_drills
-from iveg.models.base import write_json
 from iveg.models.command import Command
 from iveg.models.day import Day, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Json
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.pages.routes import Pages
@@ -125,8 +125,7 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     ) -> Response:
         """What the fleet did on one day, Europe/Madrid, and what is due next."""
         now = clock().wall
-        found = await days.read(day or in_madrid(now).date(), now)
-        return Response(write_json(found), media_type="application/json")
+        return Json(await days.read(day or in_madrid(now).date(), now))
 
     @routes.get("/day", response_model=None, include_in_schema=False)
     async def sheet(

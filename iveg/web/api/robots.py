@@ -35,12 +35,16 @@ def router(views: Views, clock: Clock) -> APIRouter:
     async def scan(robot_id: str) -> Response:
         """The newest sweep of one robot, as points in `map`."""
         swept = views.scan(robot_id)
-        points: list[tuple[float, float]] = []
-        stamp = None
-        if swept is not None:
-            stamp = swept[0].origin.stamp
-            points = [(round(x, 3), round(y, 3)) for x, y in swept[1].tolist()]
-        return Json(Scan(robot_id=robot_id, stamp=stamp, points=points))
+        if swept is None:
+            return Json(Scan(robot_id=robot_id, stamp=None, points=[]))
+        newest, points = swept
+        return Json(
+            Scan(
+                robot_id=robot_id,
+                stamp=newest.origin.stamp,
+                points=[(round(x, 3), round(y, 3)) for x, y in points.tolist()],
+            )
+        )
 
     @routes.get("/people", response_model=Listing[Person])
     async def people() -> Response:
