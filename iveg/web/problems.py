@@ -137,7 +137,9 @@ def problem_of(error: Exception) -> Problem:
             return Problem(400, str(error), "unreadable", {"reason": error.reason})
         case HopError():
             # Addresses and drivers' words stay inside.
-            return Problem(503, f"{error.hop} did not answer.", "hop", _hop(error))
+            return Problem(
+                503, f"{error.hop} did not answer.", "hop", {"hop": error.hop}
+            )
         case NotSignedInError():
             challenge = {"WWW-Authenticate": "Bearer"}
             return Problem(401, str(error), "not-signed-in", headers=challenge)
@@ -155,10 +157,6 @@ _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (ForeignOriginError, 403, "foreign-origin"),
     (NotJsonError, 415, "not-json"),
 )
-
-
-def _hop(error: HopError) -> dict[str, object]:
-    return {"hop": error.hop}
 
 
 def _invalid(error: RequestValidationError) -> Problem:

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.models.alert import Alert
@@ -10,7 +10,6 @@ from iveg.ngsi.payloads import clean_text
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
-from iveg.web.problems import Problem
 from iveg.web.security.authentication import Principal, require
 
 
@@ -36,7 +35,7 @@ def router(evaluator: Evaluator, clock: Clock) -> APIRouter:
         note = clean_text(body.note)
         found = evaluator.alerts.acknowledge(alert_id, who.name, note, clock())
         if found is None:
-            return Problem(404, "There is no such alert.").response()
+            raise HTTPException(404, "There is no such alert.")
         return Json(Alert.of(found))
 
     return routes

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from iveg.adapters import web_push
@@ -24,7 +24,6 @@ from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Json
 from iveg.web.pages.sentences import Sentences
 from iveg.web.pages.translations import LANGUAGES, read_translations
-from iveg.web.problems import Problem
 from iveg.web.security.authentication import Principal, require
 
 TEST_REST_S = 5.0
@@ -228,7 +227,9 @@ def _add_channels(routes: APIRouter, desk: Desk) -> None:
         """Change the mail."""
         email = body.applied_to(desk.contacts.email)
         if email is None:
-            return _refused("Type the password again: server or user are others.")
+            raise HTTPException(
+                422, "Type the password again: server or user are others."
+            )
         return await desk.change("email", who, lambda all_: replace(all_, email=email))
 
     @routes.put("/webhook", response_model=Messages)
@@ -236,7 +237,7 @@ def _add_channels(routes: APIRouter, desk: Desk) -> None:
         """Change the webhook."""
         hook = body.applied_to(desk.contacts.webhook)
         if not is_public_target(hook.url):
-            return _refused("The address must be a public https one.")
+            raise HTTPException(422, "The address must be a public https one.")
         return await desk.change(
             "webhook", who, lambda all_: replace(all_, webhook=hook)
         )
@@ -253,7 +254,7 @@ def _add_devices(routes: APIRouter, desk: Desk) -> None:
         """Have this browser told; the same one again takes its own place."""
         refusal = desk.refusal(body)
         if refusal:
-            return _refused(refusal)
+            raise HTTPException(422, refusal)
         device = body.device(desk.new_id(), desk.clock().wall)
         return await desk.change("push", who, lambda all_: _joined(all_, device))
 
@@ -262,7 +263,7 @@ def _add_devices(routes: APIRouter, desk: Desk) -> None:
         """Have a browser told no more."""
         known = {one.device_id for one in desk.contacts.push.devices}
         if device_id not in known:
-            return Problem(404, "There is no such device.").response()
+            raise HTTPException(404, "There is no such device.")
         return await desk.change("push", who, lambda all_: all_.without({device_id}))
 
 
@@ -295,17 +296,13 @@ class _Tests:
         rested = self._last is None or now - self._last >= TEST_REST_S
         if self._lock.locked() or not rested:
             headers = {"Retry-After": str(int(TEST_REST_S))}
-            return Problem(429, "One test at a time.", headers=headers).response()
+            raise HTTPException(429, "One test at a time.", headers)
         async with self._lock:
             self._last = now
             told = await self._messenger.test(channel)
         if not told:
-            return _refused("Nobody is to be told by this channel.", 409)
+            raise HTTPException(409, "Nobody is to be told by this channel.")
         return Json(MessageTest(told=[Told.of(one) for one in told]))
-
-
-def _refused(why: str, status: int = 422) -> Response:
-    return Problem(status, why).response()
 
 
 def writer() -> Callable[[Message, Language], Text]:
