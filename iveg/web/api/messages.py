@@ -5,8 +5,9 @@ keys of browsers are written, replaced, and told to nobody.
 """
 
 import asyncio
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, HTTPException, Response
@@ -152,9 +153,9 @@ class DeviceBody(_Body):
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Desk:
-    """Ports of the routes.
+    """What the routes do with people to be told.
 
     Attributes:
         messenger: Who keeps and tells people.
@@ -165,6 +166,8 @@ class Desk:
     messenger: Messenger
     new_id: Callable[[], str]
     clock: Clock
+    _testing: asyncio.Lock = field(default_factory=asyncio.Lock, init=False)
+    _tested_at: float = field(default=-math.inf, init=False)
 
     @property
     def contacts(self) -> Contacts:
@@ -185,17 +188,35 @@ class Desk:
         await self.messenger.change(update, channel, who.name)
         return self.answer()
 
-    def refusal(self, body: DeviceBody) -> str:
-        """Why a browser cannot be told; empty where it can."""
+    def check(self, body: DeviceBody) -> None:
+        """Refuse a browser that cannot be told.
+
+        Raises:
+            HTTPException: why it cannot.
+        """
         push = self.contacts.push
         if not push.key:
-            return "Web push was never on here."
+            raise HTTPException(422, "Web push was never on here.")
         if len(_others(push, body.endpoint)) >= messages.MOST_DEVICES:
-            return "There are as many devices as can be told."
+            raise HTTPException(422, "There are as many devices as can be told.")
         is_key = web_push.is_public_key(body.keys.p256dh)
         if not is_key or not is_public_target(body.endpoint):
-            return "That is no subscription of a public push service."
-        return ""
+            raise HTTPException(
+                422, "That is no subscription of a public push service."
+            )
+
+    async def test(self, channel: Channel) -> Response:
+        """Send a test: one at a time, and seldom."""
+        now = self.clock().mono
+        if self._testing.locked() or now - self._tested_at < TEST_REST_S:
+            headers = {"Retry-After": str(int(TEST_REST_S))}
+            raise HTTPException(429, "One test at a time.", headers)
+        async with self._testing:
+            self._tested_at = now
+            told = await self.messenger.test(channel)
+        if not told:
+            raise HTTPException(409, "Nobody is to be told by this channel.")
+        return Json(MessageTest(told=[Told.of(one) for one in told]))
 
 
 _Operator = Annotated[Principal, Depends(require("release"))]
@@ -204,7 +225,6 @@ _Operator = Annotated[Principal, Depends(require("release"))]
 def router(desk: Desk) -> APIRouter:
     """Operators alone: here are people's addresses."""
     routes = APIRouter(prefix="/api/v1/messages", tags=["messages"])
-    tests = _Tests(desk.messenger, desk.clock)
     _add_channels(routes, desk)
     _add_devices(routes, desk)
 
@@ -216,7 +236,7 @@ def router(desk: Desk) -> APIRouter:
     @routes.post("/{channel}/test", response_model=MessageTest)
     async def test(channel: Channel, _: _Operator) -> Response:
         """Send a test now, whether or not the channel is on."""
-        return await tests.run(channel)
+        return await desk.test(channel)
 
     return routes
 
@@ -252,9 +272,7 @@ def _add_devices(routes: APIRouter, desk: Desk) -> None:
     @routes.post("/devices", response_model=Messages)
     async def add_device(body: DeviceBody, who: _Operator) -> Response:
         """Have this browser told; the same one again takes its own place."""
-        refusal = desk.refusal(body)
-        if refusal:
-            raise HTTPException(422, refusal)
+        desk.check(body)
         device = body.device(desk.new_id(), desk.clock().wall)
         return await desk.change("push", who, lambda all_: _joined(all_, device))
 
@@ -280,29 +298,6 @@ def _joined(all_: Contacts, device: messages.Device) -> Contacts:
 
 def _others(push: messages.Push, endpoint: str) -> list[messages.Device]:
     return [one for one in push.devices if one.endpoint != endpoint]
-
-
-class _Tests:
-    """One test at a time, and seldom."""
-
-    def __init__(self, messenger: Messenger, clock: Clock) -> None:
-        self._messenger = messenger
-        self._clock = clock
-        self._lock = asyncio.Lock()
-        self._last: float | None = None
-
-    async def run(self, channel: Channel) -> Response:
-        now = self._clock().mono
-        rested = self._last is None or now - self._last >= TEST_REST_S
-        if self._lock.locked() or not rested:
-            headers = {"Retry-After": str(int(TEST_REST_S))}
-            raise HTTPException(429, "One test at a time.", headers)
-        async with self._lock:
-            self._last = now
-            told = await self._messenger.test(channel)
-        if not told:
-            raise HTTPException(409, "Nobody is to be told by this channel.")
-        return Json(MessageTest(told=[Told.of(one) for one in told]))
 
 
 def writer() -> Callable[[Message, Language], Text]:
