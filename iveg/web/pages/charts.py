@@ -110,7 +110,17 @@ def confidence_figure(
     ]
     layout: dict[str, object] = {"barmode": "stack", "xaxis": {"range": [0, 1]}}
     if threshold is not None:
-        layout["shapes"] = [_line_at(threshold)]
+        layout["shapes"] = [
+            {
+                "type": "line",
+                "name": "threshold",
+                "x0": threshold,
+                "x1": threshold,
+                "yref": "paper",
+                "y0": 0,
+                "y1": 1,
+            }
+        ]
     return figure_of(traces, ("confidence", "count"), layout)
 
 
@@ -174,14 +184,11 @@ def library() -> Library:
     data = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
     script = data.read_bytes()
     digest = hashlib.sha256(script).hexdigest()[:16]
-    style_ids = ("plotly.js-style-global", *map(bytes.decode, _ids_in(script)))
+    # The sheets that parts of the library bring along are named by their hash.
+    hashes = sorted({found.decode() for found in _STYLE_ID.findall(script)})
     packed = gzip.compress(script, 6, mtime=0)
+    style_ids = ("plotly.js-style-global", *hashes)
     return Library(f"plotly-{digest}.min.js", packed, style_ids)
-
-
-def _ids_in(script: bytes) -> list[bytes]:
-    """Of the sheets that parts of the library bring along, named by their hash."""
-    return sorted(set(_STYLE_ID.findall(script)))
 
 
 def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Trace]:
@@ -255,18 +262,6 @@ def _broken(
         out += [*values[start : gap + 1], fill[gap]]
         start = gap + 1
     return out + list(values[start:])
-
-
-def _line_at(x: float) -> _Trace:
-    return {
-        "type": "line",
-        "name": "threshold",
-        "x0": x,
-        "x1": x,
-        "yref": "paper",
-        "y0": 0,
-        "y1": 1,
-    }
 
 
 def figure_of(
