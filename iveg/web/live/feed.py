@@ -14,7 +14,7 @@ from iveg.pipeline import topics
 from iveg.pipeline.publish import Subscriber
 from iveg.web.live.pacing import BYTES, FEW_ROBOTS, CreditWindow
 from iveg.web.live.painting import Painting
-from iveg.web.live.telemetry import Part, TelemetryEncoder
+from iveg.web.live.telemetry import Part, TelemetryEncoder, write_frame
 
 PICTURE_S: Final = 1 / 15
 """Between two scans, or detection frames, of one robot."""
@@ -184,16 +184,14 @@ class _Frame:
         return True
 
     def write(self, number: int) -> bytes:
-        """``uint32`` length of the JSON, the JSON padded with spaces, the bodies."""
+        """The frame as it is sent."""
         head = b'{"frame":%d,"parts":[%b],"moves":[%b],"scans":[%b]}' % (
             number,
             b",".join(self._parts),
             b",".join(self.moves),
             b",".join(scan.head for scan in self._scans),
         )
-        head += b" " * (-len(head) % 4)
-        bodies = (scan.body for scan in self._scans)
-        return b"".join((len(head).to_bytes(4, "little"), head, *bodies))
+        return write_frame(head, (scan.body for scan in self._scans))
 
 
 def _next_picture(told_at: float) -> float:

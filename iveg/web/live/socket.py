@@ -29,7 +29,7 @@ from iveg.pipeline.publish import Hub, Subscriber
 from iveg.web.live.feed import TelemetryFeed
 from iveg.web.live.pacing import SUBPROTOCOL
 from iveg.web.live.painting import Painting
-from iveg.web.live.telemetry import TelemetryEncoder
+from iveg.web.live.telemetry import TelemetryEncoder, write_frame
 from iveg.web.presses import read_press
 from iveg.web.security.authentication import (
     NO_SESSION,
@@ -98,8 +98,7 @@ class Encoder:
                 "age_s": self._views.scan_age_s(robot_id, now),
             }
         )
-        head += b" " * (-len(head) % 4)
-        return len(head).to_bytes(4, "little") + head + points.tobytes()
+        return write_frame(head, [points.tobytes()])
 
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event, which is never dropped."""

@@ -5,7 +5,7 @@ shapes.  Browsers differ in when they take a part, never in its bytes: each part
 the moment of its truth (``at``, the server's monotonic clock).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -228,6 +228,12 @@ def _without_ages(person: Person) -> dict[str, Any]:
     if margin is not None:
         told["margin"] = {**margin.__dict__, "age_s": None}
     return told
+
+
+def write_frame(head: bytes, bodies: Iterable[bytes]) -> bytes:
+    """``uint32`` length of the JSON, the JSON padded with spaces, the bodies."""
+    padded = head + b" " * (-len(head) % 4)
+    return b"".join((len(padded).to_bytes(4, "little"), padded, *bodies))
 
 
 def write_ranges(scan: LaserScan) -> bytes:
