@@ -18,7 +18,6 @@ from iveg.domain.latency.segments import DATA, SEGMENTS, WINDOW_S, Data, Segment
 from iveg.domain.latency.sequence_loss import SequenceLoss
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
-from iveg.domain.latency.trace import Trace
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
 from iveg.models.base import write_json
@@ -75,9 +74,11 @@ def router(watch: LatencyWatch, clock: Clock) -> APIRouter:
         form = asked.format or form_of(request.headers)
         if form == "csv":
             return Response(_csv(await asyncio.to_thread(merge, parts)), 200, _CSV)
-        told = _told(watch, asked, clock())
+        streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
+        told = _told(watch, streams, asked, clock())
+        sampled = _sampled(streams)
         # A day of twenty robots is merged beside the loop, not in it.
-        body = await asyncio.to_thread(_finished, parts, told, asked)
+        body = await asyncio.to_thread(_finished, parts, told, sampled, asked)
         return Response(body, media_type="application/json")
 
     return routes
@@ -89,14 +90,10 @@ _CSV = {
 }
 
 
-def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
+def _told(
+    watch: LatencyWatch, streams: list[Stream], asked: Asked, now: Instant
+) -> dict[str, Any]:
     """Values read from the streams, in the loop's thread."""
-    streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
-    traced = max(
-        (one for one in streams if one.tracer.newest is not None),
-        key=lambda one: one.tracer.newest.heard_at,  # type: ignore[union-attr]
-        default=None,
-    )
     return {
         "at": format_stamp(now.wall),
         "window": asked.window,
@@ -113,29 +110,28 @@ def _told(watch: LatencyWatch, asked: Asked, now: Instant) -> dict[str, Any]:
         ],
         "pages_within_ms": _ms(watch.pages_within_s),
         "streams": [_stream(one) for one in streams],
-        "sampled": _sampled(streams),
         "remarks": [
             SegmentRemark(key=one.key, hop=one.hop, slots=dict(one.slots))
             for one in watch.overloads.remarks
         ],
-        "traced": None if traced is None else (traced.robot_id, traced.data),
-        "newest": None if traced is None else traced.tracer.newest,
+        "trace": _newest_trace(streams),
     }
 
 
 def _finished(
-    parts: Mapping[Cell, list[Sketch]], told: dict[str, Any], asked: Asked
+    parts: Mapping[Cell, list[Sketch]],
+    told: dict[str, Any],
+    sampled: Mapping[Data, list[Segment]],
+    asked: Asked,
 ) -> bytes:
     """The whole answer; in a thread of its own."""
     sketches = merge(parts)
-    traced, newest = told.pop("traced"), told.pop("newest")
-    sampled = told.pop("sampled")
     figures = {}
     if asked.figures:
         figures = {
             "bars": bars_figure(sketches),
             "cdf": cdf_figure(sketches),
-            "trace": trace_figure(newest),
+            "trace": trace_figure(told["trace"]),
         }
     library = charts.library()
     answer = LatencyTable(
@@ -144,7 +140,6 @@ def _finished(
         rows=[
             _row(data, sketches, sampled[data], with_bins=asked.bins) for data in DATA
         ],
-        trace=None if traced is None else _trace(traced, newest),
         library=f"/vendor/{library.name}",
         style_ids=list(library.style_ids),
         figures={name: orjson.Fragment(figure) for name, figure in figures.items()},
@@ -153,10 +148,17 @@ def _finished(
     return write_json(vars(answer))
 
 
-def _trace(of: tuple[str, Data], newest: Trace) -> LatencyTrace:
-    robot_id, data = of
+def _newest_trace(streams: Iterable[Stream]) -> LatencyTrace | None:
+    traced = ((one, one.tracer.newest) for one in streams)
+    known = [(one, trace) for one, trace in traced if trace is not None]
+    if not known:
+        return None
+    stream, newest = max(known, key=lambda pair: pair[1].heard_at)
     return LatencyTrace(
-        robot_id=robot_id, data=data, stamp=newest.stamp, steps=steps_of(newest)
+        robot_id=stream.robot_id,
+        data=stream.data,
+        stamp=newest.stamp,
+        steps=steps_of(newest),
     )
 
 

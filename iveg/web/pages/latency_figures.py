@@ -10,7 +10,7 @@ from iveg.domain.latency.account import Cell
 from iveg.domain.latency.segments import DATA, Segment
 from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.trace import Trace
-from iveg.models.latency import SegmentStep
+from iveg.models.latency import LatencyTrace, SegmentStep
 from iveg.web.pages.charts import figure_of
 
 STEPS: Final[tuple[Segment, ...]] = ("uplink", "fiware", "iveg", "screen")
@@ -36,7 +36,7 @@ def cdf_figure(sketches: Mapping[Cell, Sketch]) -> bytes:
     return figure_of(traces, ("ms", "share"), layout)
 
 
-def trace_figure(trace: Trace | None) -> bytes:
+def trace_figure(trace: LatencyTrace | None) -> bytes:
     """One message from hop to hop, each bar from when to when (ms)."""
     bars = [
         {
@@ -48,18 +48,16 @@ def trace_figure(trace: Trace | None) -> bytes:
             "base": [step.from_ms],
             "x": [step.to_ms - step.from_ms],
         }
-        for step in steps_of(trace)
+        for step in (trace.steps if trace else ())
     ]
     return figure_of(bars, ("ms", "hop"), {"showlegend": False})
 
 
-def steps_of(trace: Trace | None) -> list[SegmentStep]:
+def steps_of(trace: Trace) -> list[SegmentStep]:
     """The hops that a message has passed, in their order.
 
     The decision may come before Orion's copy: iVeg acts on whichever copy is first.
     """
-    if trace is None:
-        return []
     start = trace.heard_at - (trace.uplink_s or 0.0)
     spans: list[tuple[Segment, float, float | None]] = [
         ("uplink", start, None if trace.uplink_s is None else trace.heard_at),
