@@ -3,15 +3,11 @@
 from collections import Counter
 from collections.abc import Callable, Iterable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from iveg.domain import margins as margins_
 from iveg.domain.acknowledgements import acknowledgements_of
-from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins
-from iveg.domain.observations import Instant, LaserScan, Odometry
+from iveg.domain.observations import Instant
 from iveg.domain.records import LogRecord
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.speed_limits import Crossing
@@ -137,27 +133,9 @@ class Views:
             return "STOPPED"
         return "SLOW" if factor < 1.0 else "RUNNING"
 
-    def odometry(self, robot_id: str) -> Odometry | None:
-        """A robot's newest odometry."""
-        return self._world.robot(robot_id).odometry
-
-    def age_s(self, robot_id: str, now: Instant) -> float | None:
-        """Its age (s); None while nobody knows."""
-        return self._world.robot(robot_id).age_s(now)
-
-    def scan(self, robot_id: str) -> tuple[LaserScan, NDArray[np.float32]] | None:
-        """A robot's newest sweep and its points in ``map``, shape (n, 2), (m)."""
-        robot = self._world.robot(robot_id)
-        if robot.scan is None or robot.scan_pose is None:
-            return None
-        return robot.scan, robot.scan.points(robot.scan_pose)
-
-    def sweep(self, robot_id: str) -> tuple[LaserScan, Pose2D] | None:
-        """A robot's newest sweep and the pose of its sensor in ``map``."""
-        robot = self._world.robot(robot_id)
-        if robot.scan is None or robot.scan_pose is None:
-            return None
-        return robot.scan, robot.scan_pose.compose(robot.scan.mount)
+    def robot_state(self, robot_id: str) -> RobotState:
+        """One robot as the world has it, for encoders of poses and sweeps."""
+        return self._world.robot(robot_id)
 
     def scan_age_s(self, robot_id: str, now: Instant) -> float | None:
         """Seconds since the newest sweep arrived."""

@@ -34,16 +34,13 @@ def router(views: Views, clock: Clock) -> APIRouter:
     @routes.get("/robots/{robot_id}/scan", response_model=Scan)
     async def scan(robot_id: str) -> Response:
         """The newest sweep of one robot, as points in `map`."""
-        swept = views.scan(robot_id)
-        if swept is None:
+        robot = views.robot_state(robot_id)
+        if robot.scan is None or robot.scan_pose is None:
             return Json(Scan(robot_id=robot_id, stamp=None, points=[]))
-        newest, points = swept
+        swept = robot.scan.points(robot.scan_pose).tolist()
+        points = [(round(x, 3), round(y, 3)) for x, y in swept]
         return Json(
-            Scan(
-                robot_id=robot_id,
-                stamp=newest.origin.stamp,
-                points=[(round(x, 3), round(y, 3)) for x, y in points.tolist()],
-            )
+            Scan(robot_id=robot_id, stamp=robot.scan.origin.stamp, points=points)
         )
 
     @routes.get("/people", response_model=Listing[Person])

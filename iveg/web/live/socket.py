@@ -86,19 +86,18 @@ class Encoder:
         return None if data is None else text(topic, data, now)
 
     def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
-        swept = self._views.scan(robot_id)
-        if swept is None:
+        robot = self._views.robot_state(robot_id)
+        if robot.scan is None or robot.scan_pose is None:
             return None
-        scan, points = swept
         head = orjson.dumps(
             {
                 "topic": topic,
                 "robot_id": robot_id,
-                "stamp": scan.origin.stamp,
+                "stamp": robot.scan.origin.stamp,
                 "age_s": self._views.scan_age_s(robot_id, now),
             }
         )
-        return write_frame(head, [points.tobytes()])
+        return write_frame(head, [robot.scan.points(robot.scan_pose).tobytes()])
 
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event, which is never dropped."""

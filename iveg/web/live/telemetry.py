@@ -65,7 +65,8 @@ class TelemetryEncoder:
 
     def move(self, robot_id: str, now: Instant) -> Part | None:
         """Pose and motion of a robot; None before its first odometry."""
-        odometry = self._views.odometry(robot_id)
+        robot = self._views.robot_state(robot_id)
+        odometry = robot.odometry
         if odometry is None:
             return None
         kept = self._moves.get(robot_id)
@@ -74,7 +75,7 @@ class TelemetryEncoder:
         pose, twist = odometry.pose, odometry.twist
         place = round(pose.x, 3), round(pose.y, 3), round(pose.yaw, 4)
         speed = round(twist.linear_x, 3), round(twist.angular_z, 3)
-        age_s = rounded(self._views.age_s(robot_id, now))
+        age_s = rounded(robot.age_s(now))
         told = [robot_id, now.mono, age_s, *place, *speed, odometry.origin.stamp]
         version = self._hub.versions[topics.ROBOT.of(robot_id)]
         part = Part(version, orjson.dumps(told))
@@ -127,10 +128,11 @@ class TelemetryEncoder:
     def _scan(
         self, topic: str, robot_id: str, version: int, now: Instant
     ) -> Part | None:
-        swept = self._views.sweep(robot_id)
-        if swept is None:
+        robot = self._views.robot_state(robot_id)
+        scan = robot.scan
+        if scan is None or robot.scan_pose is None:
             return None
-        scan, sensor = swept
+        sensor = robot.scan_pose.compose(scan.mount)
         told = {
             "topic": topic,
             "at": now.mono,
