@@ -217,9 +217,8 @@ def _members(schema: Schema) -> Iterator[FieldDoc]:
 
 def shape_of(schema: object) -> str:
     """A schema in a few words, such as ``[Robot, …]`` or ``number or null``."""
-    reference = _reference(schema)
-    if reference is not None:
-        return reference
+    if isinstance(schema, Schema | Reference) and schema.ref is not None:
+        return schema.ref.rpartition("/")[2]
     if not isinstance(schema, Schema):
         return "anything"
     if schema.enum:
@@ -236,11 +235,6 @@ def shape_of(schema: object) -> str:
     if schema.type == "object" and isinstance(schema.additionalProperties, Schema):
         return f"{{name: {shape_of(schema.additionalProperties)}}}"
     return _word(schema)
-
-
-def _reference(schema: object) -> str | None:
-    path = schema.ref if isinstance(schema, Schema | Reference) else None
-    return None if path is None else path.rpartition("/")[2]
 
 
 def _either(translations: Iterable[str]) -> str:
