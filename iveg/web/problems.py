@@ -6,10 +6,9 @@ browser asked for one.  Answers echo no input and reveal nothing internal.
 Errors of this boundary alone, under the tree of ``domain/errors``::
 
     IvegError
-    └── AccessError
-        ├── NotSignedInError    401
-        ├── ForeignOriginError  403
-        └── NotJsonError        415
+    ├── NotSignedInError    401
+    ├── ForeignOriginError  403
+    └── NotJsonError        415
 """
 
 from collections.abc import Callable, Mapping
@@ -36,25 +35,21 @@ from iveg.domain.errors import (
 _MOST_COMPLAINTS = 20
 
 
-class AccessError(IvegError):
-    """Root of errors at the boundary, before any part is asked."""
-
-
-class NotSignedInError(AccessError):
+class NotSignedInError(IvegError):
     """The request is not authenticated."""
 
     def __init__(self) -> None:
         super().__init__("Sign in with the link that iVeg printed, or send a token.")
 
 
-class ForeignOriginError(AccessError):
+class ForeignOriginError(IvegError):
     """A browser sent this from another site, or without iVeg's own header."""
 
     def __init__(self, missing: str) -> None:
         super().__init__(f"This did not come from iVeg's own page: {missing}.")
 
 
-class NotJsonError(AccessError):
+class NotJsonError(IvegError):
     """A body that is not declared as JSON."""
 
     def __init__(self) -> None:
@@ -77,16 +72,11 @@ class Problem:
     extra: Mapping[str, object] = field(default_factory=dict)
     headers: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def title(self) -> str:
-        """The status in words."""
-        return HTTPStatus(self.status).phrase
-
     def response(self) -> Response:
         """The problem as a program reads it."""
         members = {
             "type": f"urn:iveg:{self.code}" if self.code else "about:blank",
-            "title": self.title,
+            "title": HTTPStatus(self.status).phrase,
             "status": self.status,
             "detail": self.detail,
             **self.extra,
