@@ -119,12 +119,13 @@ def _latency(parts: _Parts) -> Iterator[str]:
     sums: list[tuple[str, float | None]] = []
     for robot, data, hop, count, total, sketches in parts:
         sketch = merged(sketches)
-        for share in _SHARES:
-            labels = _labels(robot=robot, data=data, hop=hop, quantile=f"{share:g}")
-            quantiles.append((labels, sketch.quantile(share)))
-        labels = _labels(robot=robot, data=data, hop=hop)
-        counts.append((labels, count))
-        sums.append((labels, total))
+        of = {"robot": robot, "data": data, "hop": hop}
+        quantiles += [
+            (_labels(**of, quantile=f"{share:g}"), sketch.quantile(share))
+            for share in _SHARES
+        ]
+        counts.append((_labels(**of), count))
+        sums.append((_labels(**of), total))
     yield from _family(
         "latency_seconds",
         "summary",
