@@ -5,10 +5,12 @@ moment alone; an impossible moment is counted and not used.
 """
 
 from collections import deque
+from collections.abc import Mapping
 from typing import Final
 
 from iveg.domain.latency.segments import Data
 from iveg.domain.latency.watch import LatencyWatch
+from iveg.pipeline import topics
 from iveg.web.live.pacing import FRAMES
 from iveg.web.presses import read_number
 
@@ -18,6 +20,11 @@ SAMPLE_S: Final = 0.1
 """Between two samples of one topic and page: the hop is paced, and so is this."""
 _SLACK_S: Final = 0.05
 
+_MEASURED: Final[Mapping[topics.Topic, Data]] = {
+    topics.ROBOT: "odometry",
+    topics.SCAN: "lidar",
+    topics.DETECTIONS: "detections",
+}
 _Sample = tuple[str, Data, float]
 
 
@@ -34,11 +41,14 @@ class Painting:
         """Note that a topic goes with the next frame (``now`` monotonic, s)."""
         if now - self._sampled.get(topic, float("-inf")) < SAMPLE_S:
             return
-        of = _stream_of(topic)
-        decided_at = None if of is None else self._watch.decided_at(*of)
-        if of is not None and decided_at is not None:
+        row, robot_id = topics.find(topic)
+        data = _MEASURED.get(row)
+        if data is None:
+            return
+        decided_at = self._watch.decided_at(robot_id, data)
+        if decided_at is not None:
             self._sampled[topic] = now
-            self._samples.append((*of, decided_at))
+            self._samples.append((robot_id, data, decided_at))
 
     def sent(self, number: int, now: float) -> None:
         """Note that the frame was sent."""
@@ -79,15 +89,3 @@ class Painting:
         else:
             self._watch.pages_within_s = within
             self._watch.painted(robot_id, data, decided_at, at)
-
-
-def _stream_of(topic: str) -> tuple[str, Data] | None:
-    head, _, rest = topic.partition("/")
-    if head == "detections":
-        return rest, "detections"
-    if head != "robots":
-        return None
-    robot_id, _, leaf = rest.partition("/")
-    if leaf == "scan":
-        return robot_id, "lidar"
-    return None if leaf else (robot_id, "odometry")

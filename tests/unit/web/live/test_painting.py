@@ -108,7 +108,8 @@ def test_a_moment_that_cannot_be_is_counted_and_not_used(
 
 
 @pytest.mark.parametrize(
-    "topic", ["people", "robots/AGI/else", "robots/AGIX", "detections/AGI", ""]
+    "topic",
+    ["people", "robots/AGI/state", "robots/AGIX", "detections/AGI", "robots/AGI/scan"],
 )
 def test_what_was_never_decided_on_is_not_sampled(topic: str) -> None:
     watch, painting = watching()
