@@ -117,16 +117,14 @@ def _of_transport(name: str, transport: TransportId, record: R) -> object:
 
 def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
     """The sentence of a row; None for rows of numbers alone."""
-    if kind in (LogRecord, AlertRecord):
-        return lambda row: _safe(reader.say(row.key, row.slots))
-    if kind is DecisionRecord:
-        return lambda row: _safe(_decision_said(row, reader))
-    return None
+    if kind not in (LogRecord, AlertRecord, DecisionRecord):
+        return None
 
+    def tell(row: Any) -> str:
+        said = sentence_of(row) if kind is DecisionRecord else row
+        return _safe(reader.say(said.key, said.slots))
 
-def _decision_said(row: DecisionRecord, reader: Sentences) -> str:
-    sentence = sentence_of(row)
-    return reader.say(sentence.key, sentence.slots)
+    return tell
 
 
 async def write_ndjson(
