@@ -59,9 +59,9 @@ class Dss:
         settings: What an operator chose.
         data_directory: Where the database (unless set) and the journals live.
         demo: Whether the robots are emulated; shown on the page.
-        on_failure: Called when a part that must live has died.
 
     Attributes:
+        on_failure: Called when a part that must live has died.
         stores: What outlives a restart.
         pipeline: Everything between the doors; ``services`` beside it.
         face: What the web is given of it.
@@ -73,9 +73,9 @@ class Dss:
         data_directory: Path,
         *,
         demo: bool = False,
-        on_failure: Callable[[], None] | None = None,
     ) -> None:
-        self.settings, self.on_failure = settings, on_failure
+        self.settings = settings
+        self.on_failure: Callable[[], None] = lambda: None
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
         self.notify_secret = NotifySecret(notify_token)
@@ -268,8 +268,7 @@ class Dss:
         """A part that must live has died: say so and stop; the robots slow down."""
         if not task.cancelled():
             _log.critical("iVeg stops", exc_info=task.exception())
-        if self.on_failure is not None:
-            self.on_failure()
+        self.on_failure()
 
     # --- what comes in ------------------------------------------------------------
 
