@@ -14,6 +14,7 @@ from collections.abc import (
     AsyncIterator,
     Awaitable,
     Callable,
+    Iterable,
     Iterator,
     Mapping,
     Sequence,
@@ -80,13 +81,13 @@ async def write_csv(
     if reader is not None:
         yield codecs.BOM_UTF8
         head = [reader.say("export.sentence", {}), *head] if tell else head
-    yield _csv_lines([head], reader)
+    yield csv_lines([head], reader)
     async for records in pages:
         rows = []
         for record in records:
-            row = [_cell(name, read(record), reader) for name, read in columns]
+            row = [cell(name, read(record), reader) for name, read in columns]
             rows.append([tell(record), *row] if tell else row)
-        yield _csv_lines(rows, reader)
+        yield csv_lines(rows, reader)
 
 
 def _columns(kind: type[R]) -> Iterator[tuple[str, Callable[[R], object]]]:
@@ -137,7 +138,8 @@ async def write_ndjson(
         yield b"".join(write_json(one) + b"\n" for one in models)
 
 
-def _csv_lines(rows: list[list[str]], reader: Sentences | None) -> bytes:
+def csv_lines(rows: Iterable[Sequence[str]], reader: Sentences | None = None) -> bytes:
+    """Rows of cells as CSV (RFC 4180), for programs or for a reader's spreadsheet."""
     text = io.StringIO()
     # Excel takes the separator of lists of its country; Spain's is the semicolon.
     is_spanish = reader is not None and reader.translations.language == "es"
@@ -145,7 +147,8 @@ def _csv_lines(rows: list[list[str]], reader: Sentences | None) -> bytes:
     return text.getvalue().encode()
 
 
-def _cell(name: str, value: object, reader: Sentences | None) -> str:
+def cell(name: str, value: object, reader: Sentences | None = None) -> str:
+    """A value as a cell of the column of this name; empty for None."""
     if value is None:
         return ""
     if isinstance(value, bool):

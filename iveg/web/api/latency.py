@@ -1,8 +1,6 @@
 """The paper's latency table, live, beside its own numbers (docs/interfaces/http.md)."""
 
 import asyncio
-import csv
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Annotated, Any, Literal
@@ -34,7 +32,7 @@ from iveg.models.latency import (
 )
 from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.ports import Clock
-from iveg.web.api.exports import form_of
+from iveg.web.api.exports import cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.latency_figures import (
     bars_figure,
@@ -248,16 +246,13 @@ def _order(of: SequenceLoss) -> SegmentOrder:
 
 
 def _csv(sketches: Mapping[Cell, Sketch]) -> bytes:
-    """One line a kind of data and hop (RFC 4180)."""
-    text = io.StringIO()
-    lines = csv.writer(text)
+    """One line a kind of data and hop."""
     names = list(SegmentSpread.model_fields)
-    lines.writerow(["data", "hop", *names])
+    rows = [["data", "hop", *names]]
     for (data, hop), sketch in sketches.items():
         told = vars(_spread(sketch))
-        cells = ("" if told[name] is None else told[name] for name in names)
-        lines.writerow([data, hop, *cells])
-    return text.getvalue().encode()
+        rows.append([data, hop, *(cell(name, told[name]) for name in names)])
+    return csv_lines(rows)
 
 
 def _ms(seconds: float | None) -> float | None:
