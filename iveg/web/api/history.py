@@ -280,7 +280,7 @@ async def _charts(
     def draw() -> bytes:
         return write_json(
             {
-                **_library(),
+                **charts.library_facts(),
                 "speed": Fragment(charts.speed_figure(speeds, fleet)),
                 "detections": Fragment(charts.confidence_figure(counts, threshold)),
                 "stops": Fragment(charts.stop_figure(stops)),
@@ -302,7 +302,7 @@ async def _climate(queries: Queries, since: float, until: float) -> Response:
                 "until": format_stamp(until),
                 "slice_s": round(series.slice_s, 3),
                 "items": _readings(series),
-                **_library(),
+                **charts.library_facts(),
                 "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
             }
         )
@@ -315,9 +315,3 @@ def _readings(series: ClimateSeries) -> list[ClimateReading]:
     """Oldest first."""
     columns = (series.at, series.temperature, series.relative_humidity, series.co2)
     return [ClimateReading.of_series(*one) for one in zip(*columns, strict=True)]
-
-
-def _library() -> dict[str, object]:
-    """Address of the script that draws figures, and what a strict page must hold."""
-    library = charts.library()
-    return {"library": f"/vendor/{library.name}", "style_ids": library.style_ids}

@@ -131,15 +131,13 @@ def _finished(
             "cdf": cdf_figure(sketches),
             "trace": trace_figure(told["trace"]),
         }
-    library = charts.library()
     answer = LatencyTable(
         **told,
         direct=any(sketches[data, "uplink"].count for data in DATA),
         rows=[
             _row(data, sketches, sampled[data], with_bins=asked.bins) for data in DATA
         ],
-        library=f"/vendor/{library.name}",
-        style_ids=list(library.style_ids),
+        **charts.library_facts(),
         figures={name: orjson.Fragment(figure) for name, figure in figures.items()},
     )
     # Member by member, as only orjson knows what to do with a figure that is drawn.

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 from iveg.adapters.history.series import (
     CONFIDENCE_BINS,
@@ -189,6 +190,12 @@ def library() -> Library:
     packed = gzip.compress(script, 6, mtime=0)
     style_ids = ("plotly.js-style-global", *hashes)
     return Library(f"plotly-{digest}.min.js", packed, style_ids)
+
+
+def library_facts() -> dict[str, Any]:
+    """Address of the script that draws figures, and what a strict page must hold."""
+    found = library()
+    return {"library": f"/vendor/{found.name}", "style_ids": list(found.style_ids)}
 
 
 def _speed_traces(series: SpeedSeries, fleet: FleetDescription) -> Iterator[_Trace]:
