@@ -82,7 +82,7 @@ class Feed:
         if not connected or self._has_fallen_back(now) or self._is_behind():
             self.thinned = False
             self._steady_since = now
-        elif self._is_steady(now):
+        elif self.is_direct(now) and now - self._steady_since >= STEADY_S:
             self.thinned = True
         return self.thinned
 
@@ -94,9 +94,6 @@ class Feed:
         """Whether Orion's copies have been the newer ones for a while."""
         since = self._behind_since
         return since is not None and self.fiware_at - since >= 0.9 * SILENT_S
-
-    def _is_steady(self, now: float) -> bool:
-        return self.is_direct(now) and now - self._steady_since >= STEADY_S
 
 
 @dataclass(slots=True)

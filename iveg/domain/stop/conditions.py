@@ -19,7 +19,16 @@ _NOT_AT_REST = {"REQUESTED", "SENT", "DELIVERED", *_ALERTS}
 def of_machines(machines: Iterable[StopMachine], now: Instant) -> Iterable[Condition]:
     """Conditions of STOPs that are not confirmed or not obeyed."""
     for machine in machines:
-        yield from _of(machine, now)
+        stop, robot_id = machine.stop, machine.robot_id
+        if stop is None:
+            continue
+        age = round(now.mono - stop.times.requested.mono, 1)
+        slots: dict[str, Slot] = {"robot": robot_id, "age": age}
+        key = _ALERTS.get(machine.state)
+        if key is not None:
+            yield Condition("P1", key, robot_id, robot_id, slots)
+        if stop.reason == "moved" and machine.state in _NOT_AT_REST:
+            yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)
 
 
 def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
@@ -31,17 +40,3 @@ def of_mistakes(mistakes: Iterable[OffTable]) -> Iterable[Condition]:
             "event": one.key,
         }
         yield Condition("P2", "alert.stop_off_table", one.robot_id, one.robot_id, slots)
-
-
-def _of(machine: StopMachine, now: Instant) -> Iterable[Condition]:
-    """The alert condition of one robot's STOP."""
-    stop, robot_id = machine.stop, machine.robot_id
-    if stop is None:
-        return
-    age = round(now.mono - stop.times.requested.mono, 1)
-    slots: dict[str, Slot] = {"robot": robot_id, "age": age}
-    key = _ALERTS.get(machine.state)
-    if key is not None:
-        yield Condition("P1", key, robot_id, robot_id, slots)
-    if stop.reason == "moved" and machine.state in _NOT_AT_REST:
-        yield Condition("P1", "alert.stop_moved", robot_id, robot_id, slots)
