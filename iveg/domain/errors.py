@@ -8,7 +8,8 @@ IvegError
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
-├── OutboundError            an address outside iVeg that took no message
+├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
+├── OutboundError           an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
