@@ -164,7 +164,7 @@ function brushByHand() {
   const drawing = [];
   /** @type {Brush} */
   const brush = {
-    trails: { add() {}, keepOnly() {}, clear() {} },
+    trails: { add() {}, keepOnly() {} },
     soon: (compose) => compose(),
     draw: (_, whenDrawn) => void drawing.push(whenDrawn),
     end() {},

@@ -11,7 +11,7 @@
  *   scans that are not in it may be drawn (ms from now); 0: all are; `beganMs`: when that
  *   frame of the screen began (`performance.now()`)
  * @typedef {{
- *   trails: Pick<Trails, "add" | "keepOnly" | "clear">,
+ *   trails: Pick<Trails, "add" | "keepOnly">,
  *   soon: (compose: () => void) => void,
  *   draw: (picture: Picture, whenDrawn: WhenDrawn) => void,
  *   end: () => void,
@@ -62,7 +62,6 @@ export function createBrush(canvas) {
     trails: {
       add: (...crumb) => brush.trails.add(...crumb),
       keepOnly: (robots) => brush.trails.keepOnly(robots),
-      clear: () => brush.trails.clear(),
     },
     soon(compose) {
       waiting = compose;

@@ -115,11 +115,6 @@ export function createMap(canvas, store, options = {}) {
     ...{ setMeasuring: measuring.set, isMeasuring: measuring.isOn },
     ...{ onPick: picking.onPick, onPicture: frames.onPicture },
     afterDrawn: frames.afterDrawn,
-    /** Forgets trails: for a replay that jumps. */
-    clearTrails() {
-      brush.trails.clear();
-      frames.ask();
-    },
     destroy() {
       for (const end of endings) end();
     },

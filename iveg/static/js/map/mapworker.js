@@ -37,7 +37,6 @@ function follow([act, ...facts]) {
     const ids = /** @type {string[]} */ (facts[0]);
     return trails.keepOnly(new Map(ids.map((id) => [id, true])));
   }
-  if (act === "clear") return trails.clear();
   trails.add(.../** @type {[string, {x: number, y: number}, number]} */ (facts));
 }
 

@@ -8,8 +8,8 @@
  * @typedef {import("./brush.js").WhenDrawn} WhenDrawn
  * @typedef {import("./parcel.js").Parcel} Parcel
  * @typedef {import("./layers/labels.js").Vocabulary} Vocabulary
- * @typedef {["add", string, {x: number, y: number}, number] | ["keepOnly", string[]] |
- *   ["clear"]} TrailOrder
+ * @typedef {["add", string, {x: number, y: number}, number] |
+ *   ["keepOnly", string[]]} TrailOrder
  * @typedef {{n: number, parcel: Parcel, trails: TrailOrder[],
  *   vocabulary?: Vocabulary | null}} Order
  * @typedef {{canvas: OffscreenCanvas} | {trails: TrailOrder[]} | Order} ToWorker
@@ -134,10 +134,6 @@ function createSteps(tell) {
     keepOnly(robots) {
       for (const id of last.keys()) if (!robots.has(id)) last.delete(id);
       note(["keepOnly", [...robots.keys()]]);
-    },
-    clear() {
-      last.clear();
-      note(["clear"]);
     },
   };
 }

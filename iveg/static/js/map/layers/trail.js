@@ -52,10 +52,6 @@ export function createTrails() {
     keepOnly(robots) {
       for (const id of trails.keys()) if (!robots.has(id)) trails.delete(id);
     },
-    clear() {
-      trails.clear();
-      changes += 1;
-    },
     /** Number of changes of any trail. */
     changes: () => changes,
   };
