@@ -9,6 +9,7 @@
  */
 
 import { make, need, setHidden, setText } from "../panels/dom.js";
+import { tellAnswer } from "./guard.js";
 
 /** @type {readonly Class[]} */
 const CLASSES = ["person", "robot"];
@@ -73,18 +74,11 @@ export function createClassForm(store, i18n, guard) {
 
   async function save() {
     const body = { ...typed(), version: Number(seen?.version) };
-    const answer = await guard.put(body);
-    if (!answer) return say("lowering.kept");
-    if (answer.status === 200 && answer.body) {
-      fill(answer.body);
-      say("rule.saved", { version: answer.body.version });
-    } else if (answer.status === 409) {
-      // Told once; a second press confirms it.
-      seen = store.get("rule") ?? seen;
-      say("rule.stale");
-    } else if (answer.status === 0) say("rows.offline");
-    else say("rule.refused", { why: String(answer.body?.detail ?? answer.status) });
-    return undefined;
+    tellAnswer(await guard.put(body), { fill, renew, say });
+  }
+
+  function renew() {
+    seen = store.get("rule") ?? seen;
   }
 
   function add() {

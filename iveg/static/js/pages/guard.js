@@ -110,6 +110,30 @@ export function createGuard(store, i18n) {
   return { put };
 }
 
+/**
+ * Tells at a form how its change went.
+ *
+ * @param {Answer | null} answer of `put`
+ * @param {{fill: (rule: Rule) => void, renew: () => void,
+ *   say: (key: string, slots?: Record<string, string | number>) => void}} form `renew`
+ *   takes the newest version as the one that the person has seen
+ */
+export function tellAnswer(answer, { fill, renew, say }) {
+  if (!answer) return say("lowering.kept");
+  const { status, body } = answer;
+  if (status === 200 && body) {
+    fill(body);
+    return say("rule.saved", { version: body.version });
+  }
+  if (status === 409) {
+    // Told once; a second press confirms it.
+    renew();
+    return say("rule.stale");
+  }
+  if (status === 0) return say("rows.offline");
+  return say("rule.refused", { why: String(body?.detail ?? status) });
+}
+
 /** @param {{before: Rule, untilMs: number} | null} kept */
 function keep(kept) {
   sessionStorage.setItem(KEPT, JSON.stringify(kept));

@@ -3,6 +3,7 @@
  */
 
 import { need, setHidden, setText } from "../panels/dom.js";
+import { tellAnswer } from "./guard.js";
 import { dayAndTime } from "./history/local_time.js";
 
 /** @typedef {import("../core/protocol.js").Rule} Rule */
@@ -68,18 +69,11 @@ export function createRuleForm(store, i18n, guard) {
       // Numbers: the server detects an outdated version by this one.
       version: Number(seen?.version),
     });
-    if (!answer) return say("lowering.kept");
-    const { status, body } = answer;
-    if (status === 200 && body) {
-      fill(body);
-      say("rule.saved", { version: body.version });
-    } else if (status === 409) {
-      // Told once; a second press confirms it.
-      seen = store.get("rule") ?? seen;
-      say("rule.stale");
-    } else if (status === 0) say("rows.offline");
-    else say("rule.refused", { why: String(body?.detail ?? status) });
-    return undefined;
+    tellAnswer(answer, { fill, renew, say });
+  }
+
+  function renew() {
+    seen = store.get("rule") ?? seen;
   }
 
   function draw() {
