@@ -3,13 +3,13 @@
  */
 
 import { createAlertList, sentenceOf } from "../panels/alert_list.js";
-import { createMembers, floodSaid } from "../panels/alert_members.js";
+import { createMembers, writeFlood } from "../panels/alert_members.js";
 import { earlierUnknown, isKnown } from "../panels/alerts.js";
-import { make, need, setHidden, setText } from "../panels/dom.js";
+import { make, need, setHidden } from "../panels/dom.js";
 import { createSoundPanel } from "../panels/sound.js";
 import { toldSaid } from "../panels/told.js";
 import { dayAndTime } from "./history/local_time.js";
-import { createChips, createRows, soon } from "./rows.js";
+import { createChips, createRows, keepOpen, soon } from "./rows.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -42,13 +42,7 @@ export function start({ store, i18n, tone }) {
     reload();
   });
   store.subscribe("health", draw);
-  function drawFlood() {
-    /** @type {import("../core/protocol.js").Flood | null | undefined} */
-    const flood = store.get("flood");
-    setText(need("#flood"), floodSaid(flood, i18n));
-    need("#flood").toggleAttribute("data-flood", Boolean(flood?.since));
-  }
-
+  const drawFlood = () => writeFlood(need("#flood"), store.get("flood"), i18n);
   store.subscribe("flood", drawFlood);
   i18n.onChange(draw);
   i18n.onChange(drawFlood);
@@ -90,12 +84,7 @@ function whatOf(alert, i18n, opened) {
   const cell = make("td", "what", sentenceOf(alert, i18n));
   const { element, draw } = createMembers(i18n);
   draw(alert);
-  // The table is rewritten while a person reads it.
-  element.open = opened.has(alert.alert_id);
-  element.addEventListener("toggle", () => {
-    if (element.open) opened.add(alert.alert_id);
-    else opened.delete(alert.alert_id);
-  });
+  keepOpen(element, opened, alert.alert_id);
   cell.append(element);
   const told = toldSaid(alert.told, i18n);
   if (told) cell.append(make("p", "block__note", told));

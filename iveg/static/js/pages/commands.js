@@ -6,7 +6,7 @@ import { all, make, need, needPart, setText } from "../panels/dom.js";
 import { drawDue, readLast, verdictSaid } from "../panels/drill.js";
 import { dayAndTime, millisecondsOf } from "./history/local_time.js";
 import { endSaid, summaryOf, tookOf, zeroOf } from "./latency.js";
-import { createChips, createRows, soon, transportsOfPage } from "./rows.js";
+import { createChips, createRows, keepOpen, soon, transportsOfPage } from "./rows.js";
 
 /** @typedef {import("../core/i18n.js").I18n} I18n */
 
@@ -112,12 +112,7 @@ function endOf(command, i18n, opened) {
   const cell = make("td", "what", endSaid(command, i18n));
   if (!command.steps?.length) return cell;
   const steps = make("details", "members");
-  // The table is rewritten while a person reads it.
-  steps.open = opened.has(command.command_id);
-  steps.addEventListener("toggle", () => {
-    if (steps.open) opened.add(command.command_id);
-    else opened.delete(command.command_id);
-  });
+  keepOpen(steps, opened, command.command_id);
   const list = make("ol");
   for (const { at, state } of command.steps) {
     const line = make("li", "", `${millisecondsOf(at)} `);

@@ -127,6 +127,21 @@ export function createChips(attribute, onChange) {
   return (value) => pressed.size === 0 || pressed.has(value);
 }
 
+/**
+ * Keeps details open, or closed, while their table is rewritten under a person who reads.
+ *
+ * @param {HTMLDetailsElement} details
+ * @param {Set<string>} opened what is open
+ * @param {string} id
+ */
+export function keepOpen(details, opened, id) {
+  details.open = opened.has(id);
+  details.addEventListener("toggle", () => {
+    if (details.open) opened.add(id);
+    else opened.delete(id);
+  });
+}
+
 /** The transports that a page has columns for. */
 export function transportsOfPage() {
   const page = /** @type {HTMLElement} */ (document.querySelector("[data-transports]"));

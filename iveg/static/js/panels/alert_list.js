@@ -6,9 +6,8 @@
  */
 
 import { sendApi } from "../core/api.js";
-import { createMembers } from "./alert_members.js";
+import { createMembers, endOf } from "./alert_members.js";
 import { make, need, setAttribute, setHidden, setText } from "./dom.js";
-import { toldSaid } from "./told.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
 
@@ -132,21 +131,11 @@ export function sentenceOf({ key, slots }, i18n) {
 
 /** @param {Alert} alert @param {import("../core/i18n.js").I18n} i18n */
 function factsOf(alert, i18n) {
-  return [
-    i18n.t("alert.since", { at: alert.raised_at }),
-    alert.count > 1 &&
-      i18n.t("alert.times", { count: alert.count, at: alert.last_raised_at }),
-    alert.cleared_at && i18n.t("alert.cleared", { at: alert.cleared_at }),
-    alert.acknowledged_at &&
-      i18n.t("alert.acknowledged", {
-        who: alert.acknowledged_by,
-        at: alert.acknowledged_at,
-      }),
-    alert.note,
-    toldSaid(alert.told, i18n),
-  ]
-    .filter(Boolean)
-    .join(" · ");
+  const { count, raised_at, last_raised_at } = alert;
+  const since = i18n.t("alert.since", { at: raised_at });
+  const times = i18n.t("alert.times", { count, at: last_raised_at });
+  const began = count > 1 ? [since, times] : [since];
+  return [...began, ...endOf(alert, i18n)].join(" · ");
 }
 
 /** @param {(note: string) => void} onAcknowledge */

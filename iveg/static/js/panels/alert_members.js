@@ -35,21 +35,39 @@ export function createMembers(i18n) {
 
 /** @param {Occurrence} member @param {import("../core/i18n.js").I18n} i18n */
 function lineOf(member, i18n) {
-  const { priority, raised_at, cleared_at, acknowledged_at, note } = member;
   return [
-    i18n.t(`alert.priority.${priority}`),
-    i18n.t("alert.since", { at: raised_at }),
+    i18n.t(`alert.priority.${member.priority}`),
+    i18n.t("alert.since", { at: member.raised_at }),
+    ...endOf(member, i18n),
+  ].join(" · ");
+}
+
+/**
+ * What became of an alert, or of one of its occurrences.
+ *
+ * @param {Alert | Occurrence} it
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+export function endOf({ cleared_at, acknowledged_at, ...it }, i18n) {
+  const who = it.acknowledged_by;
+  return [
     cleared_at && i18n.t("alert.cleared", { at: cleared_at }),
-    acknowledged_at &&
-      i18n.t("alert.acknowledged", {
-        who: member.acknowledged_by,
-        at: acknowledged_at,
-      }),
-    note,
-    toldSaid(member.told, i18n),
-  ]
-    .filter(Boolean)
-    .join(" · ");
+    acknowledged_at && i18n.t("alert.acknowledged", { who, at: acknowledged_at }),
+    it.note,
+    toldSaid(it.told, i18n),
+  ].filter(Boolean);
+}
+
+/**
+ * Writes the rate of alerts, and marks it while they are a flood.
+ *
+ * @param {HTMLElement} place
+ * @param {import("../core/protocol.js").Flood | null | undefined} flood
+ * @param {import("../core/i18n.js").I18n} i18n
+ */
+export function writeFlood(place, flood, i18n) {
+  setText(place, floodSaid(flood, i18n));
+  place.toggleAttribute("data-flood", Boolean(flood?.since));
 }
 
 /**

@@ -7,7 +7,7 @@
 
 import { onBeat } from "../core/beat.js";
 import { byUrgency, createAlertList } from "./alert_list.js";
-import { floodSaid } from "./alert_members.js";
+import { floodSaid, writeFlood } from "./alert_members.js";
 import { need, setAttribute, setHidden, setText } from "./dom.js";
 
 /** @typedef {import("../core/protocol.js").Alert} Alert */
@@ -45,8 +45,7 @@ export function createAlertsPanel({ store, i18n }, tone) {
     const active = i18n.t("header.alerts_count", { count: open.length });
     setAttribute(button, "title", rate ? `${active} · ${rate}` : active);
     button.toggleAttribute("data-flood", Boolean(flood?.since));
-    setText(need("#alerts-flood"), rate);
-    need("#alerts-flood").toggleAttribute("data-flood", Boolean(flood?.since));
+    writeFlood(need("#alerts-flood"), flood, i18n);
     setHidden(need("#alerts-empty"), alerts.length > 0 || !isKnown(store));
     drawList();
   }
