@@ -1,4 +1,4 @@
-import { mayStand } from "../../iveg/static/js/map/layers/claims.js";
+import { claim, mayStand } from "../../iveg/static/js/map/layers/claims.js";
 import { createPlaces } from "../../iveg/static/js/map/layers/places.js";
 import { equal, test } from "./harness.js";
 
@@ -30,4 +30,17 @@ test("13.19: of two words at one place the first one is written", () => {
   equal(mayStand(paint, "recorrido", 400, 100, 11), true);
   equal(mayStand(paint, "farmer 75 %", 420, 104, 11), false);
   equal(mayStand(frame(), "farmer 75 %", 420, 104, 11), true);
+});
+
+test("words give way to no place that is out of sight", () => {
+  const at = (/** @type {number} */ top) => ({
+    left: 400,
+    right: 460,
+    top,
+    bottom: top + 24,
+  });
+  const paint = frame();
+  equal(claim(paint, [at(560)]), 0);
+  equal(claim(paint, [at(570), at(590), at(520)]), 2);
+  equal(claim(paint, [at(570), at(590)]), null);
 });

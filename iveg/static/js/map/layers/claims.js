@@ -18,20 +18,22 @@ const LETTER = 0.6;
 const settled = new WeakSet();
 
 /**
- * Takes the first place that is free.
+ * Takes the first place that is free and in sight.
  *
  * @param {Paint} paint
  * @param {readonly Rect[]} wished the best first
- * @returns {number | null} which one; null where all are taken
+ * @returns {number | null} which one; null where there is none
  */
 export function claim(paint, wished) {
-  const { places } = paint;
+  const { places, view } = paint;
   if (!places) return 0;
   if (!settled.has(places)) {
     settled.add(places);
     for (const rect of standing(paint)) places.claim([rect]);
   }
-  return places.claim(wished);
+  const seen = wished.filter(({ top, bottom }) => top >= 0 && bottom <= view.height);
+  const found = places.claim(seen);
+  return found === null ? null : wished.indexOf(seen[found]);
 }
 
 /**
