@@ -154,6 +154,18 @@ def test_13_19_a_card_is_as_high_whatever_it_says(fleet: Fleet) -> None:
         assert len(heights) == 1, size
 
 
+@pytest.mark.parametrize("fleet", [2], indirect=True)
+def test_the_menu_of_a_recorded_robot_is_on_its_card(fleet: Fleet) -> None:
+    first = frozen()["snapshot"]["robots"][0]
+    fleet.tell({**first, "replay": True})
+    card = fleet.at((1440, 900)).locator(".card").first.bounding_box()
+    menu = fleet.page.locator(".card__menu").first.bounding_box()
+    fleet.tell(first)
+    assert card is not None
+    assert menu is not None
+    assert menu["x"] + menu["width"] <= card["x"] + card["width"]
+
+
 @pytest.mark.parametrize("fleet", [6], indirect=True)
 def test_13_19_the_stop_of_each_of_six_robots_is_in_sight(fleet: Fleet) -> None:
     for size in ((1200, 800), (1440, 900), (1024, 768), (768, 1024)):
