@@ -73,6 +73,17 @@ def test_a_kind_lands_where_its_row_says(row: Kind) -> None:
     assert (kept(world, row.lands or "sensed") != before) == (row.lands is not None)
 
 
+@pytest.mark.parametrize("row", KINDS, ids=lambda row: row.of.__name__)
+def test_a_copy_is_news_only_where_its_row_orders_by_arrival(row: Kind) -> None:
+    world = World(("AGI",))
+    observation = next(one for one in SAID if isinstance(one, row.of))
+    world.apply(Received(observation, at(1.0)))
+
+    verdict = world.apply(Received(observation, at(2.0)))
+
+    assert verdict == ("duplicate" if row.ordered == "counted" else "new")
+
+
 @pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.attribute)
 def test_a_sensor_has_a_device_a_kind_and_no_name_of_another(sensor: Sensor) -> None:
     suffixes = [device.suffix for device in names.ROBOT_DEVICES]
