@@ -102,13 +102,15 @@ class Provisioner:
     def is_ours(self, subscription_id: str) -> bool:
         """Whether a notification is one that was asked for.
 
-        Orion may notify of a subscription before it has said its id: while some are
-        made, each that brings our secret is ours.
+        Orion may notify of a subscription before it has said its id, and after a
+        restart of ours of those that were made before: while some are made, and until
+        the first are known, each that brings our secret is ours.
         """
         return (
             subscription_id in self._subscription_ids
             or subscription_id in self.throttle.ids
             or self._is_subscribing
+            or not self._subscription_ids
         )
 
     async def run(self) -> None:

@@ -136,6 +136,18 @@ async def test_a_subscription_is_ours_as_soon_as_orion_uses_it(
     assert not site.provisioner.is_ours("somebody else's")
 
 
+async def test_until_the_first_are_known_those_of_an_earlier_run_are_ours(
+    fiware: Running,
+) -> None:
+    site = Site(fiware)
+    before = site.provisioner.is_ours("of an earlier run")
+    async with site.running():
+        await first_ids(site)
+
+    assert before
+    assert not site.provisioner.is_ours("of an earlier run")
+
+
 async def test_the_probe_goes_the_way_of_every_measure(fiware: Running) -> None:
     async with Site(fiware).running() as site:
         await until(lambda: site.heard)
