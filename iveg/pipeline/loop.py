@@ -18,8 +18,8 @@ from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.ports import Clock
 
 TICK_S = 0.05
-APART_S = 0.00025
-"""Least time between two takings for each robot of the fleet: 5 ms with twenty."""
+APART_S = 0.0002
+"""Least time between two takings for each robot of the fleet: 4 ms with twenty."""
 JUDGED_APART_S = 2 * APART_S
 """The same between two judgements: what robots are shown to be needs none."""
 _LATEST_APART_S = JUDGED_APART_S + APART_S / 2
