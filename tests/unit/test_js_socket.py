@@ -38,11 +38,9 @@ _CONNECT = """async ([url]) => {
     const store = new Store();
     const sight = Object.assign(new EventTarget(), {hidden: false});
     const line = new LiveLine({url, store, page: sight});
-    Object.assign(window, {store, line, sight});
-}"""
-_WATCH = """() => {
-    window.states = [];
-    window.store.subscribe('connection', (it) => window.states.push(it.state));
+    const states = [];
+    store.subscribe('connection', (it) => states.push(it.state));
+    Object.assign(window, {store, line, sight, states});
 }"""
 
 
@@ -177,8 +175,11 @@ def page(browser: Browser, files: str, live: LiveServer) -> Iterator[Page]:
     opened.clock.install()
     opened.goto(files)
     opened.evaluate(_CONNECT, [live.url])
-    _wait_for_state(opened, "open")
-    opened.evaluate(_WATCH)
+    # Told a frame after it is known: what is told from here on is news.
+    opened.wait_for_function(
+        "() => window.states.at(-1) === 'open'", timeout=_PATIENCE_MS
+    )
+    opened.evaluate("() => window.states.splice(0)")
     yield opened
     opened.close()
 
