@@ -22,6 +22,7 @@ from iveg.domain.errors import DataFileError, ExperimentRefusedError
 from iveg.domain.stamps import format_stamp
 from iveg.experiment.files import PROGRESS, directory_of, read_json, write_json
 from iveg.experiment.plan import PLANS, Size
+from iveg.experiment.progress import expected_s
 from iveg.models.experiment import Experiment, Experiments
 
 _KEPT: Final = ("IVEG_CONFIDENCE_THRESHOLD", "IVEG_SAFETY_RADIUS_M")
@@ -82,9 +83,10 @@ class ExperimentRunner:
             raise ExperimentRefusedError(self.refused)
         directory = directory_of(self._place, PLANS[size])
         directory.mkdir(parents=True, exist_ok=True)
-        steps = len(list(PLANS[size].steps()))
-        begun = {**_UNKNOWN, "state": "running", "of": steps}
-        write_json(directory / PROGRESS, begun)
+        steps = list(PLANS[size].steps())
+        left_s = round(sum(map(expected_s, steps)))
+        begun = {"state": "running", "of": len(steps), "left_s": left_s}
+        write_json(directory / PROGRESS, {**_UNKNOWN, **begun})
         self._running, self._why = directory, None
         self._ended.clear()
         self._task = asyncio.create_task(self._run(size, directory), name="experiment")

@@ -12,6 +12,8 @@ import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
 from iveg.experiment.files import read_json, write_json
+from iveg.experiment.plan import PLANS
+from iveg.experiment.progress import expected_s
 from iveg.experiment.runner import ExperimentRunner
 from iveg.models.experiment import Experiment
 from tests.processes import is_alive
@@ -69,6 +71,7 @@ async def test_one_that_runs_is_watched_and_its_end_is_told(tmp_path: Path) -> N
         ended = await until(bench, lambda one: one.state == "done")
 
     assert (begun.name, begun.state, begun.of) == ("quick-001", "running", 5)
+    assert begun.left_s == round(sum(map(expected_s, PLANS["quick"].steps())))
     assert (ended.done, ended.why, ended.report) == (5, "", True)
     assert bench.file("quick-001", "html") is not None
 
