@@ -47,23 +47,37 @@ def ask(
 
 def look(who: Page | BrowserContext, stack: Site, robot: str) -> dict[str, Any]:
     """What the server says of a robot."""
-    answer = who.request.get(f"{stack.url}/api/v1/robots/{robot}")
-    found: dict[str, Any] = answer.json()
-    return found
+    return _get(who, stack, f"robots/{robot}")
 
 
 def let_go(
     who: Page | BrowserContext, stack: Site, robot: str, within_s: float = 30.0
 ) -> None:
-    """Release and resume a robot until nothing stops it; a refusal is tried again."""
+    """Release and resume a robot until nothing stops it; a refusal is tried again.
+
+    None is asked for while another is under way, which would outlast this call.
+    """
+
+    def is_over(answer: APIResponse) -> bool:
+        path = f"commands/{answer.json()['command_id']}"
+        return _get(who, stack, path)["state"] != "RELEASING"
 
     def is_free() -> bool:
         seen = look(who, stack, robot)
         holds = [hold["id"] for hold in seen["holds"]]
         if seen["stop_state"] == "READY":
-            ask(who, stack, f"robots/{robot}/resume", {})
+            answer = ask(who, stack, f"robots/{robot}/resume", {})
         elif holds:
-            ask(who, stack, f"robots/{robot}/release", {"holds": holds})
-        return seen["stop_state"] == "RUNNING" and not holds
+            answer = ask(who, stack, f"robots/{robot}/release", {"holds": holds})
+        else:
+            return bool(seen["stop_state"] == "RUNNING")
+        if answer.ok:
+            until(lambda: is_over(answer), within_s, f"the order to {robot} is over")
+        return False
 
     until(is_free, within_s, f"{robot} is free")
+
+
+def _get(who: Page | BrowserContext, stack: Site, path: str) -> dict[str, Any]:
+    found: dict[str, Any] = who.request.get(f"{stack.url}/api/v1/{path}").json()
+    return found
