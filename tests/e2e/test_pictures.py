@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from tests.e2e.frozen import frozen_page, past_site, settle
+from iveg.models.snapshot import Snapshot
+from tests.e2e.frozen import frozen, frozen_page, past_site, settle
 from tests.e2e.reading import evaluate
 from tests.processes import Site
 
@@ -77,6 +78,12 @@ def past(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A server over a history that never changes; no robot is there."""
     with past_site(tmp_path_factory.mktemp("pictures")) as place:
         yield place
+
+
+def test_the_recorded_snapshot_is_one_that_a_server_may_send() -> None:
+    told = frozen()["snapshot"]
+
+    assert Snapshot.model_validate(told).model_dump(mode="json") == told
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
