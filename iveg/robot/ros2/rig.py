@@ -1,9 +1,8 @@
 """A robot between its ROS 2 topics and iVeg: Algorithms 1 and 3 over DDS.
 
 Thirty times a second the newest message of each topic goes through the safety node to
-iVeg (of those that change seldom, five times); each twist goes to the gate at once.
-Only the gate's output is published on the drive's topic, repeatedly while it is zero;
-when this process ends, so does publishing.
+iVeg; each twist goes to the gate at once.  Only the gate's output is published on the
+drive's topic, repeatedly while it is zero; when this process ends, so does publishing.
 """
 
 import asyncio
@@ -36,8 +35,6 @@ _DEPTH = 50
 _PICTURE_DEPTH = 2
 _LOOK_ROUND_TICKS, _TELL_TICKS = 15, 6
 """Ticks between two checks of endpoints, and between two outputs of neighbours."""
-_SLOW = frozenset({"battery", "path", "tf_static"})
-"""Topics that change seldom: they are read as often as neighbours are told."""
 _KNOWN_WITHIN_S = 8.0
 _MET_WITHIN_S = 5.0
 
@@ -222,7 +219,7 @@ class Ros2Robot:
                 timer.cancel()
 
     def _tick(self, number: int) -> None:
-        self._sense(with_slow=number % _TELL_TICKS == 0)
+        self._sense()
         if number % _LOOK_ROUND_TICKS == 0:
             self._look_round()
         if number % _TELL_TICKS == 0:
@@ -230,11 +227,9 @@ class Ros2Robot:
 
     # --- in -----------------------------------------------------------------------
 
-    def _sense(self, *, with_slow: bool) -> None:
+    def _sense(self) -> None:
         now = clock.now()
         for topic, one in self._ins.items():
-            if topic in _SLOW and not with_slow:
-                continue
             waited = one.reader.take()
             if waited:
                 self.inputs.hear(topic, waited, now.mono, one.most)
