@@ -6,7 +6,6 @@ each comes from the file, or else from iVeg's own fleet; a robot may have none.
 """
 
 import math
-import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,7 +23,7 @@ from pydantic import (
     model_validator,
 )
 
-from iveg.adapters.toml_positions import place_of
+from iveg.adapters.toml_positions import place_of, syntax_error
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import (
     CAUTIOUS,
@@ -85,7 +84,7 @@ def read_fleet(text: str, file: str) -> FleetDescription:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        line, column, why = _syntax_error(str(error), text)
+        line, column, why = syntax_error(error, text)
         reason = f"is not TOML: {why}."
         raise DataFileError(f"{file}:{line}:{column}", "", reason) from error
     try:
@@ -102,14 +101,6 @@ def read_fleet(text: str, file: str) -> FleetDescription:
             path = ("robots", index, "id")
             raise _complaint(text, file, path, f"{name} is in the list twice")
     return FleetDescription.of(robots)
-
-
-def _syntax_error(message: str, text: str) -> tuple[int, int, str]:
-    found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message)
-    if found is None:
-        lines = text.splitlines() or [""]
-        return len(lines), len(lines[-1]) + 1, message
-    return int(found[2]), int(found[3]), found[1]
 
 
 def _complaint(

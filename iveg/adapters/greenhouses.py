@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TypeVar
 
+from iveg.adapters.toml_positions import syntax_error
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane, Obstacle, Post
@@ -54,8 +55,8 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        where, reason = _syntax_error(str(error), text)
-        raise DataFileError(file, where, reason) from error
+        line, _, why = syntax_error(error, text)
+        raise DataFileError(file, f"line {line}", f"is not TOML: {why}.") from error
     page = _Page(file, text)
     _refuse_unknown(page, raw, "", 0, ("name", "bounds", *_LISTS))
     root = _Fields(page, raw, "", 0)
@@ -70,13 +71,6 @@ def read_greenhouse(text: str, file: str) -> Greenhouse:
     )
     _check_inside(page, greenhouse)
     return greenhouse
-
-
-def _syntax_error(message: str, text: str) -> tuple[str, str]:
-    found = re.fullmatch(r"(.*) \(at line (\d+), column \d+\)", message)
-    if found is None:
-        return f"line {text.count(chr(10)) + 1}", f"is not TOML: {message}."
-    return f"line {found[2]}", f"is not TOML: {found[1]}."
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,12 @@
-"""Position of a key in a TOML file, for errors that name line and column.
+"""Positions in a TOML file, for errors that name line and column.
 
-``tomllib`` tells places of syntax errors alone.  This finds the rest line by line:
-tables, lists of tables, dotted keys and inline tables, as people write them.
+``tomllib`` tells places of syntax errors alone, in their words.  This finds the rest
+line by line: tables, lists of tables, dotted keys and inline tables, as people write
+them.
 """
 
 import re
+from tomllib import TOMLDecodeError
 
 Path = tuple[str | int, ...]
 
@@ -15,6 +17,16 @@ _KEY = re.compile(
 )
 _PART = re.compile(r"""[A-Za-z0-9_-]+|"[^"]*"|'[^']*'""")
 _INLINE = re.compile(r"""([A-Za-z0-9_-]+|"[^"]*")\s*=""")
+_SAID = re.compile(r"(.*) \(at line (\d+), column (\d+)\)")
+
+
+def syntax_error(error: TOMLDecodeError, text: str) -> tuple[int, int, str]:
+    """Line and column, from 1, and reason of a syntax error; the end if it is there."""
+    found = _SAID.fullmatch(str(error))
+    if found is None:
+        lines = text.splitlines() or [""]
+        return len(lines), len(lines[-1]) + 1, str(error)
+    return int(found[2]), int(found[3]), found[1]
 
 
 def place_of(text: str, path: Path) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
-from iveg.adapters.toml_positions import place_of
+from iveg.adapters.toml_positions import place_of, syntax_error
 from iveg.domain.errors import DataFileError, UnreadableError
 from iveg.ros2 import names
 from iveg.ros2.names import Qos
@@ -248,9 +248,8 @@ def read_config(text: str, file: str) -> RobotConfig:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        found = re.search(r"at line (\d+)", str(error))
-        where = f"line {found[1]}" if found else f"line {text.count(chr(10)) + 1}"
-        raise DataFileError(file, where, f"is not TOML: {error}.") from error
+        line, _, why = syntax_error(error, text)
+        raise DataFileError(file, f"line {line}", f"is not TOML: {why}.") from error
     page = _Page(file, text)
     tables = page.values((), raw, dict.fromkeys(_KEYS, _table))
     said = {
