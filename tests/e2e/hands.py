@@ -60,7 +60,7 @@ def let_go(
 
     def is_over(answer: APIResponse) -> bool:
         path = f"commands/{answer.json()['command_id']}"
-        return _get(who, stack, path)["state"] != "RELEASING"
+        return bool(_get(who, stack, path)["state"] != "RELEASING")
 
     def is_free() -> bool:
         seen = look(who, stack, robot)
