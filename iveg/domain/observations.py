@@ -71,6 +71,10 @@ class Origin:
         return self.stamp_s if self.mono is None else self.mono
 
 
+UNKNOWN_ORIGIN = Origin()
+"""Of an observation whose sender tells none, or before it is counted."""
+
+
 @dataclass(frozen=True, slots=True)
 class Odometry:
     """Pose of ``base_link`` in ``map`` and the twist in ``base_link``."""

@@ -14,6 +14,7 @@ from iveg.domain.feeds import Feeds
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
     Climate,
     DetectionFrame,
     HeartbeatProbe,
@@ -33,7 +34,6 @@ from iveg.domain.robot_updates import dated, learn_kind, take_in
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import FIWARE
 
-_UNTOLD = Origin()
 _OF_NO_ROBOT = Climate, HeartbeatProbe
 _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 
@@ -97,7 +97,7 @@ class World:
             self._note(observation, at)
             return "new"
         robot = self.robot(observation.robot_id)
-        origin = getattr(observation, "origin", _UNTOLD)
+        origin = getattr(observation, "origin", UNKNOWN_ORIGIN)
         if self.refuses(received):
             # What Orion kept may be of a time when the robot was a recording.
             robot.refused_at = robot.refused_at if received.asked else at.mono
@@ -137,7 +137,7 @@ class World:
         Nothing of it counts: whoever plays it is not that robot.
         """
         observation = received.observation
-        if getattr(observation, "origin", _UNTOLD).replay is None:
+        if getattr(observation, "origin", UNKNOWN_ORIGIN).replay is None:
             return False
         robot = self.robots.get(getattr(observation, "robot_id", ""))
         return robot is not None and not robot.is_replay

@@ -16,6 +16,7 @@ from iveg.adapters.mqtt import MqttLink
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.stamps import format_stamp
 from iveg.emulator.camera import DETECTORS
 from iveg.emulator.emulated_robot import EmulatedRobot, FleetSettings
 from iveg.emulator.faults import open_fault_port
@@ -29,7 +30,7 @@ from iveg.emulator.scenarios import scenario_named
 from iveg.emulator.scripts import Incident
 from iveg.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
 from iveg.ngsi import names
-from iveg.ngsi.codec import format_stamp, write_climate
+from iveg.ngsi.codec import write_climate
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Network
 from iveg.ros2.names import namespace_of

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
     DetectionFrame,
     Observation,
     Origin,
@@ -153,12 +154,11 @@ class Ingest:
 
 _Stream = tuple[str | None, type[Observation]]
 _Identity = tuple[str | None, type[Observation], str | None, int | None]
-_UNTOLD = Origin()
 
 
 def _identity(observation: Observation) -> _Identity:
     """Identity of a message, where its sender counts."""
-    origin: Origin = getattr(observation, "origin", _UNTOLD)
+    origin: Origin = getattr(observation, "origin", UNKNOWN_ORIGIN)
     robot_id = getattr(observation, "robot_id", None)
     return robot_id, kind_of(observation), origin.boot, origin.seq
 

@@ -7,9 +7,9 @@ from typing import Any
 from fastapi import APIRouter, FastAPI
 
 from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
 from iveg.domain.stop import Press
 from iveg.models.snapshot import Server, Snapshot, User
-from iveg.ngsi.codec import format_stamp
 from iveg.pipeline import topics
 from iveg.pipeline.build import Pipeline, Services
 from iveg.pipeline.ports import Clock, Ids

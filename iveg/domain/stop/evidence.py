@@ -8,7 +8,6 @@ from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Hold, Instant, Origin, SafetyReport
 from iveg.domain.stop.standstill import Standstill
 
-UNKNOWN = Origin()
 _REMEMBERED_ANSWERS = 64
 
 

@@ -25,7 +25,13 @@ from math import inf
 from typing import Literal, get_args
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import CommandAnswer, Instant, Origin, SafetyReport
+from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
+    CommandAnswer,
+    Instant,
+    Origin,
+    SafetyReport,
+)
 from iveg.domain.stop.attempt import Attempt, drives
 from iveg.domain.stop.commands import PLAIN, Press, State
 from iveg.domain.stop.effects import (
@@ -36,7 +42,6 @@ from iveg.domain.stop.effects import (
     SendOnce,
     SetDesiredState,
 )
-from iveg.domain.stop.evidence import UNKNOWN
 from iveg.domain.stop.sends import Sends
 from iveg.domain.stop.status import StopStatus
 from iveg.domain.stop.wanted import DesiredRecord
@@ -226,7 +231,7 @@ class StopMachine(StopStatus):
         angular: float,
         at: Instant,
         new_id: str,
-        origin: Origin = UNKNOWN,
+        origin: Origin = UNKNOWN_ORIGIN,
         age_s: float = inf,
     ) -> list[Effect]:
         """Take a speed, proven to be no older than ``age_s``."""

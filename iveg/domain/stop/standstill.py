@@ -18,9 +18,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import Instant, Origin
-
-_UNKNOWN = Origin()
+from iveg.domain.observations import UNKNOWN_ORIGIN, Instant, Origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +46,7 @@ class TopicOrder:
     that does not rise makes all of that boot so, since what is no clock cannot tell.
     """
 
-    _newest: Origin = field(default=_UNKNOWN)
+    _newest: Origin = field(default=UNKNOWN_ORIGIN)
     _broken: str | None = None
 
     def moment(self, origin: Origin, arrived: Instant) -> Moment:
@@ -98,7 +96,7 @@ class Standstill:
         self.since, self._began, self._count = None, None, 0
 
     def rested(
-        self, at: Instant, origin: Origin = _UNKNOWN, *, sparse: bool = False
+        self, at: Instant, origin: Origin = UNKNOWN_ORIGIN, *, sparse: bool = False
     ) -> bool:
         """Take one more report at rest; returns whether the rest is a standstill.
 
@@ -133,7 +131,12 @@ class Standstill:
         return ago < LIMITS.standing_gap_s
 
     def odometry(
-        self, at: Instant, origin: Origin = _UNKNOWN, age_s: float = inf, *, moves: bool
+        self,
+        at: Instant,
+        origin: Origin = UNKNOWN_ORIGIN,
+        age_s: float = inf,
+        *,
+        moves: bool,
     ) -> bool | None:
         """Take one sample of odometry, proven to be no older than ``age_s``.
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
     Detection,
     DetectionFrame,
     Instant,
@@ -22,7 +23,6 @@ from iveg.robot.grounding.locate import Grounding
 from iveg.robot.ros2 import pictures, reading
 from iveg.robot.ros2.config import RobotConfig, Topics
 from iveg.robot.ros2.input_faults import InputFaults
-from iveg.robot.ros2.reading import UNSAID
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.robot.ros2.transforms import NoTransformError, TransformBuffer
 from iveg.robot.uplink import Sensed
@@ -184,10 +184,10 @@ class SensorInputs:
         """New observations, odometry first."""
         if self._began is None:
             self._began = now.mono
-        found: list[Sensed] = []
         self._note_silence(now.mono)
         if self._awaits_transforms(now.mono):
-            return found
+            return []
+        found: list[Sensed] = []
         for topic, work in (
             ("odometry", self._odometry),
             ("scan", self._scan),
@@ -290,10 +290,10 @@ class SensorInputs:
         to_map = self._in_map(odom, stamp, now.mono)
         if in_odom is None or to_map is None:
             self._here = None
-            return [Unplaced("", UNSAID, "odometry", twist)]
+            return [Unplaced("", UNKNOWN_ORIGIN, "odometry", twist)]
         place = to_map.compose(in_odom)
         self._here = _Here(place, in_odom, odom, stamp)
-        return [Odometry("", UNSAID, place.flat(), twist)]
+        return [Odometry("", UNKNOWN_ORIGIN, place.flat(), twist)]
 
     def _base_in_odom(
         self, message: m.Odometry, stamp: float, now: float
@@ -311,7 +311,7 @@ class SensorInputs:
         late = here is None or abs(stamp - here.stamp) > self._tf_max_age_s
         laser = self._laser(message.header.frame_id, stamp, now.mono)
         if late or laser is None:
-            return [Unplaced("", UNSAID, "scan")]
+            return [Unplaced("", UNKNOWN_ORIGIN, "scan")]
         return [reading.read_scan(message, laser)]
 
     def _laser(self, frame: str, stamp: float, now: float) -> RigidTransform | None:
@@ -345,7 +345,7 @@ class SensorInputs:
                     error.reason, self._name("detections_3d"), now.mono
                 )
                 lost += 1
-        return [DetectionFrame("", UNSAID, tuple(found), lost)]
+        return [DetectionFrame("", UNKNOWN_ORIGIN, tuple(found), lost)]
 
     def _path(self, message: m.Path, now: Instant) -> list[Sensed]:
         frame = message.header.frame_id or self._frames.map
@@ -391,11 +391,11 @@ class SensorInputs:
             return []
         self._look = None
         if not look.detections:
-            return [DetectionFrame("", UNSAID, ())]
+            return [DetectionFrame("", UNKNOWN_ORIGIN, ())]
         frame = None if depth is None else self._located(look, depth, now.mono)
         if incomplete:
             self.input_faults.note("no_depth", self._name("detections_2d"), now.mono)
-        return [frame or DetectionFrame("", UNSAID, (), len(look.detections))]
+        return [frame or DetectionFrame("", UNKNOWN_ORIGIN, (), len(look.detections))]
 
     def _located(
         self, look: m.Detection2DArray, depth: m.Image, now: float

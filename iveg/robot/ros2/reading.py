@@ -12,18 +12,16 @@ import numpy as np
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
 from iveg.domain.observations import (
+    UNKNOWN_ORIGIN,
     Battery,
     Detection,
     LaserScan,
     Navigation,
-    Origin,
 )
 from iveg.ngsi.payloads import MAX_BEAMS, MAX_PATH, clean_text
 from iveg.robot.ros2.rigid import RigidTransform, rigid_of
 from iveg.ros2 import messages as m
 
-UNSAID = Origin()
-"""Whose it is and when is filled in by the uplink."""
 FASTEST_M_S = 20.0
 """Speed above which a value is refused: no vehicle in crop rows is so fast (m/s)."""
 _FARTHEST_M = 1e6
@@ -92,7 +90,7 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
     side = _side(laser)
     return LaserScan(
         "",
-        UNSAID,
+        UNKNOWN_ORIGIN,
         scan.angle_min * side,
         scan.angle_increment * side,
         max(0.0, scan.range_min),
@@ -198,11 +196,11 @@ def read_path(
     poses = [*path.poses[::step], *path.poses[-1:]]
     points = np.array([(p.pose.position.x, p.pose.position.y, 0.0) for p in poses])
     if not points.size:
-        return Navigation("", UNSAID, "idle")
+        return Navigation("", UNKNOWN_ORIGIN, "idle")
     if not (np.abs(points) <= _FARTHEST_M).all():
         raise UnreadableError("not_a_number", "a path")
     way = tuple((float(x), float(y)) for x, y, _ in place.of(points))
-    return Navigation("", UNSAID, task, way[-1], way)
+    return Navigation("", UNKNOWN_ORIGIN, task, way[-1], way)
 
 
 def read_battery(state: m.BatteryState) -> Battery:
@@ -218,7 +216,7 @@ def read_battery(state: m.BatteryState) -> Battery:
     volts = state.voltage if math.isfinite(state.voltage) else None
     charging = {1: True, 2: False, 3: False, 4: False}
     status = charging.get(state.power_supply_status)
-    return Battery("", UNSAID, share, status, volts)
+    return Battery("", UNKNOWN_ORIGIN, share, status, volts)
 
 
 @lru_cache(1024)

@@ -18,6 +18,7 @@ from iveg.domain.latency.sketch import Sketch
 from iveg.domain.latency.stream import Stream
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
 from iveg.models.base import write_json
 from iveg.models.latency import (
     LatencyClock,
@@ -30,7 +31,6 @@ from iveg.models.latency import (
     SegmentRemark,
     SegmentSpread,
 )
-from iveg.ngsi.codec import format_stamp
 from iveg.pipeline.ports import Clock
 from iveg.web.api.exports import cell, csv_lines, form_of
 from iveg.web.pages import charts
