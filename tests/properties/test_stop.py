@@ -9,6 +9,7 @@ import itertools
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from math import inf
 from random import Random
 from typing import Literal
 
@@ -305,7 +306,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         self.moved_at = self.now if speed >= 0.02 else self.moved_at
         origin = self.rig.odometry_stamp(self.now)
         new_id = self.new_id()
-        self.perform(self.iveg.odometry(speed, 0.0, self.at(), new_id, origin))
+        self.perform(self.iveg.odometry(speed, 0.0, self.at(), new_id, origin, inf))
 
     def hear(self, word: object, transport: TransportId) -> None:
         if isinstance(word, CommandAnswer):

@@ -21,17 +21,10 @@ this module: nothing changes, ``OffTable`` tells of it, and STOP is sent on.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from math import inf
 from typing import Literal, get_args
 
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import (
-    UNKNOWN_ORIGIN,
-    CommandAnswer,
-    Instant,
-    Origin,
-    SafetyReport,
-)
+from iveg.domain.observations import CommandAnswer, Instant, Origin, SafetyReport
 from iveg.domain.stop.attempt import Attempt, drives
 from iveg.domain.stop.commands import PLAIN, Press, State
 from iveg.domain.stop.effects import (
@@ -231,8 +224,8 @@ class StopMachine(StopStatus):
         angular: float,
         at: Instant,
         new_id: str,
-        origin: Origin = UNKNOWN_ORIGIN,
-        age_s: float = inf,
+        origin: Origin,
+        age_s: float,
     ) -> list[Effect]:
         """Take a speed, proven to be no older than ``age_s``."""
         contradicted = self.is_contradicted(linear, angular, at, origin, age_s)

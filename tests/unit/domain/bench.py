@@ -3,8 +3,9 @@
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
 
-from iveg.domain.observations import CommandAnswer, Hold, Origin
+from iveg.domain.observations import UNKNOWN_ORIGIN, CommandAnswer, Hold, Origin
 from iveg.domain.stop import (
     Changed,
     Effect,
@@ -100,7 +101,9 @@ class Bench:
 
     def odometry(self, linear: float, angular: float = 0.0) -> list[Effect]:
         return self.keep(
-            self.machine.odometry(linear, angular, at(self.now), self.new_id())
+            self.machine.odometry(
+                linear, angular, at(self.now), self.new_id(), UNKNOWN_ORIGIN, inf
+            )
         )
 
     def tick(self) -> list[Effect]:
