@@ -10,6 +10,11 @@ def wall() -> float:
     return time.time()
 
 
+def mono() -> float:
+    """Monotonic clock (s)."""
+    return time.monotonic()
+
+
 def now() -> Instant:
     """This moment on the monotonic and the wall clock."""
-    return Instant(time.monotonic(), time.time())
+    return Instant(mono(), wall())

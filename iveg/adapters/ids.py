@@ -17,6 +17,6 @@ def new_id() -> str:
 
     Ids of one millisecond are in no order.
     """
-    milliseconds = int(clock.now().wall * 1000).to_bytes(_PADDED - 10, "big")
+    milliseconds = int(clock.wall() * 1000).to_bytes(_PADDED - 10, "big")
     digits = b32encode(milliseconds + os.urandom(10))[_LEFT_OUT:]
     return digits.translate(_CROCKFORD).decode()

@@ -259,7 +259,7 @@ class Dss:
             clock.now,
         )
         with contextlib.suppress(HopError):
-            day = clock.now().wall - WINDOW_S["24h"]
+            day = clock.wall() - WINDOW_S["24h"]
             measured = await queries.latency_minutes(day)
             # A day of twenty robots is half a million rows: not in the loop's thread.
             parts.latency.watch.remember(await asyncio.to_thread(hours_of, measured))

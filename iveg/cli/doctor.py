@@ -112,7 +112,7 @@ class Examination:
         self._listening_at = ""
         self._mark = ""
         self._began: dict[Check, float] = {}
-        self._ends = clock.now().mono + limit_s - _REMOVAL_S
+        self._ends = clock.mono() + limit_s - _REMOVAL_S
         self._measure_mark = ""
         self._measured_at = 0.0
         self._waited_s = 0.0
@@ -179,10 +179,10 @@ class Examination:
         await self._try(Check.ANSWER, self._answer)
 
     async def _try(self, check: Check, step: Callable[[], Awaitable[object]]) -> None:
-        if missing(check, self.findings) or clock.now().mono >= self._ends:
+        if missing(check, self.findings) or clock.mono() >= self._ends:
             return
         trouble = None
-        began = clock.now().mono
+        began = clock.mono()
         try:
             # The limit allows for two waits, or for Orion's wait for the agent.
             async with asyncio.timeout(min(2 * self._patience_s, self._left_s)):
@@ -193,12 +193,12 @@ class Examination:
             trouble = error.detail
         except (IvegError, OSError) as error:
             trouble = str(error)
-        took_s = clock.now().mono - self._began.get(check, began)
+        took_s = clock.mono() - self._began.get(check, began)
         self.findings[check] = Finding(check, took_s, trouble)
 
     @property
     def _left_s(self) -> float:
-        return max(0.0, self._ends - clock.now().mono)
+        return max(0.0, self._ends - clock.mono())
 
     # --- lag ----------------------------------------------------------------------
 
@@ -218,12 +218,12 @@ class Examination:
         if finding is None or finding.trouble is None or not self._measured_at:
             return
         until = self._measured_at + _WAITS * self._patience_s
-        left_s = min(until, self._ends) - clock.now().mono
+        left_s = min(until, self._ends) - clock.mono()
         with contextlib.suppress(TimeoutError, HopError):
             await self._seen("probe", self._measure_mark, left_s)
-            took_s = clock.now().mono - self._measured_at
+            took_s = clock.mono() - self._measured_at
             self.lag = Lag(took_s)
-        self._waited_s = took_s = clock.now().mono - self._measured_at
+        self._waited_s = took_s = clock.mono() - self._measured_at
         self.findings[Check.MEASURE] = Finding(
             Check.MEASURE, took_s, f"nothing came in {self._patience_s:.1f} s"
         )
@@ -236,7 +236,7 @@ class Examination:
         """Lag of a running iVeg's own probe, between sending and arrival at Orion."""
         with contextlib.suppress(HopError):
             left, came = await self._orion.read_probe_times()
-            fresh = clock.now().wall - came < _FRESH_S
+            fresh = clock.wall() - came < _FRESH_S
             if fresh and came - left > LATE_S:
                 return Lag(came - left, told_by=", as the running iVeg's probe shows")
         return None
@@ -267,7 +267,7 @@ class Examination:
 
     async def _measure(self) -> None:
         self._measure_mark = mark = secrets.token_hex(8)
-        self._measured_at = clock.now().mono
+        self._measured_at = clock.mono()
         await self._publish("attrs", {"probe": {"mark": mark}})
         await self._seen("probe", mark, self._patience_s)
 
@@ -287,7 +287,7 @@ class Examination:
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()
             # The steps so far are preparation; the hop begins here.
-            self._began[Check.NOTIFICATION] = clock.now().mono
+            self._began[Check.NOTIFICATION] = clock.mono()
             await self._probe.change(mark)
             try:
                 await ear.heard(mark, self._patience_s)

@@ -168,11 +168,11 @@ class Lab:
     async def _step(
         self, step: PlannedRun, environment: Mapping[str, str], progress: Progress
     ) -> None:
-        progress.begin(step, "counting", clock.now().mono)
+        progress.begin(step, "counting", clock.mono())
         rehearsal = VirtualRun(step, self.profile, self._rule, WATCHED)
         played = await self._while_all_run(rehearsal.play(step.counted_s))
         counted = counted_of(played, WATCHED)
-        progress.begin(step, "running", clock.now().mono)
+        progress.begin(step, "running", clock.mono())
         truth = self.notebook.directory / f"{step.name}.truth.jsonl"
         try:
             stack = await self._real(step, environment, truth)
@@ -181,7 +181,7 @@ class Lab:
             await stop_parts([] if robots is None else [robots])
             truth.unlink(missing_ok=True)
         self.notebook.keep(step, outcome_of(step, counted, stack))
-        progress.end(step, clock.now().mono)
+        progress.end(step, clock.mono())
 
     @property
     def _rule(self) -> DetectionRule:
@@ -197,7 +197,7 @@ class Lab:
         """The same run by all programs, any of which may end early."""
         words = ["emulator", "--scenario", step.family, "--seed", str(step.seed)]
         words += ["--profile", self.profile, "--truth", str(truth)]
-        since = format_stamp(clock.now().wall)
+        since = format_stamp(clock.wall())
         await self._start(words, environment)
         completed = await self._while_all_run(self._until_live())
         url, token = self._url, self.settings.api_token
@@ -228,9 +228,9 @@ class Lab:
             await asyncio.gather(main, *ends, return_exceptions=True)
 
     async def _until_live(self) -> bool:
-        deadline = clock.now().mono + _LIVE_WITHIN_S
+        deadline = clock.mono() + _LIVE_WITHIN_S
         while not await self._are_live():
-            if clock.now().mono > deadline:
+            if clock.mono() > deadline:
                 return False
             await asyncio.sleep(0.5)
         return True
@@ -242,12 +242,12 @@ class Lab:
     async def _stop(self) -> Any:
         """Stop the fleet; time until each robot stood (ms)."""
         await self._ask("fleet/stop", "POST")
-        deadline = clock.now().mono + _STOPS_WITHIN_S
+        deadline = clock.mono() + _STOPS_WITHIN_S
         while True:
             await asyncio.sleep(0.5)
             robots = (await self._ask("commands/latency"))["robots"]
             standing = sum(one["standing"]["count"] for one in robots)
-            if standing >= len(ROBOTS) or clock.now().mono > deadline:
+            if standing >= len(ROBOTS) or clock.mono() > deadline:
                 return robots
 
     @property
@@ -308,4 +308,4 @@ async def refuse_live_robots(settings: Settings) -> None:
 async def _ticks(progress: Progress) -> None:
     while True:
         await asyncio.sleep(1.0)
-        progress.tick(clock.now().mono)
+        progress.tick(clock.mono())

@@ -19,6 +19,6 @@ async def live_robot(settings: Settings, robots: Iterable[str]) -> str | None:
     async with OrionClient(settings.orion_url, *tenant) as orion:
         for robot_id in robots:
             heard = await orion.modified_at(robot_id)
-            if heard is not None and clock.now().wall - heard < _LIVE_S:
+            if heard is not None and clock.wall() - heard < _LIVE_S:
                 return robot_id
     return None

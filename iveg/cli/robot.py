@@ -142,12 +142,12 @@ async def refuse_second_gate(
     Raises:
         HopError: another program publishes on the topic.
     """
-    began = clock.now().mono
+    began = clock.mono()
     await asyncio.sleep(discovery_s)
     while any(
         one.writes and one.topic == topic and not one.own for one in dds.endpoints()
     ):
-        if clock.now().mono - began > ghost_s:
+        if clock.mono() - began > ghost_s:
             detail = (
                 f"{topic} has a publisher already: another gate, or a navigation that "
                 "goes round it; only one program may drive this robot"
@@ -262,8 +262,8 @@ async def _check(
         }
         link = MqttLink(broker_of(settings), f"check of {robot_id}")
         task = asyncio.create_task(link.run(), name="broker")
-        began = clock.now().mono
-        while clock.now().mono - began < _CHECK_S:
+        began = clock.mono()
+        while clock.mono() - began < _CHECK_S:
             await asyncio.sleep(0.05)
             for topic, reader in readers.items():
                 for one in reader.take():
@@ -310,5 +310,5 @@ def _hear(
         return 0.0
     header: m.Header = message.header  # type: ignore[attr-defined]
     one.frame = header.frame_id
-    one.age_s = clock.now().wall - header.stamp.seconds
+    one.age_s = clock.wall() - header.stamp.seconds
     return header.stamp.seconds if topic == "odometry" else 0.0

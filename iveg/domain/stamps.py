@@ -1,12 +1,21 @@
 """Moments as text: ISO-8601 UTC, as in the contract and all documents."""
 
 from datetime import UTC, datetime
+from functools import lru_cache
+from math import floor
 
 
 def format_stamp(wall: float) -> str:
     """Unix seconds as the contract's ISO-8601 UTC with milliseconds."""
-    stamp = datetime.fromtimestamp(wall, UTC).isoformat(timespec="milliseconds")
-    return stamp.removesuffix("+00:00") + "Z"
+    whole = floor(wall)
+    carried, micros = divmod(round((wall - whole) * 1e6), 1_000_000)
+    return f"{_second(whole + carried)}.{micros // 1000:03d}Z"
+
+
+@lru_cache(maxsize=64)
+def _second(wall: int) -> str:
+    """Without its end, which alone differs among stamps of a second."""
+    return datetime.fromtimestamp(wall, UTC).isoformat().removesuffix("+00:00")
 
 
 def parse_stamp(text: str) -> float | None:

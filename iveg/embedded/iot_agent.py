@@ -197,7 +197,7 @@ class IotAgent:
             AgentError: 404, no device has this entity.
         """
         device = self._device_for(tenancy, name, kind)
-        now = clock.now().wall
+        now = clock.wall()
         known = {one: values[one] for one in values if one in device.commands}
         for command, value in known.items():
             await self._publish(device, command, value)

@@ -71,7 +71,7 @@ class NgsiApi:
             )
         check_body(request)
         check_accept(request)
-        whose = scope(request, correlator, clock.now().wall)
+        whose = scope(request, correlator, clock.wall())
         options = read_options(request)
         return await route(self._broker, Call(request, whose, options, parts[1:]))
 

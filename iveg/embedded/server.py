@@ -79,7 +79,7 @@ async def embedded_fiware(
     iota_host = require_loopback("IVEG_IOTA_URL", iota[0])
     async with AsyncExitStack() as stack:
         south = await stack.enter_async_context(mqtt_broker(*mqtt))
-        broker = ContextBroker(clock.now().wall)
+        broker = ContextBroker(clock.wall())
         stack.callback(broker.close)
         agent = make_agent(broker, south)
         api = NgsiApi(broker)

@@ -116,7 +116,7 @@ class EmulatedRobot:
     # --- the slots ----------------------------------------------------------------
 
     def _now(self) -> float:
-        return clock.now().mono - self._run_began
+        return clock.mono() - self._run_began
 
     def _drive(self, dt: float) -> None:
         now, node = self._now(), self._node

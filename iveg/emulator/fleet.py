@@ -162,7 +162,7 @@ class SimulatedFleet:
         topic = names.measure_topic(self._settings.node.apikey, names.CLIMATE_DEVICE)
 
         def tell(_: float) -> None:
-            wall = clock.now().wall
+            wall = clock.wall()
             link.offer(topic, write_climate(climate_at(wall), format_stamp(wall)))
 
         async with asyncio.TaskGroup() as tasks:

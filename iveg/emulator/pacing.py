@@ -17,13 +17,13 @@ async def every(period: float, work: Callable[[float], None]) -> None:
 
     A call more than a period late moves the later ones: missed calls are not repeated.
     """
-    last = due = clock.now().mono
+    last = due = clock.mono()
     while True:
-        now = clock.now().mono
+        now = clock.mono()
         work(now - last)
         last = now
         due = max(due + period, now)
-        await asyncio.sleep(max(0.0, due - clock.now().mono))
+        await asyncio.sleep(max(0.0, due - clock.mono()))
 
 
 async def in_slots(period: float, work: Sequence[Callable[[float], None]]) -> None:

@@ -117,7 +117,7 @@ class Relay:
     ) -> None:
         while True:
             packet = await read_packet(reader)
-            passed = self.radio.pass_on(packet, clock.now().mono)
+            passed = self.radio.pass_on(packet, clock.mono())
             if packet.receipt and not passed:
                 # Swallowed: without it the robot's software would wait for the broker.
                 writer.write(packet.receipt)
@@ -140,7 +140,7 @@ async def _send_when_due(
 ) -> None:
     while True:
         due, raw = await waiting.get()
-        late = due - clock.now().mono
+        late = due - clock.mono()
         if late > 0.0:
             await asyncio.sleep(late)
         up.write(raw)

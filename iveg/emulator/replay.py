@@ -193,7 +193,7 @@ class ReplayedRobot:
             self._stood_s += step
         if self._stood_s >= _STANDS_AT_END_S:
             self.ended.set()
-        self._tell(clock.now().mono)
+        self._tell(clock.mono())
 
     def _slowed(self, command: float, dt: float) -> float:
         """The pace, 0 to 1: it falls no faster than the robot's brakes allow."""

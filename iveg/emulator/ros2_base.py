@@ -188,7 +188,7 @@ class Ros2Base:
     def _scan(self, _: float) -> None:
         sweep = self._rig.scan(self._world)
         message = m.LaserScan(
-            m.Header(m.Time.of(clock.now().wall), _LASER),
+            m.Header(m.Time.of(clock.wall()), _LASER),
             sweep.angle_min,
             sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),
             sweep.angle_increment,
@@ -208,7 +208,7 @@ class Ros2Base:
         self._seen.write(cdr.write(m.Detection3DArray(header, seen)))
 
     def _tell_slowly(self, _: float) -> None:
-        header = m.Header(m.Time.of(clock.now().wall), self._frames.map)
+        header = m.Header(m.Time.of(clock.wall()), self._frames.map)
         path = self._rig.navigation().path
         poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
         self._paths.write(cdr.write(m.Path(header, poses)))
@@ -216,7 +216,7 @@ class Ros2Base:
         self._batteries.write(cdr.write(battery))
 
     def _mounts(self) -> m.TFMessage:
-        stamp = m.Time.of(clock.now().wall)
+        stamp = m.Time.of(clock.wall())
         laser = self._rig.profile.laser
         return m.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
 

@@ -204,11 +204,12 @@ class RobotNode:
     def sense(self, *observations: Sensed) -> None:
         """Take observations of the robot's own sensors; origins are filled in."""
         now = self._read_clock()
+        mono = now.mono
         for one in observations:
             if isinstance(one, Odometry):
-                self._perform(self._machine.odometry(one.pose, one.twist, now.mono))
+                self._perform(self._machine.odometry(one.pose, one.twist, mono), mono)
             elif isinstance(one, Unplaced) and one.twist is not None:
-                self._perform(self._machine.odometry(None, one.twist, now.mono))
+                self._perform(self._machine.odometry(None, one.twist, mono), mono)
         if self._link.connected:
             own = self._own(now)
             for one in observations:
@@ -216,7 +217,8 @@ class RobotNode:
 
     def request_twist(self, twist: Twist2D) -> None:
         """Take upstream navigation's ``cmd_vel``; it expires after 0.5 s."""
-        self._perform(self._machine.request_twist(twist, self._read_clock().mono))
+        now = self._read_clock().mono
+        self._perform(self._machine.request_twist(twist, now), now)
 
     def limit(self, factor: float, cause: str | None = None) -> None:
         """Limit the speed factor (0, 0.5 or 1) for the robot's own software.
@@ -231,12 +233,14 @@ class RobotNode:
 
     def add_local_hold(self, source: Literal["hw", "bumper"]) -> None:
         """Hold the robot because its red button or bumper was pressed."""
-        self._perform(self._machine.local_hold(source, self._read_clock().mono))
+        now = self._read_clock().mono
+        self._perform(self._machine.local_hold(source, now), now)
 
     def release_locally(self) -> None:
         """Lift boot, button and bumper holds and resume, for the crew at the robot."""
         if not self._nobody_there:
-            self._perform(self._machine.release_locally(self._read_clock().mono))
+            now = self._read_clock().mono
+            self._perform(self._machine.release_locally(now), now)
 
     async def _tick_forever(self) -> None:
         """Tick whenever the drive got no command for 40 ms."""
@@ -248,7 +252,8 @@ class RobotNode:
     def _tick(self) -> None:
         self._put_off_tick()
         try:
-            self._perform(self._machine.tick(self._read_clock().mono))
+            now = self._read_clock().mono
+            self._perform(self._machine.tick(now), now)
         except Exception as error:  # ends ``run``, wherever it was called
             if self._broken is not None and not self._broken.done():
                 self._broken.set_exception(error)
@@ -263,9 +268,9 @@ class RobotNode:
     def _on_message(self, topic: str, payload: bytes) -> None:
         now = self._read_clock().mono
         if topic == self._command_topic:
-            self._perform(self._machine.command(payload, now))
+            self._perform(self._machine.command(payload, now), now)
         elif topic == self._desired_topic:
-            self._perform(self._machine.desired(payload, now))
+            self._perform(self._machine.desired(payload, now), now)
         else:
             self._on_feedback(topic, payload, now)
 
@@ -277,17 +282,17 @@ class RobotNode:
         self._echo.take(feedback.origin)
         self._uplink.rates.take_backlog(feedback.backlog_s, now)
         peer = topic.removeprefix("/").partition("/")[0]
-        self._perform(self._machine.feedback(peer, feedback, now))
+        self._perform(self._machine.feedback(peer, feedback, now), now)
         if self._on_feedback_read is not None:
             self._on_feedback_read(peer, feedback)
 
     # --- effects ------------------------------------------------------------------
 
-    def _perform(self, effects: tuple[Effect, ...]) -> None:
+    def _perform(self, effects: tuple[Effect, ...], now: float) -> None:
         for effect in effects:
             match effect:
                 case Drive(twist):
-                    self._tell_drive(twist)
+                    self._tell_drive(twist, now)
                 case Persist(holds):
                     self._lane.persist(holds)
                 case Answer(answer):
@@ -295,9 +300,8 @@ class RobotNode:
                 case Report(report, is_measure):
                     self._report(report, is_measure=is_measure)
 
-    def _tell_drive(self, twist: Twist2D) -> None:
+    def _tell_drive(self, twist: Twist2D, now: float) -> None:
         """Send zero and changes at once; do not repeat a command just sent."""
-        now = self._read_clock().mono
         told, at = self._told
         if twist == told and twist != REST and now - at < _SAID_WITHIN_S:
             return
@@ -312,11 +316,9 @@ class RobotNode:
         self._lane.answer(self._uplink.answer(answer, self._own(self._read_clock())))
 
     def _report(self, report: SafetyReport, *, is_measure: bool) -> None:
-        told = replace(report, faults=self._faults)
-        seq, messages = self._uplink.report(
-            told, self._own(self._read_clock()), is_measure=is_measure
-        )
-        self._machine.reported(seq, self._read_clock().mono)
+        told, now = replace(report, faults=self._faults), self._read_clock()
+        seq, messages = self._uplink.report(told, self._own(now), is_measure=is_measure)
+        self._machine.reported(seq, now.mono)
         for message in messages:
             self._lane.report(message)
 

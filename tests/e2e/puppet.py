@@ -56,7 +56,7 @@ class Puppet:
         self._seq = 0
         self._challenge = secrets.token_hex(8)
         self._echo = Echo()
-        self._started = clock.now().mono
+        self._started = clock.mono()
         self._orders = names.command_topic(_APIKEY, self.robot_id)
         topics = {self._orders: 1, names.FEEDBACK_FILTER: 1}
         self._link = MqttLink(self.address, self.robot_id, topics, self._hear)

@@ -297,9 +297,7 @@ async def test_a_slow_radio_brings_everything_late_and_in_order(
 
     def age() -> float:
         newest = cloud.newest("AGII", Odometry)
-        return (
-            0.0 if newest is None else clock.now().wall - (newest.origin.stamp_s or 0)
-        )
+        return 0.0 if newest is None else clock.wall() - (newest.origin.stamp_s or 0)
 
     async with running(emulator(address, tmp_path, port=port)):
         await until(lambda: cloud.newest("AGII", Odometry) and age() < 0.3)

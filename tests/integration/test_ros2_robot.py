@@ -96,7 +96,7 @@ class Sensors:
     async def talk(self) -> None:
         """Say where the base is thirty times a second, as often as ``burst``."""
         while True:
-            stamp = m.Time.of(clock.now().wall)
+            stamp = m.Time.of(clock.wall())
             odom = m.Header(stamp, "odom")
             links = (
                 m.TransformStamped(m.Header(stamp, "map"), "odom"),

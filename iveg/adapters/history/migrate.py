@@ -119,10 +119,10 @@ def _damage(file: Path) -> str | None:
 
     A locked file is not a damaged one; later calls deal with it.
     """
-    deadline = clock.now().mono + _CHECK_LIMIT_S
+    deadline = clock.mono() + _CHECK_LIMIT_S
     connection = sqlite3.connect(file, isolation_level=None)
     connection.set_progress_handler(
-        lambda: clock.now().mono > deadline, _STEPS_BETWEEN_LOOKS
+        lambda: clock.mono() > deadline, _STEPS_BETWEEN_LOOKS
     )
     try:
         answer = connection.execute("PRAGMA quick_check(1)").fetchone()
@@ -136,7 +136,7 @@ def _damage(file: Path) -> str | None:
 
 
 def _move_aside(file: Path, damage: str) -> None:
-    moment = datetime.fromtimestamp(clock.now().wall, UTC)
+    moment = datetime.fromtimestamp(clock.wall(), UTC)
     mark = f".corrupt-{moment:%Y%m%dT%H%M%S%f}"
     # The write-ahead files go along: left behind, they would play into the new one.
     for part in ("", "-wal", "-shm"):

@@ -8,6 +8,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.errors import UnreadableError
 from iveg.domain.geometry import Box3D, Twist2D
@@ -96,8 +97,14 @@ def read_scan(scan: m.LaserScan, laser: RigidTransform) -> LaserScan:
         max(0.0, scan.range_min),
         min(scan.range_max, _LONGEST_RANGE_M),
         laser.flat(),
-        np.where(scan.ranges.view(np.uint32) <= _FARTHEST_BITS, scan.ranges, _NOTHING),
+        _ranges(scan),
     )
+
+
+def _ranges(scan: m.LaserScan) -> NDArray[np.float32]:
+    ranges = scan.ranges.copy()
+    ranges[ranges.view(np.uint32) > _FARTHEST_BITS] = _NOTHING
+    return ranges
 
 
 def _side(laser: RigidTransform) -> int:

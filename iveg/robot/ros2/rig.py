@@ -148,7 +148,7 @@ class Ros2Robot:
         self._said: frozenset[tuple[str, str]] = frozenset()
         self._first_feedback: float | None = None
         self._known = False
-        self._alone_since = clock.now().mono
+        self._alone_since = clock.mono()
         self._open(network)
         self.node = make_node(self._drive, self._on_feedback)
 
@@ -198,7 +198,7 @@ class Ros2Robot:
         """Read all sensors on one timer: each wake-up costs as much as its work."""
         loop, ticks = asyncio.get_running_loop(), itertools.count()
         broken: asyncio.Future[None] = loop.create_future()
-        due, timer = clock.now().mono, None
+        due, timer = clock.mono(), None
 
         def tick() -> None:
             nonlocal due, timer
@@ -207,7 +207,7 @@ class Ros2Robot:
             except Exception as error:  # ends ``run``
                 broken.set_exception(error)
                 return
-            now = clock.now().mono
+            now = clock.mono()
             due = max(due + 1 / RATE_HZ, now)
             timer = loop.call_later(due - now, tick)
 
@@ -253,7 +253,7 @@ class Ros2Robot:
         self._said = said
 
     def _on_wish(self) -> None:
-        now = clock.now().mono
+        now = clock.mono()
         waited = self._wishes.reader.take()
         if len(waited) >= self._wishes.most:
             self._input_faults.note("flood", self._names.cmd_vel_in, now)
@@ -265,7 +265,7 @@ class Ros2Robot:
 
     def _look_round(self) -> None:
         """Check for other publishers on the drive, and for iVeg's knowledge of us."""
-        now, out = clock.now().mono, self._names.cmd_vel_out
+        now, out = clock.mono(), self._names.cmd_vel_out
         others = [one for one in self._network.endpoints() if not one.own]
         if any(one.writes and one.topic == out for one in others):
             self._input_faults.note("second_publisher", out, now)
@@ -278,7 +278,7 @@ class Ros2Robot:
             self._input_faults.note("unknown_to_iveg", self._id, now)
 
     def _on_feedback(self, peer: str, feedback: Feedback) -> None:
-        now = clock.now().mono
+        now = clock.mono()
         if self._first_feedback is None:
             self._first_feedback = now
         self._known = self._known or self._id in feedback.seen
@@ -287,14 +287,13 @@ class Ros2Robot:
     # --- out ----------------------------------------------------------------------
 
     def _drive(self, twist: Twist2D) -> None:
-        now = clock.now()
         try:
-            self._out.write(self._topics.write(twist, now.wall))
+            self._out.write(self._topics.write(twist, clock.wall()))
         except HopError as error:
             # No command arrives, so the base halts by its own time-out.
             _log.debug("%s: %s", self._id, error)
             out = self._names.cmd_vel_out
-            self._input_faults.note("drive_refused", out, now.mono)
+            self._input_faults.note("drive_refused", out, clock.mono())
 
     def _tell_neighbours(self) -> None:
         place = self.inputs.place

@@ -250,7 +250,7 @@ def _reader(language: str | None) -> Sentences | None:
 
 def _day(asked: Filter) -> str:
     """The first day that was asked for, for the name of the file."""
-    at = clock.now().wall if asked.since is None else asked.since
+    at = clock.wall() if asked.since is None else asked.since
     return f"-{in_madrid(at):%Y-%m-%d}"
 
 

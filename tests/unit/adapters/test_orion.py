@@ -73,11 +73,11 @@ async def test_reading_robots_never_waits_for_a_stuck_agent(
 
 
 async def test_the_time_of_the_last_odometry_is_orions(orion: OrionClient) -> None:
-    before = clock.now().wall
+    before = clock.wall()
     await put(orion, "AGI", base_pose_ground_truth=ODOMETRY)
     modified = await orion.modified_at("AGI")
     assert modified is not None
-    assert before - 0.001 <= modified <= clock.now().wall + 0.001
+    assert before - 0.001 <= modified <= clock.wall() + 0.001
 
 
 async def test_a_robot_without_odometry_has_no_time(orion: OrionClient) -> None:

@@ -45,7 +45,7 @@ class Site:
         return self.network.writers["/agi/cmd_vel"].said()
 
     def faults(self) -> set[str]:
-        now = clock.now().mono
+        now = clock.mono()
         return {one.code for one in self.robot.inputs.input_faults.faults(now)}
 
 
@@ -89,7 +89,7 @@ async def site(tmp_path: Path) -> AsyncIterator[Site]:
 
 def placed(network: FakeNetwork) -> None:
     """Odometry in map, as a localised robot has it."""
-    header = m.Header(m.Time.of(clock.now().wall), "map")
+    header = m.Header(m.Time.of(clock.wall()), "map")
     links = (m.TransformStamped(header, "odom"),)
     network.publish("/agi/tf", m.TFMessage(links))
     odom = m.Header(header.stamp, "odom")
