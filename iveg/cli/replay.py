@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from iveg.adapters.bags import BagTopics
 from iveg.adapters.fleet_files import load_fleet
 from iveg.cli.addresses import broker_of
 from iveg.cli.live_robots import live_robot
@@ -12,6 +11,7 @@ from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
+from iveg.emulator.bags import BagTopics
 from iveg.emulator.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
 

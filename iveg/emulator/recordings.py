@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from iveg.adapters.bags import Bag, BagTopics
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Odometry, Origin
+from iveg.emulator.bags import Bag, BagTopics
 from iveg.emulator.logs import LogReader, RecordingEntry
 from iveg.robot.gate import REST
 

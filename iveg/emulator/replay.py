@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iveg.adapters import clock
-from iveg.adapters.bags import BagTopics
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
@@ -24,6 +23,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
+from iveg.emulator.bags import BagTopics
 from iveg.emulator.pacing import every
 from iveg.emulator.playback import Playback
 from iveg.emulator.recordings import open_recording

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from iveg.adapters.bags import BagTopics
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry
+from iveg.emulator.bags import BagTopics
 from iveg.emulator.logs import RecordingEntry
 from iveg.emulator.recordings import open_recording
 from tests.data.bags import (

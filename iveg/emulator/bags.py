@@ -7,35 +7,27 @@ frame is taken for ``map``, and the laser sits where the robot's profile says.
 """
 
 import logging
-import math
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-import numpy as np
-
 from iveg.adapters.extras import require_extra
-from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.domain.geometry import Pose2D, Twist2D
-from iveg.domain.observations import LaserScan, Odometry, Origin
+from iveg.domain.errors import DataFileError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import UNKNOWN_ORIGIN, LaserScan, Odometry
+from iveg.robot.ros2.reading import read_pose, read_scan, read_twist
+from iveg.robot.ros2.rigid import IDENTITY
+from iveg.ros2 import messages as m
 
 if TYPE_CHECKING:  # an extra: iveg[bags]
     from rosbags.interfaces import Connection
     from rosbags.rosbag1 import Reader as Ros1Reader
     from rosbags.rosbag2 import Reader as Ros2Reader
-    from rosbags.typesys.stores.ros2_humble import (
-        nav_msgs__msg__Odometry as RosOdometry,
-    )
-    from rosbags.typesys.stores.ros2_humble import (
-        sensor_msgs__msg__LaserScan as RosScan,
-    )
 
 _log = logging.getLogger(__name__)
 ODOMETRY, SCAN = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"
-_FARTHEST_M, _FASTEST, _MOST_BEAMS = 1e6, 1e3, 4096
-_LONGEST_RANGE_M = 1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,59 +182,21 @@ class Bag:
         store = self._store
         read = store.deserialize_ros1 if self._is_ros1 else store.deserialize_cdr
         message = read(data, kind)
+        # The fields of its messages have the names that they have in ROS, as ours do.
         if kind == ODOMETRY:
-            odometry = cast("RosOdometry", message)
+            odometry = cast("m.Odometry", message)
             return _stamp_of(odometry), _odometry(odometry)
-        scan = cast("RosScan", message)
-        return _stamp_of(scan), _scan(scan, self._mount)
+        scan = cast("m.LaserScan", message)
+        return _stamp_of(scan), replace(read_scan(scan, IDENTITY), mount=self._mount)
 
 
-def _stamp_of(message: "RosOdometry | RosScan") -> float:
+def _stamp_of(message: "m.Odometry | m.LaserScan") -> float:
+    # A time of rosbags has the fields of ours and none of its properties.
     stamp = message.header.stamp
     return float(stamp.sec + stamp.nanosec / 1e9)
 
 
-def _odometry(message: "RosOdometry") -> Odometry:
+def _odometry(message: m.Odometry) -> Odometry:
     """Seen from above: pose in the odometry frame, twist in the robot's own."""
-    place, turned = message.pose.pose.position, message.pose.pose.orientation
-    twist = message.twist.twist
-    x, y, z, w = turned.x, turned.y, turned.z, turned.w
-    if not 0.0 < x * x + y * y + z * z + w * w < math.inf:
-        raise UnreadableError("bad_orientation", "a quaternion without length")
-    yaw = math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
-    _bounded(_FARTHEST_M, place.x, place.y)
-    _bounded(_FASTEST, twist.linear.x, twist.angular.z)
-    return Odometry(
-        "",
-        Origin(),
-        Pose2D(place.x, place.y, yaw),
-        Twist2D(twist.linear.x, twist.angular.z),
-    )
-
-
-def _scan(message: "RosScan", mount: Pose2D) -> LaserScan:
-    """A value that is no distance (nan, inf, below zero) is no return."""
-    ranges = np.array(message.ranges, np.float32)
-    if ranges.size > _MOST_BEAMS:
-        raise UnreadableError("too_long", f"more than {_MOST_BEAMS} ranges")
-    ranges[~((ranges >= 0.0) & (ranges <= _FARTHEST_M))] = np.inf
-    least, most = message.range_min, message.range_max
-    _bounded(_FARTHEST_M, message.angle_min, message.angle_increment, least)
-    if not most > 0.0:
-        raise UnreadableError("bad_range", "range_max must be more than 0")
-    most = min(most, _LONGEST_RANGE_M)
-    return LaserScan(
-        "",
-        Origin(),
-        message.angle_min,
-        message.angle_increment,
-        max(0.0, least),
-        most,
-        mount,
-        ranges,
-    )
-
-
-def _bounded(limit: float, *numbers: float) -> None:
-    if not all(abs(number) <= limit for number in numbers):
-        raise UnreadableError("out_of_bounds", "a number that is none or too large")
+    pose, twist = read_pose(message), read_twist(message.twist.twist)
+    return Odometry("", UNKNOWN_ORIGIN, pose.flat(), twist)
