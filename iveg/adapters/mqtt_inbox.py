@@ -101,10 +101,9 @@ class InboxClient(aiomqtt.Client):
 
     def _read(self, line: "ReadAhead") -> None:
         """Read what is there; then rest, or wait for an event if there was nothing."""
-        before = line.taken
         try:
-            self._client.loop_read()
-            while line is self._client._sock and line.pending() > 0:
+            has_come = line.take()
+            while line is self._client._sock and line.pending():
                 self._client.loop_read()
         except Exception as error:  # as aiomqtt: the connection broke
             if not self._disconnected.done():
@@ -112,7 +111,7 @@ class InboxClient(aiomqtt.Client):
             return
         if line is not self._client._sock:
             return
-        if line.taken == before:
+        if not has_come:
             self._listen(line)
         elif self._apart_s:
             self._loop.remove_reader(line.fileno())
@@ -127,23 +126,35 @@ class InboxClient(aiomqtt.Client):
 class ReadAhead:
     """A socket whose bytes are taken in large pieces, one an event.
 
-    One only, so that a flood from the broker leaves the loop its other work: then
-    ``recv`` would block until ``pending`` has said that there is nothing more.
+    One only, so that a flood from the broker leaves the loop its other work.
     """
 
     def __init__(self, inner: socket.socket, take: Take) -> None:
         self._inner = inner
-        self._take = take
+        self._tell = take
         self._begun = b""
         """Of a packet that is not whole yet."""
         self._held = memoryview(b"")
-        self._may_take = True
-        self.taken = 0
-        """How often something came from the wire."""
+        self._has_ended = False
 
     def __getattr__(self, name: str) -> Any:
         """Everything else is the socket's own."""
         return getattr(self._inner, name)
+
+    def pending(self) -> bool:
+        """Whether the library has something to read: its packets, or the end."""
+        return self._has_ended or bool(self._held)
+
+    def take(self) -> bool:
+        """Take what has come from the wire; whether anything had, or it has ended."""
+        came = self._came()
+        if came is None:
+            return False
+        self._has_ended = not came
+        arrived, self._begun = sort_packets(self._begun + came)
+        self._held = memoryview(arrived.others)
+        self._tell(arrived)
+        return True
 
     def recv(self, size: int) -> bytes:
         """Up to ``size`` bytes of packets that are the library's; none at the end.
@@ -151,34 +162,24 @@ class ReadAhead:
         Raises:
             BlockingIOError: nothing is there for now.
         """
-        if not self._held and not self._read():
-            return b""
+        if not self.pending():
+            raise BlockingIOError
         part, self._held = self._held[:size], self._held[size:]
         return bytes(part)
 
-    def pending(self) -> int:
-        """Bytes that can be read without a further event."""
-        if self._held:
-            return len(self._held)
-        self._may_take = True
+    def _came(self) -> bytes | None:
+        """What is on the wire: None where nothing is, no bytes where it has ended."""
         inner = self._inner
-        return inner.pending() if isinstance(inner, ssl.SSLSocket) else 0
-
-    def _read(self) -> bool:
-        """Take from the wire; False at its end."""
-        if not self._may_take:
-            raise BlockingIOError
-        came = self._inner.recv(READ_AHEAD)
-        if not came:
-            return False
-        self._may_take = False
-        self.taken += 1
-        arrived, self._begun = sort_packets(self._begun + came)
-        self._held = memoryview(arrived.others)
-        self._take(arrived)
-        if not arrived.others:
-            raise BlockingIOError
-        return True
+        try:
+            came = inner.recv(READ_AHEAD)
+            # No event tells of what is decrypted already.
+            while came and isinstance(inner, ssl.SSLSocket) and inner.pending():
+                came += inner.recv(inner.pending())
+        except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
+            return None
+        except OSError:
+            return b""
+        return came
 
 
 def sort_packets(read: bytes) -> tuple[Arrived, bytes]:

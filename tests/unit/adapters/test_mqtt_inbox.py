@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import socket
+import struct
 import threading
 from collections.abc import Callable, Iterator
 
@@ -39,23 +40,41 @@ def test_an_event_takes_from_the_wire_once_however_much_there_is(
 ) -> None:
     far, near = line
     far.sendall(2 * PONG)
+    assert near.take()
     assert near.recv(1) == PONG[:1]
     far.sendall(PONG)
-    assert near.pending() == 3
+    assert near.pending()
     assert near.recv(9) == PONG[1:] + PONG
+    assert not near.pending()
     with pytest.raises(BlockingIOError):
         near.recv(1)
-    assert near.pending() == 0
+    assert near.take()
     assert near.recv(9) == PONG
+    assert not near.take()
 
 
 def test_an_end_of_the_line_is_an_end(line: tuple[socket.socket, ReadAhead]) -> None:
     far, near = line
     far.sendall(PONG)
     far.close()
+    assert near.take()
     assert near.recv(9) == PONG
-    assert near.pending() == 0
+    assert not near.pending()
+    assert near.take()
+    assert near.pending()
     assert near.recv(9) == b""
+
+
+def test_a_line_that_was_reset_has_ended() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        here = socket.create_connection(server.getsockname())
+        there, _ = server.accept()
+    there.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    there.close()
+    with here:
+        near = ReadAhead(here, lambda *_: None)
+        assert near.take()
+        assert near.recv(9) == b""
 
 
 @contextlib.contextmanager
