@@ -219,6 +219,19 @@ test("an acknowledgement that failed says so and can be tried again", async () =
   list.remove();
 });
 
+test("an alert that is over and now seen offers no button until its row goes", async () => {
+  document.body.dataset.role = "operator";
+  const list = document.body.appendChild(document.createElement("ul"));
+  const { draw } = createAlertList(list, i18n, async () => 200, 150);
+  draw([alert({ cleared_at: "2026-11-20T12:01:00Z" })]);
+  list.querySelector("form")?.requestSubmit();
+  draw([]);
+  await until(() => list.querySelector("form")?.hidden === true);
+  equal(list.children.length, 1);
+  await until(() => list.children.length === 0);
+  list.remove();
+});
+
 test("13.10 the gravest stands first, of these the oldest", () => {
   const list = document.createElement("ul");
   createAlertList(list, i18n).draw([

@@ -84,9 +84,12 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     const item = makeItem(async (note) => {
       keepStill();
       const status = await send(alert.alert_id, note);
-      if (status >= 200 && status < 300) failures.delete(alert.alert_id);
+      const isTaken = status >= 200 && status < 300;
+      if (isTaken) failures.delete(alert.alert_id);
       else failures.set(alert.alert_id, status);
       draw(shown);
+      // An alert that was over is no longer told of, so nothing redraws its row.
+      if (isTaken) setHidden(need("form", item), true);
     });
     const past = createMembers(i18n);
     need("small", item).after(past.element);
