@@ -113,12 +113,17 @@ def _on_that_day(route: Route) -> None:
 
 
 def settle(page: Page, ready: str) -> None:
-    """A little time of the page's own passes, until it shows what the case is about."""
-    for _ in range(100):
+    """A little time of the page's own passes, until it shows what the case is about.
+
+    What it waits for takes real time, so of that more and more passes each round.
+    """
+    shown = page.locator(ready).first
+    for real_ms in range(0, 400, 4):
         page.clock.run_for(5)
-        if page.locator(ready).first.is_visible():
+        if shown.is_visible():
             break
-        page.evaluate("() => fetch('/healthz')")
+        page.wait_for_timeout(real_ms)
+    assert shown.is_visible(), f"never seen: {ready}"
     for _ in range(10):
         page.clock.run_for(20)
         page.evaluate("() => fetch('/healthz')")
