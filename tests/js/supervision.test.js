@@ -232,6 +232,22 @@ test("an alert that is over and now seen offers no button until its row goes", a
   list.remove();
 });
 
+test("an alert that comes back while its row stands still has its button again", async () => {
+  document.body.dataset.role = "operator";
+  const list = document.body.appendChild(document.createElement("ul"));
+  const over = alert({ cleared_at: "2026-11-20T12:01:00Z" });
+  const { draw } = createAlertList(list, i18n, async () => 200, 150);
+  draw([over]);
+  list.querySelector("form")?.requestSubmit();
+  draw([]);
+  equal(list.querySelector("form")?.hidden, true);
+  draw([over]);
+  // The answer to the acknowledgement comes after the alert has.
+  for (let i = 0; i < 5; i += 1) await Promise.resolve();
+  equal(list.querySelector("form")?.hidden, false);
+  list.remove();
+});
+
 test("13.10 the gravest stands first, of these the oldest", () => {
   const list = document.createElement("ul");
   createAlertList(list, i18n).draw([

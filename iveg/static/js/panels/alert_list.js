@@ -56,10 +56,18 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
 
   /** Writes changed rows; new and removed rows wait for the finger to leave. */
   function drawStill() {
-    for (const alert of shown) {
-      const item = items.get(alert.alert_id);
-      if (item) drawItem(item, alert);
+    for (const [id, item] of items) {
+      const alert = shown.find(({ alert_id }) => alert_id === id);
+      if (alert) drawItem(item, alert);
+      else withdraw(id, item);
     }
+  }
+
+  /** A row that is to go offers no button. @param {string} id @param {HTMLElement} item */
+  function withdraw(id, item) {
+    setHidden(need("form", item), true);
+    // Should the alert come back meanwhile, it is drawn whole.
+    drawn.delete(id);
   }
 
   function keepStill() {
@@ -84,12 +92,9 @@ export function createAlertList(list, i18n, send = acknowledge, stillMs = STILL_
     const item = makeItem(async (note) => {
       keepStill();
       const status = await send(alert.alert_id, note);
-      const isTaken = status >= 200 && status < 300;
-      if (isTaken) failures.delete(alert.alert_id);
+      if (status >= 200 && status < 300) failures.delete(alert.alert_id);
       else failures.set(alert.alert_id, status);
       draw(shown);
-      // An alert that was over is no longer told of, so nothing redraws its row.
-      if (isTaken) setHidden(need("form", item), true);
     });
     const past = createMembers(i18n);
     need("small", item).after(past.element);
