@@ -172,13 +172,13 @@ class ReadAhead:
         inner = self._inner
         try:
             came = inner.recv(READ_AHEAD)
-            # No event tells of what is decrypted already.
-            while came and isinstance(inner, ssl.SSLSocket) and inner.pending():
-                came += inner.recv(inner.pending())
         except (BlockingIOError, ssl.SSLWantReadError, ssl.SSLWantWriteError):
             return None
         except OSError:
             return b""
+        # No event tells of what is decrypted already.
+        while came and isinstance(inner, ssl.SSLSocket) and (ahead := inner.pending()):
+            came += inner.recv(ahead)
         return came
 
 
