@@ -24,7 +24,7 @@ import * as people from "./layers/people.js";
 import { createPlaces } from "./layers/places.js";
 import * as robot from "./layers/robot.js";
 import * as scalebar from "./layers/scalebar.js";
-import * as scan from "./layers/scan.js";
+import { createScanLayer } from "./layers/scan.js";
 import { createStaticImage } from "./layers/static.js";
 import * as trail from "./layers/trail.js";
 import { drawVeil } from "./layers/veil.js";
@@ -73,7 +73,7 @@ export function createPicture(canvas, trails) {
     coverage: coverage.draw,
     costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, chosen.trailS),
-    scan: scan.draw,
+    scan: createScanLayer(),
     intent: intent.draw,
     links: links.draw,
     detections: detections.draw,
@@ -84,7 +84,8 @@ export function createPicture(canvas, trails) {
   const ground = createGround(
     still,
     GROUND.map((name) => [name, (paint) => drawLayer(name, paint)]),
-    () => [trails.changes(), chosen.trailS, ...chosen.off],
+    () => [chosen.trailS, ...chosen.off],
+    trails.changes,
   );
   /** @type {Set<string>} */
   const broken = new Set();

@@ -13,7 +13,7 @@ import * as links from "../map/layers/links.js";
 import * as people from "../map/layers/people.js";
 import * as robots from "../map/layers/robot.js";
 import * as scalebar from "../map/layers/scalebar.js";
-import * as scan from "../map/layers/scan.js";
+import { createScanLayer } from "../map/layers/scan.js";
 import { readTheme } from "../map/layers/theme.js";
 import * as trail from "../map/layers/trail.js";
 import { make, need } from "./dom.js";
@@ -219,7 +219,7 @@ export const SIGNS = [
   {
     name: "scan",
     layer: "scan",
-    draw: scan.draw,
+    draw: createScanLayer(),
     scene: {
       scans: [
         {

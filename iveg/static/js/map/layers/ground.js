@@ -3,8 +3,8 @@
  * greenhouse, the costmap, trails and scans.
  *
  * Robots move in every frame; scans come fifteen times a second.  A
- * fleet's scans are thousands of points, so they are drawn together no more often than
- * that; those of a few robots in the very next frame.
+ * fleet's scans are thousands of points, so they and the trails are drawn together no more
+ * often than that; those of a few robots in the very next frame.
  *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {[name: string, draw: (paint: Paint) => void]} Layer
@@ -21,8 +21,9 @@ const FADING_MS = 250;
  *   OffscreenCanvas}} still the static layers under it
  * @param {Layer[]} layers from the ground up
  * @param {() => unknown[]} look the other values that decide how they look
+ * @param {() => number} steps of all trails so far
  */
-export function createGround(still, layers, look) {
+export function createGround(still, layers, look, steps) {
   const canvas = new OffscreenCanvas(1, 1);
   const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
     canvas.getContext("2d", { alpha: false })
@@ -57,7 +58,7 @@ export function createGround(still, layers, look) {
     update(paint, ratio, isOn) {
       const { nowMs, scans } = paint.scene;
       const wanted = [...placeOf(paint, ratio), ...look()];
-      const content = contentOf(paint);
+      const content = [steps(), ...contentOf(paint)];
       const isMoved = !isSame(wanted, drawnFor);
       if (!isMoved && isSame(content, drawn)) return 0;
       const waitedMs = Math.abs(nowMs - drawnAtMs);
