@@ -130,7 +130,7 @@ test("while no script listens for painting, nobody watches for it", () => {
   };
   const page = /** @type {any} */ (globalThis);
   delete page.__onPaint;
-  const end = installPaintHook({ watch }, { onPicture: watch });
+  const end = installPaintHook({ watch }, { onDrawn: watch });
   const counts = [watching];
   for (const listener of [() => {}, () => {}, undefined]) {
     page.__onPaint = listener;

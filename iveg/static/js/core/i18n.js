@@ -62,8 +62,6 @@ export function createI18n(load) {
     /** @param {string | number | Date} at ISO-8601, Unix seconds or a date */
     time: (at) => messages.time(at),
     language: () => messages.language,
-    /** @param {string[]} names */
-    blocks: (...names) => messages.blocks(names),
     /**
      * Calls `fn` after every switch.
      *

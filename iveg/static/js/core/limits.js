@@ -10,12 +10,8 @@
  * }} Limits those that pages use; names carry the unit
  */
 
-/** A worker has no page to read them from; its name carries them (`remotebrush.js`). */
-const written =
-  typeof document === "undefined" ? self.name : document.body.dataset.limits;
-
 /** @type {Readonly<Limits>} */
-export const LIMITS = Object.freeze(JSON.parse(written ?? ""));
+export const LIMITS = Object.freeze(JSON.parse(document.body.dataset.limits ?? ""));
 
 /**
  * Radius of a ring at an age (m), when it was `radiusM` at the younger age `thenS`.

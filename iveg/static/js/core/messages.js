@@ -90,11 +90,6 @@ export class Messages {
     return this.find(`${block}.${value}`) ?? String(value);
   }
 
-  /** Templates of some blocks, for a worker. @param {string[]} names */
-  blocks(names) {
-    return Object.fromEntries(names.map((name) => [name, this.#blocks[name]]));
-  }
-
   /** @param {number} value @param {Intl.NumberFormatOptions} options */
   formatted(value, options) {
     const name = JSON.stringify(options);

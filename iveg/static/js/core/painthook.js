@@ -8,14 +8,14 @@
  * @typedef {{robot: string, kind: "odom" | "lidar" | "detection", stamp: string}} Painted
  */
 
-/** @typedef {import("../map/frames.js").Seen} Seen */
+/** @typedef {import("../map/frames.js").WhenDrawn} WhenDrawn */
 
 /**
  * Listens for a script that defines `window.__onPaint`, now or later.  Until there is
  * one, neither store nor map are watched for it.
  *
  * @param {Pick<import("./store.js").Store, "watch">} store
- * @param {{onPicture: (watch: () => Seen) => () => void}} map
+ * @param {{onDrawn: (fn: WhenDrawn) => () => void}} map
  * @returns {() => void} ends it
  */
 export function installPaintHook(store, map) {
@@ -40,32 +40,23 @@ export function installPaintHook(store, map) {
 
 /**
  * @param {Pick<import("./store.js").Store, "watch">} store
- * @param {{onPicture: (watch: () => Seen) => () => void}} map
+ * @param {{onDrawn: (fn: WhenDrawn) => () => void}} map
  * @param {(painted: Painted) => void} tell
  */
 function attach(store, map, tell) {
   const hook = createPaintHook(tell);
   return [
     store.watch((data, topic) => hook.arrived(topic, data)),
-    map.onPicture(hook.composed),
+    map.onDrawn(hook.drawn),
   ];
 }
 
 /** @param {(painted: Painted) => void} tell */
 function createPaintHook(tell) {
-  /** @type {Map<string, Painted>} since the last picture was composed */
-  let arrived = new Map();
-  /** @type {Map<string, Painted>[]} of each picture that is under way, oldest first */
-  const composed = [];
+  /** @type {Map<string, Painted>} and not drawn yet */
+  const arrived = new Map();
   /** @type {Map<string, string>} */
   const told = new Map();
-
-  /** @param {string} name @param {Painted} painted */
-  function show(name, painted) {
-    if (told.get(name) === painted.stamp) return;
-    told.set(name, painted.stamp);
-    tell(painted);
-  }
 
   return {
     /** @param {string} topic @param {any} data */
@@ -77,18 +68,14 @@ function createPaintHook(tell) {
       if (told.get(name) === data.stamp) return;
       arrived.set(name, { robot: data.robot_id, kind, stamp: data.stamp });
     },
-    /** @returns {Seen} tells the newest that is in the picture composed now */
-    composed() {
-      const mine = arrived;
-      composed.push(mine);
-      arrived = new Map();
-      return (hasScans) => {
-        const drawn = composed.splice(0, composed.indexOf(mine) + 1);
-        for (const [name, painted] of new Map(drawn.flatMap((one) => [...one]))) {
-          if (hasScans || painted.kind !== "lidar") show(name, painted);
-          else if (!arrived.has(name)) arrived.set(name, painted);
-        }
-      };
+    /** @type {WhenDrawn} */
+    drawn(hasScans) {
+      for (const [name, painted] of arrived) {
+        if (painted.kind === "lidar" && !hasScans) continue;
+        arrived.delete(name);
+        told.set(name, painted.stamp);
+        tell(painted);
+      }
     },
   };
 }

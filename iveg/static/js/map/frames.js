@@ -4,57 +4,53 @@
  * A message requests the next picture the moment it arrives; however many arrive before
  * it, that picture has the newest of each, so no queue can grow.
  *
- * @typedef {import("./brush.js").Brush} Brush
- * @typedef {import("./picture.js").Picture} Picture
- * @typedef {(hasScans: boolean, beganMs: number) => void} Seen whether the newest scans
- *   are in it, too; when that frame of the screen began (`performance.now()`)
+ * @typedef {(hasScans: boolean, beganMs: number) => void} WhenDrawn whether the newest
+ *   scans are in it, too; when that frame of the screen began (`performance.now()`)
  */
 
 /**
- * @param {Brush} brush
- * @param {() => Picture | null} compose what is to be seen now; null: there is no place
+ * @param {() => number} draw draws what is to be seen now, and returns when the scans that
+ *   are not in it may be drawn (ms from now); 0: all are; NaN: there is no place
  */
-export function createFrames(brush, compose) {
-  /** @type {Set<() => Seen>} */
+export function createFrames(draw) {
+  /** @type {Set<WhenDrawn>} */
   const watchers = new Set();
   let isAsked = false;
+  let beganMs = performance.now();
   /** @type {ReturnType<typeof setTimeout> | undefined} */
   let later;
 
   function ask() {
     if (isAsked) return;
     isAsked = true;
-    brush.soon(() => {
-      if (isAsked) draw();
+    requestAnimationFrame((atMs) => {
+      beganMs = atMs;
+      if (isAsked) drawNow();
     });
   }
 
-  function draw() {
+  function drawNow() {
     isAsked = false;
-    const picture = compose();
-    if (!picture) return;
-    const seen = [...watchers].map((watch) => watch());
-    brush.draw(picture, (missingMs, beganMs) => {
-      for (const tell of seen) tell(missingMs === 0, beganMs);
-      clearTimeout(later);
-      if (missingMs) later = setTimeout(ask, missingMs);
-    });
+    const missingMs = draw();
+    if (Number.isNaN(missingMs)) return;
+    for (const tell of watchers) tell(missingMs === 0, beganMs);
+    clearTimeout(later);
+    if (missingMs) later = setTimeout(ask, missingMs);
   }
 
   return {
     ask,
     /** At once: a resized canvas is blank until it is drawn. */
-    draw,
+    drawNow,
     /**
-     * Calls `watch` when a picture is composed, and its result when that picture, or a
-     * newer one with all of its values, is on the canvas.
+     * Calls `fn` after each picture.
      *
-     * @param {() => Seen} watch
+     * @param {WhenDrawn} fn
      * @returns {() => void} ends it
      */
-    onPicture(watch) {
-      watchers.add(watch);
-      return () => void watchers.delete(watch);
+    onDrawn(fn) {
+      watchers.add(fn);
+      return () => void watchers.delete(fn);
     },
     /**
      * Calls `fn` once the present values are on the canvas, with the beginning of that
@@ -63,13 +59,12 @@ export function createFrames(brush, compose) {
      * @param {(beganMs: number) => void} fn
      */
     afterDrawn(fn) {
-      const end = () => void watchers.delete(watch);
-      /** @returns {Seen} */
-      const watch = () => (_, beganMs) => {
-        if (watchers.has(watch)) fn(beganMs);
-        end();
+      /** @type {WhenDrawn} */
+      const tell = (_, beganMs) => {
+        watchers.delete(tell);
+        fn(beganMs);
       };
-      watchers.add(watch);
+      watchers.add(tell);
       ask();
     },
     end() {

@@ -1,5 +1,5 @@
 /**
- * The live map: composes the picture and hands it to a brush, which draws it.
+ * The live map: composes the picture and draws it.
  *
  * @typedef {import("../core/store.js").Store} Store
  * @typedef {import("./camera.js").Camera} Camera
@@ -10,13 +10,10 @@
  *   now?: () => number, storage?: Storage | null,
  *   onFollow?: (robotId: string | null) => void, onLegend?: () => void,
  *   onMeasure?: (measure: import("./measuring.js").Measure) => void,
- *   brush?: import("./brush.js").Brush,
- * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's; `brush`
- *   draws, this thread if none is given
+ * }} MapOptions `now` is the clock of ages (ms): the page's own, or a replay's
  */
 
 import { followShortcuts } from "../core/shortcuts.js";
-import { createLocalBrush } from "./brush.js";
 import { createCamera } from "./camera.js";
 import { createCovers, onResize } from "./covers.js";
 import { createFrames } from "./frames.js";
@@ -26,8 +23,9 @@ import { createLabels } from "./layers/labels.js";
 import { browserStorage, createChoices } from "./layers/memory.js";
 import { pick } from "./layers/pick.js";
 import { readTheme } from "./layers/theme.js";
+import { createTrails } from "./layers/trail.js";
 import { createMeasuring } from "./measuring.js";
-import { LAYERS } from "./picture.js";
+import { createPicture, LAYERS } from "./picture.js";
 import { readScene } from "./scene.js";
 import { worldX, worldY } from "./viewport.js";
 
@@ -45,8 +43,10 @@ const DOUBLE_TAP_ZOOM = 2;
  */
 export function createMap(canvas, store, options = {}) {
   const { now = () => performance.now(), storage = browserStorage() } = options;
-  const { brush = createLocalBrush(canvas), onMeasure } = options;
-  const frames = createFrames(brush, compose);
+  const { onMeasure } = options;
+  const trails = createTrails();
+  const picture = createPicture(canvas, trails);
+  const frames = createFrames(draw);
   const choices = createChoices(storage, frames.ask);
   const covers = createCovers(canvas, frames.ask);
   const measuring = createMeasuring((measure) => {
@@ -63,16 +63,16 @@ export function createMap(canvas, store, options = {}) {
     pick(scene, camera.view(), px, py, choices.isOn),
   );
 
-  function compose() {
+  function draw() {
     scene = believed(readScene(store, now()), store, choices.believer());
     camera.settle();
     const view = camera.view();
-    if (!view.width || !view.height) return null;
-    return {
+    if (!view.width || !view.height) return Number.NaN;
+    return picture.draw({
       ...{ view, scene, followed: camera.followed(), tape: measuring.tape() },
       ...{ theme: looks.theme(), labels: looks.labels(), ratio: devicePixelRatio },
       ...{ off: choices.off(), trailS: choices.trailSeconds() },
-    };
+    });
   }
 
   /** @param {number} px @param {number} py */
@@ -84,7 +84,7 @@ export function createMap(canvas, store, options = {}) {
   function resize() {
     covers.forget();
     camera.resize(canvas.clientWidth, canvas.clientHeight);
-    frames.draw();
+    frames.drawNow();
   }
 
   const endings = [
@@ -95,7 +95,7 @@ export function createMap(canvas, store, options = {}) {
       legend: () => options.onLegend?.(),
     }),
     store.watch((data, topic) => {
-      leaveTrail(brush.trails, store, topic, data);
+      leaveTrail(trails, store, topic, data);
       frames.ask();
     }),
     every(AGEING_MS, frames.ask),
@@ -103,7 +103,6 @@ export function createMap(canvas, store, options = {}) {
     covers.end,
     frames.end,
     picking.end,
-    brush.end,
   ];
   frames.ask();
 
@@ -113,7 +112,7 @@ export function createMap(canvas, store, options = {}) {
     ...choicesOf(choices),
     ...{ setTheme: looks.setTheme, setLanguage: looks.setLanguage },
     ...{ setMeasuring: measuring.set, isMeasuring: measuring.isOn },
-    ...{ onPick: picking.onPick, onPicture: frames.onPicture },
+    ...{ onPick: picking.onPick, onDrawn: frames.onDrawn },
     afterDrawn: frames.afterDrawn,
     destroy() {
       for (const end of endings) end();
@@ -160,10 +159,9 @@ function createLooks(canvas, onChange) {
     },
     /**
      * @param {Translate} translate as for `createLabels`
-     * @param {import("../core/i18n.js").Blocks} [blocks]
      */
-    setLanguage(translate, blocks) {
-      labels = createLabels(translate, undefined, blocks);
+    setLanguage(translate) {
+      labels = createLabels(translate);
       onChange();
     },
   };
@@ -275,7 +273,7 @@ function wireKeys(canvas, camera, store, isEnabled, measuring) {
 }
 
 /**
- * @param {import("./brush.js").Brush["trails"]} trails
+ * @param {ReturnType<typeof createTrails>} trails
  * @param {Store} store
  * @param {string} topic
  * @param {any} data

@@ -5,10 +5,8 @@
  */
 
 import { installPaintHook } from "../core/painthook.js";
-import { createBrush } from "../map/brush.js";
 import { followCostmap, followCoverage } from "../map/costmap.js";
 import { hears } from "../map/layers/belief.js";
-import { SAID_ON_MAPS } from "../map/layers/labels.js";
 import { createMap } from "../map/map.js";
 import { all, need, setAttribute, setHidden, setText } from "./dom.js";
 import { drawHidden } from "./hidden_layers.js";
@@ -28,7 +26,6 @@ export function createMapbox(app, decision) {
   const { store, i18n } = app;
   const canvas = /** @type {HTMLCanvasElement} */ (need("#map"));
   const map = createMap(canvas, store, {
-    brush: createBrush(canvas),
     onFollow: showFollowed,
     onMeasure: showMeasure,
     onLegend: () =>
@@ -85,7 +82,7 @@ export function createMapbox(app, decision) {
   const showHidden = () => drawHidden(map.layers(), i18n);
 
   function drawTexts() {
-    map.setLanguage(i18n.t, i18n.blocks(...SAID_ON_MAPS));
+    map.setLanguage(i18n.t);
     drawLayers(app, map, showBeliever);
     showHidden();
     showBeliever();

@@ -3,25 +3,16 @@
  *
  * @typedef {(key: string, slots?: Record<string, string | number>) => string} Translate
  * @typedef {ReturnType<typeof createLabels>} Labels
- * @typedef {{language: string, blocks: import("../../core/i18n.js").Blocks}} Vocabulary
  */
 
 import { laneName } from "../../core/lanes.js";
-
-/** Blocks of messages that a map uses. */
-export const SAID_ON_MAPS = ["lane", "map", "task"];
 
 /**
  * @param {Translate} [t] of the keys `lane.…`, `task.…`, `map.ghost`, `map.last_seen`,
  *   `map.replay`; without it numbers stand alone
  * @param {string} [locale] BCP 47; the page's by default
- * @param {Vocabulary["blocks"] | null} [blocks] templates behind `t`, for a worker
  */
-export function createLabels(
-  t = untranslated,
-  locale = document.documentElement.lang,
-  blocks = null,
-) {
+export function createLabels(t = untranslated, locale = document.documentElement.lang) {
   const language = locale || "es";
   const plain = new Intl.NumberFormat(language, { maximumFractionDigits: 1 });
   const tenths = new Intl.NumberFormat(language, {
@@ -34,8 +25,6 @@ export function createLabels(
   });
   const percents = new Intl.NumberFormat(language, { style: "percent" });
   return {
-    /** @type {Vocabulary | null} for a worker */
-    vocabulary: blocks && { language, blocks },
     /** @param {string} lane */
     lane: (lane) => laneName(lane, t),
     /** A length of the scale bar. @param {number} m */
