@@ -80,30 +80,25 @@ function countedGround() {
     () => told.steps,
   );
   /** @param {number[][]} scans @param {number} nowMs */
-  function update(scans, nowMs) {
+  function update(scans, nowMs, view = VIEW) {
     const scene = sceneOf(scans, nowMs);
-    const paint = { view: VIEW, theme: null, labels: null, scene };
+    const paint = { view, theme: null, labels: null, scene };
     return ground.update(/** @type {any} */ (paint), 1, () => true);
   }
   return { told, update };
 }
 
-const FEW = [[1, 2]];
-const MANY = [Array.from({ length: 9000 }, (_, i) => i / 1000)];
-
-test("the ground of few points follows each step at once", () => {
+test("what lies under the robots waits for its turn, scan or step", () => {
   const { told, update } = countedGround();
-  for (const ms of [1000, 1016, 1032]) {
-    told.steps += 1;
-    equal(update(FEW, ms), 0);
-  }
-  equal(told.redrawn, 3);
+  equal([update([[1, 2]], 1000), told.redrawn], [0, 1]);
+  equal([update([[1, 3]], 1016), told.redrawn], [50, 1]);
+  told.steps += 1;
+  equal([update([[1, 3]], 1033), told.redrawn], [33, 1]);
+  equal([update([[1, 3]], 1066), told.redrawn], [0, 2]);
 });
 
-test("the ground of many points waits for its turn, steps of robots or not", () => {
+test("what lies under the robots is drawn at once for another view", () => {
   const { told, update } = countedGround();
-  update(MANY, 1000);
-  told.steps += 1;
-  equal([update(MANY, 1016), told.redrawn], [50, 1]);
-  equal([update(MANY, 1066), told.redrawn], [0, 2]);
+  update([[1, 2]], 1000);
+  equal([update([[1, 2]], 1016, { ...VIEW, x: 1 }), told.redrawn], [0, 2]);
 });

@@ -6,7 +6,7 @@
  *
  * @typedef {import("./layers/paint.js").Paint} Paint
  * @typedef {import("./layers/trail.js").Trails} Trails
- * @typedef {Omit<Paint, "ctx" | "places"> & {ratio: number, off: readonly string[],
+ * @typedef {Omit<Paint, "ctx" | "places" | "sprites"> & {ratio: number, off: readonly string[],
  *   trailS: number}} Picture `ratio` device pixels per CSS pixel,
  *   `off` the layers that are not drawn, `trailS` how much of the trails (s)
  */
@@ -25,6 +25,7 @@ import { createPlaces } from "./layers/places.js";
 import * as robot from "./layers/robot.js";
 import * as scalebar from "./layers/scalebar.js";
 import { createScanLayer } from "./layers/scan.js";
+import { createSprites } from "./layers/sprites.js";
 import { createStaticImage } from "./layers/static.js";
 import * as trail from "./layers/trail.js";
 import { drawVeil } from "./layers/veil.js";
@@ -87,6 +88,7 @@ export function createPicture(canvas, trails) {
     () => [chosen.trailS, ...chosen.off],
     trails.changes,
   );
+  const sprites = createSprites();
   /** @type {Set<string>} */
   const broken = new Set();
 
@@ -115,7 +117,7 @@ export function createPicture(canvas, trails) {
      */
     draw(what) {
       const { ratio } = what;
-      const paint = { ...what, ctx, places: createPlaces() };
+      const paint = { ...what, ctx, sprites, places: createPlaces() };
       chosen = what;
       matchPixels(canvas, what);
       const missingMs = ground.update(paint, ratio, isOn);

@@ -2,16 +2,15 @@
  * The layers under the robots, drawn when they have changed and copied in between: the
  * greenhouse, the costmap, trails and scans.
  *
- * Robots move in every frame; scans come fifteen times a second.  A
- * fleet's scans are thousands of points, so they and the trails are drawn together no more
- * often than that; those of a few robots in the very next frame.
+ * Robots move in every frame; scans come fifteen times a second, each robot's at moments
+ * of its own.  They and the trails are thousands of points, so they are drawn together
+ * and no more often than that.
  *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {[name: string, draw: (paint: Paint) => void]} Layer
  */
 
-/** More points than this are drawn together (a scan has 720). */
-const MANY_POINTS = 4000;
+/** Between two drawings because of scans and trails. */
 const TOGETHER_MS = 66;
 /** Trails fade with time alone. */
 const FADING_MS = 250;
@@ -56,16 +55,13 @@ export function createGround(still, layers, look, steps) {
      * @returns {number} when what is missing may be drawn (ms from now); 0: all is there
      */
     update(paint, ratio, isOn) {
-      const { nowMs, scans } = paint.scene;
+      const { nowMs } = paint.scene;
       const wanted = [...placeOf(paint, ratio), ...look()];
       const content = [steps(), ...contentOf(paint)];
       const isMoved = !isSame(wanted, drawnFor);
       if (!isMoved && isSame(content, drawn)) return 0;
       const waitedMs = Math.abs(nowMs - drawnAtMs);
-      const isMany = scans.reduce((n, { points }) => n + points.length / 2, 0);
-      if (!isMoved && isMany > MANY_POINTS && waitedMs < TOGETHER_MS) {
-        return TOGETHER_MS - waitedMs;
-      }
+      if (!isMoved && waitedMs < TOGETHER_MS) return TOGETHER_MS - waitedMs;
       redraw(paint, ratio, isOn);
       [drawnFor, drawn, drawnAtMs] = [wanted, content, nowMs];
       return 0;

@@ -14,8 +14,15 @@
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, labels: Labels,
  *   followed: string | null, tape: import("./measure.js").Tape,
  *   places?: import("./places.js").Places, ratio?: number,
- * }} Paint `places`: of the labels of this frame; `ratio`: device pixels per CSS pixel
+ *   sprites?: import("./sprites.js").Sprites,
+ * }} Paint `places`: of the labels of this frame; `ratio`: device pixels per CSS pixel;
+ *   `sprites`: kept between frames
  */
+
+/** Widths of texts that are kept: ages are many. */
+const WIDTHS_KEPT = 1000;
+/** @type {Map<string, number>} by font and text */
+const widths = new Map();
 
 /**
  * Draws with the context's state restored afterwards.
@@ -52,6 +59,22 @@ export function label({ ctx, theme }, text, x, y, style = {}) {
 }
 
 /**
+ * The width of a text (px); the context has that font then.
+ *
+ * @param {Context} ctx
+ * @param {string} font
+ * @param {string} text
+ */
+export function widthOf(ctx, font, text) {
+  ctx.font = font;
+  const key = `${font} ${text}`;
+  const width = widths.get(key) ?? ctx.measureText(text).width;
+  if (widths.size > WIDTHS_KEPT) widths.clear();
+  widths.set(key, width);
+  return width;
+}
+
+/**
  * A text in a filled capsule; returns its width.
  *
  * @param {Paint} paint
@@ -63,8 +86,7 @@ export function label({ ctx, theme }, text, x, y, style = {}) {
  * @returns {number} width (px)
  */
 export function pill({ ctx, theme }, text, x, y, fill, colour) {
-  ctx.font = `700 11px ${theme.font}`;
-  const width = ctx.measureText(text).width + 12;
+  const width = widthOfPill(ctx, theme, text);
   ctx.fillStyle = fill;
   ctx.beginPath();
   ctx.roundRect(x, y - 9, width, 18, 9);
@@ -75,6 +97,10 @@ export function pill({ ctx, theme }, text, x, y, fill, colour) {
   ctx.fillText(text, x + 6, y + 0.5);
   return width;
 }
+
+/** @param {Context} ctx @param {Theme} theme @param {string} text */
+export const widthOfPill = (ctx, theme, text) =>
+  widthOf(ctx, `700 11px ${theme.font}`, text) + 12;
 
 /**
  * @param {Context} ctx

@@ -9,7 +9,7 @@
 import { MARK_LIMIT_S } from "../scene.js";
 import { screenX, screenY } from "../viewport.js";
 import { claim } from "./claims.js";
-import { circle, isolated, label } from "./paint.js";
+import { circle, isolated, label, widthOf } from "./paint.js";
 
 /**
  * @typedef {import("./paint.js").Paint} Paint
@@ -17,6 +17,9 @@ import { circle, isolated, label } from "./paint.js";
  */
 
 const WORDS_FROM_SCALE = 24;
+/** Of a figure, with its outline; and the width of a ring's line. */
+const FIGURE_PX = 12;
+const RING_PX = 2;
 
 /** A mark is never fainter than this, or it would look like dirt. */
 const FAINTEST = 0.3;
@@ -27,9 +30,7 @@ const WORDS_ABOVE_PX = 13;
 
 /** @param {Paint} paint */
 export function draw(paint) {
-  for (const person of paint.scene.people) {
-    isolated(paint.ctx, () => drawPerson(paint, person));
-  }
+  for (const person of paint.scene.people) drawPerson(paint, person);
   isolated(paint.ctx, () => {
     for (const person of labelled(paint)) drawAge(paint, person);
   });
@@ -57,8 +58,24 @@ export function labelled({ scene, view }) {
 
 /** @param {Paint} paint @param {ScenePerson} person */
 function drawPerson(paint, person) {
-  const { ctx, view } = paint;
-  ctx.translate(screenX(view, person.x), screenY(view, person.y));
+  const { ctx, view, sprites } = paint;
+  const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
+  if (sprites && person.stage === "seen") {
+    // Whoever is seen looks like everybody else with a ring as large.
+    const ring = Math.round(person.ringM * view.scale);
+    const reach = Math.max(FIGURE_PX, ring) + RING_PX;
+    const name = `${person.peer ? "peer" : "person"} ${ring}`;
+    sprites.draw(paint, { name, reach, x, y }, (there) => drawSign(there, person));
+    return;
+  }
+  isolated(ctx, () => {
+    ctx.translate(x, y);
+    drawSign(paint, person);
+  });
+}
+
+/** About the origin. @param {Paint} paint @param {ScenePerson} person */
+function drawSign(paint, person) {
   if (person.stage !== "last_seen") drawRing(paint, person);
   if (person.peer) drawPeer(paint, person);
   else drawFigure(paint, person);
@@ -93,8 +110,7 @@ function placeOfAge(paint, text, x, y) {
   const { ctx, theme, places } = paint;
   const heights = [20, -22];
   if (!places) return heights[0];
-  ctx.font = `600 11px ${theme.font}`;
-  const half = ctx.measureText(text).width / 2;
+  const half = widthOf(ctx, `600 11px ${theme.font}`, text) / 2;
   const rects = heights.map((dy) => {
     const [top, bottom] = [y + dy - WORDS_ABOVE_PX / 2, y + dy + WORDS_ABOVE_PX / 2];
     return { left: x - half, right: x + half, top, bottom };
@@ -112,7 +128,7 @@ function drawRing({ ctx, view, theme }, person) {
   ctx.fill();
   ctx.globalAlpha = 1;
   ctx.strokeStyle = theme.ring;
-  ctx.lineWidth = 2;
+  ctx.lineWidth = RING_PX;
   ctx.setLineDash(isSeen ? [] : [8, 6]);
   ctx.stroke();
   ctx.setLineDash([]);

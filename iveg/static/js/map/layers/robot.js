@@ -9,7 +9,7 @@ import { isSilent } from "../../core/clock.js";
 import { LIMITS } from "../../core/limits.js";
 import { screenX, screenY } from "../viewport.js";
 import { claim } from "./claims.js";
-import { circle, isolated, label, pill } from "./paint.js";
+import { circle, isolated, label, pill, widthOf, widthOfPill } from "./paint.js";
 
 /**
  * @typedef {import("./paint.js").Paint} Paint
@@ -248,6 +248,9 @@ function drawPadlock({ ctx, theme }, x, y) {
   ctx.restore();
 }
 
+/** @param {import("./theme.js").Theme} theme */
+const nameFont = ({ font }) => `700 13px ${font}`;
+
 /**
  * Name above, and beside it age, half speed and recording.
  *
@@ -264,7 +267,7 @@ function drawTag(paint, robot, length) {
     weight: 700,
     colour: isLost ? theme.muted : theme.text,
   });
-  let x = ctx.measureText(robot.id).width / 2 + 6;
+  let x = widthOf(ctx, nameFont(theme), robot.id) / 2 + 6;
   if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
   for (const [text, fill, ink] of tagsOf(paint, robot)) {
     x += pill(paint, text, x, y, fill, ink) + 4;
@@ -284,9 +287,8 @@ function heightOfTag(paint, robot, length) {
   const near = length / 2 + 20;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
   if (!places) return heights[0];
-  ctx.font = `700 13px ${theme.font}`;
-  const half = ctx.measureText(robot.id).width / 2;
-  const tags = tagsOf(paint, robot).map(([text]) => ctx.measureText(text).width + 12);
+  const half = widthOf(ctx, nameFont(theme), robot.id) / 2;
+  const tags = tagsOf(paint, robot).map(([text]) => widthOfPill(ctx, theme, text));
   const x = screenX(view, robot.pose.x);
   const y = screenY(view, robot.pose.y);
   const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);

@@ -24,6 +24,8 @@ const FINE_MS = 60_000;
 const COARSE_STEP_M = 0.5;
 /** A jump this long is a new start (or another boot), not a drive. */
 const JUMP_M = 3;
+/** Steps on screen (px) that the eye cannot tell from a line. */
+const LINE_PX = 4;
 /** A trail never has more points than this. */
 const CRUMBS_MAX = 2000;
 
@@ -111,9 +113,14 @@ function drawTrail({ ctx, view, scene }, trail, pose, spanMs) {
     const to = first + Math.floor(((trail.length - first) * (shade + 1)) / shades);
     ctx.globalAlpha = 0.12 + 0.14 * shade;
     ctx.beginPath();
-    for (let i = from; i <= Math.min(to, trail.length - 1); i += 1) {
-      const [x, y] = [screenX(view, trail[i].x), screenY(view, trail[i].y)];
+    const end = Math.min(to, trail.length - 1);
+    let drawn = trail[from];
+    for (let i = from; i <= end; i += 1) {
       const isJump = i > from && distance(trail[i - 1], trail[i]) > JUMP_M;
+      const isNear = distance(drawn, trail[i]) * view.scale < LINE_PX;
+      if (isNear && !isJump && i > from && i < end) continue;
+      drawn = trail[i];
+      const [x, y] = [screenX(view, drawn.x), screenY(view, drawn.y)];
       if (isJump) ctx.moveTo(x, y);
       else ctx.lineTo(x, y);
     }
