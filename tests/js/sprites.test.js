@@ -52,7 +52,7 @@ function counted(reach = 20) {
   const told = { drawn: 0 };
   /** @param {string} name @param {object} [changes] */
   function draw(name, changes) {
-    sprites.draw(paintOf(changes), { name, reach, x: 60, y: 60 }, () => {
+    sprites.copy(paintOf(changes), { name, reach, x: 60, y: 60 }, () => {
       told.drawn += 1;
     });
     return told.drawn;

@@ -10,6 +10,7 @@ import { MARK_LIMIT_S } from "../scene.js";
 import { screenX, screenY } from "../viewport.js";
 import { claim } from "./claims.js";
 import { circle, isolated, label, widthOf } from "./paint.js";
+import { drawSign } from "./sprites.js";
 
 /**
  * @typedef {import("./paint.js").Paint} Paint
@@ -58,27 +59,22 @@ export function labelled({ scene, view }) {
 
 /** @param {Paint} paint @param {ScenePerson} person */
 function drawPerson(paint, person) {
-  const { ctx, view, sprites } = paint;
-  const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
-  if (sprites && person.stage === "seen") {
-    // Whoever is seen looks like everybody else with a ring as large.
-    const ring = Math.round(person.ringM * view.scale);
-    const reach = Math.max(FIGURE_PX, ring) + RING_PX;
-    const name = `${person.peer ? "peer" : "person"} ${ring}`;
-    sprites.draw(paint, { name, reach, x, y }, (there) => drawSign(there, person));
-    return;
+  const { ctx, view } = paint;
+  const place = { x: screenX(view, person.x), y: screenY(view, person.y) };
+  const ring = Math.round(person.ringM * view.scale);
+  // A ring that grows is like no other.
+  const kept = person.stage === "seen" ? paint.sprites : undefined;
+  if (person.stage !== "last_seen") {
+    const sign = { name: `ring ${ring}`, reach: ring + RING_PX, ...place };
+    drawSign(paint, kept, sign, (there) => drawRing(there, person));
   }
   isolated(ctx, () => {
-    ctx.translate(x, y);
-    drawSign(paint, person);
+    ctx.globalAlpha = strengthOf(person);
+    const name = `${person.peer ? "peer" : "person"} ${person.stage === "last_seen"}`;
+    const sign = { name, reach: FIGURE_PX, ...place };
+    const drawn = person.peer ? drawPeer : drawFigure;
+    drawSign(paint, paint.sprites, sign, (there) => drawn(there, person));
   });
-}
-
-/** About the origin. @param {Paint} paint @param {ScenePerson} person */
-function drawSign(paint, person) {
-  if (person.stage !== "last_seen") drawRing(paint, person);
-  if (person.peer) drawPeer(paint, person);
-  else drawFigure(paint, person);
 }
 
 /** Opacity of a figure. @param {ScenePerson} person */
@@ -136,7 +132,6 @@ function drawRing({ ctx, view, theme }, person) {
 
 /** Head and shoulders. @param {Paint} paint @param {ScenePerson} person */
 function drawFigure({ ctx, theme }, person) {
-  ctx.globalAlpha = strengthOf(person);
   ctx.strokeStyle = theme.bg;
   ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.person;
   ctx.lineWidth = 2;
@@ -148,13 +143,11 @@ function drawFigure({ ctx, theme }, person) {
   circle(ctx, 0, -5, 5);
   ctx.stroke();
   ctx.fill();
-  ctx.globalAlpha = 1;
 }
 
 /** A diamond: a machine that is not controlled from here. @param {Paint} paint
  * @param {ScenePerson} person */
 function drawPeer({ ctx, theme }, person) {
-  ctx.globalAlpha = strengthOf(person);
   ctx.strokeStyle = theme.bg;
   ctx.fillStyle = person.stage === "last_seen" ? theme.muted : theme.peer;
   ctx.lineWidth = 2;
@@ -169,5 +162,4 @@ function drawPeer({ ctx, theme }, person) {
   ctx.closePath();
   ctx.stroke();
   ctx.fill();
-  ctx.globalAlpha = 1;
 }

@@ -4,6 +4,8 @@
  *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {ReturnType<typeof createSprites>} Sprites
+ * @typedef {{name: string, reach: number, x: number, y: number}} Sign `name`: of all that
+ *   look the same; `reach`: from its centre (px); `x`, `y`: of its centre (px)
  */
 
 import { isolated } from "./paint.js";
@@ -19,15 +21,15 @@ export function createSprites() {
   /** @type {import("./theme.js").Theme | null} */
   let theme = null;
 
-  /** @param {Paint} paint @param {number} size @param {(paint: Paint) => void} sign */
-  function imageOf(paint, size, sign) {
+  /** @param {Paint} paint @param {number} size @param {(paint: Paint) => void} draw */
+  function imageOf(paint, size, draw) {
     const canvas = new OffscreenCanvas(size, size);
     const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
       canvas.getContext("2d")
     );
     const { ratio = 1 } = paint;
     ctx.setTransform(ratio, 0, 0, ratio, size / 2, size / 2);
-    sign({ ...paint, ctx });
+    draw({ ...paint, ctx });
     return canvas.transferToImageBitmap();
   }
 
@@ -36,23 +38,18 @@ export function createSprites() {
      * Draws a sign on whole device pixels.
      *
      * @param {Paint} paint
-     * @param {{name: string, reach: number, x: number, y: number}} place `name`: of all
-     *   that look the same; `reach`: of the sign from its centre (px)
-     * @param {(paint: Paint) => void} sign draws it about the origin
+     * @param {Sign} sign
+     * @param {(paint: Paint) => void} draw it about the origin
      */
-    draw(paint, { name, reach, x, y }, sign) {
+    copy(paint, { name, reach, x, y }, draw) {
       const { ctx, ratio = 1 } = paint;
       const size = 2 * Math.ceil(reach * ratio);
+      if (size > LARGEST_PX) return drawItself(paint, { x, y }, draw);
       isolated(ctx, () => {
-        if (size > LARGEST_PX) {
-          ctx.translate(x, y);
-          sign(paint);
-          return;
-        }
         if (theme !== paint.theme || images.size > KEPT) images.clear();
         theme = paint.theme;
         const key = `${name} ${size} ${ratio}`;
-        const image = images.get(key) ?? imageOf(paint, size, sign);
+        const image = images.get(key) ?? imageOf(paint, size, draw);
         images.set(key, image);
         ctx.setTransform(1, 0, 0, 1, 0, 0);
         const [left, top] = [x, y].map((at) => Math.round(at * ratio) - size / 2);
@@ -60,4 +57,29 @@ export function createSprites() {
       });
     },
   };
+}
+
+/**
+ * A copy of a sign where images are kept, else the sign itself.
+ *
+ * @param {Paint} paint
+ * @param {Sprites | undefined} sprites
+ * @param {Sign} sign
+ * @param {(paint: Paint) => void} draw it about the origin
+ */
+export function drawSign(paint, sprites, sign, draw) {
+  if (sprites) sprites.copy(paint, sign, draw);
+  else drawItself(paint, sign, draw);
+}
+
+/**
+ * @param {Paint} paint
+ * @param {{x: number, y: number}} place
+ * @param {(paint: Paint) => void} draw
+ */
+function drawItself(paint, { x, y }, draw) {
+  isolated(paint.ctx, () => {
+    paint.ctx.translate(x, y);
+    draw(paint);
+  });
 }
