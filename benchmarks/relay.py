@@ -56,6 +56,6 @@ async def live(websocket: WebSocket) -> None:
     """One page looks."""
     await websocket.accept()
     _pages.add(websocket)
-    with suppress(WebSocketDisconnect):
-        await websocket.receive_text()
+    async for _ in websocket.iter_text():
+        """Whatever it says, it is sent everything."""
     _pages.discard(websocket)
