@@ -11,53 +11,86 @@ function sceneOf(scans, nowMs = 0) {
   return {
     ...{ nowMs, robots: [], map: null, coverage: null, costmap: null },
     scans: scans.map((points, i) => ({
-      ...{ robotId: `R${i}`, slot: 1, strength: 1 },
+      ...{ robotId: `R${i}`, slot: i + 1, strength: 1 },
       points: new Float32Array(points),
     })),
   };
 }
 
-/** The rectangles that a layer fills. @param {number[][]} scans @param {number} [ratio] */
-function filled(scans, ratio = 1) {
-  /** @type {number[][]} */
-  const rectangles = [];
-  const ctx = {
-    ...{ save() {}, restore() {}, setTransform() {} },
-    fillRect: (/** @type {number[]} */ ...rectangle) => rectangles.push(rectangle),
-  };
-  const theme = { robots: ["red"] };
-  const paint = { ctx, view: VIEW, theme, scene: sceneOf(scans), ratio };
-  createScanLayer()(/** @type {any} */ (paint));
-  return rectangles;
+/**
+ * The pixels that a layer colours, by row: `59,19 red` …
+ *
+ * @param {number[][]} scans
+ * @param {{ratio?: number, strength?: number}} [how]
+ */
+function coloured(scans, { ratio = 1, strength = 1 } = {}) {
+  const [width, height] = [VIEW.width * ratio, VIEW.height * ratio];
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
+    new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true })
+  );
+  const scene = sceneOf(scans);
+  for (const scan of scene.scans) scan.strength = strength;
+  const theme = { robots: ["#f00", "rgb(0 0 255)"] };
+  createScanLayer()(/** @type {any} */ ({ ctx, view: VIEW, theme, scene, ratio }));
+  const { data } = ctx.getImageData(0, 0, width, height);
+  /** @type {{x: number, y: number, red: boolean, alpha: number}[]} */
+  const found = [];
+  for (let i = 0; i < data.length; i += 4) {
+    const [x, y] = [(i / 4) % width, Math.floor(i / 4 / width)];
+    const red = data[i] > data[i + 2];
+    if (data[i + 3]) found.push({ x, y, red, alpha: data[i + 3] });
+  }
+  return found;
 }
 
+/** @param {number[][]} scans @param {number} [ratio] */
+const placesOf = (scans, ratio) =>
+  coloured(scans, { ratio }).map(({ x, y }) => [x, y].join());
+
 test("a point of a scan is a square of whole device pixels about its place", () => {
-  equal(filled([[1, 2]]), [[59, 19, 2, 2]]);
-  equal(filled([[1.03, 2.04]]), [[59, 19, 2, 2]]);
-  equal(filled([[1, 2]], 2), [[118, 38, 4, 4]]);
-  equal(filled([[1, 2]], 1.5), [[89, 29, 3, 3]]);
+  const square = ["59,19", "60,19", "59,20", "60,20"];
+  equal(placesOf([[1, 2]]), square);
+  equal(placesOf([[1.03, 2.04]]), square);
+  const large = placesOf([[1, 2]], 2);
+  equal([large.length, large[0], large[15]], [16, "118,38", "121,41"]);
 });
 
-test("of points of a scan that fall together one is drawn", () => {
-  equal(filled([[1, 2, 1.01, 2.02, 1.04, 1.97]]).length, 1);
-  equal(filled([[1, 2, 1.2, 2]]).length, 2);
+test("points outside the view are not drawn, nor at its other side", () => {
+  equal(placesOf([[-6, 0, 6, 0, 0, 5, 0, -5, 5, 0, 0, -4, Number.NaN, 0]]), []);
+  equal(placesOf([[4.9, 0]]).length, 4);
 });
 
-test("a wall that beams hit everywhere has no gap", () => {
-  const wall = Array.from({ length: 400 }, (_, i) => [-4 + i / 50, 1]).flat();
-  const drawn = filled([wall]);
-  const columns = new Set(drawn.flatMap(([x, , size]) => [x, x + size - 1]));
-  const across = Math.max(...columns) - Math.min(...columns) + 1;
-  equal([drawn.length <= 41, across >= 80, columns.size], [true, true, across]);
+test("each robot has its own hue, and what it saw last second is fainter", () => {
+  const both = [
+    [1, 2],
+    [3, 2],
+  ];
+  equal(
+    coloured(both).map(({ red }) => red),
+    [true, true, false, false, true, true, false, false],
+  );
+  const [fresh, late] = [1, 0.35].map((strength) => coloured(both, { strength })[0]);
+  equal([fresh.alpha, late.alpha], [217, 76]);
 });
 
-test("each robot's points are drawn, also where another one's are", () => {
-  const one = [1, 2];
-  equal(filled([one, one]).length, 2);
-});
-
-test("points outside the view are not drawn", () => {
-  equal(filled([[-6, 0, 6, 0, 0, 5, 0, -5, 4.9, 0]]).length, 1);
+test("a scan is drawn in place of the one before", () => {
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
+    new OffscreenCanvas(VIEW.width, VIEW.height).getContext("2d", {
+      willReadFrequently: true,
+    })
+  );
+  const layer = createScanLayer();
+  const theme = { robots: ["#f00"] };
+  for (const points of [
+    [1, 2],
+    [-1, -2],
+  ]) {
+    ctx.clearRect(0, 0, VIEW.width, VIEW.height);
+    layer(/** @type {any} */ ({ ctx, view: VIEW, theme, scene: sceneOf([points]) }));
+  }
+  const at = (/** @type {number} */ x, /** @type {number} */ y) =>
+    ctx.getImageData(x, y, 1, 1).data[3] > 0;
+  equal([at(60, 20), at(40, 60)], [false, true]);
 });
 
 /** A ground whose redrawing is counted, with trails of so many steps. */

@@ -4,57 +4,91 @@ import { isolated } from "./paint.js";
 
 /** From this scale on (px/m) points are larger. */
 const NEAR_SCALE = 40;
-const LAST_NUMBER = 65_535;
+const OPACITY = 0.85;
 
 /**
- * Draws on whole device pixels, of the points of a scan that fall together only one, and
- * none outside the view: a fleet's scans are thousands of points, most of them on the
- * same walls, and each one drawn costs as much as a text.
+ * Writes the points into an image of the whole view: a fleet's scans are thousands of
+ * points, and a rectangle for each costs more than all pixels of the view.
  */
 export function createScanLayer() {
-  /** By pixel, the number of the scan that covered it last. */
-  let covered = new Uint16Array(0);
-  let n = 0;
+  const canvas = new OffscreenCanvas(1, 1);
+  const image = /** @type {OffscreenCanvasRenderingContext2D} */ (
+    canvas.getContext("2d")
+  );
+  const hues = createHues();
+  let pixels = image.createImageData(1, 1);
 
-  /** @param {number} pixels */
-  function nextScan(pixels) {
-    if (covered.length === pixels && n < LAST_NUMBER) {
-      n += 1;
-      return;
+  /** @param {number} width @param {number} height (device pixels) */
+  function clear(width, height) {
+    if (pixels.width !== width || pixels.height !== height) {
+      Object.assign(canvas, { width, height });
+      pixels = image.createImageData(width, height);
+    } else {
+      pixels.data.fill(0);
     }
-    covered = new Uint16Array(pixels);
-    n = 1;
   }
 
   /** @param {import("./paint.js").Paint} paint */
   return ({ ctx, view, theme, scene, ratio = 1 }) => {
+    if (!scene.scans.length) return;
+    clear(Math.ceil(view.width * ratio), Math.ceil(view.height * ratio));
     const scale = view.scale * ratio;
     const size = Math.round((view.scale > NEAR_SCALE ? 3 : 2) * ratio);
-    const [width, height] = [view.width * ratio, view.height * ratio];
-    const left = width / 2 - view.x * scale - size / 2;
-    const top = height / 2 + view.y * scale - size / 2;
-    // The last points of a row or column have their own pixels, too.
-    const row = Math.ceil(width) + size;
-    const rows = Math.ceil(height) + size;
+    const left = (view.width * ratio) / 2 - view.x * scale - size / 2;
+    const top = (view.height * ratio) / 2 + view.y * scale - size / 2;
+    for (const { points, slot, strength } of scene.scans) {
+      const ink = hues.ink(theme.robots[slot - 1], OPACITY * strength);
+      write(pixels, { points, scale, left, top, size, ink });
+    }
+    image.putImageData(pixels, 0, 0);
     isolated(ctx, () => {
       ctx.setTransform(1, 0, 0, 1, 0, 0);
-      for (const { points, slot, strength } of scene.scans) {
-        nextScan(row * rows);
-        ctx.globalAlpha = 0.85 * strength;
-        ctx.fillStyle = theme.robots[slot - 1];
-        // Rectangles one by one: quicker than one path, which would be tessellated.
-        for (let i = 0; i + 1 < points.length; i += 2) {
-          const x = Math.round(left + points[i] * scale);
-          const y = Math.round(top - points[i + 1] * scale);
-          if (x < 0 || y < 0 || x > width || y > height) continue;
-          const first = y * row + x;
-          if (covered[first] === n) continue;
-          for (let at = first; at < first + size * row; at += row) {
-            for (let k = 0; k < size; k += 1) covered[at + k] = n;
-          }
-          ctx.fillRect(x, y, size, size);
-        }
-      }
+      ctx.drawImage(canvas, 0, 0);
     });
   };
+}
+
+/**
+ * Squares of whole pixels, those that lie in the image as a whole.
+ *
+ * @param {ImageData} pixels
+ * @param {{points: Float32Array, scale: number, left: number, top: number,
+ *   size: number, ink: number}} scan points (m), the rest in device pixels
+ */
+function write({ data, width, height }, { points, scale, left, top, size, ink }) {
+  const inks = new Uint32Array(data.buffer);
+  for (let i = 0; i + 1 < points.length; i += 2) {
+    const x = Math.round(left + points[i] * scale);
+    const y = Math.round(top - points[i + 1] * scale);
+    if (x < 0 || y < 0 || x > width - size || y > height - size) continue;
+    const first = y * width + x;
+    for (let at = first; at < first + size * width; at += width) {
+      for (let k = 0; k < size; k += 1) inks[at + k] = ink;
+    }
+  }
+}
+
+/** Colours of any CSS syntax as pixels of an image. */
+function createHues() {
+  const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (
+    new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true })
+  );
+  /** @type {Map<string, Uint8ClampedArray>} */
+  const known = new Map();
+  return {
+    /** @param {string} colour @param {number} opacity 0–1 */
+    ink(colour, opacity) {
+      const pixel = known.get(colour) ?? pixelOf(ctx, colour);
+      known.set(colour, pixel);
+      pixel[3] = Math.round(255 * opacity);
+      return new Uint32Array(pixel.buffer)[0];
+    },
+  };
+}
+
+/** @param {OffscreenCanvasRenderingContext2D} ctx @param {string} colour */
+function pixelOf(ctx, colour) {
+  ctx.fillStyle = colour;
+  ctx.fillRect(0, 0, 1, 1);
+  return ctx.getImageData(0, 0, 1, 1).data;
 }
