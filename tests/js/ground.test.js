@@ -1,5 +1,6 @@
 import { createGround } from "../../iveg/static/js/map/layers/ground.js";
 import { createScanLayer } from "../../iveg/static/js/map/layers/scan.js";
+import { createStaticImage } from "../../iveg/static/js/map/layers/static.js";
 import { equal, test } from "./harness.js";
 
 /** @typedef {import("../../iveg/static/js/map/layers/paint.js").Paint} Paint */
@@ -134,4 +135,28 @@ test("what lies under the robots is drawn at once for another view", () => {
   const { told, update } = countedGround();
   update([[1, 2]], 1000);
   equal([update([[1, 2]], 1016, { ...VIEW, x: 1 }), told.redrawn], [0, 2]);
+});
+
+test("the static image is drawn for what is known, and once a second for its age", () => {
+  const told = { drawn: 0 };
+  /** @type {import("../../iveg/static/js/map/layers/static.js").StaticLayer} */
+  const layer = [
+    "coverage",
+    () => {
+      told.drawn += 1;
+    },
+  ];
+  const still = createStaticImage([layer]);
+  const theme = { bg: "#fff" };
+  /** @param {number} nowMs @param {object} [known] */
+  function drawnAt(nowMs, known = {}) {
+    const scene = { ...sceneOf([], nowMs), ...known };
+    const paint = { view: VIEW, theme, labels: null, scene };
+    still.image(/** @type {any} */ (paint), 1, () => true);
+    return told.drawn;
+  }
+  const coverage = { lanes: [] };
+  equal([drawnAt(0), drawnAt(5000)], [1, 1]);
+  equal([drawnAt(5000, { coverage }), drawnAt(5900, { coverage })], [2, 2]);
+  equal([drawnAt(6000, { coverage }), drawnAt(6000, { costmap: {} })], [3, 4]);
 });

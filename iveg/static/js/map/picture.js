@@ -46,8 +46,10 @@ export const LAYERS = [
   "scalebar",
 ];
 
-/** Under the machines; the two below them never move. */
-const GROUND = ["coverage", "costmap", "trail", "scan"];
+/** Of the greenhouse and what is known of it: they never move. */
+const STILL = ["grid", "greenhouse", "coverage", "costmap"];
+/** Under the machines. */
+const GROUND = ["trail", "scan"];
 const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
 
 /** More than any layer nests its drawing states. */
@@ -64,13 +66,11 @@ export function createPicture(canvas, trails) {
   /** @type {Pick<Picture, "off" | "trailS">} */
   let chosen = { off: [], trailS: 0 };
   const isOn = (/** @type {string} */ layer) => !chosen.off.includes(layer);
-  const still = createStaticImage([
-    ["grid", grid.draw],
-    ["greenhouse", greenhouse.draw],
-  ]);
   /** @type {Record<string, (paint: Paint) => void>} */
   const layers = {
     measure: (paint) => measure.draw(paint, paint.tape),
+    grid: grid.draw,
+    greenhouse: greenhouse.draw,
     coverage: coverage.draw,
     costmap: createCostmapLayer(),
     trail: (paint) => trail.draw(paint, trails, chosen.trailS),
@@ -83,14 +83,19 @@ export function createPicture(canvas, trails) {
     scalebar: scalebar.draw,
   };
   const ground = createGround(
-    still,
-    GROUND.map((name) => [name, (paint) => drawLayer(name, paint)]),
+    createStaticImage(STILL.map(guarded)),
+    GROUND.map(guarded),
     () => [chosen.trailS, ...chosen.off],
     trails.changes,
   );
   const sprites = createSprites();
   /** @type {Set<string>} */
   const broken = new Set();
+
+  /** @param {string} name @returns {import("./layers/ground.js").Layer} */
+  function guarded(name) {
+    return [name, (paint) => drawLayer(name, paint)];
+  }
 
   /**
    * Bad data in one layer must not take the robots off the map; reported once a layer.

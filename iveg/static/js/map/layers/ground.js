@@ -1,6 +1,6 @@
 /**
- * The layers under the robots, drawn when they have changed and copied in between: the
- * greenhouse, the costmap, trails and scans.
+ * The layers under the robots, drawn when they have changed and copied in between: trails
+ * and scans, over the static image.
  *
  * Robots move in every frame; scans come fifteen times a second, each robot's at moments
  * of its own.  They and the trails are thousands of points, so they are drawn together

@@ -1,9 +1,13 @@
-/** The static layers, drawn once per viewport, theme, greenhouse and language. */
-
 /**
+ * The layers that hardly ever change, drawn once per viewport, theme, language, greenhouse
+ * and what is known of it.
+ *
  * @typedef {import("./paint.js").Paint} Paint
  * @typedef {[name: string, draw: (paint: Paint) => void]} StaticLayer
  */
+
+/** The hatching of what no camera sees grows denser with time alone. */
+const DENSER_MS = 1000;
 
 /** @param {StaticLayer[]} layers from the ground up */
 export function createStaticImage(layers) {
@@ -34,9 +38,12 @@ export function createStaticImage(layers) {
      */
     image(paint, ratio, isOn) {
       const shown = layers.filter(([name]) => isOn(name));
-      const { width, height, scale, x, y } = paint.view;
+      const { view, theme, labels, scene } = paint;
+      const { width, height, scale, x, y } = view;
       const place = [width, height, scale, x, y, ratio];
-      const wanted = [...place, paint.theme, paint.labels, paint.scene.map, ...shown];
+      const age = scene.coverage && Math.floor(scene.nowMs / DENSER_MS);
+      const known = [scene.map, scene.costmap, scene.coverage, age];
+      const wanted = [...place, theme, labels, ...known, ...shown];
       const isSame =
         wanted.length === drawnFor.length &&
         wanted.every((it, i) => it === drawnFor[i]);
