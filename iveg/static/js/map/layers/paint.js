@@ -59,16 +59,18 @@ export function label({ ctx, theme }, text, x, y, style = {}) {
 }
 
 /**
- * The width of a text (px); the context has that font then.
+ * The width of a text (px).
  *
- * @param {Context} ctx
+ * @param {Context} ctx left with this font or as it was
  * @param {string} font
  * @param {string} text
  */
 export function widthOf(ctx, font, text) {
-  ctx.font = font;
   const key = `${font} ${text}`;
-  const width = widths.get(key) ?? ctx.measureText(text).width;
+  const known = widths.get(key);
+  if (known !== undefined) return known;
+  ctx.font = font;
+  const { width } = ctx.measureText(text);
   if (widths.size > WIDTHS_KEPT) widths.clear();
   widths.set(key, width);
   return width;
@@ -87,6 +89,7 @@ export function widthOf(ctx, font, text) {
  */
 export function pill({ ctx, theme }, text, x, y, fill, colour) {
   const width = widthOfPill(ctx, theme, text);
+  ctx.font = pillFont(theme);
   ctx.fillStyle = fill;
   ctx.beginPath();
   ctx.roundRect(x, y - 9, width, 18, 9);
@@ -100,7 +103,10 @@ export function pill({ ctx, theme }, text, x, y, fill, colour) {
 
 /** @param {Context} ctx @param {Theme} theme @param {string} text */
 export const widthOfPill = (ctx, theme, text) =>
-  widthOf(ctx, `700 11px ${theme.font}`, text) + 12;
+  widthOf(ctx, pillFont(theme), text) + 12;
+
+/** @param {Theme} theme */
+const pillFont = ({ font }) => `700 11px ${font}`;
 
 /**
  * @param {Context} ctx

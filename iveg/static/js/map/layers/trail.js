@@ -133,5 +133,6 @@ function drawTrail({ ctx, view, scene }, trail, pose, spanMs) {
 
 /** @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
 function distance(a, b) {
-  return Math.hypot(a.x - b.x, a.y - b.y);
+  const [dx, dy] = [a.x - b.x, a.y - b.y];
+  return Math.sqrt(dx * dx + dy * dy);
 }
