@@ -9,8 +9,8 @@ async function framesOfTheScreen(count = 1) {
   }
 }
 
-/** Frames whose pictures are counted. @param {(n: number) => number} [missingMs] */
-function counted(missingMs = () => 0) {
+/** Frames whose pictures are counted. @param {(n: number) => number | null} [missingMs] */
+function counted(missingMs = () => /** @type {number | null} */ (0)) {
   const told = { drawn: 0 };
   const frames = createFrames(() => {
     told.drawn += 1;
@@ -51,7 +51,7 @@ test("scans that are not in a picture are drawn when they may be", async () => {
 });
 
 test("where there is no place nobody is told of a picture", async () => {
-  const { frames } = counted((n) => (n === 1 ? Number.NaN : 0));
+  const { frames } = counted((n) => (n === 1 ? null : 0));
   let heard = 0;
   frames.onDrawn(() => {
     heard += 1;
@@ -61,6 +61,18 @@ test("where there is no place nobody is told of a picture", async () => {
     await framesOfTheScreen(2);
     equal(heard, wanted);
   }
+});
+
+test("who asks again when it is told waits for the next picture", async () => {
+  const { frames, told } = counted();
+  let heard = 0;
+  const again = () => {
+    heard += 1;
+    if (heard < 3) frames.afterDrawn(again);
+  };
+  frames.afterDrawn(again);
+  await framesOfTheScreen(6);
+  equal([told.drawn, heard], [3, 3]);
 });
 
 test("after its end nothing is drawn", async () => {

@@ -9,8 +9,9 @@
  */
 
 /**
- * @param {() => number} draw draws what is to be seen now, and returns when the scans that
- *   are not in it may be drawn (ms from now); 0: all are; NaN: there is no place
+ * @param {() => number | null} draw draws what is to be seen now, and returns when the
+ *   scans that are not in it may be drawn (ms from now); 0: all are; null: there is no
+ *   place
  */
 export function createFrames(draw) {
   /** @type {Set<WhenDrawn>} */
@@ -32,8 +33,9 @@ export function createFrames(draw) {
   function drawNow() {
     isAsked = false;
     const missingMs = draw();
-    if (Number.isNaN(missingMs)) return;
-    for (const tell of watchers) tell(missingMs === 0, beganMs);
+    if (missingMs === null) return;
+    // Who asks again meanwhile asks for the next one.
+    for (const tell of [...watchers]) tell(missingMs === 0, beganMs);
     clearTimeout(later);
     if (missingMs) later = setTimeout(ask, missingMs);
   }

@@ -67,7 +67,7 @@ export function createMap(canvas, store, options = {}) {
     scene = believed(readScene(store, now()), store, choices.believer());
     camera.settle();
     const view = camera.view();
-    if (!view.width || !view.height) return Number.NaN;
+    if (!view.width || !view.height) return null;
     return picture.draw({
       ...{ view, scene, followed: camera.followed(), tape: measuring.tape() },
       ...{ theme: looks.theme(), labels: looks.labels(), ratio: devicePixelRatio },
