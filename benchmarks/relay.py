@@ -57,5 +57,5 @@ async def live(websocket: WebSocket) -> None:
     await websocket.accept()
     _pages.add(websocket)
     async for _ in websocket.iter_text():
-        """Whatever it says, it is sent everything."""
+        pass  # Whatever it says, it is sent everything.
     _pages.discard(websocket)

@@ -19,7 +19,7 @@ function sceneOf(scans, nowMs = 0) {
 }
 
 /**
- * The pixels that a layer colours, by row: `59,19 red` …
+ * The pixels that a layer colours, by row.
  *
  * @param {number[][]} scans
  * @param {{ratio?: number, strength?: number}} [how]

@@ -6,8 +6,6 @@
  * @typedef {"ready" | "installed" | "none" | "insecure"} InstallState
  */
 
-import { scriptUrl } from "./scripturl.js";
-
 const WORKER = "/sw.js";
 
 /** The browser's events about installing; one object for the life of a page. */
@@ -55,4 +53,18 @@ export async function registerWorker() {
   } catch {
     // The offline page is a comfort; its failure is no fault of this page.
   }
+}
+
+/**
+ * The address of a worker, as browsers that check script addresses want it (Trusted
+ * Types).
+ *
+ * @param {string} path of a script of ours
+ * @returns {string}
+ */
+function scriptUrl(path) {
+  const types = /** @type {any} */ (globalThis).trustedTypes;
+  if (!types) return path;
+  const only = { createScriptURL: (/** @type {string} */ url) => url };
+  return types.createPolicy("iveg-worker", only).createScriptURL(path);
 }

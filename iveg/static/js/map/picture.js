@@ -20,6 +20,7 @@ import { createGround } from "./layers/ground.js";
 import * as intent from "./layers/intent.js";
 import * as links from "./layers/links.js";
 import * as measure from "./layers/measure.js";
+import { matchPixels } from "./layers/paint.js";
 import * as people from "./layers/people.js";
 import { createPlaces } from "./layers/places.js";
 import * as robot from "./layers/robot.js";
@@ -56,7 +57,7 @@ const OVER_GROUND = LAYERS.slice(LAYERS.indexOf("scan") + 1);
 const DEEPEST_SAVE = 8;
 
 /**
- * @param {HTMLCanvasElement | OffscreenCanvas} canvas
+ * @param {HTMLCanvasElement} canvas
  * @param {Trails} trails
  */
 export function createPicture(canvas, trails) {
@@ -124,7 +125,7 @@ export function createPicture(canvas, trails) {
       const { ratio } = what;
       const paint = { ...what, ctx, sprites, places: createPlaces() };
       chosen = what;
-      matchPixels(canvas, what);
+      matchPixels(canvas, what.view, ratio);
       const missingMs = ground.update(paint, ratio, isOn);
       ctx.setTransform(1, 0, 0, 1, 0, 0);
       ctx.drawImage(ground.canvas, 0, 0);
@@ -135,17 +136,6 @@ export function createPicture(canvas, trails) {
       return missingMs;
     },
   };
-}
-
-/**
- * @param {HTMLCanvasElement | OffscreenCanvas} canvas
- * @param {Pick<Picture, "view" | "ratio">} picture
- */
-function matchPixels(canvas, { view, ratio }) {
-  const width = Math.round(view.width * ratio);
-  const height = Math.round(view.height * ratio);
-  if (canvas.width !== width) canvas.width = width;
-  if (canvas.height !== height) canvas.height = height;
 }
 
 /**

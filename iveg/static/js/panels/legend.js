@@ -219,7 +219,7 @@ export const SIGNS = [
   {
     name: "scan",
     layer: "scan",
-    draw: createScanLayer(),
+    draw: (paint) => createScanLayer()(paint),
     scene: {
       scans: [
         {

@@ -10,6 +10,9 @@
  * @typedef {[name: string, draw: (paint: Paint) => void]} Layer
  */
 
+import { matchPixels } from "./paint.js";
+import { isSame, placeOf } from "./static.js";
+
 /** Between two drawings because of scans and trails. */
 const TOGETHER_MS = 66;
 /** Trails fade with time alone. */
@@ -36,8 +39,7 @@ export function createGround(still, layers, look, steps) {
   /** @param {Paint} paint @param {number} ratio @param {(layer: string) => boolean} isOn */
   function redraw(paint, ratio, isOn) {
     const ground = still.image(paint, ratio, isOn);
-    if (canvas.width !== ground.width) canvas.width = ground.width;
-    if (canvas.height !== ground.height) canvas.height = ground.height;
+    matchPixels(canvas, paint.view, ratio);
     ctx.setTransform(1, 0, 0, 1, 0, 0);
     ctx.drawImage(ground, 0, 0);
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -69,13 +71,6 @@ export function createGround(still, layers, look, steps) {
   };
 }
 
-/** @param {Paint} paint @param {number} ratio */
-function placeOf({ view, theme, labels, scene }, ratio) {
-  const { width, height, scale, x, y } = view;
-  const told = [scene.map, scene.coverage, scene.costmap];
-  return [width, height, scale, x, y, ratio, theme, labels, ...told];
-}
-
 /** @param {Paint} paint */
 function contentOf({ scene }) {
   return [
@@ -83,9 +78,4 @@ function contentOf({ scene }) {
     ...scene.robots.map(({ id }) => id),
     ...scene.scans.flatMap(({ points, strength }) => [points, strength]),
   ];
-}
-
-/** @param {unknown[]} one @param {unknown[]} other */
-function isSame(one, other) {
-  return one.length === other.length && one.every((it, i) => it === other[i]);
 }

@@ -9,7 +9,7 @@
  * @typedef {import("./theme.js").Theme} Theme
  * @typedef {import("./labels.js").Labels} Labels
  * @typedef {CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D} Context
- *   on the page, or in the worker
+ *   on the page, or of an image that is kept
  * @typedef {{
  *   ctx: Context, view: Viewport, theme: Theme, scene: Scene, labels: Labels,
  *   followed: string | null, tape: import("./measure.js").Tape,
@@ -19,10 +19,26 @@
  *   `sprites`: kept between frames
  */
 
+/** The letters in a capsule. */
+const PILL = { size: 11, weight: 700 };
 /** Widths of texts that are kept: ages are many. */
 const WIDTHS_KEPT = 1000;
 /** @type {Map<string, number>} by font and text */
 const widths = new Map();
+
+/**
+ * As many pixels as the view has on this screen; setting a size clears the canvas.
+ *
+ * @param {HTMLCanvasElement | OffscreenCanvas} canvas
+ * @param {Viewport} view
+ * @param {number} ratio device pixels per CSS pixel
+ */
+export function matchPixels(canvas, view, ratio) {
+  const width = Math.round(view.width * ratio);
+  const height = Math.round(view.height * ratio);
+  if (canvas.width !== width) canvas.width = width;
+  if (canvas.height !== height) canvas.height = height;
+}
 
 /**
  * Draws with the context's state restored afterwards.
@@ -46,8 +62,8 @@ export function isolated(ctx, draw) {
  * @param {{size?: number, weight?: number, colour?: string}} [style]
  */
 export function label({ ctx, theme }, text, x, y, style = {}) {
-  const { size = 12, weight = 600, colour = theme.text } = style;
-  ctx.font = `${weight} ${size}px ${theme.font}`;
+  const { colour = theme.text } = style;
+  ctx.font = fontOf(theme, style);
   ctx.textAlign = "center";
   ctx.textBaseline = "middle";
   ctx.lineJoin = "round";
@@ -59,13 +75,20 @@ export function label({ ctx, theme }, text, x, y, style = {}) {
 }
 
 /**
- * The width of a text (px).
- *
- * @param {Context} ctx left with this font or as it was
- * @param {string} font
- * @param {string} text
+ * @param {Theme} theme
+ * @param {{size?: number, weight?: number}} style
  */
-export function widthOf(ctx, font, text) {
+const fontOf = ({ font }, { size = 12, weight = 600 }) => `${weight} ${size}px ${font}`;
+
+/**
+ * The width of a label (px).
+ *
+ * @param {Pick<Paint, "ctx" | "theme">} paint
+ * @param {string} text
+ * @param {{size?: number, weight?: number}} [style] as for `label`
+ */
+export function widthOf({ ctx, theme }, text, style = {}) {
+  const font = fontOf(theme, style);
   const key = `${font} ${text}`;
   const known = widths.get(key);
   if (known !== undefined) return known;
@@ -87,9 +110,10 @@ export function widthOf(ctx, font, text) {
  * @param {string} colour
  * @returns {number} width (px)
  */
-export function pill({ ctx, theme }, text, x, y, fill, colour) {
-  const width = widthOfPill(ctx, theme, text);
-  ctx.font = pillFont(theme);
+export function pill(paint, text, x, y, fill, colour) {
+  const { ctx, theme } = paint;
+  const width = widthOfPill(paint, text);
+  ctx.font = fontOf(theme, PILL);
   ctx.fillStyle = fill;
   ctx.beginPath();
   ctx.roundRect(x, y - 9, width, 18, 9);
@@ -101,12 +125,8 @@ export function pill({ ctx, theme }, text, x, y, fill, colour) {
   return width;
 }
 
-/** @param {Context} ctx @param {Theme} theme @param {string} text */
-export const widthOfPill = (ctx, theme, text) =>
-  widthOf(ctx, pillFont(theme), text) + 12;
-
-/** @param {Theme} theme */
-const pillFont = ({ font }) => `700 11px ${font}`;
+/** @param {Pick<Paint, "ctx" | "theme">} paint @param {string} text */
+export const widthOfPill = (paint, text) => widthOf(paint, text, PILL) + 12;
 
 /**
  * @param {Context} ctx

@@ -22,6 +22,8 @@ const WORDS_FROM_SCALE = 24;
 const FIGURE_PX = 12;
 const RING_PX = 2;
 
+/** The letters of an age. */
+const AGE = { size: 11 };
 /** A mark is never fainter than this, or it would look like dirt. */
 const FAINTEST = 0.3;
 
@@ -94,7 +96,7 @@ function drawAge(paint, person) {
   const [x, y] = [screenX(view, person.x), screenY(view, person.y)];
   const dy = placeOfAge(paint, text, x, y);
   if (dy === null) return;
-  label(paint, text, x, y + dy, { size: 11, colour: paint.theme.muted });
+  label(paint, text, x, y + dy, { ...AGE, colour: paint.theme.muted });
 }
 
 /**
@@ -103,10 +105,9 @@ function drawAge(paint, person) {
  * @param {Paint} paint @param {string} text @param {number} x @param {number} y
  */
 function placeOfAge(paint, text, x, y) {
-  const { ctx, theme, places } = paint;
   const heights = [20, -22];
-  if (!places) return heights[0];
-  const half = widthOf(ctx, `600 11px ${theme.font}`, text) / 2;
+  if (!paint.places) return heights[0];
+  const half = widthOf(paint, text, AGE) / 2;
   const rects = heights.map((dy) => {
     const [top, bottom] = [y + dy - WORDS_ABOVE_PX / 2, y + dy + WORDS_ABOVE_PX / 2];
     return { left: x - half, right: x + half, top, bottom };

@@ -20,6 +20,8 @@ import { circle, isolated, label, pill, widthOf, widthOfPill } from "./paint.js"
 /** A body is never drawn shorter than this (px), however small the scale. */
 const SHORTEST_PX = 20;
 const PADLOCK_PX = 12;
+/** The letters of a name. */
+const NAME = { size: 13, weight: 700 };
 /** From one line of text to the next. */
 const WORDS_PX = 28;
 
@@ -248,9 +250,6 @@ function drawPadlock({ ctx, theme }, x, y) {
   ctx.restore();
 }
 
-/** @param {import("./theme.js").Theme} theme */
-const nameFont = ({ font }) => `700 13px ${font}`;
-
 /**
  * Name above, and beside it age, half speed and recording.
  *
@@ -259,15 +258,14 @@ const nameFont = ({ font }) => `700 13px ${font}`;
  * @param {number} length
  */
 function drawTag(paint, robot, length) {
-  const { ctx, theme } = paint;
+  const { theme } = paint;
   const y = heightOfTag(paint, robot, length);
   const isLost = isSilent(robot.link);
   label(paint, robot.id, 0, y, {
-    size: 13,
-    weight: 700,
+    ...NAME,
     colour: isLost ? theme.muted : theme.text,
   });
-  let x = widthOf(ctx, nameFont(theme), robot.id) / 2 + 6;
+  let x = widthOf(paint, robot.id, NAME) / 2 + 6;
   if (isSeenHeld(robot)) drawPadlock(paint, -x - PADLOCK_PX, y);
   for (const [text, fill, ink] of tagsOf(paint, robot)) {
     x += pill(paint, text, x, y, fill, ink) + 4;
@@ -283,12 +281,12 @@ function drawTag(paint, robot, length) {
  * @returns {number} middle of the labels, from the robot's (px)
  */
 function heightOfTag(paint, robot, length) {
-  const { ctx, view, theme, places } = paint;
+  const { view, places } = paint;
   const near = length / 2 + 20;
   const heights = [-near, near, -near - WORDS_PX, near + WORDS_PX];
   if (!places) return heights[0];
-  const half = widthOf(ctx, nameFont(theme), robot.id) / 2;
-  const tags = tagsOf(paint, robot).map(([text]) => widthOfPill(ctx, theme, text));
+  const half = widthOf(paint, robot.id, NAME) / 2;
+  const tags = tagsOf(paint, robot).map(([text]) => widthOfPill(paint, text));
   const x = screenX(view, robot.pose.x);
   const y = screenY(view, robot.pose.y);
   const left = x - half - (isSeenHeld(robot) ? 2 * PADLOCK_PX + 6 : 0);

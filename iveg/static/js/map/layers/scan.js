@@ -1,6 +1,6 @@
 /** Laser scans, the points of each robot in its own hue. */
 
-import { isolated } from "./paint.js";
+import { isolated, matchPixels } from "./paint.js";
 
 /** From this scale on (px/m) points are larger. */
 const NEAR_SCALE = 40;
@@ -18,20 +18,17 @@ export function createScanLayer() {
   const hues = createHues();
   let pixels = image.createImageData(1, 1);
 
-  /** @param {number} width @param {number} height (device pixels) */
-  function clear(width, height) {
-    if (pixels.width !== width || pixels.height !== height) {
-      Object.assign(canvas, { width, height });
-      pixels = image.createImageData(width, height);
-    } else {
-      pixels.data.fill(0);
-    }
+  function clear() {
+    const { width, height } = canvas;
+    if (pixels.width === width && pixels.height === height) pixels.data.fill(0);
+    else pixels = image.createImageData(width, height);
   }
 
   /** @param {import("./paint.js").Paint} paint */
   return ({ ctx, view, theme, scene, ratio = 1 }) => {
     if (!scene.scans.length) return;
-    clear(Math.ceil(view.width * ratio), Math.ceil(view.height * ratio));
+    matchPixels(canvas, view, ratio);
+    clear();
     const scale = view.scale * ratio;
     const size = Math.round((view.scale > NEAR_SCALE ? 3 : 2) * ratio);
     const left = (view.width * ratio) / 2 - view.x * scale - size / 2;
@@ -88,6 +85,7 @@ function createHues() {
 
 /** @param {OffscreenCanvasRenderingContext2D} ctx @param {string} colour */
 function pixelOf(ctx, colour) {
+  ctx.clearRect(0, 0, 1, 1);
   ctx.fillStyle = colour;
   ctx.fillRect(0, 0, 1, 1);
   return ctx.getImageData(0, 0, 1, 1).data;

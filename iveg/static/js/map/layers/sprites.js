@@ -1,5 +1,5 @@
 /**
- * Images of signs that look alike, each drawn once: to copy one costs a tenth of its
+ * Images of signs that look alike, each drawn once: to copy one costs less than its
  * circles and strokes.
  *
  * @typedef {import("./paint.js").Paint} Paint

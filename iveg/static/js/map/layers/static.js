@@ -6,6 +6,8 @@
  * @typedef {[name: string, draw: (paint: Paint) => void]} StaticLayer
  */
 
+import { matchPixels } from "./paint.js";
+
 /** The hatching of what no camera sees grows denser with time alone. */
 const DENSER_MS = 1000;
 
@@ -21,8 +23,7 @@ export function createStaticImage(layers) {
   /** @param {Paint} paint @param {number} ratio @param {StaticLayer[]} shown */
   function redraw(paint, ratio, shown) {
     const { view, theme } = paint;
-    canvas.width = Math.round(view.width * ratio);
-    canvas.height = Math.round(view.height * ratio);
+    matchPixels(canvas, view, ratio);
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
     ctx.fillStyle = theme.bg;
     ctx.fillRect(0, 0, view.width, view.height);
@@ -38,18 +39,29 @@ export function createStaticImage(layers) {
      */
     image(paint, ratio, isOn) {
       const shown = layers.filter(([name]) => isOn(name));
-      const { view, theme, labels, scene } = paint;
-      const { width, height, scale, x, y } = view;
-      const place = [width, height, scale, x, y, ratio];
-      const age = scene.coverage && Math.floor(scene.nowMs / DENSER_MS);
-      const known = [scene.map, scene.costmap, scene.coverage, age];
-      const wanted = [...place, theme, labels, ...known, ...shown];
-      const isSame =
-        wanted.length === drawnFor.length &&
-        wanted.every((it, i) => it === drawnFor[i]);
-      if (!isSame) redraw(paint, ratio, shown);
+      const { coverage, nowMs } = paint.scene;
+      const age = coverage && Math.floor(nowMs / DENSER_MS);
+      const wanted = [...placeOf(paint, ratio), age, ...shown];
+      if (!isSame(wanted, drawnFor)) redraw(paint, ratio, shown);
       drawnFor = wanted;
       return canvas;
     },
   };
+}
+
+/**
+ * All that decides where things lie and how they look, but for what moves.
+ *
+ * @param {Paint} paint
+ * @param {number} ratio device pixels per CSS pixel
+ */
+export function placeOf({ view, theme, labels, scene }, ratio) {
+  const { width, height, scale, x, y } = view;
+  const told = [scene.map, scene.coverage, scene.costmap];
+  return [width, height, scale, x, y, ratio, theme, labels, ...told];
+}
+
+/** @param {unknown[]} one @param {unknown[]} other */
+export function isSame(one, other) {
+  return one.length === other.length && one.every((it, i) => it === other[i]);
 }

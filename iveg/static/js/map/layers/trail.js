@@ -134,5 +134,6 @@ function drawTrail({ ctx, view, scene }, trail, pose, spanMs) {
 /** @param {{x: number, y: number}} a @param {{x: number, y: number}} b */
 function distance(a, b) {
   const [dx, dy] = [a.x - b.x, a.y - b.y];
+  // Asked of every crumb of every trail, where Math.hypot shows in a profile.
   return Math.sqrt(dx * dx + dy * dy);
 }
