@@ -87,6 +87,13 @@ class SafetyLimits:
         600.0, "s", "chosen", "a detector that is silent so long is not missed"
     )
 
+    round_trip_s: float = _limit(
+        0.5, "s", "P95 of both ways", "a contradiction that lasts longer is a doubt"
+    )
+    doubt_ends_s: float = _limit(
+        1.0, "s", "chosen", "so long without a contradiction a doubt is over"
+    )
+
     standing_speed: float = _limit(
         0.02, "m/s, rad/s", "chosen: noise at rest", "below this a robot stands"
     )

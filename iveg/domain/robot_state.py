@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.clocks import RobotClock
+from iveg.domain.doubt import Doubts
 from iveg.domain.fleet import RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
@@ -66,6 +67,7 @@ class RobotState:
             the robot is live (monotonic, s).
         map_frame: Of a recording, the frame that its messages name.
         sensed: The newest of each kind that has no member of its own.
+        doubts: What it says that contradicts itself or physics.
     """
 
     robot_id: str
@@ -93,6 +95,7 @@ class RobotState:
     refused_at: float | None = None
     map_frame: str | None = None
     sensed: dict[type[Observation], Sensed] = field(default_factory=dict)
+    doubts: Doubts = field(default_factory=Doubts)
     clock: RobotClock = field(default_factory=RobotClock)
     _orders: defaultdict[type[Observation], StreamOrder] = field(
         default_factory=lambda: defaultdict(StreamOrder)
