@@ -106,7 +106,7 @@ def detection_frame(
     origin: Origin = origin(),  # noqa: B008 - a frozen value
 ) -> DetectionFrame:
     """One look; without detections: looked, saw nothing."""
-    return DetectionFrame(robot_id, origin, detections, unreadable)
+    return DetectionFrame(robot_id, origin, detections, (None,) * unreadable)
 
 
 def hold(hold_id: str = "01JABCDEFGHJKMNPQRSTVWXYZ0") -> Hold:

@@ -12,6 +12,9 @@ serves robots that do not echo, and the display of the offset.
     more than half a second
 
 A delay lets no stamp fall: a slow transport is never taken for a clock that was set.
+A detector may stamp by a clock of its own (simulation time, another zone).  Its frames
+are compared with the odometry that came last: farther apart than any frame protects,
+they are of another clock, and their age is unknown.
 Moments are iVeg's monotonic clock, which nobody sets.
 """
 
@@ -19,7 +22,8 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from iveg.domain.observations import Instant, Origin
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import DetectionFrame, Instant, Origin
 from iveg.domain.transports import FIWARE, TransportId
 
 _BUCKET_S, _BUCKETS = 5.0, 12
@@ -30,10 +34,12 @@ AGREE = 5
 _DIRECT_FRESH_S = 10.0
 _TOLERANCE_S = 0.25
 OFFSET_WARN_S, _WARNED_S = 0.25, 60.0
-_MAX_FILTERS = 8
+_MAX_FILTERS = 16
 
 _Kind = type
 _Place = tuple[int | None, float]
+_Sender = tuple[TransportId, str | None, bool]
+"""Transport, boot, and whether it is the detector."""
 
 
 @dataclass(slots=True)
@@ -49,6 +55,8 @@ class ClockFilter:
     seen_at: float = float("-inf")
     least: float | None = None
     """Arrival less stamp of the fastest message (s); None before the first."""
+    newest: float | None = None
+    """The same of the newest one."""
 
     def observe(self, kind: _Kind, origin: Origin, now: float) -> float | None:
         """Take one message in; ``kind`` says whose count its ``seq`` belongs to.
@@ -60,6 +68,7 @@ class ClockFilter:
         if origin.stamp_s is None:
             return 0.0
         transit, self.seen_at = now - origin.stamp_s, now
+        self.newest = transit
         is_next, fell = self._place(kind, origin.seq, origin.stamp_s)
         least = self.least
         if least is None:
@@ -117,11 +126,15 @@ class ClockFilter:
 
 @dataclass(slots=True)
 class RobotClock:
-    """All that is estimated of one robot's clock: a filter a transport and boot."""
+    """All that is estimated of one robot's clock: a filter a transport and boot.
 
-    _filters: dict[tuple[TransportId, str | None], ClockFilter] = field(
-        default_factory=dict
-    )
+    Attributes:
+        detector_apart_at: When a detection frame was last stamped by another clock than
+            odometry (monotonic, s).
+    """
+
+    detector_apart_at: float | None = None
+    _filters: dict[_Sender, ClockFilter] = field(default_factory=dict)
     _warned: tuple[float, float] = (float("-inf"), 0.0)
 
     def delay(
@@ -137,18 +150,47 @@ class RobotClock:
         ``lag`` (s) is that of iVeg's own probe through FIWARE, None before one came
         back: what FIWARE alone brings is never younger.
         """
-        key = transport, origin.boot
-        if key not in self._filters:
-            while len(self._filters) >= _MAX_FILTERS:
-                del self._filters[next(iter(self._filters))]
-            self._filters[key] = ClockFilter()
-        own = self._filters[key].observe(kind, origin, at.mono)
+        own = self._filter(transport, origin.boot, kind).observe(kind, origin, at.mono)
+        if kind is DetectionFrame:
+            beyond = self._beyond_odometry(transport, origin, at.mono)
+            if beyond is None:
+                self.detector_apart_at = at.mono
+                return None
+            own = None if own is None else max(own, beyond)
         if transport != FIWARE.id:
             return own
         against_direct = self._against_direct(origin, at.mono)
         if against_direct is not None:
             return max(against_direct, lag or 0.0)
         return None if own is None or lag is None else max(own, lag)
+
+    def _filter(
+        self, transport: TransportId, boot: str | None, kind: _Kind
+    ) -> ClockFilter:
+        """The filter of a sender; detectors have their own, which fools no other."""
+        sender = transport, boot, kind is DetectionFrame
+        if sender not in self._filters:
+            while len(self._filters) >= _MAX_FILTERS:
+                del self._filters[next(iter(self._filters))]
+            self._filters[sender] = ClockFilter()
+        return self._filters[sender]
+
+    def _beyond_odometry(
+        self, transport: TransportId, origin: Origin, now: float
+    ) -> float | None:
+        """What a detection frame took beyond the fastest odometry (s), 0 if unknown.
+
+        None where it is stamped by another clock.
+        """
+        odometry = self._filters.get((transport, origin.boot, False))
+        if odometry is None or odometry.newest is None or origin.stamp_s is None:
+            return 0.0
+        transit = now - origin.stamp_s
+        if abs(transit - odometry.newest) > LIMITS.ring_lasts_s:
+            return None
+        return max(
+            0.0, transit - (transit if odometry.least is None else odometry.least)
+        )
 
     def _against_direct(self, origin: Origin, now: float) -> float | None:
         """The delay against the fastest direct message, while there are such (s)."""
@@ -166,9 +208,9 @@ class RobotClock:
         return max(0.0, beyond)
 
     def _direct(self) -> Iterator[tuple[str | None, ClockFilter]]:
-        """Boot and filter of everything that came by another way than FIWARE."""
-        for (transport, boot), one in self._filters.items():
-            if transport != FIWARE.id:
+        """Boot and filter of what came by another way than FIWARE, detectors apart."""
+        for (transport, boot, is_detector), one in self._filters.items():
+            if transport != FIWARE.id and not is_detector:
                 yield boot, one
 
     def offset_s(self, now: Instant) -> float | None:

@@ -67,9 +67,13 @@ class DetectionRule:
             return self.threshold
         return self.class_thresholds.get(class_, self.threshold)
 
+    def class_of(self, class_id: str | None) -> Class | None:
+        """The canonical class of a detector's word; None for any other."""
+        return None if class_id is None else self.aliases.get(class_id.strip().lower())
+
     def judge(self, class_id: str, confidence: float) -> RuleVerdict:
         """Judge one detection (Algorithm 2, lines 4-10)."""
-        class_ = self.aliases.get(class_id.strip().lower())
+        class_ = self.class_of(class_id)
         if confidence < self.threshold_of(class_):
             return RuleVerdict("faint", class_)
         return RuleVerdict("other" if class_ is None else "alert", class_)

@@ -45,6 +45,10 @@ class Doubts:
             and not self._is_over(spell, now)
         )
 
+    def is_open(self, now: Instant) -> bool:
+        """Whether anything is contradicted, however shortly."""
+        return not all(self._is_over(one, now) for one in self._spells.values())
+
     @staticmethod
     def _is_over(spell: _Spell, now: Instant) -> bool:
         return now.mono - spell.newest > LIMITS.doubt_ends_s

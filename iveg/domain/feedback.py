@@ -42,7 +42,8 @@ class SpeedLimit:
 
     Attributes:
         speed_factor: 0, 0.5 or 1.
-        reason: ``clear``, ``person``, ``robot`` or ``stale``.
+        reason: ``clear``, ``person``, ``robot``, ``stale``, ``doubt`` or
+            ``unsupervised``.
         cause: The person or robot that it is for.
         distance_m: From ``base_link`` to the centre of the cause (m).
     """
@@ -55,6 +56,8 @@ class SpeedLimit:
 
 
 CLEAR = SpeedLimit()
+UNSUPERVISED = SpeedLimit(HALF_SPEED, "unsupervised")
+"""Of a robot that nobody has judged, or that a feedback does not name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,7 @@ class Feedback:
         alert: The newest; None without one.
         alerts: All that are alive.
         pose: Where iVeg believes the observer to be; None when unknown.
+        speed_limits: Of every robot that is judged, clear ones included.
         seen: Newest safety-report ``seq`` that iVeg has of each robot.
         backlog_s: How far Orion is behind (s), at most ``LONGEST_BACKLOG_S``; None
             where nobody knows.

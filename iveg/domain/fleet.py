@@ -7,7 +7,7 @@ camera that can clear no spot.
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from iveg.domain.geometry import Pose2D
@@ -65,6 +65,8 @@ class RobotDescription:
 
     Attributes:
         kind: ``recording``: a replay plays it; it never slows or frees a live robot.
+        has_detector: Whether its detection frames are waited for: while they are
+            missing, nobody in its reach is clear.
         is_described: Whether somebody said what it is; else the profile is cautious.
     """
 
@@ -72,6 +74,11 @@ class RobotDescription:
     kind: Kind = "live"
     profile: RobotProfile = CAUTIOUS
     is_described: bool = False
+    has_detector: bool = True
+
+    def without_detector(self) -> "RobotDescription":
+        """The same robot, whose detector nobody waits for."""
+        return replace(self, has_detector=False)
 
 
 @dataclass(frozen=True, slots=True)

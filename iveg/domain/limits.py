@@ -83,9 +83,6 @@ class SafetyLimits:
     last_seen_s: float = _limit(
         600.0, "s", "chosen", "age up to which a mark stays on the map"
     )
-    observer_forgotten_s: float = _limit(
-        600.0, "s", "chosen", "a detector that is silent so long is not missed"
-    )
 
     round_trip_s: float = _limit(
         0.5, "s", "P95 of both ways", "a contradiction that lasts longer is a doubt"

@@ -153,13 +153,14 @@ class DetectionFrame:
     """All detections of one picture; an empty frame means that nothing was seen.
 
     Attributes:
-        unreadable: Boxes that could not be used (no confidence, no position).
+        unread: Class of each box that could not be used (no confidence, no position);
+            None where that is not known either.
     """
 
     robot_id: str
     origin: Origin
     detections: tuple[Detection, ...]
-    unreadable: int = 0
+    unread: tuple[str | None, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,6 +316,13 @@ class Overtaken:
     kind: "type[Odometry | LaserScan | DetectionFrame]"
 
 
+@dataclass(frozen=True, slots=True)
+class RefusedFrame:
+    """A detection frame that came and could not be read: somebody may be in it."""
+
+    robot_id: str
+
+
 Observation = (
     Odometry
     | LaserScan
@@ -327,12 +335,18 @@ Observation = (
     | HeartbeatProbe
     | Battery
     | Overtaken
+    | RefusedFrame
 )
 
 
 def kind_of(observation: Observation) -> type[Observation]:
     """The stream of its robot that an observation belongs to."""
-    return observation.kind if isinstance(observation, Overtaken) else type(observation)
+    match observation:
+        case Overtaken():
+            return observation.kind
+        case RefusedFrame():
+            return DetectionFrame
+    return type(observation)
 
 
 @dataclass(frozen=True, slots=True)

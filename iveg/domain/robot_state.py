@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from iveg.domain.clocks import RobotClock
+from iveg.domain.detector import Detector
 from iveg.domain.doubt import Doubts
 from iveg.domain.fleet import RobotDescription, RobotProfile
 from iveg.domain.geometry import Pose2D
@@ -60,7 +61,7 @@ class RobotState:
         sighted_at: The same of the frame that was taken last, newest or not; where
             nothing is known, the moment that is likely.
         scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
-        unreadable_at: When a detection last could not be used (monotonic, s).
+        detector: Whether its pictures are read whole.
         live_at: When a live safety node last spoke for a robot that the fleet calls a
             recording (monotonic, s): from then on it counts as live.
         refused_at: When a message that calls itself a replay was last refused, because
@@ -68,6 +69,7 @@ class RobotState:
         map_frame: Of a recording, the frame that its messages name.
         sensed: The newest of each kind that has no member of its own.
         doubts: What it says that contradicts itself or physics.
+        trusted_pose: The newest pose from before anything was contradicted.
     """
 
     robot_id: str
@@ -84,7 +86,7 @@ class RobotState:
     frame_transport: TransportId = FIWARE.id
     detections_at: float | None = None
     sighted_at: Instant | None = None
-    unreadable_at: float | None = None
+    detector: Detector = field(default_factory=Detector)
     safety: SafetyReport | None = None
     safety_received: Instant | None = None
     navigation: Navigation | None = None
@@ -96,6 +98,7 @@ class RobotState:
     map_frame: str | None = None
     sensed: dict[type[Observation], Sensed] = field(default_factory=dict)
     doubts: Doubts = field(default_factory=Doubts)
+    trusted_pose: Pose2D | None = None
     clock: RobotClock = field(default_factory=RobotClock)
     _orders: defaultdict[type[Observation], StreamOrder] = field(
         default_factory=lambda: defaultdict(StreamOrder)
@@ -116,6 +119,11 @@ class RobotState:
         if self.pose_at is None and self.odometry_received is not None:
             return self.odometry_received.mono
         return self.pose_at
+
+    def possible_poses(self) -> tuple[Pose2D, ...]:
+        """Where it may be: where it says, and where it was before it was doubted."""
+        said = () if self.odometry is None else (self.odometry.pose,)
+        return said if self.trusted_pose is None else (*said, self.trusted_pose)
 
     def link(self, now: Instant) -> Link:
         """LIVE, LATE or LOST by the age of the pose (docs/safety.md, "Age")."""
@@ -160,12 +168,14 @@ class RobotState:
     def pose_at_stamp(self, stamp_s: float | None) -> Pose2D | None:
         """The pose at a moment of the robot's own clock (s), interpolated.
 
-        Outside the short history the nearest end counts; without a stamp the newest.
+        Outside the short history the nearest end counts; without a stamp the newest,
+        and for one that is so old that it is of another clock.
         """
         poses = self._poses
         if not poses:
             return None
-        if stamp_s is None or stamp_s >= poses[-1][0]:
+        newest_s = poses[-1][0]
+        if stamp_s is None or not newest_s - LIMITS.ring_lasts_s <= stamp_s < newest_s:
             return poses[-1][1]
         index = bisect_left(poses, stamp_s, key=lambda entry: entry[0])
         if index == 0:

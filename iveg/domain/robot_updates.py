@@ -60,8 +60,6 @@ def _see(
         robot.detections_at, robot.frame, frame.origin, moment
     )
     robot.frame, robot.frame_transport = frame, received.transport
-    if frame.unreadable:
-        robot.unreadable_at = received.at.mono
 
 
 def _hear(
@@ -85,6 +83,8 @@ def _drive(
     robot.estimated_since = _since(
         robot.estimated_since, at, holds=not origin.acknowledgements
     )
+    if before is not None and not (robot.trusted_pose and robot.doubts.is_open(at)):
+        robot.trusted_pose = before.pose
     robot.odometry, robot.odometry_received = odometry, at
     if before is not None and before.origin.boot != origin.boot:
         robot.forget_poses()  # another boot counts its seconds anew

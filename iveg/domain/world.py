@@ -25,6 +25,7 @@ from iveg.domain.observations import (
     Origin,
     Overtaken,
     Received,
+    RefusedFrame,
     SafetyReport,
     kind_of,
 )
@@ -34,7 +35,8 @@ from iveg.domain.robot_updates import dated, learn_kind, take_in
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.transports import FIWARE
 
-_OF_NO_ROBOT = Climate, HeartbeatProbe
+_NO_MESSAGE = Climate, HeartbeatProbe, RefusedFrame
+"""What is in no robot's stream of messages."""
 _ASKED_AGE_S, _THINNED_AGE_S = LIMITS.late_s + 0.1, LIMITS.live_s + 0.1
 
 
@@ -93,9 +95,8 @@ class World:
             UnknownRobotError: from a robot that is not in the fleet.
         """
         observation, at = received.observation, received.at
-        if isinstance(observation, _OF_NO_ROBOT):
-            self._note(observation, at)
-            return "new"
+        if isinstance(observation, _NO_MESSAGE):
+            return self._note(observation, at)
         robot = self.robot(observation.robot_id)
         origin = getattr(observation, "origin", UNKNOWN_ORIGIN)
         if self.refuses(received):
@@ -115,6 +116,7 @@ class World:
             return "duplicate"
         if not received.asked:
             robot.heard_at = at.mono
+            robot.detector.meet_boot(origin.boot)
         likely = self._likely_age(robot, received, origin)
         if isinstance(observation, DetectionFrame):
             seen_at = self._measured_at(origin, received, likely)
@@ -126,10 +128,19 @@ class World:
             take_in(robot, received, self._measured_at(origin, received, likely))
         return verdict
 
-    def _note(self, observation: Climate | HeartbeatProbe, at: Instant) -> None:
-        """Observations without a robot."""
-        if isinstance(observation, Climate):
-            self.climate, self.climate_received = observation, at
+    def _note(
+        self, observation: Climate | HeartbeatProbe | RefusedFrame, at: Instant
+    ) -> OrderVerdict:
+        """Note what is in no stream."""
+        match observation:
+            case Climate():
+                self.climate, self.climate_received = observation, at
+            case RefusedFrame():
+                detector = self.robot(observation.robot_id).detector
+                detector.note_flaw("unreadable", at)
+                self.counters["DetectionFrame.unreadable"] += 1
+                return "refused"
+        return "new"
 
     def refuses(self, received: Received) -> bool:
         """Whether a message calls itself a replay while its robot is live.

@@ -155,7 +155,7 @@ class Found:
 
 Place = Callable[
     [Pose2D, Sequence[Found], Sequence[Target], Scenery],
-    tuple[tuple[Detection, ...], int],
+    tuple[tuple[Detection, ...], tuple[str | None, ...]],
 ]
 """Locates detected targets: boxes, and the number of targets without a position."""
 
@@ -170,7 +170,7 @@ class Detector:
         place: Locates detected targets; None draws boxes about the truth.
 
     Attributes:
-        lost: Targets of the last frame without a position.
+        lost: Classes of the targets of the last frame that have no position.
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class Detector:
         rng: np.random.Generator,
         place: Place | None = None,
     ) -> None:
-        self.lost = 0
+        self.lost: tuple[str | None, ...] = ()
         self._place = place
         self._profile = profile
         self._model = model
@@ -217,7 +217,7 @@ class Detector:
             if encounter.ghost is not None:
                 drawn.append(self._ghost_box(pose, encounter.ghost))
         if self._place is None or not found:
-            self.lost = 0
+            self.lost = ()
             return tuple(drawn)
         placed, self.lost = self._place(pose, found, targets, scenery)
         return (*placed, *drawn)

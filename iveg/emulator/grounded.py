@@ -56,7 +56,7 @@ class GroundedCamera:
         found: Sequence[Found],
         targets: Sequence[Target],
         scenery: Scenery,
-    ) -> tuple[tuple[Detection, ...], int]:
+    ) -> tuple[tuple[Detection, ...], tuple[str | None, ...]]:
         """Locate detected targets.
 
         Args:
@@ -66,35 +66,35 @@ class GroundedCamera:
             scenery: Static occluding objects.
 
         Returns:
-            Boxes in ``base_link``, and the number of targets without a position.
+            Boxes in ``base_link``, and the classes of targets without a position.
         """
         placed: list[Detection] = []
-        lost = 0
+        lost: list[str | None] = []
         for one in found:
             others = [each for each in targets if each.key != one.target.key]
             boxes, unplaced = self._one(pose, one, others, scenery)
             placed += boxes
             lost += unplaced
-        return tuple(placed), lost
+        return tuple(placed), tuple(lost)
 
     def _one(
         self, pose: Pose2D, one: Found, others: Sequence[Target], scenery: Scenery
-    ) -> tuple[tuple[Detection, ...], int]:
+    ) -> tuple[tuple[Detection, ...], tuple[str | None, ...]]:
         sensor = pose.compose(self._mount.pose)
         lens = _about(self._camera, sensor, one.target)
         if lens is None:
-            return (), 0
+            return (), ()
         shapes = [_shape(one.target), *(_shape(other) for other in others)]
         foliage = Foliage() if scenery.rectangles.size else None
         camera = replace(self._camera, lens=lens)
         view = take(camera, sensor, shapes, scenery, foliage, self._rng)
         segment = view.segment(1, one.target.class_id, one.probability)
         if segment is None:
-            return (), 0
+            return (), ()
         frame = ground_frame(
             "", Origin(), [segment], view.depth, self._mount, _SETTINGS
         )
-        return frame.detections, frame.unreadable
+        return frame.detections, frame.unread
 
 
 def _shape(target: Target) -> tuple[Upright, ...]:

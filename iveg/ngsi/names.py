@@ -21,6 +21,9 @@ NAVIGATION = "navigation"
 COMMAND, COMMAND_STATUS, COMMAND_INFO = "cmd", "cmd_status", "cmd_info"
 ALGORITHM_1 = ("class", "conf", "position_3D", "pose", "laser_scan", "timestamp")
 
+FRAME_SUFFIX = "_yolox_bounding_boxes"
+"""Of the device whose measures are detection frames."""
+
 FEEDBACK_TOPIC = "/{robot_id}/mqtt_feedback"
 FEEDBACK_FILTER = "/+/mqtt_feedback"
 DESIRED_TOPIC = "/{robot_id}/iveg/desired"
@@ -68,7 +71,7 @@ ROBOT_DEVICES = (
     ),
     Device("_odom", ((ODOMETRY, "object"),)),
     Device("_lidar2D", ((LIDAR, "array"), (LIDAR_HEADER, "object"))),
-    Device("_yolox_bounding_boxes", ((BOXES, "object"), (BOXES_HEADER, "object"))),
+    Device(FRAME_SUFFIX, ((BOXES, "object"), (BOXES_HEADER, "object"))),
     Device("_safety", ((SAFETY, "object"),)),
     Device("_nav", ((NAVIGATION, "object"),)),
     *(Device(sensor.suffix, ((sensor.attribute, "object"),)) for sensor in SENSORS),
@@ -77,7 +80,7 @@ ROBOT_DEVICES = (
 keeps its registry in memory, so that either registry picks it (docs/fiware.md)."""
 
 
-DIRECT_SUFFIXES = ("_odom", "_lidar2D", "_yolox_bounding_boxes", "_safety")
+DIRECT_SUFFIXES = ("_odom", "_lidar2D", FRAME_SUFFIX, "_safety")
 """Devices that may also speak to iVeg alone, past the IoT Agent."""
 
 

@@ -3,7 +3,7 @@
 import unicodedata
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, AliasChoices, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
@@ -133,7 +133,16 @@ class SafetyValue(OriginFields):
     """``safety_state``."""
 
     speed_factor: Annotated[float, Field(ge=0, le=1)]
-    reason: Literal["clear", "person", "robot", "stale", "hold", "watchdog"]
+    reason: Literal[
+        "clear",
+        "person",
+        "robot",
+        "stale",
+        "doubt",
+        "unsupervised",
+        "hold",
+        "watchdog",
+    ]
     cause: Text | None = None
     decision_id: Text | None = None
     holds: Annotated[list[HoldValue], Field(max_length=MAX_TEXT)] = []
@@ -220,10 +229,9 @@ class FeedbackValue(OriginFields):
     alert: AlertValue | None = None
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
-    speed_limits: Annotated[
-        dict[str, SpeedLimitValue],
-        Field(validation_alias=AliasChoices("speed_limits", "mandates")),
-    ] = {}
+    speed_limits: dict[str, SpeedLimitValue] = {}
+    clear: Annotated[list[Text], Field(max_length=MAX_BOXES)] | None = None
+    mandates: dict[str, SpeedLimitValue] = {}
     seen: dict[str, int] = {}
     backlog: Any = None
 

@@ -5,10 +5,10 @@ stands before a camera for an hour does not fill the log.
 """
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import flaw_of
 from iveg.domain.events import LogEvent, Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import DetectionFrame, Instant, Received
-from iveg.domain.rule.overload import Overload
 from iveg.domain.stream_order import OrderVerdict
 from iveg.domain.tracking.people import People, Placed
 from iveg.domain.world import World
@@ -39,7 +39,6 @@ class DetectionTracking:
         people: People,
         event_log: EventLog,
         new_id: Ids,
-        overload: Overload,
     ) -> None:
         self.placed: dict[str, list[Placed]] = {}
         self.other: dict[str, Instant] = {}
@@ -47,7 +46,6 @@ class DetectionTracking:
         self._people = people
         self._event_log = event_log
         self._new_id = new_id
-        self._overload = overload
         self._told: dict[tuple[str, str], float] = {}
 
     @property
@@ -67,22 +65,25 @@ class DetectionTracking:
         A frame that is later than a ring lives protects nobody, and would only show
         ghosts.
         """
-        robot_id = frame.robot_id
+        robot_id, detector = frame.robot_id, self._world.robot(frame.robot_id).detector
         seen_at = self._world.robot(robot_id).sighted_at or received.at
         late = verdict == "late" and not received.asked
         protects = late and received.at.mono - seen_at.mono <= LIMITS.ring_lasts_s
         if verdict != "new" and not protects:
             return
-        if not self._overload.admits(robot_id, received.at):
+        if not detector.admits_frame(received.at):
             self._world.counters["pictures.not_judged"] += 1
-            self._overload.judged(robot_id, received.at, whole=False)
+            detector.note_flaw("overload", received.at)
             return
         placed = self._look(frame, received, rule, seen_at)
         turned_away = self._people.turned_away
         if turned_away:
             self._world.counters["people.turned_away"] += turned_away
-        if verdict == "new" or turned_away:
-            self._overload.judged(robot_id, received.at, whole=not turned_away)
+        flaw = flaw_of(frame, rule, turned_away)
+        if flaw is not None:
+            detector.note_flaw(flaw, received.at)
+        elif verdict == "new":
+            detector.note_whole(self._world.robot(robot_id).detections_at)
         if verdict == "new":
             self.placed[robot_id] = placed
             self._event_log.changed(topics.DETECTIONS.of(robot_id))

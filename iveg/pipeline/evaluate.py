@@ -6,14 +6,14 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.exposure import Exposures
-from iveg.domain.feedback import CLEAR, SpeedLimit
+from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.margins import LeastMargins
@@ -27,6 +27,7 @@ from iveg.domain.observations import (
     SafetyReport,
 )
 from iveg.domain.records import AlertRecord, DecisionRecord
+from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
@@ -73,13 +74,13 @@ class Evaluator:
         self.decisions = Decisions()
         self.alerts = Alerting(event_log, new_id)
         self.exposures = Exposures()
-        self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(world.robots, CLEAR)
+        self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
+            world.robots, UNSUPERVISED
+        )
         self.protected_unseen = 0
         """How often a robot slowed for a person or peer out of its own sight."""
         self._speed_limits = SpeedLimits(greenhouse)
-        self.tracking = DetectionTracking(
-            world, self.people, event_log, new_id, self._speed_limits.overload
-        )
+        self.tracking = DetectionTracking(world, self.people, event_log, new_id)
         self._staleness = Staleness(world, self.people, greenhouse, event_log)
         self._feedback_publisher = FeedbackPublisher(
             world, self.people, self.tracking.other, fleet, boot, backlog
@@ -91,12 +92,17 @@ class Evaluator:
         self._low = LowValues()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
+        self._started: Instant | None = None
         self._untold = False
 
     @property
     def crossings(self) -> Iterable[Crossing]:
         """Every robot that is inside a ring now, with the ring."""
         return self._speed_limits.crossings
+
+    def missing(self, robot_id: str) -> Sequence[Missing]:
+        """What the claim "clear" lacks for a robot now, the reason first."""
+        return self._speed_limits.missing.get(robot_id, ())
 
     def decision_record(self, decision_id: str, now: Instant) -> DecisionRecord | None:
         """A decision that is still in memory, with the verdicts of now."""
@@ -201,6 +207,7 @@ class Evaluator:
             for robot_id, speed_limit in speed_limits.items()
             if speed_limit.speed_factor != before[robot_id].speed_factor
             or speed_limit.reason != before[robot_id].reason
+            or speed_limit.cause != before[robot_id].cause
         ]
         for robot_id in changed:
             self._event_log.changed(topics.ROBOT.of(robot_id))
@@ -248,6 +255,7 @@ class Evaluator:
 
     def tick(self, now: Instant, more: Iterable[Condition] = ()) -> None:
         """Let time pass: silence, ages, overdue links, alerts, heartbeat."""
+        self._started = self._started or now
         self._staleness.tick(now)
         self.tracking.forget(now)
         self._first_reports.forget(self.people.known)
@@ -273,10 +281,11 @@ class Evaluator:
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
+            yield from conditions.of_detector(robot, now, started=self._started or now)
             yield from self._low.conditions(robot)
             yield from conditions.of_kind(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
-        yield from conditions.of_pictures(self._speed_limits.overload, now)
+        yield from conditions.of_overload(self.world.robots.values(), now)
 
     def close_earlier(
         self,

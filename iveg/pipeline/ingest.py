@@ -1,14 +1,17 @@
 """The input of the pipeline: a bounded queue that prefers what safety needs.
 
 All transports end here.  When more comes than can be taken, the oldest telemetry of the
-same robot and kind gives way, or of the stream that has most waiting, and is counted;
-safety reports, answers and detections never do.  So a robot that floods drops its own.
+same robot and kind is dropped and counted, or of the stream that has most waiting;
+safety reports, answers and detection frames only where no telemetry waits.  So a robot
+that floods drops its own.  A detection frame that is dropped counts as one that could
+not be read: somebody may have been in it.
 """
 
 import asyncio
 import logging
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.observations import (
@@ -18,9 +21,10 @@ from iveg.domain.observations import (
     Origin,
     Overtaken,
     Received,
+    RefusedFrame,
     kind_of,
 )
-from iveg.pipeline.kinds import kind
+from iveg.pipeline.kinds import may_drop
 from iveg.pipeline.waiting import wait_set
 
 _log = logging.getLogger(__name__)
@@ -50,11 +54,13 @@ class Ingest:
         self._passed = passed
         self._is_past = is_past
         self._rejected = rejected
-        self._queue: deque[tuple[Received, _Stream | None]] = deque()
+        self._queue: deque[tuple[Received, _Stream]] = deque()
+        self._refused: dict[str | None, Received] = {}
+        """By robot, that one of its detection frames was dropped."""
         self._identities: set[_Identity] = set()
         """Of what waits and was counted by its sender."""
         self._waiting: Counter[_Stream] = Counter()
-        """How much telemetry waits, by robot and kind."""
+        """How much waits, by robot and kind."""
         self._wake = asyncio.Event()
         self._told: set[tuple[str, str]] = set()
         self.counters: Counter[str] = Counter()
@@ -69,18 +75,18 @@ class Ingest:
         # What we asked for is no message: it would hide that one was lost.
         way = "asked" if received.asked else received.alias
         self.counters[f"{way}.{name}"] += 1
-        self._passed(received)
+        if not isinstance(received.observation, RefusedFrame):
+            self._passed(received)
         if _is_twin_of_a_picture(received.observation):
             self.counters[f"{name}.duplicate"] += 1
             return
         stream = _stream(received)
-        if len(self._queue) >= MAX_QUEUED and not self._make_room(stream):
+        if len(self._queue) >= MAX_QUEUED and not self._make_room(received, stream):
             return
         self._queue.append((received, stream))
         if not received.asked:
             self._identities.add(_identity(received.observation))
-        if stream is not None:
-            self._waiting[stream] += 1
+        self._waiting[stream] += 1
         self._wake.set()
 
     def is_past(
@@ -109,44 +115,59 @@ class Ingest:
         """Everything that waits, oldest first."""
         while self._queue:
             received, stream = self._queue.popleft()
-            self._left(received, stream)
+            self._forget(received, stream)
             yield received
+        refused, self._refused = self._refused, {}
+        yield from refused.values()
 
     async def wait(self, timeout_s: float) -> None:
         """Return when something waits, or after a while."""
         await wait_set(self._wake, timeout_s)
 
-    def _make_room(self, stream: "_Stream | None") -> bool:
+    def _make_room(self, received: Received, stream: "_Stream") -> bool:
         """Drop the oldest of a stream; whether there is room for what comes.
 
         Nothing that matters is dropped for telemetry, nor telemetry of others for a
         stream that has enough waiting itself.
         """
-        victim = stream
-        if victim is None or not self._waiting[victim]:
-            victim = max(
-                self._waiting, key=lambda one: self._waiting[one], default=None
-            )
+        victim = self._victim_for(stream)
         if victim is None:
-            self._dropped(stream)
-            return stream is None
+            self._note_dropped(received, stream)
+            return False
         index = next(
             number for number, (_, one) in enumerate(self._queue) if one == victim
         )
-        gone, _ = self._queue[index]
+        dropped, _ = self._queue[index]
         del self._queue[index]
-        self._left(gone, victim)
-        self._dropped(victim)
+        self._forget(dropped, victim)
+        self._note_dropped(dropped, victim)
         return True
 
-    def _dropped(self, stream: "_Stream | None") -> None:
-        if stream is not None:
-            self.counters[f"dropped.{stream[1].__name__}"] += 1
+    def _victim_for(self, stream: "_Stream") -> "_Stream | None":
+        """The stream that loses its oldest; None: what comes is itself dropped."""
+        if _may_drop(stream) and self._waiting[stream]:
+            return stream
+        waiting = max(
+            filter(_may_drop, self._waiting),
+            key=self._waiting.__getitem__,
+            default=None,
+        )
+        if waiting is not None or _may_drop(stream):
+            return waiting
+        if self._waiting[stream]:
+            return stream
+        return max(self._waiting, key=self._waiting.__getitem__)
 
-    def _left(self, received: Received, stream: "_Stream | None") -> None:
+    def _note_dropped(self, received: Received, stream: "_Stream") -> None:
+        robot_id, kind = stream
+        self.counters[f"dropped.{kind.__name__}"] += 1
+        if kind is DetectionFrame and robot_id is not None:
+            self._refused[robot_id] = replace(
+                received, observation=RefusedFrame(robot_id)
+            )
+
+    def _forget(self, received: Received, stream: "_Stream") -> None:
         self._identities.discard(_identity(received.observation))
-        if stream is None:
-            return
         self._waiting[stream] -= 1
         if not self._waiting[stream]:
             del self._waiting[stream]
@@ -174,9 +195,12 @@ def _is_twin_of_a_picture(observation: Observation) -> bool:
     return observation.kind is DetectionFrame
 
 
-def _stream(received: Received) -> _Stream | None:
-    """Robot and kind of telemetry; None for messages that are never dropped."""
+def _stream(received: Received) -> _Stream:
+    """Robot and kind of a message."""
     observation = received.observation
-    if not kind(observation).may_drop:
-        return None
     return getattr(observation, "robot_id", None), type(observation)
+
+
+def _may_drop(stream: _Stream) -> bool:
+    """Whether it is telemetry: the newest says all that counts."""
+    return may_drop(stream[1])

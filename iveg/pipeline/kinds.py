@@ -126,6 +126,12 @@ def kind(observation: Observation) -> Kind:
     return _BY_TYPE[kind_of(observation)]
 
 
+def may_drop(of: type[Observation]) -> bool:
+    """Whether the oldest of a kind may be dropped; copies and refusals always may."""
+    row = _BY_TYPE.get(of)
+    return row is None or row.may_drop
+
+
 def read_directly(scope: Scope) -> dict[type[Observation], Kind]:
     """Kinds that are read directly from MQTT in a scope."""
     most = _SCOPES[scope]

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from iveg.domain.feedback import (
-    CLEAR,
     FULL_SPEED,
     HALF_SPEED,
+    UNSUPERVISED,
     Feedback,
     FeedbackAlert,
     SpeedLimit,
@@ -77,7 +77,7 @@ class _Topic:
     at: float
     boots: list[str | None]
     peer: _Peer | None = None
-    speed_limit: SpeedLimit = CLEAR
+    speed_limit: SpeedLimit = UNSUPERVISED
     alerts: dict[_Key, _Kept] = field(default_factory=dict)
 
 
@@ -109,7 +109,7 @@ class PeerFeedback:
             return False
         memory.origin, memory.at = feedback.origin, now
         memory.peer = self._peer(memory.peer, feedback, now)
-        memory.speed_limit = feedback.speed_limits.get(self._me, CLEAR)
+        memory.speed_limit = feedback.speed_limits.get(self._me, UNSUPERVISED)
         self._remember(memory, feedback, own, now)
         return True
 

@@ -16,6 +16,7 @@ from iveg.domain.observations import (
 )
 from iveg.ngsi import names
 from iveg.ngsi.codec.fields import write_origin, write_ranges
+from iveg.ngsi.codec.reports import write_unread
 
 
 class SinglePayload:
@@ -31,13 +32,13 @@ class SinglePayload:
         """The sweep that has not been sent yet."""
         self._detections: list[Detection] = []
         self._saw_nothing = False
-        self._unplaced = 0
+        self._unread: tuple[str | None, ...] = ()
 
     def take(self, frame: DetectionFrame) -> None:
         """Take a detection frame; it replaces what is left of the one before."""
         self._detections = sorted(frame.detections, key=lambda one: one.probability)
-        self._saw_nothing = not frame.detections and not frame.unreadable
-        self._unplaced = frame.unreadable
+        self._saw_nothing = not frame.detections and not frame.unread
+        self._unread = frame.unread
 
     def write(self, odometry: Odometry) -> bytes:
         """Payload of ``/{apikey}/{robot}/attrs`` for this odometry tick."""
@@ -56,9 +57,8 @@ class SinglePayload:
         }
         if self._detections:
             payload |= _detected(self._detections.pop(), odometry.pose)
-        elif self._unplaced:
-            nowhere = [{"frame_id": names.UNPLACED}] * self._unplaced
-            self._unplaced = 0
+        elif self._unread:
+            nowhere, self._unread = write_unread(self._unread), ()
             payload |= {names.BOXES: nowhere, names.BOXES_HEADER: origin}
         elif self._saw_nothing:
             self._saw_nothing = False

@@ -206,7 +206,7 @@ class Rig:
 
     def is_clear(self) -> bool:
         """Whether the robot may drive at full speed, with every detector sending."""
-        self.robot.detections_at = self.at().mono
+        self.robot.detector.note_whole(self.at().mono)
         found, _ = self.speed_limits.evaluate(
             self.world, self.people, DetectionRule(), self.at(), "d"
         )

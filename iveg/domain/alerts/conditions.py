@@ -9,10 +9,11 @@ from iveg.domain.events import Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.overload import Overload
 
 ESTIMATED_SHOWN_AFTER_S = 5.0
 """Time that a robot may take to receive its first feedback (s)."""
+DETECTOR_STARTS_S = 10.0
+"""Time that a fleet may take to send its first detection frames after iVeg's start."""
 SHOWN_S = 10.0
 """How long after it was last so a condition is reported (s): one at its bound is one
 alert and not one a second."""
@@ -38,7 +39,7 @@ def of_decision(decision: Decision, now: Instant) -> Iterable[Condition]:
 
 
 def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
-    """A robot that is lost, whose clock is off, or whose detections are unreadable."""
+    """A robot that is lost, doubted, or whose clock or detector is off."""
     slots: dict[str, Slot] = {"robot": robot.robot_id}
     name = robot.robot_id
     if robot.link(now) == "LOST":
@@ -49,8 +50,41 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
     if offset is not None:
         slots = {**slots, "offset": round(offset, 2)}
         yield Condition("P3", "alert.clock_offset", name, name, slots)
-    if _is_recent(robot.unreadable_at, now):
-        yield Condition("P3", "alert.unreadable_detection", name, name, slots)
+    doubts = robot.doubts.active(now)
+    if doubts:
+        slots = {"robot": name, "codes": ", ".join(doubts)}
+        yield Condition("P2", "alert.doubt", name, name, slots)
+
+
+def of_detector(
+    robot: RobotState, now: Instant, *, started: Instant
+) -> Iterable[Condition]:
+    """A detector whose pictures are not read whole; ``started``: when iVeg did."""
+    name, detector = robot.robot_id, robot.detector
+    slots: dict[str, Slot] = {"robot": name}
+    if not robot.description.has_detector:
+        return
+    if _is_recent(detector.flawed_at.get("unreadable"), now):
+        yield Condition("P2", "alert.unreadable_detection", name, name, slots)
+    if _is_recent(robot.clock.detector_apart_at, now):
+        yield Condition("P2", "alert.detector_clock", name, name, slots)
+    elif _is_silent(robot, now, started):
+        yield Condition("P2", "alert.detector_silent", name, name, slots)
+    if detector.out_of_service is not None:
+        slots = {**slots, "by": detector.out_of_service.by}
+        yield Condition("P3", "alert.detector_out_of_service", name, name, slots)
+
+
+def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
+    """Whether people are to look after it: not while it starts, nor of a lost robot."""
+    detector, link = robot.detector, robot.link(now)
+    if detector.is_flawed(now) or not detector.is_missing(now) or link == "LOST":
+        return False
+    whole_at = detector.whole_at
+    if link == "LATE" and whole_at is not None:
+        # Everything of it is late; the robot itself is reported as lost before this.
+        return now.mono - whole_at > 2 * LIMITS.late_s
+    return detector.worked or now.mono - started.mono >= DETECTOR_STARTS_S
 
 
 def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
@@ -83,12 +117,12 @@ def _was_moving(robot: RobotState) -> bool:
     return max(abs(report.linear), abs(report.angular)) >= LIMITS.standing_speed
 
 
-def of_pictures(overload: Overload, now: Instant) -> Iterable[Condition]:
+def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
     """Detectors with more detections than can be judged: one alert names them all."""
     names = [
-        name
-        for name, at in overload.last.items()
-        if name in overload.since or _is_recent(at, now)
+        robot.robot_id
+        for robot in robots
+        if _is_recent(robot.detector.flawed_at.get("overload"), now)
     ]
     if names:
         slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}

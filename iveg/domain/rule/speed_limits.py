@@ -2,9 +2,8 @@
 
 A robot inside the ring of a person or of a moving peer is limited to half speed;
 it is let go 0.3 m outside the ring and 1.0 s later, so that noise does not flap
-(docs/safety.md, "The rule").  The least factor counts, never the product.  Silence is a
-reason of its own: a robot that is not seen, or a fleet with a silent detector, drives
-at half speed.
+(docs/safety.md, "The rule").  The least factor counts, never the product.  Outside all
+rings a robot is clear only while every premise of that claim holds (``premises``).
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,7 +15,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
-from iveg.domain.rule.overload import Overload
+from iveg.domain.rule.premises import Missing, missing_premises
 from iveg.domain.rule.zones import NOT_FAR_M, Zone, ZoneFinder
 from iveg.domain.tracking.people import People
 from iveg.domain.world import World
@@ -64,13 +63,17 @@ class LimitChange:
 
 
 class SpeedLimits:
-    """Keeps the crossings of the fleet and gives every robot its speed limit."""
+    """Keeps the crossings of the fleet and gives every robot its speed limit.
+
+    Attributes:
+        missing: What the claim "clear" lacks for each robot, since the last judgement.
+    """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
         self._greenhouse = greenhouse
         self._open: dict[str, dict[str, Crossing]] = {}
         """By robot and cause."""
-        self.overload = Overload()
+        self.missing: Mapping[str, tuple[Missing, ...]] = {}
         self._zones = ZoneFinder()
 
     @property
@@ -94,13 +97,8 @@ class SpeedLimits:
             if zones or self._open.get(robot.robot_id):
                 name = f"{new_id}-{len(changes)}"
                 changes += self._cross(robot, zones, now, name)
-        silent = _silent_observer(world, now)
-        bounds = self._greenhouse.bounds
-        flooded = self.overload.slowed(world, bounds.xmax - bounds.xmin)
-        return {
-            robot.robot_id: self._speed_limit(robot, silent, flooded, now)
-            for robot in world.robots.values()
-        }, changes
+        self.missing = missing_premises(world, now)
+        return {name: self._speed_limit(name) for name in world.robots}, changes
 
     def _cross(
         self, robot: RobotState, zones: Iterable[Zone], now: Instant, new_id: str
@@ -145,15 +143,9 @@ class SpeedLimits:
             speeding_up=robot.speed_gained() > SPEEDING_UP,
         )
 
-    def _speed_limit(
-        self,
-        robot: RobotState,
-        silent: str | None,
-        flooded: Mapping[str, str],
-        now: Instant,
-    ) -> SpeedLimit:
-        """The most specific reason wins: a person, then a peer, then silence."""
-        mine = self._open.get(robot.robot_id)
+    def _speed_limit(self, robot_id: str) -> SpeedLimit:
+        """The most specific reason wins: a person, a peer, then what is missing."""
+        mine = self._open.get(robot_id)
         if mine:
             worst = min(
                 mine.values(),
@@ -166,16 +158,8 @@ class SpeedLimits:
                 worst.distance_m,
                 worst.decision_id,
             )
-        if robot.robot_id in flooded:
-            return SpeedLimit(HALF_SPEED, "stale", flooded[robot.robot_id])
-        age = robot.age_s(now)
-        if age is None or age > LIMITS.silence_s:
-            return SpeedLimit(HALF_SPEED, "stale", robot.robot_id)
-        blinded = robot.unreadable_at
-        if blinded is not None and now.mono - blinded <= LIMITS.silence_s:
-            return SpeedLimit(HALF_SPEED, "stale", robot.robot_id)
-        if silent is not None and not robot.is_replay:
-            return SpeedLimit(HALF_SPEED, "stale", silent or None)
+        for first in self.missing[robot_id]:
+            return SpeedLimit(HALF_SPEED, first.reason, first.robot_id)
         return CLEAR
 
 
@@ -248,19 +232,3 @@ def _is_ahead(robot: RobotState, zone: Zone) -> bool:
     # A peer's own ring has no alert, and a robot may name none: that is no match.
     ours = {zone.alert_id, zone.cause} - {None}
     return report.decision_id in ours or report.cause in ours
-
-
-def _silent_observer(world: World, now: Instant) -> str | None:
-    """The robot whose detector is silent; an empty text when no detector sends."""
-    ages = {
-        robot.robot_id: now.mono - robot.detections_at
-        for robot in world.live_robots()
-        if robot.detections_at is not None
-    }
-    active = {
-        name: age for name, age in ages.items() if age <= LIMITS.observer_forgotten_s
-    }
-    if not active:
-        return ""
-    slowest = max(active, key=lambda name: active[name])
-    return slowest if active[slowest] > LIMITS.silence_s else None

@@ -2,6 +2,7 @@
 
 from array import array
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -24,6 +25,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     Overtaken,
+    RefusedFrame,
     RobotFault,
     SafetyReport,
 )
@@ -92,9 +94,15 @@ def read_one(
     try:
         return ReadResult((reader(source, attributes),))
     except ValidationError as error:
-        return unread(source, f"bad_{name or 'entity'}", first_complaint(error))
+        read = unread(source, f"bad_{name or 'entity'}", first_complaint(error))
     except UnreadableError as error:
-        return unread(source, error.reason, error.detail)
+        read = unread(source, error.reason, error.detail)
+    return refused_frame(source, read) if name in _FRAMES else read
+
+
+def refused_frame(robot_id: str, read: ReadResult) -> ReadResult:
+    """A detection frame that cannot be read: a problem, and no empty picture."""
+    return replace(read, observations=(RefusedFrame(robot_id),))
 
 
 def _odometry(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
@@ -191,9 +199,21 @@ def _detections(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
     try:
         found = tuple(_detection_of(box) for box in _BOXES.validate_python(boxes))
     except ValidationError:
-        read = [_detection(box) for box in boxes]
-        found = tuple(detection for detection in read if detection is not None)
-    return DetectionFrame(robot_id, origin, found, unreadable=len(boxes) - len(found))
+        return _frame_in_part(robot_id, origin, boxes)
+    return DetectionFrame(robot_id, origin, found)
+
+
+def _frame_in_part(robot_id: str, origin: Origin, boxes: list[Any]) -> DetectionFrame:
+    """What can be read of a frame, and the classes of the boxes that cannot."""
+    read = [(box, _detection(box)) for box in boxes]
+    found = tuple(detection for _, detection in read if detection is not None)
+    unread = tuple(_class_of(box) for box, detection in read if detection is None)
+    return DetectionFrame(robot_id, origin, found, unread)
+
+
+def _class_of(box: Any) -> str | None:
+    class_id = box.get("class_id") if isinstance(box, dict) else None
+    return payloads.clean_text(class_id) if isinstance(class_id, str) else None
 
 
 def _detection(raw: Any) -> Detection | None:
@@ -285,23 +305,27 @@ _HALF_M = 0.25
 
 
 def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
-    point = payloads.PointValue.model_validate(attributes.get("position_3D"))
     box = {
         "class_id": attributes["class"],
         "probability": attributes.get("conf"),
         "frame_id": "map",
-        "position": {
-            "xmin": point.x - _HALF_M,
-            "xmax": point.x + _HALF_M,
-            "ymin": point.y - _HALF_M,
-            "ymax": point.y + _HALF_M,
-            "zmin": point.z - _HALF_M,
-            "zmax": point.z + _HALF_M,
-        },
+        "position": _sides_about(attributes.get("position_3D")),
     }
-    detection = _detection(box)
-    found = () if detection is None else (detection,)
-    return DetectionFrame(robot_id, _stamped(attributes), found, 1 - len(found))
+    return _frame_in_part(robot_id, _stamped(attributes), [box])
+
+
+def _sides_about(raw: Any) -> dict[str, float] | None:
+    """Sides of the box about a point; None where it is none."""
+    try:
+        point = payloads.PointValue.model_validate(raw)
+    except ValidationError:
+        return None
+    centre = {"x": point.x, "y": point.y, "z": point.z}
+    return {
+        axis + side: value + sign * _HALF_M
+        for axis, value in centre.items()
+        for side, sign in (("min", -1), ("max", 1))
+    }
 
 
 _PROOF = ("mono", "heard", "replay")
@@ -337,6 +361,8 @@ _READERS: Mapping[str, _Reader] = {
     "class": _single_detection,
     **{sensor.attribute: partial(_sensed, sensor) for sensor in SENSORS},
 }
+
+_FRAMES = frozenset({names.BOXES, "class"})
 
 _RANK = {name: rank for rank, name in enumerate(_READERS)}
 

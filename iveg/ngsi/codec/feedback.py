@@ -40,19 +40,24 @@ def read_feedback(payload: bytes) -> Feedback:
         None if pose is None else Pose2D(pose.x, pose.y, pose.yaw),
         None if pose is None else Twist2D(pose.linear_velocity, pose.angular_velocity),
         None if pose is None else pose.stamp,
-        {
-            robot_id: SpeedLimit(
-                speed_limit.speed_factor,
-                speed_limit.reason,
-                speed_limit.cause,
-                speed_limit.distance_m,
-                speed_limit.decision_id,
-            )
-            for robot_id, speed_limit in value.speed_limits.items()
-        },
+        _speed_limits(value),
         value.seen,
         _backlog(value.backlog),
     )
+
+
+def _speed_limits(value: payloads.FeedbackValue) -> dict[str, SpeedLimit]:
+    """Of every robot that is named; the version before named clear ones as mandates."""
+    named = value.speed_limits
+    if value.clear is None:
+        named = {**value.mandates, **named}
+    clear = dict.fromkeys(value.clear or (), CLEAR)
+    return clear | {
+        robot_id: SpeedLimit(
+            one.speed_factor, one.reason, one.cause, one.distance_m, one.decision_id
+        )
+        for robot_id, one in named.items()
+    }
 
 
 def _backlog(value: object) -> float | None:
@@ -124,9 +129,9 @@ def _write_backlog(backlog_s: float | None) -> dict[str, Any]:
 def _write_shared(feedback: Feedback) -> dict[str, Any]:
     """Part of the feedback that is the same for all robots.
 
-    A limit that limits nothing is left out, or the fleet's limits would be most of the
-    message.  ``mandates`` holds them all under the name that robots of the version
-    before read.
+    Of a robot that is clear the id alone is written, or the fleet's limits would be
+    most of the message; a robot that is named nowhere is unsupervised.  ``mandates``
+    holds them all under the name that robots of the version before read.
     """
     limits = {
         robot_id: orjson.Fragment(orjson.dumps(_write_speed_limit(speed_limit)))
@@ -139,6 +144,11 @@ def _write_shared(feedback: Feedback) -> dict[str, Any]:
             for robot_id, speed_limit in feedback.speed_limits.items()
             if speed_limit != CLEAR
         },
+        "clear": [
+            robot_id
+            for robot_id, speed_limit in feedback.speed_limits.items()
+            if speed_limit == CLEAR
+        ],
         "mandates": limits,
         "seen": dict(feedback.seen),
     }

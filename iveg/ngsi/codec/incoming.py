@@ -18,6 +18,7 @@ from iveg.ngsi.codec.attributes import (
     heartbeat,
     read_attributes,
     read_one,
+    refused_frame,
 )
 from iveg.ngsi.codec.untrusted import (
     ReadResult,
@@ -93,10 +94,13 @@ def read_measure(
     try:
         attributes = load_json(payload)
     except UnreadableError as error:
-        return unread(device_id, error.reason, error.detail)
-    if not isinstance(attributes, dict):
-        return unread(device_id, "not_an_object")
-    return read_attributes(robot_id, attributes, is_past)
+        read = unread(device_id, error.reason, error.detail)
+    else:
+        if isinstance(attributes, dict):
+            return read_attributes(robot_id, attributes, is_past)
+        read = unread(device_id, "not_an_object")
+    is_frame = device_id.endswith(names.FRAME_SUFFIX)
+    return refused_frame(robot_id, read) if is_frame else read
 
 
 def read_answer(robot_id: str, payload: bytes) -> ReadResult:

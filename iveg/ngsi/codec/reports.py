@@ -1,5 +1,6 @@
 """Messages of robots and sensors; the inverse of the readers."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import orjson
@@ -86,11 +87,19 @@ def write_detections(value: DetectionFrame) -> bytes:
         for detection in value.detections
     ]
     # Somebody is there and nobody knows where: that must not look like an empty frame.
-    boxes += [{"frame_id": names.UNPLACED}] * value.unreadable
+    boxes += write_unread(value.unread)
     return _measure(
         value.origin,
         {names.BOXES: boxes, names.BOXES_HEADER: write_origin(value.origin)},
     )
+
+
+def write_unread(unread: Iterable[str | None]) -> list[dict[str, Any]]:
+    """Boxes of somebody or something whose place is not known."""
+    return [
+        without_none({"class_id": class_id, "frame_id": names.UNPLACED})
+        for class_id in unread
+    ]
 
 
 def write_safety(value: SafetyReport) -> bytes:

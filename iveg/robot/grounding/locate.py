@@ -181,16 +181,20 @@ def ground_frame(
 ) -> DetectionFrame:
     """One frame of the detector as the robot reports it, boxes in ``base_link``.
 
-    A target that is sure enough and still has no place counts as ``unreadable``: that
+    A target that is sure enough and still has no place counts as unread: that
     somebody is there and nobody knows where must not look like an empty frame.
     """
-    answers = [_answer(segment, picture, settings) for segment in segments]
+    answers = [(one.class_id, _answer(one, picture, settings)) for one in segments]
     found = tuple(
         to_detection(answer, mount)
-        for answer in answers
+        for _, answer in answers
         if isinstance(answer, Grounded)
     )
-    lost = len(answers) - len(found) - answers.count("unsure")
+    lost = tuple(
+        class_id
+        for class_id, answer in answers
+        if answer != "unsure" and not isinstance(answer, Grounded)
+    )
     return DetectionFrame(robot_id, origin, found, lost)
 
 

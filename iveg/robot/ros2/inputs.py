@@ -329,7 +329,7 @@ class SensorInputs:
         stamp = message.header.stamp.seconds
         found: list[Detection] = []
         places: dict[str, RigidTransform | None] = {}
-        lost = 0
+        lost: list[str | None] = []
         for one in message.detections:
             frame = one.header.frame_id or message.header.frame_id
             if frame not in places:
@@ -337,15 +337,15 @@ class SensorInputs:
             place = places[frame]
             try:
                 if place is None:
-                    lost += 1
+                    lost.append(reading.class_id_of(one.results, self._classes))
                 else:
                     found.append(reading.read_detection(one, place, self._classes))
             except UnreadableError as error:
                 self.input_faults.note(
                     error.reason, self._name("detections_3d"), now.mono
                 )
-                lost += 1
-        return [DetectionFrame("", UNKNOWN_ORIGIN, tuple(found), lost)]
+                lost.append(reading.class_id_of(one.results, self._classes))
+        return [DetectionFrame("", UNKNOWN_ORIGIN, tuple(found), tuple(lost))]
 
     def _path(self, message: m.Path, now: Instant) -> list[Sensed]:
         frame = message.header.frame_id or self._frames.map
@@ -395,7 +395,10 @@ class SensorInputs:
         frame = None if depth is None else self._located(look, depth, now.mono)
         if incomplete:
             self.input_faults.note("no_depth", self._name("detections_2d"), now.mono)
-        return [frame or DetectionFrame("", UNKNOWN_ORIGIN, (), len(look.detections))]
+        lost = (
+            reading.class_id_of(one.results, self._classes) for one in look.detections
+        )
+        return [frame or DetectionFrame("", UNKNOWN_ORIGIN, (), tuple(lost))]
 
     def _located(
         self, look: m.Detection2DArray, depth: m.Image, now: float

@@ -26,7 +26,7 @@ from iveg.robot.grounding.locate import (
     hull_of,
 )
 from iveg.robot.grounding.mask import EDGE_LIMIT, write_mask
-from iveg.robot.ros2.reading import read_hypothesis, within_world
+from iveg.robot.ros2.reading import class_id_of, read_hypothesis, within_world
 from iveg.robot.ros2.rigid import RigidTransform
 from iveg.ros2 import messages as m
 
@@ -122,7 +122,11 @@ def grounded(
         for number, one in enumerate(look.detections, 1)
     ]
     found = tuple(one for one in answers if isinstance(one, Detection))
-    lost = len(answers) - len(found) - answers.count("unsure")
+    lost = tuple(
+        class_id_of(one.results, classes)
+        for one, answer in zip(look.detections, answers, strict=True)
+        if answer != "unsure" and not isinstance(answer, Detection)
+    )
     return DetectionFrame("", Origin(), found, lost)
 
 

@@ -170,6 +170,18 @@ def read_hypothesis(
     return name, best.score
 
 
+def class_id_of(
+    results: tuple[m.ObjectHypothesisWithPose, ...], classes: tuple[str, ...]
+) -> str | None:
+    """The only class that a detection may be of; None where it may be another."""
+    if len(results) != 1:
+        return None
+    try:
+        return read_hypothesis(results, classes)[0]
+    except UnreadableError:
+        return None
+
+
 def _score(hypothesis: m.ObjectHypothesis) -> float:
     return -1.0 if math.isnan(hypothesis.score) else hypothesis.score
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import flaw_of
 from iveg.domain.feedback import SpeedLimit
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
@@ -84,7 +85,12 @@ class Scene:
             robot_id, *detections, unreadable=unreadable, origin=self._origin()
         )
         self._apply(received(frame, after=self.now))
-        return self.sight(frame)
+        placed, robot = self.sight(frame), self.world.robot(robot_id)
+        if flaw_of(frame, self.rule, self.people.turned_away):
+            robot.detector.note_flaw("unreadable", at(self.now))
+        else:
+            robot.detector.note_whole(robot.detections_at)
+        return placed
 
     def sight(self, frame: DetectionFrame) -> list[Placed]:
         return self.people.sight(

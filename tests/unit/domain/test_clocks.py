@@ -5,7 +5,13 @@ from dataclasses import replace
 import pytest
 
 from iveg.domain.clocks import RobotClock
-from iveg.domain.observations import Instant, Odometry, Origin, SafetyReport
+from iveg.domain.observations import (
+    DetectionFrame,
+    Instant,
+    Odometry,
+    Origin,
+    SafetyReport,
+)
 from iveg.domain.transports import DIRECT, FIWARE, TransportId
 from tests.builders import START, at, origin
 
@@ -200,7 +206,7 @@ def test_boots_that_are_long_gone_are_forgotten() -> None:
     for number in range(100):
         robot.send(0.0, boot=f"boot-{number}")
 
-    assert len(robot.estimate._filters) == 8
+    assert len(robot.estimate._filters) == 16
 
 
 @pytest.mark.parametrize(
@@ -226,3 +232,36 @@ def test_a_warning_lasts_a_minute_so_that_none_flaps() -> None:
 
 def test_nothing_is_told_of_a_clock_that_nobody_heard() -> None:
     assert RobotClock().warning(START) is None
+
+
+# --- a detector's own clock -------------------------------------------------------
+
+
+@pytest.mark.parametrize("apart_s", [600.0, -600.0, 10.5, -10.5])
+def test_a_frame_that_is_stamped_by_another_clock_is_of_unknown_age(
+    apart_s: float,
+) -> None:
+    robot = Robot()
+    robot.send(0.0)
+
+    robot.ahead_s = apart_s
+    assert robot.send(0.1, kind=DetectionFrame) is None
+    assert robot.estimate.detector_apart_at == at(0.1).mono
+
+
+def test_a_detectors_clock_makes_no_pose_old() -> None:
+    robot = Robot()
+    robot.send(0.0)
+    robot.ahead_s = 600.0
+    for number in range(10):
+        robot.send(0.1 * number, kind=DetectionFrame)
+
+    robot.ahead_s = 0.0
+    assert robot.send(1.0) == pytest.approx(0.0)
+
+
+def test_a_frame_that_is_late_by_the_clock_of_odometry_is_late() -> None:
+    robot = Robot()
+    robot.send(0.0)
+
+    assert robot.send(0.0, 2.0, kind=DetectionFrame) == pytest.approx(2.0)

@@ -17,7 +17,6 @@ from iveg.domain.world import World
 from tests.builders import (
     START,
     at,
-    detection_frame,
     odometry,
     origin,
     received,
@@ -244,14 +243,6 @@ def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
     found = robot_keys(world.robot("AGI"), 0.1)
 
     assert (("P3", "alert.clock_offset") in found) is told
-
-
-def test_an_unreadable_detection_is_told_for_ten_seconds() -> None:
-    world = World(["AGI"])
-    world.apply(received(detection_frame(unreadable=2)))
-
-    assert robot_keys(world.robot("AGI"), 9.9) == [("P3", "alert.unreadable_detection")]
-    assert robot_keys(world.robot("AGI"), 10.1) == []
 
 
 # --- the book ---------------------------------------------------------------------

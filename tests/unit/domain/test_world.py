@@ -18,6 +18,7 @@ from iveg.domain.observations import (
     Observation,
     Origin,
     Received,
+    RefusedFrame,
 )
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_state import RobotState
@@ -347,10 +348,11 @@ def test_climate_and_heartbeat_belong_to_no_robot() -> None:
     assert world.climate_received == START
 
 
-def test_an_unreadable_detection_is_remembered_with_its_moment() -> None:
-    world = world_with(detection_frame(unreadable=1))
+def test_a_frame_that_was_refused_is_remembered_with_its_moment() -> None:
+    world = world_with(RefusedFrame("AGI"))
 
-    assert world.robot("AGI").unreadable_at == START.mono
+    assert world.robot("AGI").detector.flawed_at == {"unreadable": START.mono}
+    assert world.robot("AGI").frame is None
 
 
 def test_the_agents_opinion_is_kept_for_display() -> None:
@@ -458,9 +460,13 @@ def test_the_pose_at_a_stamp_is_interpolated() -> None:
     assert driven().pose_at_stamp(START.wall + 3.25) == Pose2D(3.25, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(("after", "x"), [(-5.0, 0.0), (99.0, 9.0)])
+@pytest.mark.parametrize(("after", "x"), [(-0.9, 0.0), (99.0, 9.0)])
 def test_outside_the_history_the_nearest_end_counts(after: float, x: float) -> None:
     assert driven().pose_at_stamp(START.wall + after) == Pose2D(x, 0.0, 0.0)
+
+
+def test_for_a_stamp_of_another_clock_the_newest_pose_counts() -> None:
+    assert driven().pose_at_stamp(START.wall - 600.0) == Pose2D(9.0, 0.0, 0.0)
 
 
 def test_without_a_stamp_the_newest_pose_counts() -> None:

@@ -53,7 +53,7 @@ def test_a_person_is_placed_near_the_truth_at_any_distance(
 
     assert found.frame_id == "base_link"
     assert found.box.centre[:2] == pytest.approx((ahead, 0.1), abs=0.35)
-    assert (found.class_id, found.probability, lost) == ("farmer", 0.9, 0)
+    assert (found.class_id, found.probability, lost) == ("farmer", 0.9, ())
 
 
 def test_a_robot_shows_the_face_that_is_seen() -> None:
@@ -66,7 +66,7 @@ def test_a_robot_shows_the_face_that_is_seen() -> None:
 
 
 def test_crop_hides_a_person_from_the_picture_too() -> None:
-    assert camera().place(HERE, [Found(person(4.0, 3.2), 0.9)], [], CROP) == ((), 0)
+    assert camera().place(HERE, [Found(person(4.0, 3.2), 0.9)], [], CROP) == ((), ())
 
 
 def test_a_person_behind_a_robot_is_not_in_the_picture() -> None:
@@ -77,26 +77,29 @@ def test_a_person_behind_a_robot_is_not_in_the_picture() -> None:
     (found, lost) = camera().place(HERE, [Found(behind, 0.9)], [tall, behind], CROP)
 
     heads = [one.box.zmin for one in found]
-    assert lost == 0
+    assert lost == ()
     assert all(bottom > 0.5 for bottom in heads)
 
 
 def test_whom_depth_cannot_reach_counts_as_there_without_a_place() -> None:
     far = person(9.5)
 
-    assert camera().place(HERE, [Found(far, 0.9)], [far], CROP) == ((), 1)
+    assert camera().place(HERE, [Found(far, 0.9)], [far], CROP) == ((), ("farmer",))
 
 
 def test_the_detector_tells_who_has_no_place_until_the_next_look() -> None:
     detector = Detector(
-        AGI, DETECTORS["perfect"], np.random.default_rng(1), lambda *_: ((), 1)
+        AGI,
+        DETECTORS["perfect"],
+        np.random.default_rng(1),
+        lambda *_: ((), ("farmer",)),
     )
 
     seen = detector.detect(0.0, HERE, [person(3.0)], CROP)
     lost = detector.lost
     detector.detect(10.0, HERE, [], CROP)
 
-    assert (seen, lost, detector.lost) == ((), 1, 0)
+    assert (seen, lost, detector.lost) == ((), ("farmer",), ())
 
 
 def test_both_cameras_find_the_same_people_in_nearly_the_same_places() -> None:
@@ -113,7 +116,7 @@ def test_both_cameras_find_the_same_people_in_nearly_the_same_places() -> None:
         for robot_id in ("AGI", "AGII"):
             truth = drawn.rigs[robot_id].detect(tick / 10, drawn).detections
             found = grounded.rigs[robot_id].detect(tick / 10, grounded)
-            assert len(found.detections) + found.unreadable == len(truth)
+            assert len(found.detections) + len(found.unread) == len(truth)
             for one, other in zip(found.detections, truth, strict=False):
                 away = math.dist(one.box.centre[:2], other.box.centre[:2])
                 assert away < (0.4 if one.class_id == "farmer" else 1.0)

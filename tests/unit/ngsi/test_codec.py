@@ -6,7 +6,7 @@ import numpy as np
 import orjson
 import pytest
 
-from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     Climate,
@@ -180,7 +180,7 @@ def test_a_detection_of_algorithm_1_without_confidence_is_counted() -> None:
     (frame,) = entity(**{"class": "farmer", "position_3D": {"x": 1, "y": 2, "z": 0}})
 
     assert isinstance(frame, DetectionFrame)
-    assert frame.unreadable == 1
+    assert len(frame.unread) == 1
 
 
 # --- scans ------------------------------------------------------------------------
@@ -312,6 +312,7 @@ def test_feedback_is_written_as_the_contract_says() -> None:
             "stamp": "t",
         },
         "speed_limits": {"AGII": limited},
+        "clear": ["AGI"],
         "mandates": {
             "AGI": {"speed_factor": 1.0, "reason": "clear"},
             "AGII": limited,
@@ -327,7 +328,12 @@ def test_feedback_is_written_as_the_contract_says() -> None:
         {"mandates": {"AGI": {"speed_factor": 0.5, "reason": "person"}}},
         {
             "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
+            "clear": [],
             "mandates": {"AGI": {"speed_factor": 1.0}, "AGII": {"speed_factor": 1.0}},
+        },
+        {
+            "speed_limits": {"AGI": {"speed_factor": 0.5, "reason": "person"}},
+            "clear": ["AGI"],
         },
     ],
 )
@@ -337,6 +343,21 @@ def test_speed_limits_are_read_by_their_name_or_by_the_one_before(
     feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **limits}))
 
     assert feedback.speed_limits == {"AGI": SpeedLimit(0.5, "person")}
+
+
+def test_who_is_named_clear_is_clear_and_who_is_not_named_is_not_there() -> None:
+    feedback = codec.read_feedback(
+        orjson.dumps({"robot_id": "AGI", "speed_limits": {}, "clear": ["AGI"]})
+    )
+
+    assert feedback.speed_limits == {"AGI": CLEAR}
+
+
+def test_the_version_before_named_clear_robots_as_mandates_alone() -> None:
+    told = {"speed_limits": {}, "mandates": {"AGI": {"speed_factor": 1.0}}}
+    feedback = codec.read_feedback(orjson.dumps({"robot_id": "AGI", **told}))
+
+    assert feedback.speed_limits["AGI"].speed_factor == 1.0
 
 
 def test_feedback_with_nothing_to_tell_says_null() -> None:

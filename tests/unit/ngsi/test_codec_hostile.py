@@ -79,7 +79,7 @@ def test_a_probability_that_is_none_makes_the_box_unreadable(
     reading = codec.read_measure("AGI_yolox_bounding_boxes", text)
 
     frames = [one for one in reading.observations if isinstance(one, DetectionFrame)]
-    assert [(len(one.detections), one.unreadable) for one in frames] in ([(1, 1)], [])
+    assert [(len(one.detections), len(one.unread)) for one in frames] in ([(1, 1)], [])
     assert frames or reading.problems
 
 
@@ -92,7 +92,7 @@ def test_a_box_without_probability_or_position_is_counted_not_guessed() -> None:
     )
 
     assert len(frame.detections) == 1
-    assert frame.unreadable == 3
+    assert len(frame.unread) == 3
 
 
 def test_a_range_too_long_for_any_laser_is_refused_without_a_warning() -> None:

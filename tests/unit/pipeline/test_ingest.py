@@ -14,6 +14,7 @@ from iveg.domain.observations import (
     Origin,
     Overtaken,
     Received,
+    RefusedFrame,
     SafetyReport,
 )
 from iveg.domain.transports import DIRECT
@@ -80,12 +81,41 @@ def test_f24_a_flood_of_telemetry_holds_back_no_safety_report() -> None:
     assert kept.count(True) == 50
 
 
-def test_a_queue_of_nothing_but_safety_grows_rather_than_losing_one() -> None:
+def test_a_queue_of_nothing_but_safety_keeps_the_newest_of_each_robot() -> None:
     queue = ingest()
-    for _ in range(MAX_QUEUED + 5):
-        queue.offer(received(safety_report()))
+    queue.offer(received(safety_report("AGII")))
+    for seq in range(MAX_QUEUED + 5):
+        queue.offer(received(safety_report(origin=origin(seq))))
 
-    assert len(list(queue.drain())) == MAX_QUEUED + 5
+    left = [one.observation for one in queue.drain()]
+
+    assert len(left) == MAX_QUEUED
+    assert left[0] == safety_report("AGII")
+    assert left[-1] == safety_report(origin=origin(MAX_QUEUED + 4))
+
+
+def test_a_flood_of_frames_keeps_the_newest_and_says_that_others_were_not_read() -> (
+    None
+):
+    queue = ingest()
+    for seq in range(50_000):
+        queue.offer(received(detection_frame(origin=origin(seq))))
+
+    assert queue.waiting == MAX_QUEUED
+    left = [one.observation for one in queue.drain()]
+    assert left[-2:] == [detection_frame(origin=origin(49_999)), RefusedFrame("AGI")]
+    assert list(queue.drain()) == []
+
+
+def test_a_flood_of_one_robots_frames_costs_no_other_robot_one() -> None:
+    queue = ingest()
+    queue.offer(received(detection_frame("AGII")))
+    for seq in range(MAX_QUEUED + 5):
+        queue.offer(received(detection_frame(origin=origin(seq))))
+
+    left = [one.observation for one in queue.drain()]
+    assert detection_frame("AGII") in left
+    assert RefusedFrame("AGII") not in left
 
 
 def test_what_comes_is_counted_by_transport_and_kind() -> None:

@@ -14,6 +14,7 @@ from iveg.domain.observations import (
     Observation,
     Overtaken,
     Received,
+    RefusedFrame,
 )
 from iveg.domain.records import ReadingRecord
 from iveg.domain.world import World
@@ -50,7 +51,7 @@ def battery(desk: Desk, level: float | None, *, charging: bool | None = False) -
 
 
 def test_every_kind_of_observation_has_one_row() -> None:
-    kinds = set(typing.get_args(Observation)) - {Overtaken}
+    kinds = set(typing.get_args(Observation)) - {Overtaken, RefusedFrame}
 
     assert [row.of for row in KINDS if row.of in kinds] == [row.of for row in KINDS]
     assert {row.of for row in KINDS} == kinds

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import orjson
 
-from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.feedback import CLEAR, Feedback, FeedbackAlert, SpeedLimit
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import CommandAnswer, Hold, Origin, SafetyReport
 from iveg.ngsi import codec
@@ -131,7 +131,7 @@ class Rig:
             "robot_id": "AGII",
             "origin": Origin("cloud", self.feedback_seq),
             "alerts": self.alerts,
-            "speed_limits": self.speed_limits,
+            "speed_limits": {"AGI": CLEAR, **self.speed_limits},
             "seen": {"AGI": self.report_seq},
         }
         return Feedback(**(values | parts))  # type: ignore[arg-type]

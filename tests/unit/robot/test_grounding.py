@@ -349,4 +349,4 @@ def test_a_look_reports_the_placed_and_counts_the_sure_that_have_no_place() -> N
 
     assert (frame.robot_id, frame.origin.seq) == ("AGI", 3)
     assert [found.frame_id for found in frame.detections] == ["base_link"]
-    assert frame.unreadable == 2
+    assert len(frame.unread) == 2

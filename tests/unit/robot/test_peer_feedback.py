@@ -2,7 +2,13 @@
 
 import pytest
 
-from iveg.domain.feedback import Feedback, FeedbackAlert, SpeedLimit
+from iveg.domain.feedback import (
+    CLEAR,
+    UNSUPERVISED,
+    Feedback,
+    FeedbackAlert,
+    SpeedLimit,
+)
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Origin
 from iveg.robot.caps import FREE, Cap, lowest
@@ -24,7 +30,7 @@ class Bench:
         at: float,
         *alerts: FeedbackAlert,
         alert: FeedbackAlert | None = None,
-        speed_limit: SpeedLimit | None = None,
+        speed_limit: SpeedLimit | None = CLEAR,
         own: Pose2D | None = HERE,
         pose: Pose2D | None = None,
         twist: Twist2D | None = None,
@@ -301,3 +307,16 @@ def test_my_own_pose_in_my_own_topic_does_not_slow_me() -> None:
     bench = Bench()
     bench.tell(0.0, robot_id="AGI", pose=HERE, twist=DRIVES)
     assert bench.cap(0.0) == FREE
+
+
+def test_whom_a_feedback_does_not_name_is_unsupervised_and_no_more_than_half() -> None:
+    bench = Bench()
+    bench.tell(0.0, speed_limit=None)
+    assert bench.cap(0.0) == Cap(0.5, UNSUPERVISED.reason)
+
+
+def test_one_topic_that_does_not_name_a_robot_outweighs_one_that_does() -> None:
+    bench = Bench()
+    bench.tell(0.0, speed_limit=None)
+    bench.tell(0.0, robot_id="AGIII")
+    assert bench.cap(0.0).factor == 0.5

@@ -18,6 +18,8 @@ from iveg.robot.uplink import Uplink
 from tests.builders import START, detection, odometry
 from tests.unit.robot.rig import AHEAD, REST, Rig, stop
 
+UNREAD = ("farmer", None)
+
 
 def sent(observation: Unplaced | DetectionFrame) -> tuple[str, bytes]:
     wire: list[tuple[str, bytes]] = []
@@ -67,23 +69,23 @@ def test_a_reader_that_does_not_know_unplaced_refuses_the_whole() -> None:
 
 def test_whoever_was_seen_without_a_place_is_unreadable_to_iveg() -> None:
     """An unreadable detection slows the fleet; an empty frame would not."""
-    _, payload = sent(DetectionFrame("", Origin(), (detection("farmer", 1.0),), 2))
+    _, payload = sent(DetectionFrame("", Origin(), (detection("farmer", 1.0),), UNREAD))
 
     (frame,) = codec.read_measure("AGI_yolox_bounding_boxes", payload).observations
 
     assert isinstance(frame, DetectionFrame)
-    assert (len(frame.detections), frame.unreadable) == (1, 2)
+    assert (len(frame.detections), frame.unread) == (1, UNREAD)
 
 
 def test_the_single_payload_does_not_call_them_an_empty_look() -> None:
     wire: list[bytes] = []
     uplink = Uplink("AGI", "iveg", "b", lambda _, raw: wire.append(raw), form="single")
 
-    uplink.send(DetectionFrame("", Origin(), (), 2), START)
+    uplink.send(DetectionFrame("", Origin(), (), UNREAD), START)
     uplink.send(odometry(), START)
 
     found = codec.read_measure("AGI", wire[0]).observations
-    assert [one.unreadable for one in found if isinstance(one, DetectionFrame)] == [2]
+    assert [one.unread for one in found if isinstance(one, DetectionFrame)] == [UNREAD]
 
 
 def test_faults_come_back_as_they_were_reported() -> None:

@@ -286,9 +286,7 @@ def test_a_robot_whose_pose_is_silent_for_a_second_is_slowed(
 
 
 @pytest.mark.parametrize(("age", "reason"), [(1.0, "clear"), (1.01, "stale")])
-def test_every_robot_is_slowed_while_an_observer_is_silent(
-    age: float, reason: str
-) -> None:
+def test_a_silent_detector_slows_its_robot(age: float, reason: str) -> None:
     scene = watching(Scene())
     scene.now = age
     scene.drive("AGI", 0.0)
@@ -297,48 +295,8 @@ def test_every_robot_is_slowed_while_an_observer_is_silent(
 
     speed_limits = scene.judge()
 
-    assert [one.reason for one in speed_limits.values()] == [reason] * 2
-
-
-def test_it_is_told_whose_eyes_are_shut() -> None:
-    scene = watching(Scene())
-    scene.now = 2.0
-    scene.drive("AGI", 0.0)
-    scene.look("AGI")
-
-    assert scene.judge()["AGI"].cause == "AGII"
-
-
-def test_while_nobody_looks_at_all_everybody_is_slowed() -> None:
-    scene = Scene()
-    scene.drive("AGI", 0.0)
-
-    speed_limit = scene.judge()["AGI"]
-
-    assert (speed_limit.reason, speed_limit.cause) == ("stale", None)
-
-
-def test_a_robot_that_has_not_looked_for_ten_minutes_is_no_observer_any_more() -> None:
-    scene = watching(Scene())
-    scene.now = 601.0
-    scene.drive("AGI", 0.0)
-    scene.look("AGI")
-
-    assert scene.judge()["AGI"] == CLEAR
-
-
-@pytest.mark.parametrize(("age", "reason"), [(1.0, "stale"), (1.01, "clear")])
-def test_an_unreadable_detection_slows_its_observer_for_a_second(
-    age: float, reason: str
-) -> None:
-    scene = watching(Scene())
-    scene.look("AGI", unreadable=1)
-    scene.now = age
-    watching(scene)
-
-    speed_limits = scene.judge()
-
-    assert (speed_limits["AGI"].reason, speed_limits["AGII"]) == (reason, CLEAR)
+    assert speed_limits["AGI"] == CLEAR
+    assert speed_limits["AGII"].reason == reason
 
 
 # --- recordings -------------------------------------------------------------------

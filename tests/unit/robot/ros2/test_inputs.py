@@ -320,7 +320,7 @@ def test_who_was_seen_without_a_place_is_counted_and_not_placed() -> None:
     (found,) = Bench(tree=False).hear("detections_3d", look(seen(), seen())).tick()
 
     assert isinstance(found, DetectionFrame)
-    assert (found.detections, found.unreadable) == ((), 2)
+    assert (found.detections, len(found.unread)) == ((), 2)
 
 
 @pytest.mark.parametrize(
@@ -334,7 +334,7 @@ def test_a_detection_that_cannot_be_is_counted_beside_the_others(
     (found,) = bench.hear("detections_3d", look(seen(), bad)).tick()
 
     assert isinstance(found, DetectionFrame)
-    assert (len(found.detections), found.unreadable) == (1, 1)
+    assert (len(found.detections), len(found.unread)) == (1, 1)
 
 
 def test_a_class_list_gives_numbers_their_names() -> None:

@@ -124,7 +124,7 @@ def test_a_look_whose_depth_never_comes_counts_everybody_as_lost() -> None:
 
     found = grounded(one, 0.4)
 
-    assert (found.detections, found.unreadable) == ((), 1)
+    assert (found.detections, len(found.unread)) == ((), 1)
     assert one.faults(0.4)["no_depth"] == "/boxes"
 
 
@@ -133,7 +133,7 @@ def test_a_camera_without_a_place_counts_everybody_as_lost() -> None:
 
     found = grounded(one.hear("camera_info", info()).hear("detections_2d", look(box())))
 
-    assert found.unreadable == 1
+    assert len(found.unread) == 1
     assert one.faults()["no_transform"] == "map → camera_optical"
 
 
@@ -142,7 +142,7 @@ def test_an_empty_look_needs_no_depth() -> None:
 
     found = grounded(one.hear("detections_2d", look()))
 
-    assert (found.detections, found.unreadable) == ((), 0)
+    assert (found.detections, len(found.unread)) == ((), 0)
 
 
 def test_who_is_not_sure_enough_is_left_out_and_not_lost() -> None:
@@ -150,7 +150,7 @@ def test_who_is_not_sure_enough_is_left_out_and_not_lost() -> None:
 
     found = grounded(one.hear("detections_2d", look(box(0.4))))
 
-    assert (found.detections, found.unreadable) == ((), 0)
+    assert (found.detections, len(found.unread)) == ((), 0)
 
 
 @pytest.mark.parametrize("x", [math.nan, -500.0])
@@ -159,7 +159,7 @@ def test_a_box_that_lies_nowhere_is_lost(x: float) -> None:
 
     found = grounded(one.hear("detections_2d", look(box(x=x))))
 
-    assert found.unreadable == 1
+    assert len(found.unread) == 1
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,116 @@
+"""What is known of one robot's detector: whether its pictures are read whole.
+
+Silence, a refused frame and a healthy empty aisle must never look alike, so only one
+thing proves that a detector works::
+
+    a frame read whole, at most a second old, and none in that second that was not
+
+Until then it is *missing* (docs/safety.md, "Clear"), unless an operator took it out of
+service.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import DetectionFrame, Instant
+
+FRAMES_HZ = 45.0
+"""Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
+
+Flaw = Literal["unreadable", "overload"]
+"""Why a frame was not read whole: it or a box of a person or robot was refused, or more
+came than can be judged."""
+
+
+def flaw_of(
+    frame: DetectionFrame, rule: DetectionRule, turned_away: int = 0
+) -> Flaw | None:
+    """Why a judged frame does not count as read whole; None: it does.
+
+    Args:
+        frame: The frame; an unread box counts where it may show a person or robot.
+        rule: Knows which classes these are.
+        turned_away: Detections for which there was no room.
+    """
+    if turned_away:
+        return "overload"
+    unread = frame.unread
+    return "unreadable" if None in unread or any(map(rule.class_of, unread)) else None
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfService:
+    """An operator's word that a detector is not to be waited for.
+
+    Attributes:
+        by: Who said so; ``since`` when (Unix s).
+        boot: Of the robot at that moment; another one ends it.  None before the first.
+    """
+
+    by: str
+    since: float
+    boot: str | None = None
+
+
+@dataclass(slots=True)
+class Detector:
+    """The evidence of one detector; moments are monotonic seconds.
+
+    Attributes:
+        whole_at: The newest frame that was read whole was not measured before this
+            moment; None before the first, and while its age is not known.
+        flawed_at: When a frame was last not read whole, by flaw.
+        worked: Whether a frame was ever read whole.
+        out_of_service: None: it is required.
+    """
+
+    whole_at: float | None = None
+    flawed_at: dict[Flaw, float] = field(default_factory=dict)
+    worked: bool = False
+    out_of_service: OutOfService | None = None
+    _allowance: float = FRAMES_HZ
+    _counted_at: float | None = None
+
+    def admits_frame(self, now: Instant) -> bool:
+        """Whether one more frame may be judged; counts it if so."""
+        before = now.mono if self._counted_at is None else self._counted_at
+        earned = FRAMES_HZ * max(0.0, now.mono - before)
+        self._allowance = min(FRAMES_HZ, self._allowance + earned)
+        self._counted_at = now.mono
+        admitted = self._allowance >= 1.0
+        self._allowance -= admitted
+        return admitted
+
+    def note_whole(self, measured_at: float | None) -> None:
+        """Note a frame that was read whole; None: nobody knows its age."""
+        self.whole_at, self.worked = measured_at, True
+
+    def note_flaw(self, flaw: Flaw, now: Instant) -> None:
+        """Note a frame that was not."""
+        self.flawed_at[flaw] = now.mono
+
+    def is_flawed(self, now: Instant) -> bool:
+        """Whether a frame was not read whole within the silence limit."""
+        moments = self.flawed_at.values()
+        return any(now.mono - moment <= LIMITS.silence_s for moment in moments)
+
+    def is_missing(self, now: Instant) -> bool:
+        """Whether nothing proves that it works; one out of service is not waited for.
+
+        A frame that is refused counts even then: somebody may be in it.
+        """
+        if self.is_flawed(now):
+            return True
+        if self.out_of_service is not None:
+            return False
+        return self.whole_at is None or now.mono - self.whole_at > LIMITS.silence_s
+
+    def meet_boot(self, boot: str | None) -> bool:
+        """Meet a message of a boot; whether that puts the detector back in service."""
+        ended = self.out_of_service
+        if ended is None or boot is None or boot == ended.boot:
+            return False
+        self.out_of_service = None
+        return True

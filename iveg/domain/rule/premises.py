@@ -1,0 +1,88 @@
+"""Premises of the claim "clear": what of them is missing now, for each robot.
+
+A factor of 1.0 says that nobody is near.  That claim rests on the robot's own pose, on
+the detectors of everybody in reach, and on nobody in reach being in doubt
+(docs/safety.md, "Clear").  The list of what is missing is built here and nowhere else;
+an empty list is the only way to 1.0.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.robot_state import RobotState
+from iveg.domain.world import World
+
+Premise = Literal["pose", "doubt", "detector"]
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """One premise that does not hold.
+
+    Attributes:
+        robot_id: Whose pose, detector or word it is.
+    """
+
+    premise: Premise
+    robot_id: str
+
+    @property
+    def reason(self) -> str:
+        """Reason of a speed limit that rests on it (docs/interfaces/mqtt.md)."""
+        return "doubt" if self.premise == "doubt" else "stale"
+
+
+def missing_premises(world: World, now: Instant) -> Mapping[str, tuple[Missing, ...]]:
+    """What is missing for each robot, the reason for its limit first."""
+    gaps = [
+        (observer, premise)
+        for observer in world.robots.values()
+        for premise in _gaps(observer, now)
+    ]
+    return {
+        robot.robot_id: tuple(_missing_of(robot, gaps, now))
+        for robot in world.robots.values()
+    }
+
+
+def _missing_of(
+    robot: RobotState, gaps: list[tuple[RobotState, Premise]], now: Instant
+) -> Iterator[Missing]:
+    age = robot.age_s(now)
+    if age is None or age > LIMITS.silence_s:
+        yield Missing("pose", robot.robot_id)
+    for observer, premise in gaps:
+        if _concerns(observer, robot):
+            yield Missing(premise, observer.robot_id)
+
+
+def _gaps(observer: RobotState, now: Instant) -> Iterator[Premise]:
+    """What one robot leaves open for everybody in its reach."""
+    if observer.doubts.active(now):
+        yield "doubt"
+    detector = observer.detector
+    is_required = observer.description.has_detector and not observer.is_replay
+    if detector.is_missing(now) if is_required else detector.is_flawed(now):
+        yield "detector"
+
+
+def _concerns(observer: RobotState, robot: RobotState) -> bool:
+    """Whether a robot is where the observer's camera would protect it.
+
+    A robot of unknown place may be anywhere.  What a recording lacks concerns
+    recordings of its own frame.
+    """
+    if observer is robot:
+        return True
+    if observer.recording != robot.recording:
+        return False
+    reach = observer.profile.camera_range + LIMITS.ring_most_m
+    theirs, ours = observer.possible_poses(), robot.possible_poses()
+    return (
+        not theirs
+        or not ours
+        or any(one.distance_to(two.x, two.y) <= reach for one in theirs for two in ours)
+    )
