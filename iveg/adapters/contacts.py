@@ -6,17 +6,14 @@ the same, for STOP does not depend on mail.
 """
 
 import asyncio
-import logging
 from dataclasses import asdict
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from iveg.adapters.files import Form, read_lines, write_lines
+from iveg.adapters.files import Form, put_aside, read_lines, write_lines
 from iveg.domain.errors import DataFileError, HopError
 from iveg.domain.messages import Contacts
-
-_log = logging.getLogger(__name__)
 
 FORM = Form("contacts")
 _READER = TypeAdapter(Contacts)
@@ -34,7 +31,7 @@ class FileContacts:
             lines = [line for _, line in read_lines(self._path, FORM)]
             return _READER.validate_json(lines[-1]) if lines else Contacts()
         except (ValidationError, DataFileError, OSError) as error:
-            self._put_aside(type(error).__name__)
+            put_aside(self._path, type(error).__name__)
             return Contacts()
 
     async def save(self, contacts: Contacts) -> None:
@@ -47,11 +44,3 @@ class FileContacts:
             await asyncio.to_thread(write_lines, self._path, FORM, [asdict(contacts)])
         except OSError as error:
             raise HopError("disk", str(error)) from error
-
-    def _put_aside(self, why: str) -> None:
-        aside = self._path.with_name(self._path.name + ".unreadable")
-        _log.error("%s cannot be read (%s): put aside as %s", self._path, why, aside)
-        try:
-            self._path.replace(aside)
-        except OSError:
-            _log.warning("%s stays where it is", self._path)

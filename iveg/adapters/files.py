@@ -4,6 +4,7 @@ Each file begins with a line that names its content and version; a file without 
 line is of version 0.  A file of a newer iVeg is refused.
 """
 
+import logging
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -13,6 +14,8 @@ from typing import IO
 import orjson
 
 from iveg.domain.errors import DataFileError
+
+_log = logging.getLogger(__name__)
 
 _OWNER_ALONE = 0o600
 
@@ -95,6 +98,16 @@ def _is_head(path: Path, form: Form, line: bytes) -> bool:
         )
         raise DataFileError(str(path), "line 1", reason)
     return True
+
+
+def put_aside(path: Path, why: str) -> None:
+    """Rename a file that cannot be read, so that the next one is whole."""
+    aside = path.with_name(path.name + ".unreadable")
+    _log.error("%s cannot be read (%s): put aside as %s", path, why, aside)
+    try:
+        path.replace(aside)
+    except OSError:
+        _log.warning("%s stays where it is", path)
 
 
 class AppendedFile:

@@ -173,6 +173,7 @@ class _Laser(_Table):
 class _Robot(_Table):
     id: Annotated[str, AfterValidator(_checked_id)]
     kind: Kind = "live"
+    detector: bool = True
     body: _Body | None = None
     drive: _Drive | None = None
     camera: _Camera | None = None
@@ -195,7 +196,9 @@ class _Robot(_Table):
         laser = self.laser
         profile = replace(profile, laser=Pose2D(laser.x_m, laser.y_m, laser.yaw_rad))
         is_described = body is not None and drive is not None
-        return RobotDescription(self.id, self.kind, profile, is_described)
+        return RobotDescription(
+            self.id, self.kind, profile, is_described, self.detector
+        )
 
 
 def _driven(profile: RobotProfile, drive: _Drive) -> RobotProfile:

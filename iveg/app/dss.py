@@ -134,8 +134,10 @@ class Dss:
         return KeptChoices(
             stores.rules,
             stores.contacts,
+            stores.detectors,
             stores.rules.load(first, clock.now()),
             stores.contacts.load(),
+            stores.detectors.load(),
         )
 
     def _ports(self) -> Ports:

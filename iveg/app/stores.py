@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from iveg.adapters.contacts import FileContacts
+from iveg.adapters.detectors import FileDetectors
 from iveg.adapters.history.engine import history_url, sqlite_file
 from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.recorder import Recorder, journal_file
@@ -27,6 +28,7 @@ class Stores:
     journal: FileJournal
     rules: FileRules
     contacts: FileContacts
+    detectors: FileDetectors
     sessions: FileSessions
 
     async def close(self) -> None:
@@ -50,5 +52,6 @@ def open_stores(settings: Settings, data_directory: Path) -> Stores:
         FileJournal(directory / "commands.jsonl"),
         FileRules(directory / "rules.jsonl"),
         FileContacts(directory / "contacts.jsonl"),
+        FileDetectors(directory / "detectors.jsonl"),
         FileSessions(directory / "sessions.jsonl"),
     )

@@ -48,6 +48,7 @@ class World:
         probe: Lag of FIWARE; without one FIWARE's lag is not used.
 
     Attributes:
+        returned_detectors: Whose detector a boot has put back in service, until read.
         ledger: When iVeg's own feedback was composed, which robots echo.
     """
 
@@ -66,6 +67,7 @@ class World:
         self.climate_received: Instant | None = None
         self.counters: Counter[str] = Counter()
         self.feeds = Feeds()
+        self.returned_detectors: list[str] = []
 
     def robot(self, robot_id: str) -> RobotState:
         """One robot.
@@ -115,8 +117,7 @@ class World:
         if verdict == "duplicate" or (received.asked and origin.seq is None):
             return "duplicate"
         if not received.asked:
-            robot.heard_at = at.mono
-            robot.detector.meet_boot(origin.boot)
+            self._hear(robot, origin, at)
         likely = self._likely_age(robot, received, origin)
         if isinstance(observation, DetectionFrame):
             seen_at = self._measured_at(origin, received, likely)
@@ -127,6 +128,12 @@ class World:
         if verdict == "new":
             take_in(robot, received, self._measured_at(origin, received, likely))
         return verdict
+
+    def _hear(self, robot: RobotState, origin: Origin, at: Instant) -> None:
+        """Note that a robot speaks; its next boot puts its detector back in service."""
+        robot.heard_at = at.mono
+        if robot.detector.meet_boot(origin.boot):
+            self.returned_detectors.append(robot.robot_id)
 
     def _note(
         self, observation: Climate | HeartbeatProbe | RefusedFrame, at: Instant

@@ -7,6 +7,7 @@ from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Instant
 from iveg.domain.robot_state import Link, RobotState
+from iveg.domain.stamps import format_stamp
 from iveg.domain.transports import TransportId
 from iveg.models.base import Model, rounded
 from iveg.models.command import Command
@@ -110,6 +111,36 @@ class SpeedLimit(Model):
         )
 
 
+class MissingPremise(Model):
+    """One thing without which a robot is not clear (docs/safety.md, "Clear")."""
+
+    premise: Literal["pose", "doubt", "detector"]
+    robot_id: str
+    """Whose pose, word or detector it is."""
+
+
+class Detector(Model):
+    """Whether the robot's pictures are read whole, and waited for."""
+
+    required: bool
+    """By the fleet file, and not out of service."""
+    missing: bool
+    out_by: str | None
+    """Who took it out of service."""
+    out_since: str | None
+
+    @classmethod
+    def of(cls, robot: RobotState, now: Instant) -> "Detector":
+        """At this moment."""
+        out = robot.detector.out_of_service
+        return cls(
+            required=robot.description.has_detector and out is None,
+            missing=robot.detector.is_missing(now),
+            out_by=None if out is None else out.by,
+            out_since=None if out is None else format_stamp(out.since),
+        )
+
+
 class Battery(Model):
     """The robot's battery, as it said last."""
 
@@ -197,6 +228,9 @@ class Robot(Model):
     applied: Applied | None
     speed_limit: SpeedLimit
     mandate: SpeedLimit
+    missing: list[MissingPremise]
+    """What "clear" lacks, its reason first."""
+    detector: Detector
     holds: list[Hold]
     stop: Command | None
     stop_state: str

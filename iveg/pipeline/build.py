@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import OutOfService
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
@@ -15,6 +16,7 @@ from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
 from iveg.pipeline.command import Commander
 from iveg.pipeline.coverage import CoverageMonitor
+from iveg.pipeline.detectors import Detectors
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopState
@@ -27,6 +29,7 @@ from iveg.pipeline.ports import (
     Clock,
     CommandPort,
     ContactStore,
+    DetectorStore,
     FleetPort,
     MessageSender,
     RuleStore,
@@ -106,12 +109,15 @@ class KeptChoices:
     Attributes:
         rules: Every version of the rule, oldest first.
         contacts: Whom iVeg tells outside.
+        out_of_service: Detectors that nobody waits for, by robot.
     """
 
     rule_store: RuleStore
     contact_store: ContactStore
+    detector_store: DetectorStore
     rules: Sequence[DetectionRule] = ()
     contacts: Contacts = field(default_factory=Contacts)
+    out_of_service: Mapping[str, OutOfService] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +125,7 @@ class Services:
     """Parts beside the rule loop, for people; STOP and speed limits need none."""
 
     rules: Rules
+    detectors: Detectors
     messenger: Messenger
     mapper: Mapper
     coverage: CoverageMonitor
@@ -196,6 +203,7 @@ def build_services(
     alerts.on_raised = messenger.offer
     return Services(
         Rules(evaluator, kept.rule_store, event_log, kept.rules),
+        Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
         messenger,
         Mapper(parts.world, greenhouse.bounds),
         CoverageMonitor(parts.world, greenhouse),

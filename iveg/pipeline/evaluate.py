@@ -12,6 +12,7 @@ from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.events import LogEvent, Slot
 from iveg.domain.exposure import Exposures
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
@@ -257,6 +258,7 @@ class Evaluator:
         """Let time pass: silence, ages, overdue links, alerts, heartbeat."""
         self._started = self._started or now
         self._staleness.tick(now)
+        self._log_returned_detectors(now)
         self.tracking.forget(now)
         self._first_reports.forget(self.people.known)
         self.settle()
@@ -268,6 +270,14 @@ class Evaluator:
         if self.exposures.due(now):
             self._look_at_margins(now)
         self.alerts.sync([*self._conditions(now), *more], now)
+
+    def _log_returned_detectors(self, now: Instant) -> None:
+        returned = self.world.returned_detectors
+        for robot_id in returned:
+            slots: dict[str, Slot] = {"robot": robot_id}
+            event = LogEvent("system", "log.detector_booted", slots, robot_id)
+            self._event_log.log(event, now)
+        returned.clear()
 
     def _look_at_margins(self, now: Instant) -> None:
         fleet = list(self.world.live_robots())

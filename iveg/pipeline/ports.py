@@ -1,9 +1,10 @@
 """Ports of the pipeline: what it needs of the outside, a few verbs each."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, Protocol
 
 from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detector import OutOfService
 from iveg.domain.feedback import Feedback
 from iveg.domain.messages import Contacts, Delivery, Message
 from iveg.domain.observations import Instant
@@ -88,6 +89,13 @@ class RuleStore(Protocol):
 
     async def append(self, rule: DetectionRule) -> None:
         """Write a new version down; returns when it is on disk. Raises HopError."""
+
+
+class DetectorStore(Protocol):
+    """Storage of the detectors out of service."""
+
+    async def save(self, out: Mapping[str, OutOfService]) -> None:
+        """Put them in the place of those before; returns on disk. Raises HopError."""
 
 
 class ContactStore(Protocol):

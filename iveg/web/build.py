@@ -19,6 +19,7 @@ from iveg.web.api import (
     commands,
     costmap,
     coverage,
+    detectors,
     health,
     latency,
     messages,
@@ -90,6 +91,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield commands.router(parts.commander, clock)
     yield alerts.router(evaluator, clock)
     yield rule.router(beside.rules, clock)
+    yield detectors.router(beside.detectors, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock)
     yield health.router(clock, views.health)

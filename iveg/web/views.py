@@ -28,7 +28,9 @@ from iveg.models.people import Person as PersonModel
 from iveg.models.places import GreenhouseMap, Position
 from iveg.models.robot import (
     Applied,
+    Detector,
     Hold,
+    MissingPremise,
     Mode,
     Navigation,
     Pose,
@@ -95,6 +97,11 @@ class Views:
             applied=Applied.of(robot, now),
             speed_limit=limit,
             mandate=limit,
+            missing=[
+                MissingPremise(premise=one.premise, robot_id=one.robot_id)
+                for one in self._evaluator.missing(robot_id)
+            ],
+            detector=Detector.of(robot, now),
             holds=[] if safety is None else [Hold.of(one) for one in safety.holds],
             stop=None if machine.stop is None else self.command(machine.stop, now),
             stop_state=machine.state,

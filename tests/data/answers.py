@@ -102,6 +102,7 @@ async def _world() -> WebDesk:
     desk = WebDesk()
     desk.drive("AGI", 3.0)
     desk.drive("AGII", 9.0)
+    desk.hear(detection_frame("AGII", origin=desk.next_origin()))
     desk.hear(scan("AGI", origin=desk.next_origin()))
     path = ((3.0, 0.0), (8.0, 0.5))
     desk.hear(Navigation("AGI", desk.next_origin(), "row 4", (8.0, 0.5), path))

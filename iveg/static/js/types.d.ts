@@ -280,6 +280,16 @@ export type DetectionFrame = {
   items: Detection[];
 };
 
+/** Whether the robot's pictures are read whole, and waited for. */
+export type Detector = {
+  /** By the fleet file, and not out of service. */
+  required: boolean;
+  missing: boolean;
+  /** Who took it out of service. */
+  out_by: string | null;
+  out_since: string | null;
+};
+
 /** One drill and its verdict. */
 export type Drill = {
   robot_id: string;
@@ -553,6 +563,13 @@ export type Messages = {
   counts: Record<string, number>;
 };
 
+/** One thing without which a robot is not clear (docs/safety.md, "Clear"). */
+export type MissingPremise = {
+  premise: "pose" | "doubt" | "detector";
+  /** Whose pose, word or detector it is. */
+  robot_id: string;
+};
+
 /** The robot's intent, in ``map`` (m). */
 export type Navigation = {
   task: string;
@@ -720,6 +737,9 @@ export type Robot = {
   applied: Applied | null;
   speed_limit: SpeedLimit;
   mandate: SpeedLimit;
+  /** What "clear" lacks, its reason first. */
+  missing: MissingPremise[];
+  detector: Detector;
   holds: Hold[];
   stop: Command | null;
   stop_state: string;

@@ -22,6 +22,7 @@ from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
 from iveg.web.security.authentication import Authenticator, NotifySecret, Role
 from iveg.web.views import Views
+from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.rule_store import FakeRuleStore
 from tests.unit.pipeline.desk import Desk
@@ -48,8 +49,9 @@ class WebDesk(Desk):
         )
         self.rule_store = FakeRuleStore()
         self.contact_store = FakeContacts()
+        self.detector_store = FakeDetectorStore()
         self.senders = {name: FakeSender(name) for name in CHANNELS}
-        kept = KeptChoices(self.rule_store, self.contact_store)
+        kept = KeptChoices(self.rule_store, self.contact_store, self.detector_store)
         self.services = build_services(self.parts, kept, {**self.senders}, self.clock)
         self.rules = self.services.rules
         self.views = Views(self.parts, lambda: Counter({"some": 1}))

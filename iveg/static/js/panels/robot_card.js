@@ -6,6 +6,7 @@
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
 import { all, setAttribute, setHidden, setText } from "./dom.js";
+import { createDetector } from "./detector.js";
 import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
 import { drawReadings } from "./readings.js";
@@ -36,6 +37,7 @@ export class RobotCard {
   #gauge = createGauge();
   #release;
   #drill;
+  #detector;
 
   /** @param {App} app @param {HTMLElement} card */
   constructor(app, card) {
@@ -47,6 +49,7 @@ export class RobotCard {
     this.#ages = all("[data-age]", card);
     this.#release = createRelease(app, card, this.#robotId);
     this.#drill = createDrill(app, card, this.#robotId);
+    this.#detector = createDetector(app, card, this.#robotId);
     this.#parts.gauge.append(this.#gauge.svg, this.#gauge.bar);
     this.#parts.menu.addEventListener("click", (event) => this.#toggle(event));
     this.#parts.follow.addEventListener("click", () => this.#follow());
@@ -64,6 +67,7 @@ export class RobotCard {
     if (dialogs.isOpen(this.#panel)) this.#drawMarginParts(robot);
     this.#release.draw(robot);
     this.#drill.draw(this.#release.factsOf(robot));
+    this.#detector.draw(robot);
   }
 
   get #panel() {

@@ -54,6 +54,10 @@ export function whySaid(robot, i18n) {
   }
   const isLimited = (robot.speed_limit?.speed_factor ?? 1) < 1;
   const reason = isLimited ? robot.speed_limit?.reason : robot.applied?.reason;
+  const [lacks] = robot.missing ?? [];
+  if (isLimited && lacks && (reason === "stale" || reason === "doubt")) {
+    return missingSaid(lacks, robot.robot_id, i18n);
+  }
   const distance = robot.speed_limit?.distance_m ?? null;
   if (distance === null && (reason === "person" || reason === "robot")) {
     return i18n.t(`why.${reason}`);
@@ -61,6 +65,18 @@ export function whySaid(robot, i18n) {
   const isHollow = isWaiting(robot) || isSilent(linkOfRobot(robot));
   if (!reason || (reason === "clear" && isHollow)) return "";
   return i18n.t(`robot.why.${reason}`, { distance });
+}
+
+/**
+ * What a robot lacks to be clear.
+ *
+ * @param {import("../types.js").MissingPremise} lacks
+ * @param {string} ownId
+ * @param {I18n} i18n
+ */
+function missingSaid({ premise, robot_id }, ownId, i18n) {
+  const own = premise !== "pose" && robot_id === ownId ? "_own" : "";
+  return i18n.t(`robot.missing.${premise}${own}`, { robot: robot_id });
 }
 
 /** Whether a robot has ever sent a pose or a report. @param {Robot | undefined} robot */

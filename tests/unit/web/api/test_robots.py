@@ -30,7 +30,7 @@ async def test_a_robot_that_was_never_heard_is_all_unknown() -> None:
     assert isinstance(told, dict)
     assert told["link"] == "UNKNOWN"
     assert (told["pose"], told["age_s"], told["speed_factor"]) == (None, None, None)
-    assert told["speed_limit"]["speed_factor"] == 1.0
+    assert told["speed_limit"]["speed_factor"] == 0.5
     assert told["mandate"] == told["speed_limit"]
 
 
@@ -117,7 +117,7 @@ async def test_a_robot_that_is_to_stop_is_told_with_its_command() -> None:
     told = await get(desk, "/robots/AGI")
 
     assert isinstance(told, dict)
-    assert (told["mode"], told["stop_state"]) == ("RUNNING", "SENT")
+    assert (told["mode"], told["stop_state"]) == ("SLOW", "SENT")
     assert told["stop"]["requested_by"] == "ana"
     assert told["stop"]["transports"] == {"direct": "ok", "fiware": "pending"}
     assert told["stop"]["roads"] == told["stop"]["transports"]
@@ -159,7 +159,7 @@ async def test_a_robot_is_stopped_when_it_says_so_and_not_when_it_was_asked() ->
 
     desk.report("AGI", Hold(hold_id, "iveg", "remote"))
 
-    assert asked == "RUNNING"
+    assert asked == "SLOW"
     assert desk.views.robot("AGI", desk.clock()).mode == "STOPPED"
 
 
