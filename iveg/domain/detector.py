@@ -37,7 +37,9 @@ def flaw_of(
     if turned_away:
         return "overload"
     unread = frame.unread
-    return "unreadable" if None in unread or any(map(rule.class_of, unread)) else None
+    if None in unread or any(map(rule.class_of, unread)):
+        return "unreadable"
+    return None
 
 
 @dataclass(frozen=True, slots=True)

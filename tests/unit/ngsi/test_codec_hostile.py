@@ -12,12 +12,13 @@ from iveg.domain.observations import (
     LaserScan,
     Navigation,
     Odometry,
+    RefusedFrame,
     SafetyReport,
 )
 from iveg.ngsi import codec, payloads
 from tests.builders import notification, pose_value
 
-BOX = {
+BOX: dict[str, object] = {
     "class_id": "farmer",
     "probability": 0.9,
     "position": dict.fromkeys(("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"), 1.0),
@@ -332,3 +333,59 @@ def test_a_scan_with_a_bad_header_is_refused_whole() -> None:
     reading = codec.read_measure("AGI_lidar2D", payload)
 
     assert not [one for one in reading.observations if isinstance(one, LaserScan)]
+
+
+# --- frames that cannot be read --------------------------------------------------
+
+HEADER = {"boot": "b", "seq": 1, "stamp": "2026-11-21T03:31:20.000Z"}
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        {"bounding_boxes": [BOX] * 257, "detection_header": HEADER},
+        {"bounding_boxes": [BOX], "detection_header": {**HEADER, "stamp": 17e8}},
+        {"bounding_boxes": "none", "detection_header": HEADER},
+        {"class": "farmer", "conf": 0.9, "timestamp": 5},
+    ],
+)
+def test_a_frame_that_cannot_be_read_is_refused_and_never_an_empty_picture(
+    attributes: dict[str, object],
+) -> None:
+    reading = codec.read_attributes("AGI", attributes)
+
+    assert reading.observations == (RefusedFrame("AGI"),)
+    assert len(reading.problems) == 1
+
+
+@pytest.mark.parametrize("payload", [b"{", b"[]", b'{"bounding_boxes": [NaN]}'])
+def test_bytes_of_a_detector_that_are_no_measure_are_a_refused_frame(
+    payload: bytes,
+) -> None:
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", payload)
+
+    assert reading.observations == (RefusedFrame("AGI"),)
+
+
+def test_bytes_of_another_device_that_are_no_measure_refuse_no_frame() -> None:
+    assert codec.read_measure("AGI_odom", b"{").observations == ()
+
+
+def test_a_bad_box_keeps_the_good_ones_and_tells_its_class() -> None:
+    unsure: dict[str, object] = {**BOX, "probability": 95}
+    boxes = [BOX, unsure, {**unsure, "class_id": "tomato"}, {**unsure, "class_id": 7}]
+
+    (frame,) = codec.read_attributes("AGI", {"bounding_boxes": boxes}).observations
+
+    assert isinstance(frame, DetectionFrame)
+    assert len(frame.detections) == 1
+    assert frame.unread == ("farmer", "tomato", None)
+
+
+def test_a_single_payload_without_a_place_keeps_its_class() -> None:
+    told = {"class": "tomato", "conf": 0.9, "timestamp": HEADER["stamp"]}
+
+    (frame,) = codec.read_attributes("AGI", told).observations
+
+    assert isinstance(frame, DetectionFrame)
+    assert frame.unread == ("tomato",)
