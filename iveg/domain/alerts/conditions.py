@@ -68,7 +68,7 @@ def of_detector(
         yield Condition("P2", "alert.unreadable_detection", name, name, slots)
     if _is_recent(robot.clock.detector_apart_at, now):
         yield Condition("P2", "alert.detector_clock", name, name, slots)
-    elif _is_silent(robot, now, started):
+    if _is_silent(robot, now, started):
         yield Condition("P2", "alert.detector_silent", name, name, slots)
     if detector.out_of_service is not None:
         slots = {**slots, "by": detector.out_of_service.by}
@@ -80,6 +80,8 @@ def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
     detector, link = robot.detector, robot.link(now)
     if detector.is_flawed(now) or not detector.is_missing(now) or link == "LOST":
         return False
+    if _is_recent(robot.clock.detector_apart_at, now, LIMITS.silence_s):
+        return False  # it speaks, by another clock
     whole_at = detector.whole_at
     if link == "LATE" and whole_at is not None:
         # Everything of it is late; the robot itself is reported as lost before this.
@@ -97,8 +99,8 @@ def of_kind(robot: RobotState, now: Instant) -> Iterable[Condition]:
         yield Condition("P2", "alert.replay_refused", name, name, slots)
 
 
-def _is_recent(moment: float | None, now: Instant) -> bool:
-    return moment is not None and now.mono - moment < SHOWN_S
+def _is_recent(moment: float | None, now: Instant, within_s: float = SHOWN_S) -> bool:
+    return moment is not None and now.mono - moment < within_s
 
 
 def _may_be_late_s(robot: RobotState, now: Instant) -> float:

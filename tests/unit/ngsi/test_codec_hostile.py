@@ -18,7 +18,7 @@ from iveg.domain.observations import (
 from iveg.ngsi import codec, payloads
 from tests.builders import notification, pose_value
 
-BOX: dict[str, object] = {
+BOX = {
     "class_id": "farmer",
     "probability": 0.9,
     "position": dict.fromkeys(("xmin", "xmax", "ymin", "ymax", "zmin", "zmax"), 1.0),
@@ -344,7 +344,7 @@ HEADER = {"boot": "b", "seq": 1, "stamp": "2026-11-21T03:31:20.000Z"}
     "attributes",
     [
         {"bounding_boxes": [BOX] * 257, "detection_header": HEADER},
-        {"bounding_boxes": [BOX], "detection_header": {**HEADER, "stamp": 17e8}},
+        {"bounding_boxes": [BOX], "detection_header": HEADER | {"stamp": 17e8}},
         {"bounding_boxes": "none", "detection_header": HEADER},
         {"class": "farmer", "conf": 0.9, "timestamp": 5},
     ],
