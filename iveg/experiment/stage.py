@@ -19,7 +19,7 @@ from iveg.ngsi import codec
 from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.loop import RuleLoop
 from iveg.robot.echo import Echo
-from iveg.robot.effects import Drive, Effect, Report
+from iveg.robot.effects import Answer, Drive, Effect, Report
 from iveg.robot.gate import REST
 from iveg.robot.holds import HoldSet
 from iveg.robot.judgement import Limits
@@ -108,6 +108,15 @@ class StagedRobot:
         self._echo.take(feedback.origin)
         self._perform(self._machine.feedback(topic, feedback, now.mono), now)
 
+    def order(self, payload: bytes, now: Instant) -> None:
+        """Take an order that iVeg sends to this robot."""
+        self._perform(self._machine.command(payload, now.mono), now)
+
+    @property
+    def speed(self) -> float:
+        """True speed (m/s)."""
+        return abs(self._rig.vehicle.twist.linear_x)
+
     def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
         for effect in effects:
             match effect:
@@ -116,6 +125,9 @@ class StagedRobot:
                 case Report(report):
                     seq, (_, message) = self._uplink.report(report, self._dated(now))
                     self._machine.reported(seq, now.mono)
+                    self._say(message.topic, message.payload)
+                case Answer(answer):
+                    message = self._uplink.answer(answer, self._dated(now))
                     self._say(message.topic, message.payload)
 
     def _say(self, topic: str, payload: bytes) -> None:
@@ -140,6 +152,9 @@ class Stage:
         move_clock: Advances the clock by seconds; returns the time.
         hear: Called with each message of a robot, from its creation on.
         looked, scan_every: As for ``StagedRobot``.
+
+    Attributes:
+        robots: Its robots, by id.
     """
 
     def __init__(
@@ -160,7 +175,7 @@ class Stage:
         self._ingest, self._loop, self._told = ingest, loop, told
         self._move_clock = move_clock
         self.now = move_clock(0.0)
-        self._robots = {
+        self.robots = {
             robot_id: StagedRobot(rig, self.now, hear, looked, scan_every)
             for robot_id, rig in world.rigs.items()
         }
@@ -176,14 +191,14 @@ class Stage:
             if number == round(at_s / STEP_S):
                 self.happen(order)
         self._world.walk(STEP_S)
-        for robot in self._robots.values():
+        for robot in self.robots.values():
             robot.step(number, self._world, self.now)
         self._loop.step(self._ingest.drain(), self.now)
         self._deliver()
 
     def happen(self, order: FaultOrder) -> None:
         """Inject a fault into a robot, or end it."""
-        self._robots[order.robot].obey(order)
+        self.robots[order.robot].obey(order)
 
     def _deliver(self) -> None:
         """Deliver new feedback to every robot."""
@@ -191,5 +206,5 @@ class Stage:
         self._delivered += len(told)
         for feedback in told:
             payload = codec.write_feedback(feedback)
-            for robot in self._robots.values():
+            for robot in self.robots.values():
                 robot.listen(feedback.robot_id, payload, self.now)

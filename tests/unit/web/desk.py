@@ -9,6 +9,7 @@ from functools import cache
 import httpx
 import uvicorn
 
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
 from iveg.pipeline.build import KeptChoices, build_services
@@ -25,7 +26,7 @@ from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.rule_store import FakeRuleStore
-from tests.unit.pipeline.desk import Desk
+from tests.unit.pipeline.desk import FIELD, Desk
 
 HOST = "iveg.test"
 API_TOKEN = "a-token-for-programs"
@@ -38,8 +39,12 @@ _pages = cache(Pages)
 class WebDesk(Desk):
     """A desk that browsers, programs and Orion can reach."""
 
-    def __init__(self, robots: tuple[str, ...] = ("AGI", "AGII")) -> None:
-        super().__init__(robots)
+    def __init__(
+        self,
+        robots: tuple[str, ...] = ("AGI", "AGII"),
+        greenhouse: Greenhouse = FIELD,
+    ) -> None:
+        super().__init__(robots, greenhouse)
         self.heard: list[Instant] = []
         self.queues = metrics.Queues({"ingest": 3}, {"history": 2}, {"stop_send": 1})
         self.authenticator = Authenticator(

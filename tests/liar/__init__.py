@@ -1,0 +1,1 @@
+"""One part lies by a seeded script while honest robots drive among people."""
