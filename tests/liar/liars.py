@@ -3,6 +3,7 @@
 A liar is given the field before each step, and may alter what passes its part.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from random import Random
 from typing import Any
@@ -57,16 +58,16 @@ def wild(value: Any, rnd: Random) -> Any:
     return rnd.choice(_WILD)
 
 
-class _Telemetry(Liar):
+class _Telemetry(Liar, ABC):
     """Alters what the liar's robot sends."""
 
     def __init__(self, field: Field, rnd: Random) -> None:
         super().__init__(field, rnd)
         field.alter = self.alter
 
+    @abstractmethod
     def alter(self, topic: str, payload: bytes) -> list[tuple[str, bytes]]:
         """What is sent instead."""
-        raise NotImplementedError
 
 
 class RobotLies(_Telemetry):
