@@ -64,7 +64,7 @@ class Detector:
         whole_at: The newest frame that was read whole was not measured before this
             moment; None before the first, and while its age is not known.
         flawed_at: When a frame was last not read whole, by flaw.
-        worked: Whether a frame was ever read whole.
+        worked: Whether it was ever proven to work.
         out_of_service: None: it is required.
     """
 
@@ -87,7 +87,8 @@ class Detector:
 
     def note_whole(self, measured_at: float | None) -> None:
         """Note a frame that was read whole; None: nobody knows its age."""
-        self.whole_at, self.worked = measured_at, True
+        self.whole_at = measured_at
+        self.worked = self.worked or measured_at is not None
 
     def note_flaw(self, flaw: Flaw, now: Instant) -> None:
         """Note a frame that was not."""

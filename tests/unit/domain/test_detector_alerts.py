@@ -1,0 +1,108 @@
+"""When a detector asks for people, and under which name."""
+
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.alerts import conditions
+from iveg.domain.detector import OutOfService
+from iveg.domain.observations import RefusedFrame
+from iveg.domain.world import World
+from tests.builders import START, at, detection_frame, odometry, origin, received
+
+STARTED = at(-60.0)
+
+
+def driving(world: World | None = None, now: float = 0.0) -> World:
+    """AGI tells its pose at ``now``."""
+    world = world or World(["AGI"])
+    said = odometry("AGI", origin=origin(round(100 * now), after=now))
+    world.apply(received(said, after=now))
+    return world
+
+
+def keys(world: World, now: float, started: float = -60.0) -> list[str]:
+    found = conditions.of_detector(world.robot("AGI"), at(now), started=at(started))
+    assert {one.priority for one in found} <= {"P2"}
+    return [
+        one.key
+        for one in conditions.of_detector(
+            world.robot("AGI"), at(now), started=at(started)
+        )
+    ]
+
+
+def test_a_detector_that_worked_and_falls_silent_is_told_at_once() -> None:
+    world = driving()
+    world.robot("AGI").detector.note_whole(START.mono)
+    driving(world, 1.0)
+
+    assert keys(world, 1.0) == []
+    assert keys(world, 1.01) == ["alert.detector_silent"]
+
+
+@pytest.mark.parametrize(("since", "told"), [(9.9, False), (10.0, True)])
+def test_one_that_never_worked_has_ten_seconds_to_begin(
+    since: float, *, told: bool
+) -> None:
+    assert bool(keys(driving(), 0.0, -since)) is told
+
+
+def test_a_frame_whose_age_is_not_proven_yet_is_no_loss() -> None:
+    world = driving()
+    world.robot("AGI").detector.note_whole(None)
+
+    assert keys(world, 0.0, -1.0) == []
+
+
+@pytest.mark.parametrize("now", [2.0, 4.0])
+def test_of_a_robot_that_is_late_or_lost_itself_the_detector_is_no_news(
+    now: float,
+) -> None:
+    world = driving()
+    world.robot("AGI").detector.note_whole(START.mono)
+
+    assert keys(world, now) == []
+
+
+def test_of_a_robot_that_stays_late_it_is() -> None:
+    world = driving()
+    world.robot("AGI").detector.note_whole(START.mono)
+    driving(world, 6.0)
+
+    assert keys(world, 7.5) == ["alert.detector_silent"]
+
+
+def test_a_refused_frame_is_told_for_ten_seconds() -> None:
+    world = driving()
+    world.apply(received(RefusedFrame("AGI")))
+    driving(world, 9.0)
+    world.robot("AGI").detector.note_whole(at(9.5).mono)
+
+    assert keys(world, 9.9) == ["alert.unreadable_detection"]
+    assert keys(world, 10.1) == []
+
+
+def test_a_detector_by_another_clock_is_not_called_silent() -> None:
+    world = driving()
+    frame = detection_frame("AGI", origin=origin(1, after=-600.0))
+    world.apply(received(frame, after=0.1))
+
+    assert keys(world, 0.1) == ["alert.detector_clock"]
+
+
+def test_out_of_service_it_is_a_notice_and_not_silence() -> None:
+    world = driving()
+    world.robot("AGI").detector.out_of_service = OutOfService("maria", 1.0)
+
+    (found,) = conditions.of_detector(world.robot("AGI"), at(0.0), started=STARTED)
+
+    assert (found.priority, found.key) == ("P3", "alert.detector_out_of_service")
+
+
+def test_a_robot_without_a_detector_lacks_none() -> None:
+    world = driving()
+    robot = world.robot("AGI")
+    robot.description = replace(robot.description, has_detector=False)
+
+    assert keys(world, 0.0) == []
