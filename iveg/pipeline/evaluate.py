@@ -324,7 +324,9 @@ class Evaluator:
         evidence = evidence_of(
             report, self.decisions, self.people, self.world, self.greenhouse
         )
-        self._event_log.log(speed_line(report, evidence), at)
+        self._event_log.log(
+            speed_line(report, evidence, self.missing(report.robot_id)), at
+        )
 
     def _log_speed_limit(
         self, robot_id: str, before: SpeedLimit, after: SpeedLimit, at: Instant

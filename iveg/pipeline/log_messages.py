@@ -1,5 +1,6 @@
 """Log lines about speeds and alerts: template, and what fills its holes."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from iveg.domain.alerts.alert_book import Alert
@@ -11,6 +12,7 @@ from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import SafetyReport
 from iveg.domain.robot_state import RobotState
+from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person
@@ -117,6 +119,12 @@ def _of_person(
     )
 
 
+def _first_of(missing: Iterable[Missing], report: SafetyReport) -> Missing | None:
+    """The premise whose lack a robot reports as its reason."""
+    told = report.reason, report.cause
+    return next((one for one in missing if (one.reason, one.robot_id) == told), None)
+
+
 def _of_peer(
     peer: RobotState, robot: RobotState, greenhouse: Greenhouse
 ) -> SlowdownCauses | None:
@@ -132,8 +140,15 @@ def _of_peer(
     )
 
 
-def speed_line(report: SafetyReport, evidence: SlowdownCauses | None) -> LogEvent:
-    """A robot applies another factor than before, and why."""
+def speed_line(
+    report: SafetyReport,
+    evidence: SlowdownCauses | None,
+    missing: Iterable[Missing] = (),
+) -> LogEvent:
+    """A robot applies another factor than before, and why.
+
+    ``missing``: what it lacks to be clear; an old pose is told as any old data.
+    """
     slots: dict[str, Slot] = {
         "robot": report.robot_id,
         "factor": report.speed_factor,
@@ -143,6 +158,10 @@ def speed_line(report: SafetyReport, evidence: SlowdownCauses | None) -> LogEven
     key = "log.speed_up"
     if report.speed_factor < FULL_SPEED:
         key = f"log.speed_down.{report.reason}"
+        lacks = _first_of(missing, report)
+        if lacks is not None and lacks.premise != "pose":
+            key = f"log.speed_down.{lacks.premise}"
+            slots["observer"] = lacks.robot_id
         if evidence is not None:
             key += "" if evidence.in_sight else "_nlos"
             slots |= {

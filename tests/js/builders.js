@@ -36,6 +36,8 @@ export function robot(changes = {}) {
     applied: null,
     speed_limit: CLEAR,
     mandate: CLEAR,
+    missing: [],
+    detector: { required: true, missing: false, out_by: null, out_since: null },
     holds: [],
     stop: null,
     stop_state: "RUNNING",

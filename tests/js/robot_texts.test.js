@@ -1,5 +1,6 @@
 import { isSilent } from "../../iveg/static/js/core/clock.js";
 import { createLabels } from "../../iveg/static/js/map/layers/labels.js";
+import { detectorSaid } from "../../iveg/static/js/panels/detector.js";
 import { createGauge, readingOf } from "../../iveg/static/js/panels/gauge.js";
 import {
   certaintySaid,
@@ -151,4 +152,43 @@ test("what a restart restored has an age that nobody knows, and says so on the m
     [labels.ago(12.4), labels.ago(Number.POSITIVE_INFINITY)],
     ["map.ghost 12", "? s"],
   );
+});
+
+/** @param {string} premise @param {string} robot_id @param {string} reason */
+function lacking(premise, robot_id, reason) {
+  return robot({
+    speed_limit: { speed_factor: 0.5, reason, cause: robot_id, distance_m: null },
+    missing: [{ premise, robot_id }],
+  });
+}
+
+test("a robot says what it lacks to be clear, and whose it is", () => {
+  equal(whySaid(lacking("pose", "AGI", "stale"), words), "robot.missing.pose AGI");
+  equal(
+    whySaid(lacking("detector", "AGI", "stale"), words),
+    "robot.missing.detector_own AGI",
+  );
+  equal(
+    whySaid(lacking("detector", "AGII", "stale"), words),
+    "robot.missing.detector AGII",
+  );
+  equal(whySaid(lacking("doubt", "AGII", "doubt"), words), "robot.missing.doubt AGII");
+});
+
+test("near a person that is the reason, whatever else is missing", () => {
+  const near = robot({
+    speed_limit: { speed_factor: 0.5, reason: "person", distance_m: 1.4 },
+    missing: [{ premise: "detector", robot_id: "AGII" }],
+  });
+  equal(whySaid(near, words), "robot.why.person 1.4");
+});
+
+test("a camera is read, not read, out of service or not there", () => {
+  const said = (/** @type {object} */ detector) =>
+    detectorSaid(robot({ detector }), words);
+  const out = { out_by: null, out_since: null };
+  equal(said({ required: true, missing: false, ...out }), "detector.state.works");
+  equal(said({ required: true, missing: true, ...out }), "detector.state.missing");
+  equal(said({ required: false, missing: true, ...out }), "detector.state.none");
+  equal(detectorSaid(undefined, words), "");
 });

@@ -3,6 +3,8 @@
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import SafetyReport
+from iveg.domain.rule.premises import Missing
+from iveg.pipeline.log_messages import speed_line
 from tests.builders import detection, safety_report
 from tests.unit.pipeline.desk import Desk
 
@@ -154,3 +156,20 @@ def test_full_speed_again_has_one_sentence_whatever_it_was_for() -> None:
     desk.report("AGI", factor=1.0, reason="clear")
 
     assert told(desk)[0] == "log.speed_up"
+
+
+def test_a_slow_down_for_a_camera_that_is_not_read_names_it() -> None:
+    report = safety_report(speed_factor=0.5, reason="stale", cause="AGII")
+    lacks = Missing("doubt", "AGII"), Missing("detector", "AGII")
+
+    line = speed_line(report, None, lacks)
+
+    assert (line.key, line.slots["observer"]) == ("log.speed_down.detector", "AGII")
+
+
+def test_a_slow_down_for_an_old_pose_is_told_as_old_data() -> None:
+    report = safety_report(speed_factor=0.5, reason="stale", cause="AGI")
+
+    line = speed_line(report, None, [Missing("pose", "AGI")])
+
+    assert line.key == "log.speed_down.stale"

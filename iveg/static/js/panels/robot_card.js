@@ -5,8 +5,8 @@
  */
 
 import { aboutAge, ageOf, linkOfRobot } from "../core/clock.js";
-import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDetector } from "./detector.js";
+import { all, setAttribute, setHidden, setText } from "./dom.js";
 import { createDrill } from "./drill.js";
 import { createGauge } from "./gauge.js";
 import { drawReadings } from "./readings.js";
