@@ -33,7 +33,7 @@ from cyclonedds.util import duration
 from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.dds import Dds, DdsReader, DdsWriter, announced, write_qos
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback
+from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.ros2 import cdr, names
@@ -162,7 +162,8 @@ async def iveg(address: BrokerAddress, ended: asyncio.Event) -> None:
     while not ended.is_set():
         await asyncio.sleep(0.1)
         seq += 1
-        said = Feedback("AGI", Origin("b", seq), seen=dict(seen))
+        clear = {"AGI": CLEAR}
+        said = Feedback("AGI", Origin("b", seq), speed_limits=clear, seen=dict(seen))
         link.offer("/AGI/mqtt_feedback", codec.write_feedback(said), 1)
     running.cancel()
     await asyncio.gather(running, return_exceptions=True)

@@ -12,7 +12,7 @@ from typing import TypeVar
 import aiomqtt
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback, SpeedLimit
+from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.observations import (
     CommandAnswer,
     Observation,
@@ -120,7 +120,7 @@ class Cloud:
                 feedback = Feedback(
                     robot_id,
                     Origin("cloud", seq),
-                    speed_limits=dict(self.speed_limits),
+                    speed_limits=dict.fromkeys(self.heard, CLEAR) | self.speed_limits,
                     seen=seen,
                 )
                 self.link.offer(

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback, SpeedLimit
+from iveg.domain.feedback import CLEAR, Feedback, SpeedLimit
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
@@ -86,9 +86,7 @@ class Cloud:
             if self.speaks and self.link.connected and self.reports:
                 self.seq += 1
                 newest = self.reports[-1].origin.seq or 0
-                speed_limits = (
-                    {} if self.speed_limit is None else {"AGI": self.speed_limit}
-                )
+                speed_limits = {"AGI": self.speed_limit or CLEAR}
                 feedback = Feedback(
                     "AGII",
                     Origin(self.boot, self.seq),

@@ -11,7 +11,7 @@ import pytest
 
 from iveg.adapters import clock
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.domain.feedback import Feedback
+from iveg.domain.feedback import CLEAR, Feedback
 from iveg.domain.observations import Origin, SafetyReport
 from iveg.ngsi import codec
 from iveg.ngsi.names import direct_topic
@@ -79,7 +79,10 @@ class Iveg:
         while True:
             seq += 1
             heard = 0 if self.report is None else self.report.origin.seq or 0
-            said = Feedback(ROBOT, Origin("b", seq), seen={ROBOT: heard})
+            clear = {ROBOT: CLEAR}
+            said = Feedback(
+                ROBOT, Origin("b", seq), speed_limits=clear, seen={ROBOT: heard}
+            )
             topic = f"/{ROBOT}/mqtt_feedback"
             self.link.offer(topic, codec.write_feedback(said), 1)
             await asyncio.sleep(0.1)
