@@ -35,6 +35,10 @@ class FeedbackLedger:
         if len(self._moments) > 2 * _KEPT:
             del self._firsts[:_KEPT], self._moments[:_KEPT]
 
+    def is_unsent(self, heard: FeedbackRef | None) -> bool:
+        """Whether a robot names feedback of this boot that was never sent."""
+        return heard is not None and heard.boot == self._boot and heard.seq > self._last
+
     def composed_at(self, heard: FeedbackRef | None) -> float | None:
         """The moment when that feedback was composed, or earlier (monotonic, s).
 

@@ -56,6 +56,7 @@ class RobotState:
         estimated_since: When odometry first came that proves nothing, if the newest
             does not (monotonic, s).
         unproven_since: When odometry first came whose age nobody knows (monotonic, s).
+        alive_since: When odometry came again after a silence (monotonic, s).
         heard_at: Arrival of the newest message of any kind (monotonic, s).
         detections_at: Like ``pose_at``, of the newest detection frame.
         sighted_at: The same of the frame that was taken last, newest or not; where
@@ -79,6 +80,7 @@ class RobotState:
     pose_at: float | None = None
     estimated_since: float | None = None
     unproven_since: float | None = None
+    alive_since: float | None = None
     scan: LaserScan | None = None
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None

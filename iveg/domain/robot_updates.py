@@ -1,5 +1,6 @@
 """Updates of one robot's state by the newest observation of each kind."""
 
+from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     CommandAnswer,
     CommandStatus,
@@ -85,6 +86,9 @@ def _drive(
     )
     if before is not None and not (robot.trusted_pose and robot.doubts.is_open(at)):
         robot.trusted_pose = before.pose
+    heard = robot.odometry_received
+    if heard is None or at.mono - heard.mono > LIMITS.silence_s:
+        robot.alive_since = at.mono
     robot.odometry, robot.odometry_received = odometry, at
     if before is not None and before.origin.boot != origin.boot:
         robot.forget_poses()  # another boot counts its seconds anew

@@ -12,6 +12,7 @@ from iveg.domain.age import FeedbackLedger
 from iveg.domain.errors import UnknownRobotError
 from iveg.domain.feeds import Feeds
 from iveg.domain.fleet import FleetDescription
+from iveg.domain.geometry import Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import (
     UNKNOWN_ORIGIN,
@@ -29,6 +30,7 @@ from iveg.domain.observations import (
     SafetyReport,
     kind_of,
 )
+from iveg.domain.plausibility import Plausibility
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_state import RobotState
 from iveg.domain.robot_updates import dated, learn_kind, take_in
@@ -46,6 +48,7 @@ class World:
     Args:
         fleet: Its robots; ids alone are robots without a description.
         probe: Lag of FIWARE; without one FIWARE's lag is not used.
+        bounds: Of the greenhouse; without them a robot may be anywhere.
 
     Attributes:
         returned_detectors: Whose detector a boot has put back in service, until read.
@@ -53,9 +56,13 @@ class World:
     """
 
     def __init__(
-        self, fleet: FleetDescription | Iterable[str], probe: ProbeLag | None = None
+        self,
+        fleet: FleetDescription | Iterable[str],
+        probe: ProbeLag | None = None,
+        bounds: Rectangle | None = None,
     ) -> None:
         self.ledger = FeedbackLedger()
+        self._plausibility = Plausibility(bounds, self.ledger)
         self._probe = probe
         if not isinstance(fleet, FleetDescription):
             fleet = FleetDescription.undescribed(fleet)
@@ -126,8 +133,17 @@ class World:
                 seen_at = at.mono - (likely or 0.0)
             robot.sighted_at = dated(at, seen_at)
         if verdict == "new":
+            self._doubt(robot, received)
             take_in(robot, received, self._measured_at(origin, received, likely))
         return verdict
+
+    def _doubt(self, robot: RobotState, received: Received) -> None:
+        """Note what contradicts the robot's state; recordings may jump as they like."""
+        if robot.is_replay or received.asked:
+            return
+        for code in self._plausibility.contradictions(robot, received):
+            robot.doubts.contradicted(code, received.at)
+            self.counters[f"contradicted.{code}"] += 1
 
     def _hear(self, robot: RobotState, origin: Origin, at: Instant) -> None:
         """Note that a robot speaks; its next boot puts its detector back in service."""

@@ -138,7 +138,7 @@ def build(
     start, hub = ports.clock(), Hub()
     event_log = EventLog(hub, ports.sink, start)
     health_monitor = HealthMonitor(start, ports.history_state)
-    world = World(fleet, health_monitor.probe)
+    world = World(fleet, health_monitor.probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
     ingest = Ingest(

@@ -77,15 +77,17 @@ def of_detector(
 
 def _is_silent(robot: RobotState, now: Instant, started: Instant) -> bool:
     """Whether people are to look after it: not while it starts, nor of a lost robot."""
-    detector, link = robot.detector, robot.link(now)
-    if detector.is_flawed(now) or not detector.is_missing(now) or link == "LOST":
+    detector = robot.detector
+    if detector.is_flawed(now) or not detector.is_missing(now):
+        return False
+    if robot.link(now) == "LOST":
         return False
     if _is_recent(robot.clock.detector_apart_at, now, LIMITS.silence_s):
         return False  # it speaks, by another clock
-    whole_at = detector.whole_at
-    if link == "LATE" and whole_at is not None:
-        # Everything of it is late; the robot itself is reported as lost before this.
-        return now.mono - whole_at > 2 * LIMITS.late_s
+    if detector.whole_at is not None and robot.pose_at is not None:
+        # Else all of it is late or has just come back: the robot itself is reported.
+        is_alive = now.mono - (robot.alive_since or now.mono) > LIMITS.silence_s
+        return is_alive and robot.pose_at - detector.whole_at > LIMITS.silence_s
     return detector.worked or now.mono - started.mono >= DETECTOR_STARTS_S
 
 

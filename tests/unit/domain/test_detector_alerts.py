@@ -37,8 +37,9 @@ def test_a_detector_that_worked_and_falls_silent_is_told_at_once() -> None:
     world.robot("AGI").detector.note_whole(START.mono)
     driving(world, 1.0)
 
-    assert keys(world, 1.0) == []
-    assert keys(world, 1.01) == ["alert.detector_silent"]
+    assert keys(world, 1.01) == []
+    driving(world, 1.1)
+    assert keys(world, 1.1) == ["alert.detector_silent"]
 
 
 @pytest.mark.parametrize(("since", "told"), [(9.9, False), (10.0, True)])
@@ -68,9 +69,21 @@ def test_of_a_robot_that_is_late_or_lost_itself_the_detector_is_no_news(
 def test_of_a_robot_that_stays_late_it_is() -> None:
     world = driving()
     world.robot("AGI").detector.note_whole(START.mono)
-    driving(world, 6.0)
+    for now in (5.0, 5.9, 6.8):
+        driving(world, now)
 
-    assert keys(world, 7.5) == ["alert.detector_silent"]
+    assert keys(world, 8.3) == ["alert.detector_silent"]
+
+
+def test_of_a_robot_that_has_just_come_back_it_is_no_news_for_a_second() -> None:
+    world = driving()
+    world.robot("AGI").detector.note_whole(START.mono)
+    told = []
+    for now in (20.0, 20.5, 21.0, 21.5):
+        driving(world, now)
+        told.append(keys(world, now))
+
+    assert told == [[], [], [], ["alert.detector_silent"]]
 
 
 def test_a_refused_frame_is_told_for_ten_seconds() -> None:
