@@ -9,6 +9,7 @@ import asyncio
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Literal
 
@@ -35,6 +36,8 @@ class FileJournal:
         self._file = AppendedFile(path, FORM)
         self._lock = asyncio.Lock()
         self._is_newer = False
+        # Of its own: the default threads may all be busy with files of comfort.
+        self._thread = ThreadPoolExecutor(1, "stop-journal")
 
     def read(self) -> dict[str, DesiredRecord]:
         """Robots that were to stand when iVeg last ran, with their desired state.
@@ -111,12 +114,14 @@ class FileJournal:
     async def _write(self, entry: Mapping[str, Any]) -> None:
         async with self._lock:
             try:
-                await asyncio.to_thread(self._file.append, entry)
+                loop = asyncio.get_running_loop()
+                await loop.run_in_executor(self._thread, self._file.append, entry)
             except OSError:
                 _log.exception("the command journal could not be written")
 
     def close(self) -> None:
-        """Let the file go."""
+        """Let thread and file go."""
+        self._thread.shutdown()
         self._file.close()
 
 

@@ -73,6 +73,8 @@ class Recorder:
         self._clock = read_clock
         self._queue = RecordQueue(capacity)
         self._thread = ThreadPoolExecutor(1, "history")
+        # A STOP waits for its audit row: no thread of anything else may delay that.
+        self._journal_thread = ThreadPoolExecutor(1, "history-journal")
         self._unflushed: list[Waiting] = []
         self._securing = asyncio.Lock()
         self._awake, self._full = asyncio.Event(), asyncio.Event()
@@ -161,6 +163,7 @@ class Recorder:
             self._thread, self._store.close
         )
         self._thread.shutdown(wait=False)
+        self._journal_thread.shutdown(wait=False)
 
     async def _gather(self) -> None:
         """Wait for work, then a moment longer so that a batch is worth its commit."""
@@ -256,7 +259,8 @@ class Recorder:
 
     async def _append(self, rows: list[Waiting]) -> bool:
         try:
-            await asyncio.to_thread(self._journal.append, rows)
+            loop = asyncio.get_running_loop()
+            await loop.run_in_executor(self._journal_thread, self._journal.append, rows)
         except HopError as error:
             self._detail = str(error)
             return False

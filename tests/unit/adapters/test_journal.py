@@ -2,6 +2,8 @@
 
 import asyncio
 import logging
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
 from typing import Literal
@@ -242,3 +244,20 @@ async def test_a_journal_of_a_newer_iveg_is_believed_and_left_as_it_is(
     assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
     assert path.read_bytes() == newer
     assert "stop-journal 9" in caplog.text
+
+
+async def test_f64_a_stop_is_on_disk_while_all_other_threads_are_busy(
+    tmp_path: Path,
+) -> None:
+    loop, free = asyncio.get_running_loop(), threading.Event()
+    loop.set_default_executor(ThreadPoolExecutor(1))
+    busy = loop.run_in_executor(None, free.wait)
+    journal = FileJournal(tmp_path / "commands.jsonl")
+
+    async with asyncio.timeout(30):
+        await journal.log_desired("AGI", "stopped", "01H", "ana", START)
+
+    assert journal.read()["AGI"].hold_id == "01H"
+    free.set()
+    await busy
+    journal.close()
