@@ -38,6 +38,7 @@ from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.mapping import Mapper
 from iveg.pipeline.publish import Hub
+from iveg.pipeline.supervision import Supervision
 
 BEAMS = 720
 ODOMETRY_HZ, SCAN_HZ, LOOK_HZ, SAFETY_HZ = 20, 10, 10, 2
@@ -105,7 +106,7 @@ def assessor_of(robots: tuple[str, ...], fleet: Telling) -> Evaluator:
         load_greenhouse("agroconnect"),
         DetectionRule(),
         fleet,
-        EventLog(Hub(), Sink(), start),
+        EventLog(Hub(), Sink(), start, Supervision(lambda: start)),
         lambda: f"{next(numbers):026d}",
         "bench",
     )

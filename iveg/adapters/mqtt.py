@@ -93,7 +93,8 @@ class MqttLink:
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._early: list[Qos1Message] = []
         """Came before all subscriptions were in place, when nothing can be answered."""
-        self._wake = asyncio.Event()
+        self._wake, self._drained = asyncio.Event(), asyncio.Event()
+        self._drained.set()
         self._loss_told = False
         self._mistake: Exception | None = None
         self.replaced = 0
@@ -191,6 +192,7 @@ class MqttLink:
                 if confirmed := _of_qos(1, offered):
                     await self._send_confirmed(client, confirmed)
                 await client.written()
+            self._drained.set()
 
     async def _send_confirmed(
         self, client: OutboxClient, messages: list[tuple[str, bytes]]
@@ -207,7 +209,12 @@ class MqttLink:
         if topic in self._offered:
             self.replaced += 1
         self._offered[topic] = (payload, qos)
+        self._drained.clear()
         self._wake.set()
+
+    async def drained(self) -> None:
+        """Return when the socket has everything that was offered."""
+        await self._drained.wait()
 
     async def publish(
         self, topic: str, payload: bytes, qos: int = 1, *, retain: bool = False

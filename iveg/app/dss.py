@@ -26,13 +26,14 @@ from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
+from iveg.app.life import Work, live
 from iveg.app.stores import open_stores
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.errors import HopError
+from iveg.domain.errors import HopError, VitalPartError
 from iveg.domain.events import LogEvent
 from iveg.domain.latency.segments import WINDOW_S
 from iveg.domain.messages import Channel
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Observation
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
 from iveg.experiment.runner import ExperimentRunner
@@ -61,7 +62,8 @@ class Dss:
         demo: Whether the robots are emulated; shown on the page.
 
     Attributes:
-        on_failure: Called when a part that must live has died.
+        on_failure: Called when a vital part has ended.
+        failure: What ended it; None while all is well.
         stores: What outlives a restart.
         pipeline: Everything between the doors; ``services`` beside it.
         face: What the web is given of it.
@@ -76,6 +78,7 @@ class Dss:
     ) -> None:
         self.settings = settings
         self.on_failure: Callable[[], None] = lambda: None
+        self.failure: VitalPartError | None = None
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
         self.notify_secret = NotifySecret(notify_token)
@@ -111,7 +114,7 @@ class Dss:
             lambda *told: self.pipeline.ingest.reject(*told),
             settings.direct_read,
             lambda *identity: self.pipeline.ingest.is_past(*identity),
-            lambda *told: self.pipeline.latency.watch.passed_over(*told),
+            lambda *counted: self._passed_over(*counted),
         )
         return MqttLink(
             BrokerAddress.from_url(
@@ -237,16 +240,22 @@ class Dss:
 
     async def _live(self) -> None:
         parts, beside, stores = self.pipeline, self.services, self.stores
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self.link.run(), name="mqtt")
-            tasks.create_task(parts.loop.run(), name="rule-loop")
-            tasks.create_task(beside.mapper.run(clock.now), name="costmap")
-            tasks.create_task(beside.coverage.run(clock.now), name="coverage")
-            tasks.create_task(self.provisioner.run(), name="provisioner")
-            tasks.create_task(stores.recorder.run(), name="recorder")
-            tasks.create_task(beside.messenger.run(), name="messages")
-            parts.commander.restore(stores.journal.read(), clock.now())
-            tasks.create_task(self._remember(), name="remember")
+        vital: dict[str, Work] = {"mqtt": self.link.run, "rule-loop": parts.loop.run}
+        comfort: dict[str, Work] = {
+            "costmap": lambda: beside.mapper.run(clock.now),
+            "coverage": lambda: beside.coverage.run(clock.now),
+            "provisioner": self.provisioner.run,
+            "history": stores.recorder.run,
+            "messages": beside.messenger.run,
+            "earlier": self._remember,
+        }
+        parts.commander.restore(stores.journal.read(), clock.now())
+        await live(vital, comfort, parts.supervision, self._last_word)
+
+    async def _last_word(self) -> None:
+        """Have every robot slow at once: nobody watches any more."""
+        self.pipeline.evaluator.leave_unsupervised(clock.now())
+        await self.link.drained()
 
     async def _remember(self) -> None:
         """Take up what earlier runs left in the history, as soon as it answers."""
@@ -267,9 +276,12 @@ class Dss:
             parts.latency.watch.remember(await asyncio.to_thread(hours_of, measured))
 
     def _ended(self, task: asyncio.Task[None]) -> None:
-        """A part that must live has died: say so and stop; the robots slow down."""
-        if not task.cancelled():
-            _log.critical("iVeg stops", exc_info=task.exception())
+        """A vital part has ended: say so and leave; the robots slow down."""
+        error = None if task.cancelled() else task.exception()
+        _log.critical("iVeg stops", exc_info=error)
+        self.failure = VitalPartError("dss")
+        if isinstance(error, VitalPartError):
+            self.failure = error
         self.on_failure()
 
     # --- what comes in ------------------------------------------------------------
@@ -280,6 +292,10 @@ class Dss:
 
     def _broker_lost(self) -> None:
         self.pipeline.health_monitor.mqtt_connected = False
+
+    def _passed_over(self, robot_id: str, kind: type[Observation], count: int) -> None:
+        supervision, watch = self.pipeline.supervision, self.pipeline.latency.watch
+        supervision.guard("latency", watch.passed_over)(robot_id, kind, count)
 
     def _notified(self, at: Instant) -> None:
         self.pipeline.health_monitor.notified_at = at.mono

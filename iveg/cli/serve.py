@@ -74,6 +74,8 @@ async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
     except asyncio.CancelledError:
         server.should_exit = True
         await serving
+    if dss.failure is not None:
+        raise dss.failure
 
 
 async def _upgrade_history(settings: Settings, data: Path) -> None:

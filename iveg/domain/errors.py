@@ -11,6 +11,7 @@ IvegError
 ├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
 ├── OutboundError           an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
+├── VitalPartError          a part that STOP needs has ended; ends the process
 └── HopError                a neighbour that cannot be reached or answered wrongly
     └── NoAnswerError       one that took the question and did not answer in time
 """
@@ -109,6 +110,13 @@ class NotAllowedError(IvegError):
 
     def __init__(self, action: str, role: str) -> None:
         super().__init__(f"{role} may not {action}.")
+
+
+class VitalPartError(IvegError):
+    """A part without which there is no STOP or no speed limit has ended."""
+
+    def __init__(self, part: str) -> None:
+        super().__init__(f"{part} has ended, and iVeg with it: robots stand soon.")
 
 
 class HopError(IvegError):

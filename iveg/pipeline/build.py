@@ -24,6 +24,7 @@ from iveg.pipeline.ingest import Ingest
 from iveg.pipeline.latency import LatencyMonitor
 from iveg.pipeline.loop import RuleLoop
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.margins import MarginTotals
 from iveg.pipeline.messenger import Messenger
 from iveg.pipeline.ports import (
     Clock,
@@ -38,6 +39,7 @@ from iveg.pipeline.ports import (
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.rules import Rules
+from iveg.pipeline.supervision import Supervision
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +93,15 @@ class Pipeline:
     evaluator: Evaluator
     commander: Commander
     loop: RuleLoop
+    supervision: Supervision
+    margins: MarginTotals
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
         total = Counter(self.ingest.counters)
         total.update(self.world.counters)
         total.update(self.commander.counters)
+        total.update(self.supervision.counters)
         total["live.browsers"] = self.hub.watchers
         total["nlos.protected"] = self.evaluator.protected_unseen
         return total
@@ -135,15 +140,15 @@ def build(
     fleet: FleetDescription, greenhouse: Greenhouse, ports: Ports, choices: Choices
 ) -> Pipeline:
     """All parts, wired."""
-    start, hub = ports.clock(), Hub()
-    event_log = EventLog(hub, ports.sink, start)
+    start, hub, supervision = ports.clock(), Hub(), Supervision(ports.clock)
+    event_log = EventLog(hub, ports.sink, start, supervision)
     health_monitor = HealthMonitor(start, ports.history_state)
     world = World(fleet, health_monitor.probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    ingest = Ingest(
-        world.robots.__contains__, ports.rejected, world.is_past, watch.arrived
-    )
+    guard, probe = supervision.guard, health_monitor.probe
+    rejected, arrived = ports.rejected, guard("latency", watch.arrived)
+    ingest = Ingest(world.robots.__contains__, rejected, world.is_past, arrived)
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -152,7 +157,7 @@ def build(
         event_log,
         ports.new_id,
         choices.boot,
-        health_monitor.probe.lag,
+        probe.lag,
     )
     commander = Commander(
         fleet.ids,
@@ -163,9 +168,10 @@ def build(
         ports.new_id,
         ports.clock,
         drills=choices.drills,
-        agent_lag_s=health_monitor.probe.lag,
+        agent_lag_s=probe.lag,
         is_cut=lambda way, at: way == FIWARE.id and health_monitor.is_cut(at),
     )
+    margins = MarginTotals(world, evaluator.people)
     loop = RuleLoop(
         ingest,
         evaluator,
@@ -173,7 +179,9 @@ def build(
         health_monitor,
         event_log,
         ports.clock,
-        latency,
+        supervision,
+        guard("latency", watch.decided),
+        (guard("latency", latency.tick), guard("margins", margins.tick)),
     )
     return Pipeline(
         hub,
@@ -185,6 +193,8 @@ def build(
         evaluator,
         commander,
         loop,
+        supervision,
+        margins,
     )
 
 
@@ -200,11 +210,11 @@ def build_services(
     messenger = Messenger(
         kept.contacts, kept.contact_store, senders, alerts, event_log, clock
     )
-    alerts.on_raised = messenger.offer
+    alerts.on_raised = parts.supervision.guard("messages", messenger.offer)
     return Services(
         Rules(evaluator, kept.rule_store, event_log, kept.rules),
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
         messenger,
-        Mapper(parts.world, greenhouse.bounds),
+        Mapper(parts.world, greenhouse.bounds, parts.ingest.reject),
         CoverageMonitor(parts.world, greenhouse),
     )

@@ -13,11 +13,8 @@ from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.exposure import Exposures
 from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.limits import LIMITS
-from iveg.domain.margins import LeastMargins
 from iveg.domain.observations import (
     Climate,
     DetectionFrame,
@@ -74,7 +71,6 @@ class Evaluator:
         self.people = People(greenhouse.bounds)
         self.decisions = Decisions()
         self.alerts = Alerting(event_log, new_id)
-        self.exposures = Exposures()
         self.speed_limits: dict[str, SpeedLimit] = dict.fromkeys(
             world.robots, UNSUPERVISED
         )
@@ -267,8 +263,6 @@ class Evaluator:
             self.tell(now)
         for decision in self.decisions.every_open():
             self._advance(decision, decision.aged(now), now)
-        if self.exposures.due(now):
-            self._look_at_margins(now)
         self.alerts.sync([*self._conditions(now), *more], now)
 
     def _log_returned_detectors(self, now: Instant) -> None:
@@ -278,13 +272,6 @@ class Evaluator:
             event = LogEvent("system", "log.detector_booted", slots, robot_id)
             self._event_log.log(event, now)
         returned.clear()
-
-    def _look_at_margins(self, now: Instant) -> None:
-        fleet = list(self.world.live_robots())
-        margins = LeastMargins(fleet, self.people.known.values(), now).telling()
-        ages = [robot.age_s(now) for robot in fleet]
-        seen = any(age is not None and age <= LIMITS.pose_lost_s for age in ages)
-        self.exposures.update(margins, now, seen=seen)
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
         for decision in self.decisions.every_open():
@@ -318,14 +305,18 @@ class Evaluator:
         for decision in self.decisions.every_open():
             self._advance(decision, decision.broken_off(now), now)
 
+    def leave_unsupervised(self, now: Instant) -> None:
+        """Tell every robot to slow, once: a part without which nobody watches ended."""
+        limits = dict.fromkeys(self.world.robots, UNSUPERVISED)
+        self._feedback_publisher.tell(limits, self.rule, now)
+
     # --- words --------------------------------------------------------------------
 
     def _log_speed(self, report: SafetyReport, at: Instant) -> None:
-        evidence = evidence_of(
-            report, self.decisions, self.people, self.world, self.greenhouse
-        )
-        self._event_log.log(
-            speed_line(report, evidence, self.missing(report.robot_id)), at
+        known = self.decisions, self.people, self.world, self.greenhouse
+        missing = self.missing(report.robot_id)
+        self._event_log.write(
+            lambda: speed_line(report, evidence_of(report, *known), missing), at
         )
 
     def _log_speed_limit(

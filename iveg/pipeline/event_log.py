@@ -5,9 +5,10 @@ API and the database agree.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, fields, replace
-from typing import Any
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec
 
 from iveg.domain.alerts.alert_book import Alert, Occurrence
 from iveg.domain.decisions import Decision
@@ -31,11 +32,28 @@ from iveg.pipeline import topics
 from iveg.pipeline.evidence import cleared_behind, left_behind, record_of, wall_of
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import OdometryThinner, RecordSink
+from iveg.pipeline.supervision import Supervision
 
 _KEPT_LINES = 500
 READING_PERIOD_S = 60.0
 """Air and batteries change slowly: a day is 1,440 rows."""
 _NOT_VALUES = ("robot_id", "origin")
+_P = ParamSpec("_P")
+
+
+def _guarded(
+    write: Callable[Concatenate["EventLog", _P], None],
+) -> Callable[Concatenate["EventLog", _P], None]:
+    """The same, whose failure is the history's and not that of what is recorded."""
+
+    @wraps(write)
+    def guarded(log: "EventLog", /, *args: _P.args, **kwargs: _P.kwargs) -> None:
+        try:
+            write(log, *args, **kwargs)
+        except Exception as error:
+            log.failed("history", error)
+
+    return guarded
 
 
 class EventLog:
@@ -43,11 +61,15 @@ class EventLog:
 
     Attributes:
         changed: Marks a topic as changed for every browser (``Hub.changed``).
+        failed: Told of a part of comfort and its failure.
         lines: The newest log lines, oldest first.
     """
 
-    def __init__(self, hub: Hub, sink: RecordSink, start: Instant) -> None:
-        self.changed = hub.changed
+    def __init__(
+        self, hub: Hub, sink: RecordSink, start: Instant, supervision: Supervision
+    ) -> None:
+        self.changed = supervision.guard("live", hub.changed)
+        self.failed = supervision.failed
         self._hub = hub
         self._sink = sink
         self._thinner = OdometryThinner()
@@ -57,6 +79,7 @@ class EventLog:
         self._next_id = int(start.wall * 1000)
         self.lines: deque[LogRecord] = deque(maxlen=_KEPT_LINES)
 
+    @_guarded
     def log(self, event: LogEvent, at: Instant) -> None:
         """One line of the log."""
         self._next_id += 1
@@ -74,6 +97,12 @@ class EventLog:
         self._sink.offer(record)
         self._hub.append(topics.LOG.name, record)
 
+    @_guarded
+    def write(self, event: Callable[[], LogEvent], at: Instant) -> None:
+        """One line of the log, whose facts are looked up here and not by the caller."""
+        self.log(event(), at)
+
+    @_guarded
     def recall(self, earlier: Iterable[LogRecord]) -> None:
         """Put lines of an earlier run before those of this one; any order."""
         first = self.lines[0].id if self.lines else self._next_id + 1
@@ -85,10 +114,12 @@ class EventLog:
             self.lines.extendleft(reversed(before))
             self._hub.append(topics.EARLIER_LOG.name, before)
 
+    @_guarded
     def decision(self, decision: Decision, now: Instant) -> None:
         """Record a decision that is new or has a new link."""
         self._sink.offer(record_of(decision, now))
 
+    @_guarded
     def left_behind(
         self,
         decisions: Iterable[DecisionRecord],
@@ -101,6 +132,7 @@ class EventLog:
         for alert in alerts:
             self._sink.offer(cleared_behind(alert, now.wall))
 
+    @_guarded
     def detection(
         self, one: Placed, robot_id: str, stamp: str | None, at: Instant, transport: str
     ) -> None:
@@ -127,6 +159,7 @@ class EventLog:
             )
         )
 
+    @_guarded
     def odometry(
         self, read: Odometry, robot: RobotState, limit: float, link: str, at: Instant
     ) -> None:
@@ -151,6 +184,7 @@ class EventLog:
         if record is not None:
             self._sink.offer(record)
 
+    @_guarded
     def command(self, command: Command, changed: Changed | None, at: Instant) -> None:
         """Record a command that is new or has taken a step."""
         times = command.times
@@ -176,12 +210,14 @@ class EventLog:
             self._audit(command, changed.state, changed.why or changed.key, at)
         self._hub.append(topics.COMMAND.of(command.command_id), command)
 
+    @_guarded
     def closed(self, closed: Closed, at: Instant) -> None:
         """Record the end of a command that is no longer followed."""
         command = closed.command
         self.command(command, None, at)
         self._audit(command, command.state, closed.key, at)
 
+    @_guarded
     def left_over(self, row: CommandRecord, heir: str | None, at: Instant) -> None:
         """Close a command of an earlier run.
 
@@ -196,9 +232,16 @@ class EventLog:
         self._audit(row, state, f"server restarted; {told}", at)
 
     async def flushed(self) -> None:
-        """Return when every command and audit row so far is durable."""
-        await self._sink.flushed()
+        """Return when every command and audit row so far is durable.
 
+        A history that fails holds up no STOP: the journal has the desired state.
+        """
+        try:
+            await self._sink.flushed()
+        except Exception as error:
+            self.failed("history", error)
+
+    @_guarded
     def rule(self, event: LogEvent, at: Instant) -> None:
         """Log a new version of the rule; its rings change, too."""
         self.log(event, at)
@@ -218,6 +261,7 @@ class EventLog:
             )
         )
 
+    @_guarded
     def climate(self, read: Climate, at: Instant) -> None:
         """Record a climate reading, once a minute."""
         if self._is_due("", Climate, at):
@@ -230,6 +274,7 @@ class EventLog:
                 )
             )
 
+    @_guarded
     def reading(self, read: Observation, robot_id: str, at: Instant) -> None:
         """Record a reading of a small sensor, once a minute for each."""
         kind = type(read)
@@ -254,6 +299,7 @@ class EventLog:
             self._kept[robot_id, kind] = at.mono
         return is_due
 
+    @_guarded
     def alert(self, alert: Alert) -> None:
         """Record an alert that was raised, acknowledged or cleared."""
         condition, last = alert.condition, alert.last

@@ -68,6 +68,7 @@ class Kind:
         apart_s: There, least time between two of a robot that are read (s).
         low: When it is worth a P3 alert.
         kept: Whether the history keeps it as a reading, once a minute.
+        vital: Whether a STOP or a speed limit may rest on it.
     """
 
     of: type[Observation]
@@ -80,6 +81,7 @@ class Kind:
     apart_s: float = 0.0
     low: Low | None = None
     kept: bool = False
+    vital: bool = False
 
 
 def _low_battery(battery: Battery) -> float | None:
@@ -88,7 +90,13 @@ def _low_battery(battery: Battery) -> float | None:
 
 
 KINDS = (
-    Kind(Odometry, lands="odometry", touches=(topics.ROBOT,), direct="all"),
+    Kind(
+        Odometry,
+        lands="odometry",
+        touches=(topics.ROBOT,),
+        direct="all",
+        vital=True,
+    ),
     Kind(
         LaserScan,
         lands="scan",
@@ -96,7 +104,14 @@ KINDS = (
         direct="all",
         apart_s=SCANS_APART_S,
     ),
-    Kind(DetectionFrame, may_drop=False, lands="frame", direct="safety", qos=1),
+    Kind(
+        DetectionFrame,
+        may_drop=False,
+        lands="frame",
+        direct="safety",
+        qos=1,
+        vital=True,
+    ),
     Kind(
         SafetyReport,
         may_drop=False,
@@ -104,12 +119,20 @@ KINDS = (
         touches=(topics.ROBOT,),
         direct="safety",
         qos=1,
+        vital=True,
     ),
     Kind(Navigation, lands="navigation", direct="all"),
     Kind(CommandStatus, ordered="by arrival", lands="command_status"),
-    Kind(CommandAnswer, may_drop=False, lands=None, direct="safety", qos=1),
+    Kind(
+        CommandAnswer,
+        may_drop=False,
+        lands=None,
+        direct="safety",
+        qos=1,
+        vital=True,
+    ),
     Kind(Climate, ordered="by arrival", lands="climate", touches=(topics.CLIMATE,)),
-    Kind(HeartbeatProbe, ordered="by arrival", lands=None),
+    Kind(HeartbeatProbe, ordered="by arrival", lands=None, vital=True),
     Kind(
         Battery,
         touches=(topics.ROBOT,),

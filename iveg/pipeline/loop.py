@@ -4,18 +4,26 @@ If this loop hangs, feedback stops and every robot slows down by itself (fault F
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from itertools import chain
 
 from iveg.domain.events import LogEvent
-from iveg.domain.observations import CommandAnswer, HeartbeatProbe, Instant, Received
+from iveg.domain.observations import (
+    CommandAnswer,
+    HeartbeatProbe,
+    Instant,
+    Received,
+    kind_of,
+)
 from iveg.pipeline import topics
 from iveg.pipeline.command import Commander
 from iveg.pipeline.evaluate import Evaluator
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.health_monitor import HealthMonitor, HopHealth, HopState
 from iveg.pipeline.ingest import Ingest
-from iveg.pipeline.latency import LatencyMonitor
+from iveg.pipeline.kinds import kind
 from iveg.pipeline.ports import Clock
+from iveg.pipeline.supervision import Supervision
 
 TICK_S = 0.05
 APART_S = 0.0002
@@ -35,7 +43,13 @@ def reading_apart_s(robots: int) -> float:
 
 
 class RuleLoop:
-    """Runs ingest, assess and command in one order, in one task."""
+    """Runs ingest, assess and command in one order, in one task.
+
+    Args:
+        supervision: Names what of comfort is down.
+        decided: Comfort that measures: called with what a judgement was made of.
+        ticks: Comfort that lets time pass, called with each tick; all of it guarded.
+    """
 
     def __init__(
         self,
@@ -45,7 +59,9 @@ class RuleLoop:
         health_monitor: HealthMonitor,
         event_log: EventLog,
         clock: Clock,
-        latency: LatencyMonitor,
+        supervision: Supervision,
+        decided: Callable[[Iterable[Received], Instant], None],
+        ticks: Sequence[Callable[[Instant], None]],
     ) -> None:
         self._ingest = ingest
         self._evaluator = evaluator
@@ -53,7 +69,9 @@ class RuleLoop:
         self._health_monitor = health_monitor
         self._event_log = event_log
         self._clock = clock
-        self._latency = latency
+        self._supervision = supervision
+        self._decided = decided
+        self._ticks = ticks
         self._ticked = float("-inf")
         self._health_at = float("-inf")
         self._taken: list[Received] = []
@@ -91,7 +109,7 @@ class RuleLoop:
         ``judges``: the fleet now, too; else with the next step that does.
         """
         for received in arrived:
-            fresh = self._evaluator.take(received)
+            fresh = self._apply(received)
             if fresh:
                 self._taken.append(received)
             if isinstance(received.observation, HeartbeatProbe):
@@ -104,14 +122,32 @@ class RuleLoop:
         if judges:
             self._evaluator.settle()
         if self._taken and not self._evaluator.is_unjudged:
-            self._latency.watch.decided(self._taken, self._clock())
+            self._decided(self._taken, self._clock())
             self._taken.clear()
         if now.mono - self._ticked >= TICK_S - 1e-3:
             self._ticked = now.mono
             self._commander.tick(now)
-            self._evaluator.tick(now, self._commander.conditions(now))
+            commanded = self._commander.conditions(now)
+            supervised = self._supervision.conditions(now)
+            self._evaluator.tick(now, chain(commanded, supervised))
             self._watch_chain(now)
-            self._latency.tick(now)
+            for tick in self._ticks:
+                tick(now)
+
+    def _apply(self, received: Received) -> bool:
+        """Whether it became part of the state.
+
+        What only comfort reads is refused where it fails, and hurts no neighbour.
+        """
+        observation = received.observation
+        try:
+            return self._evaluator.take(received)
+        except Exception as error:
+            if kind(observation).vital:
+                raise
+            source, of = getattr(observation, "robot_id", "?"), kind_of(observation)
+            self._ingest.reject(source, f"unusable_{of.__name__}", repr(error))
+            return False
 
     def _watch_chain(self, now: Instant) -> None:
         hops = self._health_monitor.hops(now)

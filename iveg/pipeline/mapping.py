@@ -6,7 +6,7 @@ longest, and a fleet that sends more is drawn less often.
 """
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from iveg.domain.costmap import (
     Costmap,
@@ -35,10 +35,17 @@ class Mapper:
 
     Args:
         bounds: The outer wall of the greenhouse.
+        reject: Told of a scan that cannot be drawn: robot, reason, detail.
     """
 
-    def __init__(self, world: World, bounds: Rectangle) -> None:
+    def __init__(
+        self,
+        world: World,
+        bounds: Rectangle,
+        reject: Callable[[str, str, str], None] = lambda *_: None,
+    ) -> None:
         self._world = world
+        self._reject = reject
         wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
         self._is_open = wide > _WIDEST_M
         self._grid = None if self._is_open else Grid.over(bounds)
@@ -91,7 +98,12 @@ class Mapper:
         if scan is None or pose is None or self._grid is None:
             return
         self._read[robot.robot_id], self._read_at[robot.robot_id] = scan, now.mono
-        sweep = sweep_of(scan, pose, self._grid)
+        try:
+            sweep = sweep_of(scan, pose, self._grid)
+        except Exception as error:
+            # One robot's scan ends neither this part nor the drawing of the others.
+            self._reject(robot.robot_id, "undrawable_scan", repr(error))
+            return
         for key in (None, robot.robot_id):
             self._drawn[key] = _added(self._drawn.get(key), self._grid, sweep, now)
 

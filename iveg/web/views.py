@@ -59,6 +59,8 @@ class Views:
         self, parts: Pipeline, counters: Callable[[], Counter[str]] | None = None
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
+        self._margins = parts.margins
+        self.reject = parts.ingest.reject
         self._world, self._people = parts.world, parts.evaluator.people
         self._greenhouse = parts.evaluator.greenhouse
         self._event_log = parts.event_log
@@ -270,7 +272,7 @@ class Views:
     def safety(self, now: Instant) -> Safety:
         """How soon the fleet obeys, and how close it comes to people."""
         acknowledgements = acknowledgements_of(self._evaluator.live_decisions(), now)
-        return Safety.of(acknowledgements, self._evaluator.exposures.today, now)
+        return Safety.of(acknowledgements, self._margins.exposures.today, now)
 
     def climate(self, now: Instant) -> Climate | None:
         """The newest reading of the air."""

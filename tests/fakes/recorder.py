@@ -11,6 +11,7 @@ class FakeRecorder:
     Attributes:
         durable: What would outlive a crash.
         opened: Cleared, the disk hangs until it is set.
+        mistake: Raised by everything, where it is set.
     """
 
     def __init__(self) -> None:
@@ -18,11 +19,16 @@ class FakeRecorder:
         self.durable: list[Record] = []
         self.opened = asyncio.Event()
         self.opened.set()
+        self.mistake: Exception | None = None
 
     def offer(self, record: Record) -> None:
+        if self.mistake is not None:
+            raise self.mistake
         self.records.append(record)
 
     async def flushed(self) -> None:
+        if self.mistake is not None:
+            raise self.mistake
         now = list(self.records)
         await self.opened.wait()
         if len(now) > len(self.durable):

@@ -97,6 +97,9 @@ def read_one(
         read = unread(source, f"bad_{name or 'entity'}", first_complaint(error))
     except UnreadableError as error:
         read = unread(source, error.reason, error.detail)
+    except Exception as error:
+        # A value that no bound foresaw is that message's end and nobody else's.
+        read = unread(source, f"bad_{name or 'entity'}", repr(error))
     return refused_frame(source, read) if name in _FRAMES else read
 
 

@@ -81,7 +81,11 @@ class Encoder:
     def _encode(self, topic: str) -> bytes | None:
         now, (row, key) = self._clock(), topics.find(topic)
         if row is topics.SCAN:
-            return self._scan(topic, key, now)
+            try:
+                return self._scan(topic, key, now)
+            except Exception as error:
+                self._views.reject(key, "undrawable_scan", repr(error))
+                return None
         data = None if row.read is None else row.read(self._views, key, now)
         return None if data is None else text(topic, data, now)
 

@@ -118,7 +118,12 @@ class TelemetryEncoder:
     def _encode(self, topic: str, version: int, now: Instant) -> Part | None:
         row, robot_id = topics.find(topic)
         if row is topics.SCAN:
-            return self._scan(topic, robot_id, version, now)
+            try:
+                return self._scan(topic, robot_id, version, now)
+            except Exception as error:
+                # Else it would end the line of every browser.
+                self._views.reject(robot_id, "undrawable_scan", repr(error))
+                return None
         data = self._views.frame(robot_id, now)
         if data is None:
             return None

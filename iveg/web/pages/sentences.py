@@ -13,7 +13,13 @@ from iveg.web.pages.translations import HOLE, Translations
 
 _TRACK = re.compile(r"([PR])(\d+)")
 _NOTHING: Final = "—"
-_NAMED: Final = {"class": "class", "a": "class.a", "why": "why", "hop": "hop"}
+_NAMED: Final = {
+    "class": "class",
+    "a": "class.a",
+    "why": "why",
+    "hop": "hop",
+    "part": "part",
+}
 _LANES: Final = (
     (re.compile(r"(?:Pasillo )?(\d+)"), "lane.number"),
     (re.compile(r"Pasillo (\d+) norte"), "lane.number_north"),

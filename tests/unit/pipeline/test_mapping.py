@@ -111,6 +111,22 @@ def test_one_tick_takes_one_scan_however_many_wait() -> None:
     assert knows(field.shared(), 6.0) != knows(field.shared(), 16.0)
 
 
+def test_f60_a_scan_that_cannot_be_drawn_is_refused_and_the_others_are_drawn() -> None:
+    field, refused = Field(), list[tuple[str, str]]()
+    field.mapper = Mapper(
+        field.world, ROOM, lambda robot, why, _: refused.append((robot, why))
+    )
+    field.sweep_from("AGI", 5.0)
+    field.sweep_from("AGII", 15.0)
+    flat = scan("AGI", [3.0] * 360, angle_increment=0.0, range_max=12.0)
+    field.world.robot("AGI").scan = flat
+    field.tick()
+    field.tick()
+
+    assert refused == [("AGI", "undrawable_scan")]
+    assert knows(field.shared(), 16.0)
+
+
 def test_the_same_scan_counts_once() -> None:
     field = Field()
     field.sweep_from("AGI", 5.0)

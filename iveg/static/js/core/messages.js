@@ -31,6 +31,7 @@ const FORMATS = {
   a: (value, messages) => messages.named("class.a", value),
   why: (value, messages) => messages.named("why", value),
   hop: (value, messages) => messages.named("hop", value),
+  part: (value, messages) => messages.named("part", value),
   data: (value, messages) => messages.named("stream", value),
   drive: (value, messages) => messages.named("drive", value),
   lane: (value, messages) => laneName(String(value), messages.say),
