@@ -50,10 +50,12 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
     queries, face = dss.stores.queries, dss.face
     views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock
     yield stop_records.router(queries, clock, views.find_command)
-    days = day.Days(queries, evaluator.greenhouse, dss.settings.drill_days)
+    greenhouse, worker = evaluator.greenhouse, dss.worker
+    days = day.Days(queries.url, greenhouse, dss.settings.drill_days, worker)
     yield day.router(days, pages, clock)
     yield history.router(
         queries,
+        worker,
         threshold=lambda: evaluator.rule.threshold,
         present=lambda name: evaluator.decision_record(name, clock()),
         flood=views.flood,

@@ -26,6 +26,7 @@ from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
+from iveg.adapters.worker import Worker
 from iveg.app.life import Work, live
 from iveg.app.stores import open_stores
 from iveg.domain.detection_rule import DetectionRule
@@ -90,6 +91,7 @@ class Dss:
         self.orion = OrionClient(settings.orion_url, *tenant)
         self.agent = IotAgentClient(settings.iota_url, *tenant)
         self.outbound = OutboundHttp()
+        self.worker = Worker(lambda error: self._failed("worker", error))
         kept = self._kept_choices()
         choices = Choices(kept.rules[-1], Drills(settings.drill_days), self._boot)
         greenhouse = load_greenhouse(settings.greenhouse)
@@ -215,6 +217,7 @@ class Dss:
             queues=self.queues,
             clock=clock.now,
             new_id=new_id,
+            worker=self.worker,
         )
 
     # --- life ---------------------------------------------------------------------
@@ -237,6 +240,7 @@ class Dss:
             await self.orion.close()
             await self.agent.close()
             self.outbound.close()
+            self.worker.close()
 
     async def _live(self) -> None:
         parts, beside, stores = self.pipeline, self.services, self.stores
@@ -292,6 +296,9 @@ class Dss:
 
     def _broker_lost(self) -> None:
         self.pipeline.health_monitor.mqtt_connected = False
+
+    def _failed(self, part: str, error: Exception) -> None:
+        self.pipeline.supervision.failed(part, error)
 
     def _passed_over(self, robot_id: str, kind: type[Observation], count: int) -> None:
         supervision, watch = self.pipeline.supervision, self.pipeline.latency.watch

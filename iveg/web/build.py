@@ -27,6 +27,7 @@ from iveg.web.api import (
     robots,
     rule,
 )
+from iveg.web.api.answers import Apart
 from iveg.web.live import socket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
@@ -44,6 +45,7 @@ class Face:
         orion: Takes Orion's notifications.
         boot: Random, new at each start.
         queues: How full the queues are.
+        worker: Where long work is done.
     """
 
     pipeline: Pipeline
@@ -56,6 +58,7 @@ class Face:
     queues: Callable[[], metrics.Queues]
     clock: Clock
     new_id: Ids
+    worker: Apart
 
     def snapshot(self, principal: Principal, now: Instant) -> Snapshot:
         """Everything that is known, for a browser that has just come."""
@@ -93,7 +96,7 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield rule.router(beside.rules, clock)
     yield detectors.router(beside.detectors, clock)
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
-    yield latency.router(watch, clock)
+    yield latency.router(watch, clock, face.worker)
     yield health.router(clock, views.health)
     yield metrics.router(clock, views.health, watch, face.queues)
 

@@ -38,6 +38,7 @@ from tests.fakes.records import (
     detection_record,
     log_record,
 )
+from tests.fakes.worker import FakeWorker
 from tests.unit.web.desk import WebDesk
 
 _ID = re.compile(rb"\bID\d{4}(-\d+)?")
@@ -148,6 +149,7 @@ def _open(desk: WebDesk, queries: Queries) -> None:
     desk.app.include_router(
         history.router(
             queries,
+            FakeWorker(),
             flood=desk.views.flood,
             read_clock=lambda: seen_at,
         )

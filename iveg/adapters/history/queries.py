@@ -44,9 +44,13 @@ class Queries:
     """Reads the history.
 
     Every method raises ``HopError`` when the database does not answer.
+
+    Attributes:
+        url: The database, for a process that asks it itself.
     """
 
     def __init__(self, database_url: str) -> None:
+        self.url = database_url
         self._engine = reading_engine(database_url)
         self._threads = ThreadPoolExecutor(_THREADS, "history-read")
 

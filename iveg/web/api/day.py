@@ -1,5 +1,6 @@
 """The evening sheet over HTTP: as numbers, and as a page to print."""
 
+import asyncio
 from datetime import date, timedelta
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ from iveg.models.command import Command
 from iveg.models.day import Day, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
-from iveg.web.api.answers import Json
+from iveg.web.api.answers import Apart, Json
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.pages.routes import Pages
@@ -34,13 +35,46 @@ _MOST_PAGES = 20
 
 
 class Days:
-    """Reads days from the history.
+    """Has days read from the history, in the worker process: a day takes seconds.
 
     Args:
-        queries: The history.
+        url: The history's database.
         greenhouse: Whose aisles count.
         drill_days: A STOP drill is due after so many days; 0: never.
+        worker: The process.
     """
+
+    def __init__(
+        self, url: str, greenhouse: Greenhouse, drill_days: float, worker: Apart
+    ) -> None:
+        self._url = url
+        self._greenhouse = greenhouse
+        self._drill_days = drill_days
+        self._worker = worker
+
+    async def read(self, day: date, now: float) -> Day:
+        """One day, as far as it has gone (``now`` in Unix s)."""
+        asked = self._url, self._greenhouse, self._drill_days, day, now
+        return await self._worker.run(read_day, *asked)
+
+
+def read_day(
+    url: str, greenhouse: Greenhouse, drill_days: float, day: date, now: float
+) -> Day:
+    """One day, as far as it has gone (``now`` in Unix s); takes seconds."""
+
+    async def read() -> Day:
+        queries = Queries(url)
+        try:
+            return await _Reading(queries, greenhouse, drill_days).read(day, now)
+        finally:
+            queries.close()
+
+    return asyncio.run(read())
+
+
+class _Reading:
+    """What a day needs of the history, and what follows from it."""
 
     def __init__(
         self, queries: Queries, greenhouse: Greenhouse, drill_days: float
@@ -50,7 +84,7 @@ class Days:
         self._drill_days = drill_days
 
     async def read(self, day: date, now: float) -> Day:
-        """One day, as far as it has gone (``now`` in Unix s)."""
+        """The day."""
         since, end = start_of(day), start_of(day + _DAY)
         until = max(since, min(end, now))
         poses, seen = await self._queries.day_series(since, until)

@@ -10,15 +10,7 @@ never held in memory.
 import codecs
 import csv
 import io
-from collections.abc import (
-    AsyncIterator,
-    Awaitable,
-    Callable,
-    Iterable,
-    Iterator,
-    Mapping,
-    Sequence,
-)
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from operator import attrgetter
@@ -63,31 +55,32 @@ def form_of(headers: Headers) -> Form:
     return best
 
 
-async def write_csv(
-    kind: type[R],
-    pages: AsyncIterator[Sequence[R]],
-    reader: Sentences | None = None,
-) -> AsyncIterator[bytes]:
-    """Rows as CSV (RFC 4180), one column a field of the record, times in UTC.
+def csv_head(kind: type[R], reader: Sentences | None = None) -> bytes:
+    """The first line of rows as CSV (RFC 4180), one column a field of the record.
 
     Args:
         kind: What each row is.
-        pages: The rows.
         reader: Whose spreadsheet it is for; None for programs.
     """
+    head = [name.rstrip("_") for name, _ in _columns(kind)]
+    if reader is None:
+        return csv_lines([head])
+    if _telling(kind, reader):
+        head = [reader.say("export.sentence", {}), *head]
+    return codecs.BOM_UTF8 + csv_lines([head], reader)
+
+
+def csv_rows(
+    kind: type[R], records: Iterable[R], reader: Sentences | None = None
+) -> bytes:
+    """Rows below that line, times in UTC."""
     columns = list(_columns(kind))
     tell = None if reader is None else _telling(kind, reader)
-    head = [name.rstrip("_") for name, _ in columns]
-    if reader is not None:
-        yield codecs.BOM_UTF8
-        head = [reader.say("export.sentence", {}), *head] if tell else head
-    yield csv_lines([head], reader)
-    async for records in pages:
-        rows = []
-        for record in records:
-            row = [cell(name, read(record), reader) for name, read in columns]
-            rows.append([tell(record), *row] if tell else row)
-        yield csv_lines(rows, reader)
+    rows = []
+    for record in records:
+        row = [cell(name, read(record), reader) for name, read in columns]
+        rows.append([tell(record), *row] if tell else row)
+    return csv_lines(rows, reader)
 
 
 def _columns(kind: type[R]) -> Iterator[tuple[str, Callable[[R], object]]]:
@@ -128,14 +121,9 @@ def _telling(kind: type[R], reader: Sentences) -> Callable[[Any], str] | None:
     return tell
 
 
-async def write_ndjson(
-    view: Callable[[Sequence[R]], Awaitable[Sequence[Model]]],
-    pages: AsyncIterator[Sequence[R]],
-) -> AsyncIterator[bytes]:
+def ndjson_rows(model: Callable[..., Model], rows: Iterable[tuple[Any, ...]]) -> bytes:
     """Rows as one JSON value a line, each as the list has it."""
-    async for records in pages:
-        models = await view(records)
-        yield b"".join(write_json(one) + b"\n" for one in models)
+    return b"".join(write_json(model(*row)) + b"\n" for row in rows)
 
 
 def csv_lines(rows: Iterable[Sequence[str]], reader: Sentences | None = None) -> bytes:

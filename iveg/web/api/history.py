@@ -17,7 +17,12 @@ from iveg.adapters import clock
 from iveg.adapters.history import lists
 from iveg.adapters.history.lists import Filter, ListOf, Page
 from iveg.adapters.history.queries import Queries
-from iveg.adapters.history.series import ClimateSeries
+from iveg.adapters.history.series import (
+    ClimateSeries,
+    CommandLatency,
+    ConfidenceCount,
+    SpeedSeries,
+)
 from iveg.domain.alerts.flood import Flood as NoFlood
 from iveg.domain.fleet import NOBODY, FleetDescription
 from iveg.domain.records import CommandRecord, DecisionRecord, Record
@@ -31,7 +36,7 @@ from iveg.models.people import Detection
 from iveg.models.reading import Reading
 from iveg.pipeline.ports import Clock
 from iveg.web.api import exports
-from iveg.web.api.answers import Json
+from iveg.web.api.answers import Apart, Json
 from iveg.web.api.exports import MEDIA_TYPES, Form
 from iveg.web.api.history_filters import Filters, Range, Span, filter_of, range_of
 from iveg.web.pages import charts
@@ -42,6 +47,8 @@ from iveg.web.security.authentication import require
 
 R = TypeVar("R", bound=Record)
 _DAY_S = 86_400.0
+_FEW = 200
+"""Rows that cost the loop less than sending them to the worker."""
 _FOR_GOOD = "public, max-age=31536000, immutable"
 _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
     MEDIA_TYPES[form]: {} for form in ("csv", "ndjson")
@@ -50,19 +57,32 @@ _CSV_AND_NDJSON: dict[str, dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class _List(Generic[R]):
-    """One list: its source and its models; ``more`` stands beside it."""
+    """One list: its source and its models; ``more`` stands beside it.
+
+    Attributes:
+        model: Of a row, and of what ``beside`` found for it.
+        beside: Other rows that the models of some rows need, in their order.
+    """
 
     path: str
     of: ListOf[R]
     ask: Callable[[Filter], Awaitable[Page[R]]]
-    view: Callable[[Sequence[R]], Awaitable[list[Model]]]
+    model: Callable[..., Model]
     listing: type[Listing[Any]]
     says: str
     more: Callable[[], dict[str, Any]] = dict
+    beside: Callable[[Sequence[R]], Awaitable[list[Any]]] | None = None
+
+    async def rows(self, records: Sequence[R]) -> list[tuple[Any, ...]]:
+        """What ``model`` is called with, for each record."""
+        if self.beside is None:
+            return [(one,) for one in records]
+        return list(zip(records, await self.beside(records), strict=True))
 
 
 def router(
     queries: Queries,
+    worker: Apart,
     *,
     threshold: Callable[[], float | None] = lambda: None,
     present: Callable[[str], DecisionRecord | None] = lambda _: None,
@@ -74,6 +94,7 @@ def router(
 
     Args:
         queries: Where the past is asked for.
+        worker: Where files are written and figures drawn.
         threshold: Least confidence of the rule in force, marked in the chart.
         present: A decision that is still in memory; its links are those of now.
         flood: How fast alerts come.
@@ -82,7 +103,7 @@ def router(
     """
     routes = APIRouter(dependencies=[Depends(require("read"))], tags=["history"])
     for one in _lists(queries, flood):
-        _add_list(routes, one)
+        _add_list(routes, one, worker)
 
     @routes.get(
         "/api/v1/decisions/{decision_id}",
@@ -107,7 +128,13 @@ def router(
     )
     async def draw(asked: Annotated[Range, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall)
-        return await _charts(queries, since, until, asked.robot, threshold(), fleet)
+        found = await asyncio.gather(
+            queries.speed_series(since, until, asked.robot),
+            queries.confidence_counts(since, until, asked.robot),
+            queries.command_latencies(since, until, asked.robot),
+        )
+        body = await worker.run(_draw_charts, *found, threshold(), fleet)
+        return Response(body, media_type=MEDIA_TYPES["json"])
 
     @routes.get(
         "/api/v1/history/climate",
@@ -119,7 +146,9 @@ def router(
     )
     async def climate(asked: Annotated[Span, Query()]) -> Response:
         since, until = range_of(asked, read_clock().wall, _DAY_S)
-        return await _climate(queries, since, until)
+        series = await queries.climate_series(since, until)
+        body = await worker.run(_draw_climate, series, since, until)
+        return Response(body, media_type=MEDIA_TYPES["json"])
 
     @routes.get("/vendor/{name}", include_in_schema=False)
     async def vendor(name: str) -> Response:
@@ -133,18 +162,16 @@ def router(
 
 
 def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ...]:
-    async def audited(records: Sequence[CommandRecord]) -> list[Model]:
+    async def steps_of(records: Sequence[CommandRecord]) -> list[Any]:
         steps = await queries.steps_of([one.command_id for one in records])
-        return [
-            Command.of_record(one, steps.get(one.command_id, ())) for one in records
-        ]
+        return [steps.get(one.command_id, ()) for one in records]
 
     return (
         _List(
             "decisions",
             lists.DECISIONS,
             queries.decisions,
-            _each(Decision.of_record),
+            Decision.of_record,
             Listing[Decision],
             "Why robots were slowed, by when it began",
         ),
@@ -152,7 +179,7 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "detections",
             lists.DETECTIONS,
             queries.detections,
-            _each(Detection.of_record),
+            Detection.of_record,
             Listing[Detection],
             "What robots saw, by when it reached iVeg",
         ),
@@ -160,15 +187,16 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "commands",
             lists.COMMANDS,
             queries.commands,
-            audited,
+            Command.of_record,
             Listing[Command],
             "Every STOP, release and resume, by when it was asked",
+            beside=steps_of,
         ),
         _List(
             "alerts",
             lists.ALERTS,
             queries.alerts,
-            _each(Alert.of_record),
+            Alert.of_record,
             AlertListing,
             "Every alert, by when it was last raised, and how fast they come",
             lambda: {"flood": flood()},
@@ -177,7 +205,7 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "log",
             lists.LOG,
             queries.log,
-            _each(LogEntry.of_record),
+            LogEntry.of_record,
             Listing[LogEntry],
             "The action and inference log",
         ),
@@ -185,14 +213,14 @@ def _lists(queries: Queries, flood: Callable[[], Flood]) -> tuple[_List[Any], ..
             "readings",
             lists.READINGS,
             queries.readings,
-            _each(Reading.of_record),
+            Reading.of_record,
             Listing[Reading],
             "What small sensors of robots said; `class` asks for a kind, as `battery`",
         ),
     )
 
 
-def _add_list(routes: APIRouter, one: _List[R]) -> None:
+def _add_list(routes: APIRouter, one: _List[R], worker: Apart) -> None:
     @routes.get(
         f"/api/v1/{one.path}",
         name=one.path,
@@ -206,28 +234,27 @@ def _add_list(routes: APIRouter, one: _List[R]) -> None:
         form = filters.format or exports.form_of(request.headers)
         asked = filter_of(filters, one.of)
         if form == "json":
-            return await _listing(await one.ask(asked), one)
-        return await _file(one, filters, asked, form)
+            return await _listing(await one.ask(asked), one, worker)
+        return await _file(one, filters, asked, form, worker)
 
 
-def _each(
-    view: Callable[[R], Model],
-) -> Callable[[Sequence[R]], Awaitable[list[Model]]]:
-    """A view of rows that need no other rows."""
-
-    async def views(records: Sequence[R]) -> list[Model]:
-        return [view(record) for record in records]
-
-    return views
-
-
-async def _listing(page: Page[R], one: _List[R]) -> Response:
+async def _listing(page: Page[R], one: _List[R], worker: Apart) -> Response:
     after = None if page.next is None else lists.write_cursor(page.next)
-    items = await one.view(page.items)
-    return Json(one.listing(items=items, next=after, **one.more()))
+    rows = await one.rows(page.items)
+    if len(rows) <= _FEW:
+        items = [one.model(*row) for row in rows]
+        return Json(one.listing(items=items, next=after, **one.more()))
+    items_json = Fragment(await worker.run(_write_items, one.model, rows))
+    return Json({"items": items_json, "next": after, **one.more()})
 
 
-async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> Response:
+def _write_items(model: Callable[..., Model], rows: Sequence[tuple[Any, ...]]) -> bytes:
+    return write_json([model(*row) for row in rows])
+
+
+async def _file(
+    one: _List[R], filters: Filters, asked: Filter, form: Form, worker: Apart
+) -> Response:
     """A whole list as a file; with a limit, that many rows of it."""
     if filters.limit is None:
         asked = replace(asked, limit=lists.MOST_ROWS)
@@ -235,12 +262,34 @@ async def _file(one: _List[R], filters: Filters, asked: Filter, form: Form) -> R
     first = await one.ask(asked)
     pages = _pages(one, first, asked, whole=filters.limit is None)
     if form == "csv":
-        body = exports.write_csv(one.of.kind, pages, _reader(filters.language))
+        body = _csv(one.of.kind, pages, filters.language, worker)
     else:
-        body = exports.write_ndjson(one.view, pages)
+        body = _ndjson(one, pages, worker)
     name = f"{one.path}{_day(asked) if filters.language else ''}.{form}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return StreamingResponse(body, 200, headers, MEDIA_TYPES[form])
+
+
+async def _csv(
+    kind: type[R],
+    pages: AsyncIterator[Sequence[R]],
+    language: str | None,
+    worker: Apart,
+) -> AsyncIterator[bytes]:
+    yield exports.csv_head(kind, _reader(language))
+    async for records in pages:
+        yield await worker.run(_csv_page, kind, records, language)
+
+
+def _csv_page(kind: type[R], records: Sequence[R], language: str | None) -> bytes:
+    return exports.csv_rows(kind, records, _reader(language))
+
+
+async def _ndjson(
+    one: _List[R], pages: AsyncIterator[Sequence[R]], worker: Apart
+) -> AsyncIterator[bytes]:
+    async for records in pages:
+        yield await worker.run(exports.ndjson_rows, one.model, await one.rows(records))
 
 
 @cache
@@ -263,52 +312,35 @@ async def _pages(
         yield page.items
 
 
-async def _charts(
-    queries: Queries,
-    since: float,
-    until: float,
-    robot: str | None,
+def _draw_charts(
+    speeds: Sequence[SpeedSeries],
+    counts: Sequence[ConfidenceCount],
+    stops: Sequence[CommandLatency],
     threshold: float | None,
     fleet: FleetDescription,
-) -> Response:
-    speeds, counts, stops = await asyncio.gather(
-        queries.speed_series(since, until, robot),
-        queries.confidence_counts(since, until, robot),
-        queries.command_latencies(since, until, robot),
+) -> bytes:
+    return write_json(
+        {
+            **charts.library_facts(),
+            "speed": Fragment(charts.speed_figure(speeds, fleet)),
+            "detections": Fragment(charts.confidence_figure(counts, threshold)),
+            "stops": Fragment(charts.stop_figure(stops)),
+        }
     )
 
-    def draw() -> bytes:
-        return write_json(
-            {
-                **charts.library_facts(),
-                "speed": Fragment(charts.speed_figure(speeds, fleet)),
-                "detections": Fragment(charts.confidence_figure(counts, threshold)),
-                "stops": Fragment(charts.stop_figure(stops)),
-            }
-        )
 
-    body = await asyncio.to_thread(draw)
-    return Response(body, media_type=MEDIA_TYPES["json"])
-
-
-async def _climate(queries: Queries, since: float, until: float) -> Response:
-    series = await queries.climate_series(since, until)
-
-    def draw() -> bytes:
-        figures = charts.climate_figures(series)
-        return write_json(
-            {
-                "since": format_stamp(since),
-                "until": format_stamp(until),
-                "slice_s": round(series.slice_s, 3),
-                "items": _readings(series),
-                **charts.library_facts(),
-                "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
-            }
-        )
-
-    body = await asyncio.to_thread(draw)
-    return Response(body, media_type=MEDIA_TYPES["json"])
+def _draw_climate(series: ClimateSeries, since: float, until: float) -> bytes:
+    figures = charts.climate_figures(series)
+    return write_json(
+        {
+            "since": format_stamp(since),
+            "until": format_stamp(until),
+            "slice_s": round(series.slice_s, 3),
+            "items": _readings(series),
+            **charts.library_facts(),
+            "figures": {kind: Fragment(drawn) for kind, drawn in figures.items()},
+        }
+    )
 
 
 def _readings(series: ClimateSeries) -> list[ClimateReading]:

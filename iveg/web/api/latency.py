@@ -32,6 +32,7 @@ from iveg.models.latency import (
     SegmentSpread,
 )
 from iveg.pipeline.ports import Clock
+from iveg.web.api.answers import Apart
 from iveg.web.api.exports import cell, csv_lines, form_of
 from iveg.web.pages import charts
 from iveg.web.pages.latency_figures import (
@@ -59,7 +60,7 @@ class Asked(BaseModel):
     )
 
 
-def router(watch: LatencyWatch, clock: Clock) -> APIRouter:
+def router(watch: LatencyWatch, clock: Clock, worker: Apart) -> APIRouter:
     """Routes of the latency table."""
     routes = APIRouter(
         prefix="/api/v1", tags=["latency"], dependencies=[Depends(require("read"))]
@@ -75,8 +76,10 @@ def router(watch: LatencyWatch, clock: Clock) -> APIRouter:
         streams = [one for one in watch.streams if asked.robot in (None, one.robot_id)]
         told = _told(watch, streams, asked, clock())
         sampled = _sampled(streams)
-        # A day of twenty robots is merged beside the loop, not in it.
-        body = await asyncio.to_thread(_finished, parts, told, sampled, asked)
+        # A day of twenty robots is merged in a thread, as sending all of it to the
+        # worker costs more; the figures of the sums are drawn there.
+        sketches = await asyncio.to_thread(merge, parts)
+        body = await worker.run(_finished, sketches, told, sampled, asked)
         return Response(body, media_type="application/json")
 
     return routes
@@ -117,13 +120,12 @@ def _told(
 
 
 def _finished(
-    parts: Mapping[Cell, list[Sketch]],
+    sketches: Mapping[Cell, Sketch],
     told: dict[str, Any],
     sampled: Mapping[Data, list[Segment]],
     asked: Asked,
 ) -> bytes:
-    """The whole answer; in a thread of its own."""
-    sketches = merge(parts)
+    """The whole answer; in the worker."""
     figures = {}
     if asked.figures:
         figures = {

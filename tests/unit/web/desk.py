@@ -26,6 +26,7 @@ from iveg.web.views import Views
 from tests.fakes.detector_store import FakeDetectorStore
 from tests.fakes.messages import FakeContacts, FakeSender
 from tests.fakes.rule_store import FakeRuleStore
+from tests.fakes.worker import FakeWorker
 from tests.unit.pipeline.desk import FIELD, Desk
 
 HOST = "iveg.test"
@@ -81,6 +82,7 @@ class WebDesk(Desk):
             queues=lambda: self.queues,
             clock=self.clock,
             new_id=self.ids,
+            worker=FakeWorker(),
         )
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, live_routers(self.face))

@@ -36,6 +36,7 @@ from tests.fakes.records import (
     detection_record,
     odometry_record,
 )
+from tests.fakes.worker import FakeWorker
 
 pytestmark = pytest.mark.e2e
 
@@ -67,7 +68,7 @@ class Server:
         reader = Principal("ana", "operator")
         app.dependency_overrides[require("read")] = lambda: reader
         app.include_router(service_worker.router())
-        app.include_router(history.router(self._queries))
+        app.include_router(history.router(self._queries, FakeWorker()))
         app.include_router(
             router(
                 Pages(_SITE),

@@ -8,7 +8,6 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from iveg.adapters.history.queries import Queries
 from iveg.adapters.history.store import Store
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse, Lane
@@ -27,6 +26,7 @@ from tests.fakes.records import (
     detection_record,
     odometry_record,
 )
+from tests.fakes.worker import FakeWorker
 
 GREENHOUSE = Greenhouse(
     "house", Rectangle(0, 0, 20, 20), lanes=(Lane("1", Rectangle(0, 0, 20, 4)),)
@@ -45,7 +45,7 @@ RECORDS: tuple[Record, ...] = (
 @pytest.fixture
 async def browser(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
     url = f"sqlite:///{tmp_path / 'history.db'}"
-    store, queries = Store(url), Queries(url)
+    store = Store(url)
     store.write([Waiting(one, n, 0.0) for n, one in enumerate(RECORDS, 1)])
     store.close()
 
@@ -57,7 +57,9 @@ async def browser(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
         sign_in_token="cd" * 32, api_token="", clock=now
     )
     pages = Pages(Site("house", ("AGI",), "1", demo=False))
-    app.include_router(day.router(day.Days(queries, GREENHOUSE, 30.0), pages, now))
+    app.include_router(
+        day.router(day.Days(url, GREENHOUSE, 30.0, FakeWorker()), pages, now)
+    )
     cookie = {
         "Cookie": f"iveg={app.state.authenticator.sessions.open('ana', 'viewer')}"
     }
@@ -66,7 +68,6 @@ async def browser(tmp_path: Path) -> AsyncIterator[httpx.AsyncClient]:
         transport=transport, base_url="http://iveg", headers=cookie
     ) as client:
         yield client
-    queries.close()
 
 
 async def test_a_day_is_told_in_numbers(browser: httpx.AsyncClient) -> None:

@@ -35,6 +35,7 @@ from tests.fakes.records import (
     log_record,
     odometry_record,
 )
+from tests.fakes.worker import FakeWorker
 
 LISTS = ("decisions", "detections", "commands", "alerts", "log", "readings")
 
@@ -54,6 +55,7 @@ class Past:
         self.app.include_router(
             router(
                 self._queries,
+                FakeWorker(),
                 threshold=lambda: 0.8,
                 present=self.present.get,
                 read_clock=lambda: Instant(0.0, NOON + 60.0),
@@ -630,7 +632,7 @@ async def test_a_database_that_is_away_is_a_problem_and_not_a_crash(
     app = FastAPI()
     queries = Queries("postgresql://somebody:secret@127.0.0.1:1/history")
     app.dependency_overrides[require("read")] = lambda: None
-    app.include_router(router(queries))
+    app.include_router(router(queries, FakeWorker()))
     problems.install(app)
     transport = httpx.ASGITransport(app=app)
 
