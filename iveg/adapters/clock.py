@@ -15,6 +15,11 @@ def mono() -> float:
     return time.monotonic()
 
 
+def thread_cpu() -> float:
+    """CPU that the calling thread has used (s)."""
+    return time.thread_time()
+
+
 def now() -> Instant:
     """This moment on the monotonic and the wall clock."""
     return Instant(mono(), wall())

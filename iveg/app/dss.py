@@ -18,6 +18,7 @@ from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
 from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.mail import MailSender
 from iveg.adapters.mqtt import BrokerAddress, MqttLink
 from iveg.adapters.orion import OrionClient
@@ -252,6 +253,7 @@ class Dss:
             "history": stores.recorder.run,
             "messages": beside.messenger.run,
             "earlier": self._remember,
+            "loop-watch": LoopWatch(parts.supervision.note_turn).run,
         }
         parts.commander.restore(stores.journal.read(), clock.now())
         await live(vital, comfort, parts.supervision, self._last_word)

@@ -98,7 +98,8 @@ def live_routers(face: Face) -> Iterator[APIRouter]:
     yield messages.router(messages.Desk(beside.messenger, face.new_id, clock))
     yield latency.router(watch, clock, face.worker)
     yield health.router(clock, views.health)
-    yield metrics.router(clock, views.health, watch, face.queues)
+    turns = parts.supervision.longest_turn_s
+    yield metrics.router(clock, views.health, watch, face.queues, turns)
 
 
 def build_app(

@@ -43,6 +43,7 @@ def router(
     health: Callable[[Instant], Health],
     watch: LatencyWatch,
     queues: Callable[[], Queues],
+    longest_turn_s: Callable[[Instant], float],
 ) -> APIRouter:
     """The endpoint that Prometheus asks."""
     routes = APIRouter(tags=["health"])
@@ -50,7 +51,8 @@ def router(
     @routes.get("/metrics", dependencies=[Depends(require("read"))])
     async def metrics() -> Response:
         """Counters, hops, latency and safety in Prometheus' text format."""
-        state = health(clock())
+        now = clock()
+        state = health(now)
         parts = _parts(watch)
         lines = [
             *_events(state.counters),
@@ -58,6 +60,7 @@ def router(
             *_streams(watch),
             *_clocks(watch),
             *_queues(queues()),
+            *_turns(longest_turn_s(now)),
             *_safety(state.safety),
         ]
         # Twenty robots have 300 sketches to sum up: beside the loop, not in it.
@@ -200,6 +203,15 @@ def _queues(queues: Queues) -> Iterator[str]:
     ):
         samples = ((_labels(**{label: key}), count) for key, count in counts.items())
         yield from _family(name, kind, told, samples)
+
+
+def _turns(longest_s: float) -> Iterator[str]:
+    yield from _family(
+        "loop_longest_turn_seconds",
+        "gauge",
+        "CPU of the longest turn of the loop, last two minutes.",
+        [("", round(longest_s, 4))],
+    )
 
 
 def _safety(safety: Safety) -> Iterator[str]:
