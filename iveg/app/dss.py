@@ -244,19 +244,26 @@ class Dss:
             self.worker.close()
 
     async def _live(self) -> None:
-        parts, beside, stores = self.pipeline, self.services, self.stores
-        vital: dict[str, Work] = {"mqtt": self.link.run, "rule-loop": parts.loop.run}
-        comfort: dict[str, Work] = {
+        parts = self.pipeline
+        parts.commander.restore(self.stores.journal.read(), clock.now())
+        await live(self.vital(), self.comfort(), parts.supervision, self._last_word)
+
+    def vital(self) -> dict[str, Work]:
+        """Parts without which there is no STOP or no speed limit, by name."""
+        return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run}
+
+    def comfort(self) -> dict[str, Work]:
+        """All other parts, by name; each may fail by itself."""
+        beside, supervision = self.services, self.pipeline.supervision
+        return {
             "costmap": lambda: beside.mapper.run(clock.now),
             "coverage": lambda: beside.coverage.run(clock.now),
             "provisioner": self.provisioner.run,
-            "history": stores.recorder.run,
+            "history": self.stores.recorder.run,
             "messages": beside.messenger.run,
             "earlier": self._remember,
-            "loop-watch": LoopWatch(parts.supervision.note_turn).run,
+            "loop-watch": LoopWatch(supervision.note_turn).run,
         }
-        parts.commander.restore(stores.journal.read(), clock.now())
-        await live(vital, comfort, parts.supervision, self._last_word)
 
     async def _last_word(self) -> None:
         """Have every robot slow at once: nobody watches any more."""

@@ -41,10 +41,16 @@ class _Server(uvicorn.Server):
         yield
 
 
-async def serve(settings: Settings, data: Path, *, demo: bool) -> None:
-    """The decision-support system with its page."""
+async def serve(
+    settings: Settings, data: Path, *, demo: bool, make: type[Dss] = Dss
+) -> None:
+    """The decision-support system with its page.
+
+    Raises:
+        VitalPartError: one of its vital parts has ended.
+    """
     await _upgrade_history(settings, data)
-    dss = Dss(settings, data, demo=demo)
+    dss = make(settings, data, demo=demo)
     app = create_app(dss)
     server = _Server(
         uvicorn.Config(

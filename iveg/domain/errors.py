@@ -116,7 +116,7 @@ class VitalPartError(IvegError):
     """A part without which there is no STOP or no speed limit has ended."""
 
     def __init__(self, part: str) -> None:
-        super().__init__(f"{part} has ended, and iVeg with it: robots stand soon.")
+        super().__init__(f"{part} has ended, and iVeg with it; robots slow and stand.")
 
 
 class HopError(IvegError):

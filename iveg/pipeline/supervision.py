@@ -71,7 +71,7 @@ class Supervision:
         now = self._clock()
         self.counters[f"comfort_failed.{part}"] += 1
         if not self._is_down(part, now):
-            _log.error("%s has failed and is restarted", part, exc_info=error)
+            _log.error("%s has failed; what is vital goes on", part, exc_info=error)
         self._failed_at[part] = now.mono
 
     async def keep_running(
