@@ -1,5 +1,6 @@
 """The web face of the DSS: the routes of now, of the past, and the pages."""
 
+import asyncio
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
@@ -11,6 +12,7 @@ from starlette.staticfiles import StaticFiles
 from iveg import __version__
 from iveg.app.dss import Dss
 from iveg.web.api import day, experiments, history, sign_in_code, stop_records
+from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker
 from iveg.web.security.authentication import require
@@ -39,7 +41,8 @@ def create_app(dss: Dss) -> FastAPI:
     @app.get("/openapi.json", dependencies=[Depends(require("read"))])
     async def document() -> Any:
         """This interface in OpenAPI."""
-        return app.openapi()
+        # Made once, in a thread: it takes most of a second.
+        return Json(await asyncio.to_thread(app.openapi))
 
     app.mount("/static", StaticFiles(directory=str(files("iveg") / "static")))
     return app

@@ -3,6 +3,7 @@
 ``Pages`` draws; ``router`` gives each page its address.
 """
 
+import asyncio
 import json
 from collections.abc import Callable
 from dataclasses import asdict
@@ -153,7 +154,9 @@ def router(
 
     @routes.get("/docs", response_model=None)
     async def docs(request: Request, visitor: _Reader) -> Response:
-        return pages.draw(DocsPage(pages.frame(request, "docs", visitor), document()))
+        # Made once, in a thread: it takes most of a second.
+        found = await asyncio.to_thread(document)
+        return pages.draw(DocsPage(pages.frame(request, "docs", visitor), found))
 
     @routes.get("/about", response_model=None)
     async def about(request: Request, visitor: _Reader) -> Response:
