@@ -259,6 +259,31 @@ MUTANTS = (
         "if True:",
         ("unit/domain/test_standstill.py",),
     ),
+    Mutant(
+        "vital: a drawing shares the fate of STOP",
+        'return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run}',
+        'return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run, '
+        '"costmap": lambda: self.services.mapper.run(clock.now)}',
+        ("unit/app",),
+    ),
+    Mutant(
+        "vital: a failure of comfort is its caller's",
+        "                self.failed(part, error)\n\n        return guarded",
+        "                raise\n\n        return guarded",
+        ("unit/pipeline/test_supervision.py",),
+    ),
+    Mutant(
+        "vital: a part ends without a last word to the robots",
+        "await _say(last_word)",
+        "",
+        ("unit/app",),
+    ),
+    Mutant(
+        "vital: a scan that cannot be taken in ends the rule loop",
+        "if kind(observation).vital:",
+        "if True:",
+        ("unit/pipeline/test_supervision.py",),
+    ),
 )
 
 

@@ -33,11 +33,12 @@ def test_the_text_of_every_mutant_is_in_the_code(mutant: Mutant) -> None:
     assert mutant.right != mutant.wrong
 
 
-def test_stop_the_rule_freshness_and_clear_have_mutants() -> None:
+def test_stop_the_rule_freshness_clear_and_what_is_vital_have_mutants() -> None:
     assert len(MUTANTS) >= 10
     assert {mutant.says.partition(":")[0] for mutant in MUTANTS} == {
         "STOP",
         "rule",
         "freshness",
         "clear",
+        "vital",
     }

@@ -1,0 +1,28 @@
+"""Which parts share the fate of the process, and what happens when one ends."""
+
+from pathlib import Path
+
+import pytest
+
+from iveg.app.dss import Dss
+from iveg.settings import Settings
+
+
+@pytest.fixture
+def dss(tmp_path: Path) -> Dss:
+    return Dss(Settings(), tmp_path)
+
+
+async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(
+    dss: Dss,
+) -> None:
+    assert set(dss.vital()) == {"mqtt", "rule-loop"}
+    assert set(dss.comfort()) == {
+        "costmap",
+        "coverage",
+        "provisioner",
+        "history",
+        "messages",
+        "earlier",
+        "loop-watch",
+    }
