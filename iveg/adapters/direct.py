@@ -96,12 +96,13 @@ class DirectReader:
         self, apikey: str, robot_id: str, rows: Mapping[type[Observation], Kind]
     ) -> Iterator[tuple[str, _Source]]:
         """Topics of one robot."""
+        past = self._is_past
         for kind, row in rows.items():
             if kind not in _SUFFIXES:
                 continue
             suffix = _SUFFIXES[kind]
             device = robot_id + suffix
-            read = partial(codec.read_measure, device, is_past=self._is_past)
+            read = partial(codec.read_measure, device, is_past=past, later=True)
             source = _Source(robot_id, row.qos, read, kind, row.apart_s)
             yield names.measure_topic(apikey, device), source
             if suffix in names.DIRECT_SUFFIXES:
@@ -110,7 +111,7 @@ class DirectReader:
                     replace(source, sparse=False),
                 )
         if rows:
-            whole = partial(codec.read_measure, robot_id, is_past=self._is_past)
+            whole = partial(codec.read_measure, robot_id, is_past=past, later=True)
             yield names.measure_topic(apikey, robot_id), _Source(robot_id, 1, whole)
             answer = partial(codec.read_answer, robot_id)
             yield names.answer_topic(apikey, robot_id), _Source(robot_id, 1, answer)

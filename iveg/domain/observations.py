@@ -4,6 +4,7 @@ The field names are those of ``nav_msgs``, ``sensor_msgs`` and the NGSI entity; 
 are Unix seconds unless said otherwise.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -302,6 +303,19 @@ class HeartbeatProbe:
     origin: Origin
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class UnreadScan:
+    """A scan of which only the identity is read: nothing else of it slows a robot.
+
+    Attributes:
+        read: The scan.  Raises UnreadableError.
+    """
+
+    robot_id: str
+    origin: Origin
+    read: Callable[[], LaserScan]
+
+
 @dataclass(frozen=True, slots=True)
 class Overtaken:
     """A message older than its stream, reduced to its identity.
@@ -334,6 +348,7 @@ Observation = (
     | Climate
     | HeartbeatProbe
     | Battery
+    | UnreadScan
     | Overtaken
     | RefusedFrame
 )
@@ -346,6 +361,8 @@ def kind_of(observation: Observation) -> type[Observation]:
             return observation.kind
         case RefusedFrame():
             return DetectionFrame
+        case UnreadScan():
+            return LaserScan
     return type(observation)
 
 

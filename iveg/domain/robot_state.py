@@ -23,6 +23,7 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
     SafetyReport,
+    UnreadScan,
     kind_of,
 )
 from iveg.domain.stream_order import OrderVerdict, StreamOrder
@@ -81,7 +82,7 @@ class RobotState:
     estimated_since: float | None = None
     unproven_since: float | None = None
     alive_since: float | None = None
-    scan: LaserScan | None = None
+    scan: LaserScan | UnreadScan | None = None
     scan_pose: Pose2D | None = None
     scan_received: Instant | None = None
     frame: DetectionFrame | None = None

@@ -12,6 +12,7 @@ from iveg.domain.observations import (
     Origin,
     Received,
     SafetyReport,
+    UnreadScan,
 )
 from iveg.domain.robot_state import RobotState, Sensed
 
@@ -36,7 +37,7 @@ def take_in(robot: RobotState, received: Received, moment: float | None) -> None
     match observation:
         case Odometry():
             _drive(robot, observation, at, moment)
-        case LaserScan():
+        case LaserScan() | UnreadScan():
             robot.scan, robot.scan_received = observation, dated(at, moment)
             robot.scan_pose = robot.pose_at_stamp(observation.origin.own_s)
         case DetectionFrame():

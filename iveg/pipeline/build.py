@@ -10,7 +10,7 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Received
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
@@ -39,6 +39,7 @@ from iveg.pipeline.ports import (
 from iveg.pipeline.publish import Hub
 from iveg.pipeline.record import RecordSink
 from iveg.pipeline.rules import Rules
+from iveg.pipeline.scans import ScanReader
 from iveg.pipeline.supervision import Supervision
 
 
@@ -95,6 +96,7 @@ class Pipeline:
     loop: RuleLoop
     supervision: Supervision
     margins: MarginTotals
+    scans: ScanReader
 
     def counters(self) -> Counter[str]:
         """Everything that is counted in it."""
@@ -143,12 +145,11 @@ def build(
     start, hub, supervision = ports.clock(), Hub(), Supervision(ports.clock)
     event_log = EventLog(hub, ports.sink, start, supervision)
     health_monitor = HealthMonitor(start, ports.history_state)
-    world = World(fleet, health_monitor.probe, greenhouse.bounds)
+    probe, guard = health_monitor.probe, supervision.guard
+    world = World(fleet, probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    guard, probe = supervision.guard, health_monitor.probe
-    rejected, arrived = ports.rejected, guard("latency", watch.arrived)
-    ingest = Ingest(world.robots.__contains__, rejected, world.is_past, arrived)
+    ingest = _ingest(world, ports, guard("latency", watch.arrived))
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -195,7 +196,12 @@ def build(
         loop,
         supervision,
         margins,
+        ScanReader(ingest.reject),
     )
+
+
+def _ingest(world: World, ports: Ports, arrived: Callable[[Received], None]) -> Ingest:
+    return Ingest(world.robots.__contains__, ports.rejected, world.is_past, arrived)
 
 
 def build_services(
@@ -215,6 +221,6 @@ def build_services(
         Rules(evaluator, kept.rule_store, event_log, kept.rules),
         Detectors(parts.world, kept.detector_store, event_log, kept.out_of_service),
         messenger,
-        Mapper(parts.world, greenhouse.bounds, parts.ingest.reject),
+        Mapper(parts.world, greenhouse.bounds, parts.scans),
         CoverageMonitor(parts.world, greenhouse),
     )

@@ -6,7 +6,7 @@ longest, and a fleet that sends more is drawn less often.
 """
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from iveg.domain.costmap import (
     Costmap,
@@ -18,11 +18,12 @@ from iveg.domain.costmap import (
     window_round,
 )
 from iveg.domain.geometry import Rectangle
-from iveg.domain.observations import Instant, LaserScan
+from iveg.domain.observations import Instant, LaserScan, UnreadScan
 from iveg.domain.robot_state import RobotState
 from iveg.domain.rule.zones import Zone
 from iveg.domain.world import World
 from iveg.pipeline.ports import Clock
+from iveg.pipeline.scans import ScanReader
 
 TICK_S = 0.05
 _PERIOD_S = 0.25
@@ -35,23 +36,23 @@ class Mapper:
 
     Args:
         bounds: The outer wall of the greenhouse.
-        reject: Told of a scan that cannot be drawn: robot, reason, detail.
+        scans: Reads them.
     """
 
     def __init__(
         self,
         world: World,
         bounds: Rectangle,
-        reject: Callable[[str, str, str], None] = lambda *_: None,
+        scans: ScanReader | None = None,
     ) -> None:
         self._world = world
-        self._reject = reject
+        self._scans = scans or ScanReader()
         wide = max(bounds.xmax - bounds.xmin, bounds.ymax - bounds.ymin)
         self._is_open = wide > _WIDEST_M
         self._grid = None if self._is_open else Grid.over(bounds)
         # By robot; the fleet shares that of None.
         self._drawn: dict[str | None, Occupancy] = {}
-        self._read: dict[str, LaserScan] = {}
+        self._read: dict[str, LaserScan | UnreadScan] = {}
         self._read_at: dict[str, float] = {}
 
     async def run(self, clock: Clock) -> None:
@@ -93,16 +94,20 @@ class Mapper:
         return self._read_at.get(robot.robot_id, float("-inf"))
 
     def _draw(self, robot: RobotState, now: Instant) -> None:
-        scan, pose = robot.scan, robot.scan_pose
+        pose = robot.scan_pose
         self._place()
-        if scan is None or pose is None or self._grid is None:
+        if robot.scan is None or pose is None or self._grid is None:
             return
-        self._read[robot.robot_id], self._read_at[robot.robot_id] = scan, now.mono
+        self._read[robot.robot_id] = robot.scan
+        self._read_at[robot.robot_id] = now.mono
+        scan = self._scans.newest(robot)
+        if scan is None:
+            return
         try:
             sweep = sweep_of(scan, pose, self._grid)
         except Exception as error:
             # One robot's scan ends neither this part nor the drawing of the others.
-            self._reject(robot.robot_id, "undrawable_scan", repr(error))
+            self._scans.undrawable(robot.robot_id, error)
             return
         for key in (None, robot.robot_id):
             self._drawn[key] = _added(self._drawn.get(key), self._grid, sweep, now)

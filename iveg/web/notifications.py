@@ -128,7 +128,9 @@ class NotificationEndpoint:
 
     def _take(self, body: bytes, at: Instant) -> Problem | None:
         try:
-            subscription_id, reading = read_notification(body, self._ingest.is_past)
+            subscription_id, reading = read_notification(
+                body, self._ingest.is_past, later=True
+            )
         except UnreadableError as error:
             return problem_of(error)
         if not self._is_ours(subscription_id):

@@ -60,7 +60,7 @@ class Views:
     ) -> None:
         self._evaluator, self._commander = parts.evaluator, parts.commander
         self._margins = parts.margins
-        self.reject = parts.ingest.reject
+        self.scans = parts.scans
         self._world, self._people = parts.world, parts.evaluator.people
         self._greenhouse = parts.evaluator.greenhouse
         self._event_log = parts.event_log

@@ -4,6 +4,7 @@ from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,16 @@ from iveg.ngsi.sensors import SENSORS, Sensor
 _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
 _BOXES: TypeAdapter[list[payloads.BoxValue]] = TypeAdapter(list[payloads.BoxValue])
-_Reader = Callable[[str, Any], Observation]
+Reader = Callable[[str, Any], Observation]
 IsPast = Callable[[str, type[Observation], str, int], bool]
 """Whether robot, kind, boot and seq tell that a message cannot be news."""
 
 
 def read_attributes(
-    robot_id: str, attributes: Mapping[str, Any], is_past: IsPast | None = None
+    robot_id: str,
+    attributes: Mapping[str, Any],
+    is_past: IsPast | None = None,
+    instead: Mapping[str, Reader] = MappingProxyType({}),
 ) -> ReadResult:
     """Read every attribute of a robot that the contract knows; skip the others.
 
@@ -51,6 +55,7 @@ def read_attributes(
         robot_id: Whose they are.
         attributes: By name.
         is_past: Tells by its identity what need not be read; None reads all.
+        instead: Other readers of some attributes.
     """
     readings = []
     known = attributes.keys() & _READERS.keys()
@@ -61,7 +66,8 @@ def read_attributes(
         old = (
             None if is_past is None else _overtaken(robot_id, name, attributes, is_past)
         )
-        readings.append(old or read_one(robot_id, _READERS[name], attributes, name))
+        reader = instead.get(name) or _READERS[name]
+        readings.append(old or read_one(robot_id, reader, attributes, name))
     return readings[0] if len(readings) == 1 else merge(readings)
 
 
@@ -88,7 +94,7 @@ def _overtaken(
 
 
 def read_one(
-    source: str, reader: _Reader, attributes: Mapping[str, Any], name: str = ""
+    source: str, reader: Reader, attributes: Mapping[str, Any], name: str = ""
 ) -> ReadResult:
     """Result of one reader on an entity, or the reason of its failure."""
     try:
@@ -351,7 +357,7 @@ def _sensed(
     return sensor.read(robot_id, read_origin(value), value)
 
 
-_READERS: Mapping[str, _Reader] = {
+_READERS: Mapping[str, Reader] = {
     names.ODOMETRY: _odometry,
     names.LIDAR: _scan,
     names.BOXES: _detections,

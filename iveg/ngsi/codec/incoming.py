@@ -13,6 +13,7 @@ from iveg.domain.errors import UnreadableError
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import (
     IsPast,
+    Reader,
     climate,
     command_answer,
     heartbeat,
@@ -20,6 +21,7 @@ from iveg.ngsi.codec.attributes import (
     read_one,
     refused_frame,
 )
+from iveg.ngsi.codec.unread import UNREAD
 from iveg.ngsi.codec.untrusted import (
     ReadResult,
     first_complaint,
@@ -28,15 +30,18 @@ from iveg.ngsi.codec.untrusted import (
     unread,
 )
 
+_NO_OTHERS: Mapping[str, Reader] = {}
+
 
 def read_notification(
-    body: bytes, is_past: IsPast | None = None
+    body: bytes, is_past: IsPast | None = None, *, later: bool = False
 ) -> tuple[str, ReadResult]:
     """Read a notification, normalized or keyValues.
 
     Args:
         body: JSON.
         is_past: Tells by its identity what need not be read; None reads all.
+        later: Leave scans unread, for those who draw them.
 
     Returns:
         The subscription's id and what its entities hold.
@@ -48,12 +53,16 @@ def read_notification(
         notification = payloads.NotificationValue.model_validate(load_json(body))
     except ValidationError as error:
         raise UnreadableError("not_a_notification", first_complaint(error)) from error
-    entities = [read_entity(entity, is_past) for entity in notification.data]
+    entities = [
+        read_entity(entity, is_past, later=later) for entity in notification.data
+    ]
     read = entities[0] if len(entities) == 1 else merge(entities)
     return notification.subscriptionId, read
 
 
-def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> ReadResult:
+def read_entity(
+    entity: Mapping[str, Any], is_past: IsPast | None = None, *, later: bool = False
+) -> ReadResult:
     """Read one NGSI-v2 entity in either representation."""
     entity_id, entity_type = entity.get("id"), entity.get("type")
     if not isinstance(entity_id, str) or not isinstance(entity_type, str):
@@ -66,7 +75,7 @@ def read_entity(entity: Mapping[str, Any], is_past: IsPast | None = None) -> Rea
     if entity_type == names.ROBOT_TYPE:
         if not names.is_robot_id(entity_id):
             return unread(payloads.clean_text(entity_id), "bad_robot_id")
-        return read_attributes(entity_id, attributes, is_past)
+        return read_attributes(entity_id, attributes, is_past, _readers(later=later))
     if (entity_id, entity_type) == (names.CLIMATE_ID, names.CLIMATE_TYPE):
         return read_one(entity_id, climate, attributes)
     if (entity_id, entity_type) == (names.HEARTBEAT_ID, names.HEARTBEAT_TYPE):
@@ -85,9 +94,16 @@ def _attribute_value(attribute: Any) -> Any:
 
 
 def read_measure(
-    device_id: str, payload: bytes, is_past: IsPast | None = None
+    device_id: str,
+    payload: bytes,
+    is_past: IsPast | None = None,
+    *,
+    later: bool = False,
 ) -> ReadResult:
-    """Read what a robot's device published on its ``attrs`` topic."""
+    """Read what a robot's device published on its ``attrs`` topic.
+
+    ``later``: leave scans unread, for those who draw them.
+    """
     robot_id = names.robot_of_device(device_id)
     if not names.is_robot_id(robot_id):
         return unread(payloads.clean_text(device_id), "bad_robot_id")
@@ -97,10 +113,15 @@ def read_measure(
         read = unread(device_id, error.reason, error.detail)
     else:
         if isinstance(attributes, dict):
-            return read_attributes(robot_id, attributes, is_past)
+            readers = _readers(later=later)
+            return read_attributes(robot_id, attributes, is_past, readers)
         read = unread(device_id, "not_an_object")
     is_frame = device_id.endswith(names.FRAME_SUFFIX)
     return refused_frame(robot_id, read) if is_frame else read
+
+
+def _readers(*, later: bool) -> Mapping[str, Reader]:
+    return UNREAD if later else _NO_OTHERS
 
 
 def read_answer(robot_id: str, payload: bytes) -> ReadResult:

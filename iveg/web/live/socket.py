@@ -84,24 +84,25 @@ class Encoder:
             try:
                 return self._scan(topic, key, now)
             except Exception as error:
-                self._views.reject(key, "undrawable_scan", repr(error))
+                self._views.scans.undrawable(key, error)
                 return None
         data = None if row.read is None else row.read(self._views, key, now)
         return None if data is None else text(topic, data, now)
 
     def _scan(self, topic: str, robot_id: str, now: Instant) -> bytes | None:
         robot = self._views.robot_state(robot_id)
-        if robot.scan is None or robot.scan_pose is None:
+        scan = self._views.scans.newest(robot)
+        if scan is None or robot.scan_pose is None:
             return None
         head = orjson.dumps(
             {
                 "topic": topic,
                 "robot_id": robot_id,
-                "stamp": robot.scan.origin.stamp,
+                "stamp": scan.origin.stamp,
                 "age_s": self._views.scan_age_s(robot_id, now),
             }
         )
-        return write_frame(head, [robot.scan.points(robot.scan_pose).tobytes()])
+        return write_frame(head, [scan.points(robot.scan_pose).tobytes()])
 
     def event(self, topic: str, item: object) -> bytes:
         """The frame of an event, which is never dropped."""

@@ -12,6 +12,7 @@ from iveg.domain.observations import (
     Odometry,
     Received,
     SafetyReport,
+    kind_of,
 )
 from iveg.ngsi import codec
 from iveg.pipeline.kinds import Scope
@@ -113,7 +114,7 @@ def test_of_scans_at_30_hz_every_second_is_read_and_the_others_are_told() -> Non
         bench.reader.read("/AGI/iveg/lidar2D", codec.write_scan(scan()))
         bench.reader.read("/AGI/iveg/odom", codec.write_odometry(odometry()))
 
-    read = [type(one.observation) for one in bench.offered]
+    read = [kind_of(one.observation) for one in bench.offered]
     assert (read.count(LaserScan), read.count(Odometry)) == (15, 30)
     assert bench.passed_over == 15 * [("AGI", LaserScan, 1)]
 

@@ -122,7 +122,8 @@ class Listener:
     def told(self) -> tuple[object, ...]:
         robot = self.world.robots["AGI"]
         known = robot.odometry, robot.pose_at, robot.heard_at, robot.detections_at
-        swept = robot.scan and (robot.scan.origin, robot.scan.ranges.tolist())
+        scan = robot.scan
+        swept = isinstance(scan, LaserScan) and (scan.origin, scan.ranges.tolist())
         frame = robot.frame and robot.frame.origin
         return (*known, swept, frame, robot.clock, dict(self.world.counters))
 

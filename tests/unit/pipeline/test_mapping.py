@@ -6,6 +6,7 @@ from iveg.domain.costmap import Costmap
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.rule.zones import Zone
 from iveg.pipeline.mapping import Mapper
+from iveg.pipeline.scans import ScanReader
 from tests.builders import at, scan
 from tests.unit.domain.scene import Scene
 
@@ -113,9 +114,8 @@ def test_one_tick_takes_one_scan_however_many_wait() -> None:
 
 def test_f60_a_scan_that_cannot_be_drawn_is_refused_and_the_others_are_drawn() -> None:
     field, refused = Field(), list[tuple[str, str]]()
-    field.mapper = Mapper(
-        field.world, ROOM, lambda robot, why, _: refused.append((robot, why))
-    )
+    scans = ScanReader(lambda robot, why, _: refused.append((robot, why)))
+    field.mapper = Mapper(field.world, ROOM, scans)
     field.sweep_from("AGI", 5.0)
     field.sweep_from("AGII", 15.0)
     flat = scan("AGI", [3.0] * 360, angle_increment=0.0, range_max=12.0)
