@@ -172,6 +172,8 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
         found = await days.read(wanted, now)
         before, after = ((wanted + step).isoformat() for step in (-_DAY, _DAY))
         frame = pages.frame(request, "day", visitor)
-        return pages.draw(DayPage(frame, found, before, after))
+        page = DayPage(frame, found, before, after)
+        # The first drawing also reads the template.
+        return await asyncio.to_thread(pages.draw, page)
 
     return routes
