@@ -28,6 +28,7 @@ from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import (
     CAUTIOUS,
     FleetDescription,
+    Frame,
     Kind,
     RobotDescription,
     RobotProfile,
@@ -162,6 +163,7 @@ class _Camera(_Table):
     height_m: Annotated[float, Field(gt=0, le=10)] = CAUTIOUS.camera_height
     fov_deg: Annotated[float, Field(gt=0, le=360)]
     range_m: Annotated[float, Field(gt=0, le=100)]
+    unlabelled_frame: Frame | None = None
 
 
 class _Laser(_Table):
@@ -192,6 +194,7 @@ class _Robot(_Table):
                 camera_height=camera.height_m,
                 camera_fov=math.radians(camera.fov_deg),
                 camera_range=camera.range_m,
+                unlabelled_frame=camera.unlabelled_frame,
             )
         laser = self.laser
         profile = replace(profile, laser=Pose2D(laser.x_m, laser.y_m, laser.yaw_rad))

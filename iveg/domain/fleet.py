@@ -14,6 +14,8 @@ from iveg.domain.geometry import Pose2D
 from iveg.domain.limits import LIMITS
 
 Kind = Literal["live", "recording"]
+Frame = Literal["map", "base_link", "camera_link", "camera_optical_frame"]
+"""Frames that a box may be in (REP-105); the last has optical axes (REP-103)."""
 
 ROBOT_ID = re.compile(r"[A-Za-z0-9-]{1,64}")
 RESERVED_IDS = frozenset({"climate", "iveg-canary", "iveg-doctor"})
@@ -35,6 +37,7 @@ class RobotProfile:
         camera_fov: What the camera sees across (rad); 0: nobody knows, so that a spot
             is never taken for empty.
         camera_range: How far it may see (m).
+        unlabelled_frame: The frame of boxes that come without one; None: nobody knows.
         laser: Pose of the laser in ``base_link``.
     """
 
@@ -51,7 +54,13 @@ class RobotProfile:
     camera_height: float = 0.6
     camera_fov: float = 0.0
     camera_range: float = 15.0
+    unlabelled_frame: Frame | None = None
     laser: Pose2D = Pose2D(0.0, 0.0, 0.0)
+
+    @property
+    def has_known_camera(self) -> bool:
+        """Whether somebody said where the camera is and what it sees."""
+        return self.camera_fov > 0.0
 
 
 CAUTIOUS = RobotProfile()

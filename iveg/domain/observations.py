@@ -139,13 +139,13 @@ class Detection:
         class_id: As sent (``farmer``); the rule's class comes from the alias table.
         probability: 0 to 1.
         box: In ``frame_id``.
-        frame_id: ``map`` or ``base_link``.
+        frame_id: As sent (``iveg.domain.frames`` resolves it); None: without one.
     """
 
     class_id: str
     probability: float
     box: Box3D
-    frame_id: Literal["map", "base_link"] = "base_link"
+    frame_id: str | None = None
     det_id: str | None = None
 
 

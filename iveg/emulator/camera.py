@@ -289,7 +289,8 @@ class Detector:
         corners = [into(pose, float(x), float(y)) for x, y in moved]
         xs, ys = [x for x, _ in corners], [y for _, y in corners]
         box = Box3D(min(xs), max(xs), min(ys), max(ys), 0.0, target.height)
-        return Detection(target.class_id, self._certainty(encounter, seen), box)
+        certainty = self._certainty(encounter, seen)
+        return Detection(target.class_id, certainty, box, "base_link")
 
     def _certainty(self, encounter: _Encounter, seen: float) -> float:
         return self._probability(encounter.confidence - _HIDDEN_LOSS * (1.0 - seen))
@@ -307,4 +308,5 @@ def upright_box(
     pose: Pose2D, class_id: str, x: float, y: float, probability: float
 ) -> Detection:
     """A box of a person's size at a position in ``map``, given in ``base_link``."""
-    return Detection(class_id, probability, box_of_a_person(*into(pose, x, y)))
+    box = box_of_a_person(*into(pose, x, y))
+    return Detection(class_id, probability, box, "base_link")

@@ -71,7 +71,7 @@ class SinglePayload:
 
 def _detected(detection: Detection, pose: Pose2D) -> dict[str, object]:
     x, y, z = detection.box.centre
-    if detection.frame_id == "base_link":
+    if detection.frame_id != "map":
         x, y = pose.transform(x, y)
     return {
         "class": detection.class_id,

@@ -27,7 +27,7 @@ assumed_braking_m_s2 = 0.4
 
 [[robots]]
 id = "B2"
-camera = { x_m = 0.2, fov_deg = 90, range_m = 5.0 }
+camera = { x_m = 0.2, fov_deg = 90, range_m = 5.0, unlabelled_frame = "camera_link" }
 """
 
 
@@ -45,6 +45,7 @@ def test_what_the_file_says_of_a_robot_is_what_is_known_of_it() -> None:
     assert (one.profile.drive, one.profile.turning_radius) == ("ackermann", 1.5)
     assert (one.profile.max_speed, one.profile.assumed_braking) == (0.6, 0.4)
     assert one.profile.camera_fov == CAUTIOUS.camera_fov
+    assert one.profile.unlabelled_frame is None
 
 
 def test_a_robot_without_body_and_drive_is_one_that_nobody_described() -> None:
@@ -52,6 +53,7 @@ def test_a_robot_without_body_and_drive_is_one_that_nobody_described() -> None:
 
     assert (one.kind, one.is_described) == ("live", False)
     assert one.profile.camera == Pose2D(0.2, 0.0, 0.0)
+    assert one.profile.unlabelled_frame == "camera_link"
     assert one.profile.camera_fov == pytest.approx(math.pi / 2)
     assert one.profile.length == CAUTIOUS.length
 
@@ -72,6 +74,7 @@ def test_margins_never_count_on_better_brakes_than_the_drive_has() -> None:
         ('"B2"', '"B1"', "fleet.toml:17:1, robots[1].id: B1 is in the list twice"),
         ('"B2"', '"climate"', "fleet.toml:17:1, robots[1].id:"),
         ("fov_deg = 90", 'fov_deg = "wide"', "fleet.toml:18:23, robots[1].camera.fov"),
+        ('"camera_link"', '"odom"', "fleet.toml:18:52, robots[1].camera.unlabelled_f"),
         ('"recording"', '"maybe"', "fleet.toml:3:1, robots[0].kind:"),
         ("= 0.4", "= 1.4", "fleet.toml:9:1, robots[0].drive: assumed_braking_m_s2 m"),
         ("kind =", "kind", "fleet.toml:3:6: is not TOML:"),

@@ -1,0 +1,103 @@
+"""Frames of reference of detected boxes (REP-103, REP-105), by the names of TF.
+
+A box in ``map`` or ``base_link`` stays as it is; one of the camera is taken to
+``base_link`` by the mount in the robot's description.  A box without a frame is in the
+one that the description names, and in either ``base_link`` or ``camera_link`` where it
+names none.  A frame that nobody described has no place: that is doubt, not a guess.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+from iveg.domain.fleet import Frame, RobotDescription, RobotProfile
+from iveg.domain.geometry import Box3D
+from iveg.domain.observations import Detection
+
+_NAMED: dict[str, Frame] = {
+    "map": "map",
+    "base_link": "base_link",
+    "camera_link": "camera_link",
+}
+_OPTICAL = ("_optical", "_optical_frame")
+_EITHER: tuple[Frame, ...] = ("base_link", "camera_link")
+
+
+@dataclass(frozen=True, slots=True)
+class FramedBox:
+    """A box in a frame whose pose in ``map`` is the world's or the robot's own."""
+
+    box: Box3D
+    frame_id: Literal["map", "base_link"]
+
+
+def resolve_box(
+    detection: Detection, robot: RobotDescription
+) -> tuple[FramedBox | None, ...]:
+    """The box of a detection, once for each frame that it may be in.
+
+    Returns:
+        None in place of a box whose frame nobody described.
+    """
+    return tuple(
+        _in_known_frame(detection.box, frame, robot.profile)
+        for frame in _frames_of(detection.frame_id, robot)
+    )
+
+
+def _frames_of(
+    frame_id: str | None, robot: RobotDescription
+) -> tuple[Frame | None, ...]:
+    if frame_id is not None:
+        return (frame_named(frame_id, robot.robot_id),)
+    described = robot.profile.unlabelled_frame
+    return _EITHER if described is None else (described,)
+
+
+@lru_cache(maxsize=256)
+def frame_named(name: str, robot_id: str) -> Frame | None:
+    """The frame that a robot means by a name of TF; None for a name that is unknown.
+
+    Leading slashes and the robot's own prefix are left out: ``/map``,
+    ``AGI/base_link``, ``agi_camera_link``.  The prefix of another robot is unknown.
+    """
+    *prefix, last = name.strip("/").split("/")
+    own = robot_id.lower().replace("-", "_")
+    if prefix and prefix[-1].lower() not in (own, robot_id.lower()):
+        return None
+    if last.endswith(_OPTICAL):
+        return "camera_optical_frame"
+    if last.lower().startswith(f"{own}_"):
+        return _NAMED.get(last) or _NAMED.get(last[len(own) + 1 :])
+    return _NAMED.get(last)
+
+
+def _in_known_frame(
+    box: Box3D, frame: Frame | None, profile: RobotProfile
+) -> FramedBox | None:
+    if frame == "map" or frame == "base_link":
+        return FramedBox(box, frame)
+    if frame is None or not profile.has_known_camera:
+        return None
+    upright = _upright(box) if frame == "camera_optical_frame" else box
+    return FramedBox(_in_base_link(upright, profile), "base_link")
+
+
+def _upright(box: Box3D) -> Box3D:
+    """From optical axes (x right, y down, z forward) to x forward, y left, z up."""
+    return Box3D(box.zmin, box.zmax, -box.xmax, -box.xmin, -box.ymax, -box.ymin)
+
+
+def _in_base_link(box: Box3D, profile: RobotProfile) -> Box3D:
+    """From ``camera_link`` to ``base_link``: the hull of the turned box.
+
+    The centre of the hull is the turned centre.
+    """
+    corners = [
+        profile.camera.transform(x, y)
+        for x in (box.xmin, box.xmax)
+        for y in (box.ymin, box.ymax)
+    ]
+    xs, ys = zip(*corners, strict=True)
+    up = profile.camera_height
+    return Box3D(min(xs), max(xs), min(ys), max(ys), box.zmin + up, box.zmax + up)
