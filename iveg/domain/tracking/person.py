@@ -26,7 +26,8 @@ class Sighting:
         possible: It was below the threshold, but seen again and again.
         reach_m: Where the position is doubtful, x and y are the observer's own, and
             this is how far its camera reaches (m); else 0.
-        chain: Number of the chain of sightings whose newest this is.
+        chain: Number of the chain of sightings whose newest this is; negative: of the
+            second place of a box that may be in two (``iveg.domain.frames``).
         recording: The map frame of the recording that saw it; None: a robot of today.
     """
 

@@ -17,33 +17,24 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from iveg.domain.detection_rule import Class
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
 from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.picture import (
+    PlacedDetection,
+    chain_cost,
+    distance_between,
+    first_places,
+    is_alike,
+    live_cost,
+    lost_cost,
+)
 
 MAX_PEOPLE = 256
-GATE_M, GATE_CAP_M = 1.0, 2.0
 MERGE_M = 0.5
-LOST_SPEED, LOST_CAP_M = 1.0, 6.0
-"""How far from where somebody was lost the same one may appear: more is as often
-another person (``benchmarks/tracking.py``; m/s, m)."""
 MARK_M = 6.0
 """So near to a new track a last-seen mark is taken for the same person's."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlacedDetection:
-    """One confident detection of a picture.
-
-    Attributes:
-        decision_id: Of the alert, should this begin a track.
-    """
-
-    class_: Class
-    sighting: Sighting
-    decision_id: str
 
 
 @dataclass
@@ -67,15 +58,11 @@ class Tracker:
             The track of each detection; None where no more can be kept.
         """
         chains = self._continue_chains(picture, at)
-        picture = [
-            PlacedDetection(
-                one.class_, self._chained(one.sighting, old), one.decision_id
-            )
-            for one, old in zip(picture, chains, strict=True)
-        ]
+        picture = self._chained(picture, chains)
         tracks = self._choose_tracks(picture, chains, at)
         for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
-            tracks[index] = self._put(one, old, tracks[index], at)
+            track = tracks[one.first_place(index)]
+            tracks[index] = self._put(one, old, track, at)
         named = [track for track in tracks if track is not None]
         self._remember_together(named)
         merged = dict(self._merge(dict.fromkeys(named), at))
@@ -109,10 +96,12 @@ class Tracker:
             (person, earlier)
             for person in self.known.values()
             for earlier in person.sightings
-            if earlier.observer == observer and earlier.age_s(at) <= LIMITS.ring_lasts_s
+            if earlier.observer == observer
+            and earlier.chain > 0
+            and earlier.age_s(at) <= LIMITS.ring_lasts_s
         ]
         for is_live in (True, False):
-            wanting = [index for index, old in enumerate(out) if old is None]
+            wanting = [index for index in first_places(picture) if out[index] is None]
             if not wanting:
                 break
             offered = [
@@ -122,7 +111,7 @@ class Tracker:
             ]
             costs = [
                 [
-                    _chain_cost(picture[i], person, earlier, at)
+                    chain_cost(picture[i], person, earlier, at)
                     for person, earlier in offered
                 ]
                 for i in wanting
@@ -130,15 +119,48 @@ class Tracker:
             for row, column in assign(costs):
                 person, earlier = offered[column]
                 out[wanting[row]] = person.person_id, earlier
-        return out
+        return [
+            old if one.first_place(index) == index else self._beside(out, one)
+            for index, (one, old) in enumerate(zip(picture, out, strict=True))
+        ]
+
+    def _beside(
+        self, chains: Sequence[tuple[str, Sighting] | None], one: PlacedDetection
+    ) -> tuple[str, Sighting] | None:
+        """What a further place replaces: the one beside what its first replaces."""
+        first = None if one.same_as is None else chains[one.same_as]
+        if first is None:
+            return None
+        track, replaced = first
+        for earlier in self.known[track].sightings:
+            if earlier.chain == -replaced.chain:
+                return track, earlier
+        return None
 
     def _chained(
-        self, sighting: Sighting, old: tuple[str, Sighting] | None
-    ) -> Sighting:
-        if old is not None:
-            return sighting.in_chain(old[1].chain)
-        self._chains += 1
-        return sighting.in_chain(self._chains)
+        self,
+        picture: Sequence[PlacedDetection],
+        chains: Sequence[tuple[str, Sighting] | None],
+    ) -> list[PlacedDetection]:
+        """The picture with the number of each one's chain.
+
+        The chain of a further place has its first one's number, negative.
+        """
+        out: list[PlacedDetection] = []
+        for index, (one, old) in enumerate(zip(picture, chains, strict=True)):
+            first = one.first_place(index)
+            if first != index:
+                chain = -out[first].sighting.chain
+            elif old is not None:
+                chain = old[1].chain
+            else:
+                self._chains += 1
+                chain = self._chains
+            sighting = one.sighting.in_chain(chain)
+            out.append(
+                PlacedDetection(one.class_, sighting, one.decision_id, one.same_as)
+            )
+        return out
 
     # --- tracks -------------------------------------------------------------------
 
@@ -149,12 +171,15 @@ class Tracker:
         at: Instant,
     ) -> list[str | None]:
         tracks: list[str | None] = [None] * len(picture)
-        for index, old in enumerate(chains):
+        firsts = first_places(picture)
+        for index in firsts:
+            old = chains[index]
             if old is not None and old[1].age_s(at) <= LIMITS.seen_s:
                 tracks[index] = old[0]
         self._assign_tracks(picture, tracks, at, is_live=True)
         taken = set(tracks)
-        for index, old in enumerate(chains):
+        for index in firsts:
+            old = chains[index]
             if tracks[index] is None and old is not None and old[0] not in taken:
                 tracks[index] = old[0]
                 taken.add(old[0])
@@ -170,7 +195,7 @@ class Tracker:
         is_live: bool,
     ) -> None:
         """Assign free tracks to detections without one."""
-        wanting = [index for index, track in enumerate(tracks) if track is None]
+        wanting = [index for index in first_places(picture) if tracks[index] is None]
         if not wanting:
             return
         taken = set(tracks)
@@ -181,7 +206,7 @@ class Tracker:
             and (person.age_s(at) <= LIMITS.seen_s) is is_live
             and person.age_s(at) <= LIMITS.ring_lasts_s
         ]
-        cost = _live_cost if is_live else _lost_cost
+        cost = live_cost if is_live else lost_cost
         costs = [[cost(picture[i], person, at) for person in offered] for i in wanting]
         for row, column in assign(costs):
             tracks[wanting[row]] = offered[column].person_id
@@ -240,9 +265,9 @@ class Tracker:
     def _drop_mark(self, one: PlacedDetection, at: Instant) -> None:
         """Drop the nearest last-seen mark within reach of a new person, its owner."""
         marks = [
-            (_distance(person.newest, one.sighting), person.person_id)
+            (distance_between(person.newest, one.sighting), person.person_id)
             for person in self.known.values()
-            if _is_alike(person, one) and person.stage(at) == "last_seen"
+            if is_alike(person, one) and person.stage(at) == "last_seen"
         ]
         distance, track = min(marks, default=(math.inf, ""))
         if distance <= MARK_M:
@@ -287,7 +312,7 @@ class Tracker:
                 and other.person_id not in apart
                 and other.age_s(at) <= LIMITS.seen_s
                 and not other.newest.reach_m
-                and _distance(other.newest, person.newest) <= self.merge_m
+                and distance_between(other.newest, person.newest) <= self.merge_m
             ):
                 return other.person_id
         return None
@@ -310,62 +335,3 @@ def _name_now(track: str | None, merged: Mapping[str, str]) -> str | None:
     while track is not None and track in merged:
         track = merged[track]
     return track
-
-
-def _is_alike(person: Person, one: PlacedDetection) -> bool:
-    """Whether they can be one: of a class, and of the same map."""
-    frame = person.newest.recording
-    return person.class_ == one.class_ and frame == one.sighting.recording
-
-
-def _chain_cost(
-    one: PlacedDetection, person: Person, earlier: Sighting, at: Instant
-) -> float:
-    """Distance to the observer's own earlier sighting (m); inf for another person's."""
-    if not _is_alike(person, one) or bool(earlier.reach_m) != bool(
-        one.sighting.reach_m
-    ):
-        return math.inf
-    if earlier.reach_m:
-        return 0.0
-    distance = _distance(earlier, one.sighting)
-    return distance if distance <= _gate(earlier, at) else math.inf
-
-
-def _live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
-    """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
-
-    Where two robots see one person with noise, a detection that lies far from the one
-    sighting seldom lies far from both.
-    """
-    if not _is_alike(person, one) or one.sighting.reach_m:
-        return math.inf
-    return min(
-        (
-            distance
-            for earlier in person.sightings
-            if not earlier.reach_m
-            and earlier.age_s(at) <= LIMITS.seen_s
-            and (distance := _distance(earlier, one.sighting)) <= _gate(earlier, at)
-        ),
-        default=math.inf,
-    )
-
-
-def _lost_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
-    """Distance to the last sighting (m); inf beyond what is likely."""
-    last = person.newest
-    if not _is_alike(person, one) or one.sighting.reach_m or last.reach_m:
-        return math.inf
-    distance = _distance(last, one.sighting)
-    reach = min(LOST_CAP_M, GATE_M + LOST_SPEED * last.age_s(at))
-    return distance if distance <= reach else math.inf
-
-
-def _distance(one: Sighting, other: Sighting) -> float:
-    return math.hypot(one.x - other.x, one.y - other.y)
-
-
-def _gate(earlier: Sighting, at: Instant) -> float:
-    """How far one may have walked since a sighting (m, capped)."""
-    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - earlier.at.mono))

@@ -9,7 +9,8 @@ from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.observations import Instant
 from iveg.domain.tracking.assignment import assign
 from iveg.domain.tracking.person import Sighting
-from iveg.domain.tracking.tracker import PlacedDetection, Tracker
+from iveg.domain.tracking.picture import PlacedDetection
+from iveg.domain.tracking.tracker import Tracker
 from tests.builders import at
 from tests.unit.domain.scene import Scene, person
 

@@ -1,0 +1,101 @@
+"""One picture as the tracker takes it, and its distances to who is known already."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from iveg.domain.detection_rule import Class
+from iveg.domain.limits import LIMITS
+from iveg.domain.observations import Instant
+from iveg.domain.tracking.person import Person, Sighting
+
+GATE_M, GATE_CAP_M = 1.0, 2.0
+LOST_SPEED, LOST_CAP_M = 1.0, 6.0
+"""How far from where somebody was lost the same one may appear: more is as often
+another person (``benchmarks/tracking.py``; m/s, m)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedDetection:
+    """One confident detection of a picture.
+
+    Attributes:
+        decision_id: Of the alert, should this begin a track.
+        same_as: Index in the picture of the first place of the same box, which may be
+            its own; None: its own.  Every further place joins the track of the first.
+    """
+
+    class_: Class
+    sighting: Sighting
+    decision_id: str
+    same_as: int | None = None
+
+    def first_place(self, index: int) -> int:
+        """Index of the first place of its box; ``index`` is its own."""
+        return index if self.same_as is None else self.same_as
+
+
+def first_places(picture: Sequence[PlacedDetection]) -> list[int]:
+    """Indices of the boxes' first places."""
+    return [
+        index for index, one in enumerate(picture) if one.first_place(index) == index
+    ]
+
+
+def is_alike(person: Person, one: PlacedDetection) -> bool:
+    """Whether they can be one: of a class, and of the same map."""
+    frame = person.newest.recording
+    return person.class_ == one.class_ and frame == one.sighting.recording
+
+
+def chain_cost(
+    one: PlacedDetection, person: Person, earlier: Sighting, at: Instant
+) -> float:
+    """Distance to the observer's own earlier sighting (m); inf for another person's."""
+    if not is_alike(person, one) or bool(earlier.reach_m) != bool(one.sighting.reach_m):
+        return math.inf
+    if earlier.reach_m:
+        return 0.0
+    distance = distance_between(earlier, one.sighting)
+    return distance if distance <= _gate(earlier, at) else math.inf
+
+
+def live_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
+    """Distance to the nearest fresh sighting by anybody (m); inf beyond its gate.
+
+    Where two robots see one person with noise, a detection that lies far from the one
+    sighting seldom lies far from both.
+    """
+    if not is_alike(person, one) or one.sighting.reach_m:
+        return math.inf
+    return min(
+        (
+            distance
+            for earlier in person.sightings
+            if not earlier.reach_m
+            and earlier.age_s(at) <= LIMITS.seen_s
+            and (distance := distance_between(earlier, one.sighting))
+            <= _gate(earlier, at)
+        ),
+        default=math.inf,
+    )
+
+
+def lost_cost(one: PlacedDetection, person: Person, at: Instant) -> float:
+    """Distance to the last sighting (m); inf beyond what is likely."""
+    last = person.newest
+    if not is_alike(person, one) or one.sighting.reach_m or last.reach_m:
+        return math.inf
+    distance = distance_between(last, one.sighting)
+    reach = min(LOST_CAP_M, GATE_M + LOST_SPEED * last.age_s(at))
+    return distance if distance <= reach else math.inf
+
+
+def distance_between(one: Sighting, other: Sighting) -> float:
+    """Horizontal distance between two sightings (m)."""
+    return math.hypot(one.x - other.x, one.y - other.y)
+
+
+def _gate(earlier: Sighting, at: Instant) -> float:
+    """How far one may have walked since a sighting (m, capped)."""
+    return min(GATE_CAP_M, GATE_M + LIMITS.walking_m_s * abs(at.mono - earlier.at.mono))
