@@ -25,7 +25,7 @@ came than can be judged."""
 
 
 def flaw_of(
-    frame: DetectionFrame, rule: DetectionRule, turned_away: int = 0
+    frame: DetectionFrame, rule: DetectionRule, turned_away: int = 0, unplaced: int = 0
 ) -> Flaw | None:
     """Why a judged frame does not count as read whole; None: it does.
 
@@ -33,11 +33,12 @@ def flaw_of(
         frame: The frame; an unread box counts where it may show a person or robot.
         rule: Knows which classes these are.
         turned_away: Detections for which there was no room.
+        unplaced: Detections of somebody whose place nobody knows.
     """
     if turned_away:
         return "overload"
     unread = frame.unread
-    if None in unread or any(map(rule.class_of, unread)):
+    if unplaced or None in unread or any(map(rule.class_of, unread)):
         return "unreadable"
     return None
 

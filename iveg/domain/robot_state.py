@@ -64,6 +64,7 @@ class RobotState:
             nothing is known, the moment that is likely.
         scan_received: Like ``pose_at``, of the newest scan; ``safety_received`` too.
         detector: Whether its pictures are read whole.
+        unlabelled: Whether boxes of its newest frame with any came without a frame.
         live_at: When a live safety node last spoke for a robot that the fleet calls a
             recording (monotonic, s): from then on it counts as live.
         refused_at: When a message that calls itself a replay was last refused, because
@@ -90,6 +91,7 @@ class RobotState:
     detections_at: float | None = None
     sighted_at: Instant | None = None
     detector: Detector = field(default_factory=Detector)
+    unlabelled: bool = False
     safety: SafetyReport | None = None
     safety_received: Instant | None = None
     navigation: Navigation | None = None

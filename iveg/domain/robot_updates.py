@@ -62,6 +62,8 @@ def _see(
         robot.detections_at, robot.frame, frame.origin, moment
     )
     robot.frame, robot.frame_transport = frame, received.transport
+    if frame.detections:
+        robot.unlabelled = any(one.frame_id is None for one in frame.detections)
 
 
 def _hear(

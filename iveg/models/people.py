@@ -108,7 +108,7 @@ class Detection(Model):
             class_id=one.detection.class_id,
             probability=one.detection.probability,
             position=Position(x=x, y=y, z=z),
-            box=DetectionBox.of(one.detection.box, one.detection.frame_id),
+            box=DetectionBox.of(one.framed.box, one.framed.frame_id),
             confident=one.kind != "faint",
             person_id=None if one.person is None else one.person.person_id,
             peer=one.peer,

@@ -109,7 +109,7 @@ class BoxValue(Wire):
     class_id: Text
     probability: Annotated[float, Field(ge=0, le=1)]
     position: PositionValue
-    frame_id: Literal["map", "base_link"] = "base_link"
+    frame_id: Text | None = None
     det_id: Text | None = None
 
 

@@ -18,6 +18,7 @@ from iveg.pipeline.ports import Ids
 
 _LOGGED_S = 2.0
 _MAX_SUBJECTS = 1000
+_MAX_FRAMES = 200
 _KEYS = {
     "alert": "log.detection",
     "faint": "log.detection_faint",
@@ -47,6 +48,7 @@ class DetectionTracking:
         self._event_log = event_log
         self._new_id = new_id
         self._told: dict[tuple[str, str], float] = {}
+        self._unknown_frames: set[tuple[str, str]] = set()
 
     @property
     def subjects(self) -> int:
@@ -76,10 +78,12 @@ class DetectionTracking:
             detector.note_flaw("overload", received.at)
             return
         placed = self._look(frame, received, rule, seen_at)
-        turned_away = self._people.turned_away
+        turned_away, unplaced = self._people.turned_away, self._people.unplaced
         if turned_away:
             self._world.counters["people.turned_away"] += turned_away
-        flaw = flaw_of(frame, rule, turned_away)
+        if unplaced:
+            self._world.counters["people.unplaced"] += unplaced
+        flaw = flaw_of(frame, rule, turned_away, unplaced)
         if flaw is not None:
             detector.note_flaw(flaw, received.at)
         elif verdict == "new":
@@ -96,11 +100,24 @@ class DetectionTracking:
         seen_at: Instant,
     ) -> list[Placed]:
         placed = self._people.sight(frame, self._world, rule, seen_at, self._new_id())
+        for name in self._people.unknown_frames:
+            self._name_unknown_frame(frame.robot_id, name, received.at)
         for one in placed:
             self._describe(one, frame, received)
         if any(one.person is not None for one in placed):
             self._event_log.changed(topics.PEOPLE.name)
         return placed
+
+    def _name_unknown_frame(self, robot_id: str, frame_id: str, at: Instant) -> None:
+        """Count a frame that nobody described; log it once for each robot."""
+        self._world.counters["detections.unknown_frame"] += 1
+        known, name = self._unknown_frames, (robot_id, frame_id)
+        if name in known or len(known) >= _MAX_FRAMES:
+            return
+        known.add(name)
+        slots: dict[str, Slot] = {"robot": robot_id, "frame": frame_id}
+        line = LogEvent("detection", "log.unknown_frame", slots, robot_id)
+        self._event_log.log(line, at)
 
     def _describe(self, one: Placed, frame: DetectionFrame, received: Received) -> None:
         at, robot_id = received.at, frame.robot_id

@@ -153,8 +153,8 @@ class EventLog:
                 class_=one.class_,
                 person_id=None if one.person is None else one.person.person_id,
                 box={
-                    **asdict(one.detection.box),
-                    "frame_id": one.detection.frame_id,
+                    **asdict(one.framed.box),
+                    "frame_id": one.framed.frame_id,
                 },
             )
         )

@@ -81,7 +81,7 @@ detections = st.builds(
     texts,
     thousandths(0, 1),
     st.builds(Box3D, metres, metres, metres, metres, metres, metres),
-    st.sampled_from(["map", "base_link"]),
+    st.sampled_from([None, "map", "base_link", "camera_optical_frame"]),
     maybe,
 )
 frames = st.builds(

@@ -134,7 +134,7 @@ def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Conditio
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
-    """Robots with estimated ages or without a description: one alert each."""
+    """Estimated ages, no description, boxes without a frame: one alert each."""
     fleet = list(robots)
     estimated = [
         robot.robot_id
@@ -142,10 +142,16 @@ def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:
         if robot.estimated_since is not None
         and now.mono - robot.estimated_since > ESTIMATED_SHOWN_AFTER_S
     ]
+    unlabelled = [
+        one.robot_id
+        for one in fleet
+        if one.unlabelled and one.profile.unlabelled_frame is None
+    ]
     undescribed = [one.robot_id for one in fleet if not one.description.is_described]
     for key, names in (
         ("alert.age_estimated", estimated),
         ("alert.robots_not_described", undescribed),
+        ("alert.frame_not_named", unlabelled),
     ):
         if names:
             slots: dict[str, Slot] = {"robots": ", ".join(names)}

@@ -10,14 +10,16 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.frames import FramedBox, resolve_box
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import Person, Sighting
+from iveg.domain.tracking.picture import PlacedDetection
 from iveg.domain.tracking.point_index import PointIndex
 from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
-from iveg.domain.tracking.tracker import PlacedDetection, Tracker
+from iveg.domain.tracking.tracker import Tracker
 from iveg.domain.world import World
 
 _SUSPECT_M = 1.0
@@ -29,7 +31,11 @@ _BEYOND_WALL_M = 2.0
 class Placed:
     """A detection in ``map`` with what became of it.
 
+    One whose frame is not known for certain is placed more than once.
+
     Attributes:
+        framed: Its box in the frame that it was taken to be in.
+        index: Of the detection in its frame.
         person: The person it belongs to; None when faint, another class, or a peer.
         peer: The fleet member that it is a sighting of.
         possible: Below the threshold, but seen again and again.
@@ -38,6 +44,8 @@ class Placed:
     """
 
     detection: Detection
+    framed: FramedBox
+    index: int
     position: tuple[float, float, float]
     kind: Literal["alert", "faint", "other"]
     class_: Class | None
@@ -63,6 +71,10 @@ class People:
         self._indexed: dict[str, Person] = {}
         self.turned_away = 0
         """Detections of the last frame without room."""
+        self.unplaced = 0
+        """Detections of the last frame that may be somebody, with an unknown place."""
+        self.unknown_frames: frozenset[str] = frozenset()
+        """Frames that the last frame named and nobody described."""
 
     @property
     def spots(self) -> PointIndex:
@@ -102,11 +114,7 @@ class People:
         """
         observer = world.robot(frame.robot_id)
         pose = observer.pose_at_stamp(frame.origin.own_s)
-        placed = [
-            judged
-            for detection in frame.detections
-            if (judged := _place(detection, pose, rule)) is not None
-        ]
+        placed = self._place(frame, observer, pose, rule)
         if rule.possible_people:
             placed = self._suspect(placed, frame.robot_id, at)
         placed = [
@@ -115,6 +123,31 @@ class People:
         ]
         self._faint[frame.robot_id] = [one for one in placed if one.kind == "faint"]
         return self._assign(placed, observer, at, new_id)
+
+    def _place(
+        self,
+        frame: DetectionFrame,
+        observer: RobotState,
+        pose: Pose2D | None,
+        rule: DetectionRule,
+    ) -> list[Placed]:
+        """Place every detection wherever it may be, and note those without a place."""
+        placed: list[Placed] = []
+        unknown, self.unplaced = set[str](), 0
+        for index, detection in enumerate(frame.detections):
+            boxes = resolve_box(detection, observer.description)
+            found = [
+                _placed(detection, box, index, pose, rule)
+                for box in boxes
+                if box is not None and (pose is not None or box.frame_id == "map")
+            ]
+            placed += found
+            if len(found) < len(boxes):
+                self.unplaced += _may_be_somebody(detection, rule)
+            if None in boxes and detection.frame_id is not None:
+                unknown.add(detection.frame_id)
+        self.unknown_frames = frozenset(unknown)
+        return placed
 
     def _suspect(
         self, placed: Sequence[Placed], observer: str, at: Instant
@@ -148,14 +181,16 @@ class People:
             for index, one in enumerate(out)
             if one.kind == "alert" and one.peer is None
         ]
+        first: dict[int, int] = {}
         tracks = self._tracker.take(
             [
                 PlacedDetection(
                     out[index].class_ or "person",
                     _sighting(out[index], observer, at),
                     f"{new_id}-{index}",
+                    first.setdefault(out[index].index, number),
                 )
-                for index in wanting
+                for number, index in enumerate(wanting)
             ],
             at,
         )
@@ -166,6 +201,8 @@ class People:
                 # For each box of each picture: ``replace`` takes twice as long.
                 out[index] = Placed(
                     one.detection,
+                    one.framed,
+                    one.index,
                     one.position,
                     one.kind,
                     one.class_,
@@ -193,17 +230,26 @@ class People:
         return self._tracker.forget(now)
 
 
-def _place(
-    detection: Detection, pose: Pose2D | None, rule: DetectionRule
-) -> Placed | None:
-    """Place one detection of a robot that stood at ``pose``; None: nobody knows."""
-    x, y, z = detection.box.centre
-    if detection.frame_id == "base_link":
-        if pose is None:
-            return None
+def _placed(
+    detection: Detection,
+    framed: FramedBox,
+    index: int,
+    pose: Pose2D | None,
+    rule: DetectionRule,
+) -> Placed:
+    """Place one detection of a robot that stood at ``pose``."""
+    x, y, z = framed.box.centre
+    if framed.frame_id == "base_link" and pose is not None:
         x, y = pose.transform(x, y)
     verdict = rule.judge(detection.class_id, detection.probability)
-    return Placed(detection, (x, y, z), verdict.kind, verdict.class_)
+    return Placed(detection, framed, index, (x, y, z), verdict.kind, verdict.class_)
+
+
+def _may_be_somebody(detection: Detection, rule: DetectionRule) -> bool:
+    """Whether a detection would slow robots if its place were known."""
+    verdict = rule.judge(detection.class_id, detection.probability)
+    suspected = verdict.class_ == "person" and detection.probability >= POSSIBLE_FROM
+    return verdict.kind == "alert" or (rule.possible_people and suspected)
 
 
 def _match_peer(one: Placed, observer: RobotState, world: World, at: Instant) -> Placed:

@@ -206,17 +206,21 @@ def _detections(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
             payloads.OriginFields.model_validate(attributes[names.BOXES_HEADER])
         )
     try:
-        found = tuple(_detection_of(box) for box in _BOXES.validate_python(boxes))
+        read = list(map(_detection_of, _BOXES.validate_python(boxes)))
     except ValidationError:
-        return _frame_in_part(robot_id, origin, boxes)
-    return DetectionFrame(robot_id, origin, found)
+        read = [_detection(box) for box in boxes]
+    return _frame(robot_id, origin, boxes, read)
 
 
-def _frame_in_part(robot_id: str, origin: Origin, boxes: list[Any]) -> DetectionFrame:
-    """What can be read of a frame, and the classes of the boxes that cannot."""
-    read = [(box, _detection(box)) for box in boxes]
-    found = tuple(detection for _, detection in read if detection is not None)
-    unread = tuple(_class_of(box) for box, detection in read if detection is None)
+def _frame(
+    robot_id: str, origin: Origin, boxes: list[Any], read: list[Detection | None]
+) -> DetectionFrame:
+    """What could be read of a frame, and the classes of the boxes that could not."""
+    found = tuple(one for one in read if one is not None)
+    if len(found) == len(boxes):
+        return DetectionFrame(robot_id, origin, found)
+    pairs = zip(boxes, read, strict=True)
+    unread = tuple(_class_of(box) for box, detection in pairs if detection is None)
     return DetectionFrame(robot_id, origin, found, unread)
 
 
@@ -232,12 +236,15 @@ def _detection(raw: Any) -> Detection | None:
         return None
 
 
-def _detection_of(box: payloads.BoxValue) -> Detection:
+def _detection_of(box: payloads.BoxValue) -> Detection | None:
+    if box.frame_id == names.UNPLACED:
+        return None
     sides = box.position
     position = Box3D(
         sides.xmin, sides.xmax, sides.ymin, sides.ymax, sides.zmin, sides.zmax
     )
-    return Detection(box.class_id, box.probability, position, box.frame_id, box.det_id)
+    frame_id = box.frame_id or None
+    return Detection(box.class_id, box.probability, position, frame_id, box.det_id)
 
 
 def _safety(robot_id: str, attributes: Mapping[str, Any]) -> SafetyReport:
@@ -320,7 +327,7 @@ def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> Detection
         "frame_id": "map",
         "position": _sides_about(attributes.get("position_3D")),
     }
-    return _frame_in_part(robot_id, _stamped(attributes), [box])
+    return _frame(robot_id, _stamped(attributes), [box], [_detection(box)])
 
 
 def _sides_about(raw: Any) -> dict[str, float] | None:

@@ -58,7 +58,7 @@ def test_the_papers_listing_1_is_accepted_as_it_stands() -> None:
     assert isinstance(sweep, LaserScan)
     assert isinstance(frame, DetectionFrame)
     assert frame.detections[0].class_id == "farmer"
-    assert frame.detections[0].frame_id == "base_link"
+    assert frame.detections[0].frame_id is None
 
 
 def test_a_notification_names_its_subscription() -> None:

@@ -96,6 +96,27 @@ def test_a_box_without_probability_or_position_is_counted_not_guessed() -> None:
     assert len(frame.unread) == 3
 
 
+@pytest.mark.parametrize("named", ["frame_id", "null", "empty"])
+def test_a_box_that_names_no_frame_is_read_without_one(named: str) -> None:
+    bare = {name: value for name, value in BOX.items() if name != "frame_id"}
+    said = {"frame_id": bare, "null": {**bare, "frame_id": None}}
+
+    frame = boxes(said.get(named, {**bare, "frame_id": "\u0000"}))
+
+    assert [one.frame_id for one in frame.detections] == [None]
+
+
+def test_a_frame_that_nobody_knows_is_kept_as_it_was_sent_and_short() -> None:
+    frame = boxes({**BOX, "frame_id": "odom\u0007"}, {**BOX, "frame_id": "x" * 1000})
+
+    assert [one.frame_id for one in frame.detections] == ["odom", "x" * 64]
+
+
+@pytest.mark.parametrize("frame_id", ["unplaced", 7, ["map"]])
+def test_a_box_without_a_place_is_unreadable(frame_id: object) -> None:
+    assert boxes({**BOX, "frame_id": frame_id}).unreadable == 1
+
+
 def test_a_range_too_long_for_any_laser_is_refused_without_a_warning() -> None:
     payload = b'{"lidar_points": [1.0, 1e300]}'
 

@@ -292,7 +292,9 @@ def test_looks_without_identity_are_placed_with_the_newest_pose() -> None:
     scene = Scene()
     scene.drive("AGI", 4.0)
     box = Box3D(1.0, 1.0, 0.0, 0.0, 0.0, 1.8)
-    frame = detection_frame("AGI", Detection("person", 0.9, box), origin=Origin())
+    frame = detection_frame(
+        "AGI", Detection("person", 0.9, box, "base_link"), origin=Origin()
+    )
 
     (placed,) = scene.sight(frame)
 

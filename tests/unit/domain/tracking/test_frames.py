@@ -1,0 +1,216 @@
+"""People in boxes without a frame, and in frames that nobody described."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from iveg.domain.fleet import Frame
+from iveg.domain.geometry import Box3D, Pose2D
+from iveg.domain.observations import Detection
+from tests.builders import at
+from tests.unit.domain.scene import Scene, machine
+
+HERE = Pose2D(3.2, -7.1, 2.3)
+PERSON = 1.1, -3.4
+"""A place before the robot, in ``map`` (m)."""
+
+
+def seen_from(pose: Pose2D, x: float, y: float) -> tuple[float, float]:
+    """A place of ``map`` as it is seen from a pose (m)."""
+    dx, dy = x - pose.x, y - pose.y
+    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+    return cos * dx + sin * dy, cos * dy - sin * dx
+
+
+def box_at(x: float, y: float, z: float = 0.9) -> Box3D:
+    return Box3D(x - 0.25, x + 0.25, y - 0.25, y + 0.25, z - 0.9, z + 0.9)
+
+
+def somebody(robot_id: str, frame: Frame, named: str | None = None) -> Detection:
+    """The person's box as a detector has it whose numbers are in ``frame``."""
+    camera = HERE.compose(Scene().world.robot(robot_id).profile.camera)
+    ahead, left = seen_from(camera, *PERSON)
+    box = {
+        "map": box_at(*PERSON),
+        "base_link": box_at(*seen_from(HERE, *PERSON)),
+        "camera_link": box_at(ahead, left, 0.3),
+        "camera_optical_frame": Box3D(
+            -left - 0.25, -left + 0.25, -1.2, 0.6, ahead - 0.25, ahead + 0.25
+        ),
+    }
+    return Detection("farmer", 0.94, box[frame], named)
+
+
+def scene_of(robot_id: str, unlabelled_frame: Frame | None = None) -> Scene:
+    scene = Scene()
+    robot = scene.world.robot(robot_id)
+    profile = replace(robot.profile, unlabelled_frame=unlabelled_frame)
+    robot.description = replace(robot.description, profile=profile)
+    scene.drive(robot_id, HERE.x, HERE.y, HERE.yaw)
+    return scene
+
+
+robots = pytest.mark.parametrize("robot_id", ["AGI", "AGII"])
+frames = pytest.mark.parametrize(
+    "frame", ["map", "base_link", "camera_link", "camera_optical_frame"]
+)
+
+
+@robots
+@frames
+def test_a_box_without_a_frame_lands_on_the_person_where_the_fleet_names_the_frame(
+    robot_id: str, frame: Frame
+) -> None:
+    scene = scene_of(robot_id, frame)
+
+    (placed,) = scene.look(robot_id, somebody(robot_id, frame))
+
+    assert math.dist(placed.position[:2], PERSON) < 0.05
+    assert placed.position[2] == pytest.approx(0.9)
+
+
+@robots
+@frames
+def test_a_box_lands_on_the_person_where_it_names_its_frame_itself(
+    robot_id: str, frame: Frame
+) -> None:
+    scene = scene_of(robot_id, "base_link")
+
+    (placed,) = scene.look(robot_id, somebody(robot_id, frame, f"/{robot_id}/{frame}"))
+
+    assert math.dist(placed.position[:2], PERSON) < 0.05
+
+
+@robots
+@pytest.mark.parametrize("frame", ["base_link", "camera_link"])
+def test_until_the_fleet_names_it_one_person_has_a_ring_at_both_places(
+    robot_id: str, frame: Frame
+) -> None:
+    scene = scene_of(robot_id)
+    for tenth in range(20):
+        scene.now = tenth / 10
+        scene.look(robot_id, somebody(robot_id, frame))
+
+    (known,) = scene.everyone
+    circles = [
+        (look.x, look.y, radius) for look, radius in known.rings(scene.rule, at(1.9))
+    ]
+    apart = math.dist(circles[0][:2], circles[1][:2])
+    assert [radius for *_, radius in circles] == [2.0, 2.0]
+    assert apart == pytest.approx(scene.world.robot(robot_id).profile.camera.x)
+    assert min(math.dist(place[:2], PERSON) for place in circles) < 0.05
+
+
+@robots
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_robot_within_two_metres_of_either_place_is_slowed(
+    robot_id: str, side: float
+) -> None:
+    scene = scene_of(robot_id)
+    near, far = (
+        place.position for place in scene.look(robot_id, somebody(robot_id, "map"))
+    )
+    beyond = {-1.0: near, 1.0: far}[side]
+    peer = {"AGI": "AGII", "AGII": "AGI"}[robot_id]
+    x = beyond[0] + side * 1.99 * math.cos(HERE.yaw)
+    y = beyond[1] + side * 1.99 * math.sin(HERE.yaw)
+
+    scene.drive(peer, x, y, linear=0.0)
+
+    assert scene.judge()[peer].reason == "person"
+
+
+def test_two_people_in_boxes_without_a_frame_are_two() -> None:
+    scene = scene_of("AGI")
+    for tenth in range(20):
+        scene.now = tenth / 10
+        scene.look(
+            "AGI",
+            Detection("farmer", 0.9, box_at(4.0 + tenth / 20, 0.0)),
+            Detection("farmer", 0.9, box_at(4.0, 1.0)),
+        )
+
+    assert [one.person_id for one in scene.everyone] == ["P1", "P2"]
+    assert [len(one.sightings) for one in scene.everyone] == [2, 2]
+
+
+def test_a_person_whose_frame_is_told_later_stays_the_same_person() -> None:
+    scene = scene_of("AGI")
+    scene.look("AGI", somebody("AGI", "camera_link"))
+    scene.now = 0.1
+
+    scene.look("AGI", somebody("AGI", "camera_link", "camera_link"))
+
+    assert [one.person_id for one in scene.everyone] == ["P1"]
+
+
+def test_a_peer_in_a_box_without_a_frame_is_that_peer_at_both_places() -> None:
+    scene = scene_of("AGI")
+    scene.drive("AGII", 3.2, -3.1)
+    ahead, left = seen_from(HERE, 3.2, -3.1)
+    seen = replace(machine(0.0), box=box_at(ahead, left), frame_id=None)
+
+    placed = scene.look("AGI", seen)
+
+    assert [one.peer for one in placed] == ["AGII", "AGII"]
+
+
+def test_a_person_in_a_frame_that_nobody_described_is_not_placed_but_counted() -> None:
+    scene = scene_of("AGI")
+
+    placed = scene.look("AGI", somebody("AGI", "map", "odom"))
+
+    assert placed == []
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (
+        1,
+        frozenset({"odom"}),
+    )
+
+
+def test_a_thing_in_a_frame_that_nobody_described_is_named_and_not_counted() -> None:
+    scene = scene_of("AGI")
+    faint = replace(somebody("AGI", "map", "odom"), probability=0.6)
+
+    scene.look("AGI", Detection("tomato", 0.9, box_at(1.0, 0.0), "odom"), faint)
+
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (
+        0,
+        frozenset({"odom"}),
+    )
+
+
+def test_a_faint_person_without_a_place_counts_where_the_rule_looks_for_them() -> None:
+    scene = scene_of("AGI")
+    scene.rule = replace(scene.rule, possible_people=True)
+
+    scene.look("AGI", replace(somebody("AGI", "map", "odom"), probability=0.6))
+
+    assert scene.people.unplaced == 1
+
+
+def test_somebody_seen_by_a_robot_without_a_pose_is_without_a_place() -> None:
+    scene = Scene()
+
+    scene.look("AGI", somebody("AGI", "base_link", "base_link"))
+
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (1, frozenset())
+
+
+def test_a_frame_in_which_everybody_has_a_place_clears_the_count() -> None:
+    scene = scene_of("AGI")
+    scene.look("AGI", somebody("AGI", "map", "odom"))
+
+    scene.look("AGI", somebody("AGI", "map", "map"))
+
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (0, frozenset())
+
+
+def test_without_a_described_camera_only_the_place_in_base_link_is_known() -> None:
+    scene = Scene(("R1",))
+    scene.drive("R1", HERE.x, HERE.y, HERE.yaw)
+
+    (placed,) = scene.look("R1", Detection("farmer", 0.9, box_at(2.0, 0.0)))
+
+    assert placed.position[:2] == pytest.approx(HERE.transform(2.0, 0.0))
+    assert (scene.people.unplaced, scene.people.unknown_frames) == (1, frozenset())
