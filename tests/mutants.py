@@ -284,6 +284,30 @@ MUTANTS = (
         "if True:",
         ("unit/pipeline/test_supervision.py",),
     ),
+    Mutant(
+        "rule: a box without a frame counts in base_link alone",
+        "return _EITHER if described is None else (described,)",
+        'return (described or "base_link",)',
+        ("unit/domain/tracking/test_frames.py",),
+    ),
+    Mutant(
+        "rule: a camera that nobody described counts as mounted in base_link",
+        "if frame is None or not profile.has_known_camera:",
+        "if frame is None:",
+        ("unit/domain/test_frames.py",),
+    ),
+    Mutant(
+        "rule: somebody without a place slows nobody",
+        "self.unplaced += _may_be_somebody(detection, rule)",
+        "self.unplaced += 0",
+        ("unit/pipeline/test_frames.py",),
+    ),
+    Mutant(
+        "rule: the second place of a box is counted as somebody else",
+        "return index if self.same_as is None else self.same_as",
+        "return index",
+        ("unit/domain/tracking/test_frames.py",),
+    ),
 )
 
 

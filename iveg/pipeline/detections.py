@@ -18,7 +18,8 @@ from iveg.pipeline.ports import Ids
 
 _LOGGED_S = 2.0
 _MAX_SUBJECTS = 1000
-_MAX_FRAMES = 200
+_MAX_FRAMES = 20
+"""Names of unknown frames that are logged, of each robot."""
 _KEYS = {
     "alert": "log.detection",
     "faint": "log.detection_faint",
@@ -48,7 +49,7 @@ class DetectionTracking:
         self._event_log = event_log
         self._new_id = new_id
         self._told: dict[tuple[str, str], float] = {}
-        self._unknown_frames: set[tuple[str, str]] = set()
+        self._unknown_frames: dict[str, set[str]] = {}
 
     @property
     def subjects(self) -> int:
@@ -111,10 +112,10 @@ class DetectionTracking:
     def _name_unknown_frame(self, robot_id: str, frame_id: str, at: Instant) -> None:
         """Count a frame that nobody described; log it once for each robot."""
         self._world.counters["detections.unknown_frame"] += 1
-        known, name = self._unknown_frames, (robot_id, frame_id)
-        if name in known or len(known) >= _MAX_FRAMES:
+        named = self._unknown_frames.setdefault(robot_id, set())
+        if frame_id in named or len(named) >= _MAX_FRAMES:
             return
-        known.add(name)
+        named.add(frame_id)
         slots: dict[str, Slot] = {"robot": robot_id, "frame": frame_id}
         line = LogEvent("detection", "log.unknown_frame", slots, robot_id)
         self._event_log.log(line, at)

@@ -137,12 +137,16 @@ def test_an_unknown_frame_is_counted_each_time_and_logged_once_for_each_robot() 
     assert desk.world.counters["people.unplaced"] == 3
 
 
-def test_a_robot_that_invents_frames_without_end_does_not_fill_the_log() -> None:
+def test_a_robot_that_invents_frames_fills_neither_the_log_nor_the_room_of_others() -> (
+    None
+):
     desk = parked()
     for number in range(300):
         desk.clock.now += 0.05
         desk.look("AGI", replace(detection(x=4.0), frame_id=f"frame-{number}"))
 
+    desk.look("AGII", replace(detection(x=4.0), frame_id="odom"))
+
     lines = [one for one in desk.event_log.lines if one.key == "log.unknown_frame"]
-    assert len(lines) == 200
-    assert desk.world.counters["detections.unknown_frame"] == 300
+    assert [one.robot_id for one in lines] == ["AGI"] * 20 + ["AGII"]
+    assert desk.world.counters["detections.unknown_frame"] == 301
