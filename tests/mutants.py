@@ -195,7 +195,7 @@ MUTANTS = (
     ),
     Mutant(
         "clear: a frame with somebody who could not be placed is whole",
-        "if None in unread or any(map(rule.class_of, unread)):",
+        "if unplaced or None in unread or any(map(rule.class_of, unread)):",
         "if False:",
         ("unit/domain/test_detector.py",),
     ),

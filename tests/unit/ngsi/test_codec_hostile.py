@@ -114,7 +114,7 @@ def test_a_frame_that_nobody_knows_is_kept_as_it_was_sent_and_short() -> None:
 
 @pytest.mark.parametrize("frame_id", ["unplaced", 7, ["map"]])
 def test_a_box_without_a_place_is_unreadable(frame_id: object) -> None:
-    assert boxes({**BOX, "frame_id": frame_id}).unreadable == 1
+    assert boxes({**BOX, "frame_id": frame_id}).unread == ("farmer",)
 
 
 def test_a_range_too_long_for_any_laser_is_refused_without_a_warning() -> None:

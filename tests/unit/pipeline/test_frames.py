@@ -105,13 +105,16 @@ async def test_the_papers_box_is_one_person_at_two_places_on_the_page() -> None:
     }
 
 
-def test_a_person_in_an_unknown_frame_slows_who_is_near_until_a_whole_frame() -> None:
+def test_a_person_in_an_unknown_frame_slows_who_is_near_for_a_second() -> None:
     desk = parked("AGI", "AGII")
 
     desk.look("AGI", replace(detection(x=4.0), frame_id="odom"))
     assert factors(desk) == [0.5, 0.5]
 
-    desk.look("AGI", detection(x=-90.0))
+    desk.clock.now = 1.01
+    for robot_id, x in (("AGI", 0.0), ("AGII", 10.0)):
+        desk.drive(robot_id, x, linear=0.0)
+        desk.look(robot_id, detection(x=-90.0))
     assert factors(desk) == [1.0, 1.0]
 
 
