@@ -66,6 +66,7 @@ class Dss:
     Attributes:
         on_failure: Called when a vital part has ended.
         failure: What ended it; None while all is well.
+        counted: Counters of parts beside it, told with its own.
         stores: What outlives a restart.
         pipeline: Everything between the doors; ``services`` beside it.
         face: What the web is given of it.
@@ -81,6 +82,7 @@ class Dss:
         self.settings = settings
         self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
+        self.counted: list[Counter[str]] = [log_filter.counted]
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
         self.notify_secret = NotifySecret(notify_token)
@@ -333,7 +335,8 @@ class Dss:
         """Everything that is counted."""
         total = self.pipeline.counters()
         total.update(self.stores.recorder.counters)
-        total.update(log_filter.counted)
+        for counted in self.counted:
+            total.update(counted)
         total.update(self.services.messenger.counters)
         return total
 

@@ -8,7 +8,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import uvicorn
+from fastapi import FastAPI
 
+from iveg.adapters import clock
+from iveg.adapters.connections import (
+    ConnectionCaps,
+    ConnectionTable,
+    raise_descriptor_limit,
+)
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
 from iveg.app.dss import Dss
@@ -17,8 +24,9 @@ from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.running import print_sign_in_link, report_ready
 from iveg.domain.errors import HopError
 from iveg.settings import Settings
+from iveg.web.bounded_http import bounded_http
 from iveg.web.live.bounded import BoundedSocket
-from iveg.web.notification_http import notification_http
+from iveg.web.security.connections import proxies
 
 _log = logging.getLogger(__name__)
 _WS_MAX_BYTES = 65536
@@ -50,24 +58,19 @@ async def serve(
         VitalPartError: one of its vital parts has ended.
     """
     await _upgrade_history(settings, data)
+    raise_descriptor_limit()
     dss = make(settings, data, demo=demo)
     app = create_app(dss)
+    config = _config(settings, app)
+    table = ConnectionTable(
+        clock.mono,
+        ConnectionCaps.for_this_process(),
+        proxies(config.forwarded_allow_ips),
+    )
+    config.http = bounded_http(app.state.orion, table)
+    dss.counted.append(table.counters)
     server = _Server(
-        uvicorn.Config(
-            app,
-            http=notification_http(app.state.orion),
-            host=settings.host,
-            port=settings.port,
-            log_config=None,
-            access_log=False,
-            ws=BoundedSocket,
-            ws_max_size=_WS_MAX_BYTES,
-            ws_ping_interval=10.0,
-            ws_ping_timeout=10.0,
-            ws_per_message_deflate=False,
-            timeout_graceful_shutdown=2,
-            server_header=False,
-        ),
+        config,
         on_start=report_ready
         if demo
         else lambda: print_sign_in_link(settings, dss.sign_in_token),
@@ -75,13 +78,33 @@ async def serve(
     tune_garbage_collection()
     dss.on_failure = lambda: setattr(server, "should_exit", True)
     serving = asyncio.create_task(server.serve(), name="http")
+    ending = asyncio.create_task(table.run(), name="http-late-requests")
     try:
         await asyncio.shield(serving)
     except asyncio.CancelledError:
         server.should_exit = True
         await serving
+    finally:
+        ending.cancel()
     if dss.failure is not None:
         raise dss.failure
+
+
+def _config(settings: Settings, app: FastAPI) -> uvicorn.Config:
+    return uvicorn.Config(
+        app,
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        access_log=False,
+        ws=BoundedSocket,
+        ws_max_size=_WS_MAX_BYTES,
+        ws_ping_interval=10.0,
+        ws_ping_timeout=10.0,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
 
 
 async def _upgrade_history(settings: Settings, data: Path) -> None:

@@ -31,7 +31,7 @@ from iveg.web.api.answers import Apart
 from iveg.web.live import socket
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
-from iveg.web.security import headers, rate_limits
+from iveg.web.security import connections, headers, rate_limits
 from iveg.web.security.authentication import Authenticator, Principal
 from iveg.web.security.signin import SignInLink
 from iveg.web.views import Views
@@ -128,6 +128,7 @@ def build_app(
     app.add_middleware(
         SignInLink, authenticator=face.authenticator, refusal=pages.refused_link
     )
+    app.add_middleware(connections.KnownConnections, identify=identify)
     # Last is outermost: a refusal carries the headers, too.
     app.add_middleware(headers.SecurityHeaders)
     app.add_middleware(notifications.NotificationsFirst, endpoint=face.orion)

@@ -15,20 +15,20 @@ from iveg.web.security.headers import NOTIFICATIONS_PATH
 _URL = NOTIFICATIONS_PATH.encode()
 
 
-def notification_http(endpoint: NotificationEndpoint) -> type[HttpToolsProtocol]:
-    """The protocol of a server whose notifications go to ``endpoint``."""
-    return type("BoundNotificationHttp", (NotificationHttp,), {"endpoint": endpoint})
-
-
 class NotificationHttp(HttpToolsProtocol):
     """One connection of Orion's, or anybody's.
 
     Attributes:
-        endpoint: Of the connection's server; see :func:`notification_http`.
+        endpoint: Of the connection's server; set by a subclass for each.
     """
 
     endpoint: NotificationEndpoint
     _body: list[bytes] | None = None
+
+    @property
+    def is_notification(self) -> bool:
+        """Whether a notification with the right secret is on its way."""
+        return self._body is not None
 
     def on_headers_complete(self) -> None:
         """The head is here: whether this is a plain notification is known."""

@@ -10,15 +10,16 @@ import httpx
 import uvicorn
 
 from iveg.domain.greenhouse import Greenhouse
+from iveg.adapters.connections import ConnectionCaps, ConnectionTable
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
 from iveg.pipeline.build import KeptChoices, build_services
 from iveg.web import notifications
 from iveg.web.api import metrics
+from iveg.web.bounded_http import bounded_http
 from iveg.web.build import Face, build_app, live_routers
 from iveg.web.live import socket
 from iveg.web.live.bounded import BoundedSocket
-from iveg.web.notification_http import notification_http
 from iveg.web.pages.contexts import Site
 from iveg.web.pages.routes import Pages
 from iveg.web.security.authentication import Authenticator, NotifySecret, Role
@@ -84,6 +85,7 @@ class WebDesk(Desk):
             new_id=self.ids,
             worker=FakeWorker(),
         )
+        self.table = ConnectionTable(lambda: self.clock().mono, ConnectionCaps())
         self.pages = _pages(self.face.site)
         self.app = build_app(self.face, self.pages, live_routers(self.face))
 
@@ -124,7 +126,7 @@ class WebDesk(Desk):
             port=0,
             log_config=None,
             lifespan="off",
-            http=notification_http(self.notifications),
+            http=bounded_http(self.notifications, self.table),
             ws=BoundedSocket,
             timeout_graceful_shutdown=1,
         )

@@ -1,0 +1,281 @@
+"""Connections of one listener: how many there may be, and how long a request may take.
+
+The newest connection comes in and the oldest one that asks for nothing goes, so that a
+STOP gets through while somebody holds a thousand half-sent requests open::
+
+    opened ──> awaited ──> busy ──> idle ──> awaited …
+                  └── too late ──> ended
+
+A connection whose request was signed in is *vouched for*: it gives way last, and never
+while it is busy.  A part of all places is kept for addresses that have signed in.
+"""
+
+import asyncio
+import logging
+import resource
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from ipaddress import IPv6Address, ip_address
+from typing import Final
+
+CONNECTION: Final = "iveg.connection"
+"""Key of a :class:`Connection` in the ``state`` of an ASGI scope."""
+_log = logging.getLogger(__name__)
+_LOOKS_EVERY_S = 0.5
+_KNOWN_S = 12 * 3600.0
+"""How long an address that signed in keeps its share: as long as an idle session."""
+_MOST_ADDRESSES = 1024
+
+
+_MOST_DESCRIPTORS = 4096
+
+
+def raise_descriptor_limit() -> None:
+    """Allow this process as many open files as it may have by itself, in reason."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _MOST_DESCRIPTORS if hard == resource.RLIM_INFINITY else hard
+    wanted = min(wanted, _MOST_DESCRIPTORS)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionCaps:
+    """What a listener bears.
+
+    Attributes:
+        connections: In all.
+        of_strangers: Of addresses that nobody has signed in from.
+        of_an_address: Of one address; of IPv6 one network of 64 bits.
+        head_bytes: Request line and headers of one request.
+        head_s: Time in which they have to be here (s); ``body_s`` the body after them.
+    """
+
+    connections: int = 512
+    of_strangers: int = 384
+    of_an_address: int = 192
+    head_bytes: int = 16_384
+    head_s: float = 5.0
+    body_s: float = 30.0
+
+    @classmethod
+    def for_this_process(cls) -> "ConnectionCaps":
+        """As many as leave half of the file descriptors to everything else."""
+        soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        most = cls().connections
+        if soft != resource.RLIM_INFINITY:
+            most = max(8, min(most, soft // 2))
+        return cls(most, most * 3 // 4, most * 3 // 8)
+
+
+@dataclass(eq=False, slots=True)
+class Connection:
+    """One connection of a :class:`ConnectionTable`.
+
+    Attributes:
+        peer: Address at the other end; ``address`` that of the client behind it.
+        since: When it last began to wait or to be served (monotonic s).
+        due: When what it waits for has to be here; None: it waits for nothing.
+        is_busy: Whether a request of it is being answered.
+        is_proxy: Whether the peer speaks for others.
+        vouched: Whether its newest request was signed in.
+    """
+
+    table: "ConnectionTable" = field(repr=False)
+    peer: str
+    end: Callable[[], None] = field(repr=False)
+    since: float
+    address: str
+    is_proxy: bool
+    due: float | None = None
+    is_busy: bool = False
+    vouched: bool = False
+
+    def await_head(self) -> None:
+        """A request begins: nobody has vouched for it yet."""
+        self._expect(self.table.caps.head_s)
+        self.vouched = False
+
+    def await_body(self) -> None:
+        """Its head is here."""
+        self._expect(self.table.caps.body_s)
+
+    def serve(self) -> None:
+        """A request is whole and is being answered, or a WebSocket is open."""
+        self.due, self.is_busy = None, True
+
+    def rest(self) -> None:
+        """The answer is out."""
+        self.since, self.due, self.is_busy = self.table.now(), None, False
+        self.address = self.peer
+
+    def vouch(self) -> None:
+        """Its request was signed in."""
+        self.vouched = True
+        self.table.remember(self.address)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is awaited of it, and it waits for nothing."""
+        return self.due is None and not self.is_busy
+
+    def belongs_to(self, client: str) -> bool:
+        """Name the client behind a proxy; whether that one may have another."""
+        if client == self.address:
+            return True
+        self.address = client
+        return self.table.has_room(self)
+
+    def leave(self) -> None:
+        """It is closed."""
+        self.table.remove(self)
+
+    def _expect(self, within_s: float) -> None:
+        self.since = self.table.now()
+        self.due, self.is_busy = self.since + within_s, False
+
+
+class ConnectionTable:
+    """All connections of a listener.
+
+    Args:
+        now: Monotonic clock (s).
+        caps: What the listener bears.
+        is_proxy: Whether an address is a proxy's, whose clients are told apart by what
+            it says of them, so that it has no cap of its own.
+
+    Attributes:
+        counters: Connections that gave way, were refused or came too late.
+    """
+
+    def __init__(
+        self,
+        now: Callable[[], float],
+        caps: ConnectionCaps,
+        is_proxy: Callable[[str], bool] = lambda _: False,
+    ) -> None:
+        self.now = now
+        self.caps = caps
+        self.counters: Counter[str] = Counter()
+        self._is_proxy = is_proxy
+        self._all: dict[Connection, None] = {}
+        self._known: OrderedDict[str, float] = OrderedDict()
+        self._told: OrderedDict[tuple[str, str], None] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def admit(self, peer: str, end: Callable[[], None]) -> Connection | None:
+        """Take in a new connection; None where it has to be closed at once.
+
+        Args:
+            peer: Address at the other end.
+            end: Closes it without waiting for anything.
+        """
+        network = network_of(peer)
+        is_proxy = self._is_proxy(peer)
+        new = Connection(self, network, end, self.now(), network, is_proxy)
+        self._all[new] = None
+        if self.has_room(new):
+            new.await_head()
+            return new
+        self.remove(new)
+        return None
+
+    def has_room(self, new: Connection) -> bool:
+        """Whether a connection may stay; others that must give way for it are ended."""
+        own = [one for one in self._all if one.address == new.address]
+        capped = not (new.is_proxy and new.address == new.peer)
+        if capped and len(own) > self.caps.of_an_address:
+            return self._give_way(own, new)
+        if not self._is_known(new.address):
+            strangers = [one for one in self._all if not self._is_known(one.address)]
+            if len(strangers) > self.caps.of_strangers:
+                return self._give_way(_of_the_greediest(strangers), new)
+        if len(self._all) > self.caps.connections:
+            return self._give_way(_of_the_greediest(self._all), new)
+        return True
+
+    def remember(self, address: str) -> None:
+        """Keep a share for an address that somebody has signed in from."""
+        self._known[address] = self.now()
+        self._known.move_to_end(address)
+        if len(self._known) > _MOST_ADDRESSES:
+            self._known.popitem(last=False)
+
+    def remove(self, connection: Connection) -> None:
+        """Forget a connection."""
+        self._all.pop(connection, None)
+
+    def end_overdue(self) -> None:
+        """End every connection whose request did not come in time."""
+        now = self.now()
+        for one in [one for one in self._all if one.due is not None and one.due < now]:
+            self._end(one, "late")
+
+    async def run(self) -> None:
+        """Look for requests that are late, until cancelled."""
+        while True:
+            await asyncio.sleep(_LOOKS_EVERY_S)
+            self.end_overdue()
+
+    def refused(self, address: str, reason: str) -> None:
+        """Count a refusal; the first of an address and reason is logged."""
+        self.counters[f"connections.{reason}"] += 1
+        if reason == "late" or (address, reason) in self._told:
+            return
+        self._told[address, reason] = None
+        if len(self._told) > _MOST_ADDRESSES:
+            self._told.popitem(last=False)
+        _log.warning("connections of %s: %s", address or "?", _SENTENCES[reason])
+
+    def _give_way(self, among: Iterable[Connection], new: Connection) -> bool:
+        others = [one for one in among if one is not new]
+        free = [one for one in others if not (one.vouched and one.is_busy)]
+        if not free:
+            self.refused(new.address, "refused")
+            return False
+        self._end(min(free, key=lambda one: (one.vouched, one.since)), "gave_way")
+        return True
+
+    def _end(self, one: Connection, reason: str) -> None:
+        self.refused(one.address, reason)
+        self.remove(one)
+        one.end()
+
+    def _is_known(self, address: str) -> bool:
+        at = self._known.get(address)
+        return at is not None and self.now() - at < _KNOWN_S
+
+
+_SENTENCES: Final = {
+    "refused": "one too many is refused, as all others are in use",
+    "gave_way": "too many, the oldest gives way",
+    "head_too_long": "a request with too long a head is refused",
+    "unreadable": "a request that cannot be read is refused",
+}
+
+
+def network_of(address: str) -> str:
+    """Whom an address belongs to: of IPv6 the first 64 bits, which one host may have.
+
+    Anything that is no address stands for itself, cut.
+    """
+    try:
+        read = ip_address(address.partition("%")[0])
+    except ValueError:
+        return address[:64]
+    if not isinstance(read, IPv6Address):
+        return address
+    if read.ipv4_mapped is not None:
+        return str(read.ipv4_mapped)
+    return str(IPv6Address(int(read) >> 64 << 64))
+
+
+def _of_the_greediest(among: Iterable[Connection]) -> list[Connection]:
+    """The connections of the address that has the most."""
+    by_address: dict[str, list[Connection]] = {}
+    for one in among:
+        by_address.setdefault(one.address, []).append(one)
+    return max(by_address.values(), key=len)
