@@ -60,6 +60,12 @@ class ConnectionCaps:
     body_s: float = 30.0
 
     @classmethod
+    def on_loopback(cls) -> "ConnectionCaps":
+        """Of a listener whose clients are all on this machine: one address has all."""
+        most = cls.for_this_process().connections
+        return cls(most, most, most)
+
+    @classmethod
     def for_this_process(cls) -> "ConnectionCaps":
         """As many as leave half of the file descriptors to everything else."""
         soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -253,6 +259,7 @@ _SENTENCES: Final = {
     "refused": "one too many is refused, as all others are in use",
     "gave_way": "too many, the oldest gives way",
     "head_too_long": "a request with too long a head is refused",
+    "packet_too_long": "a packet that is too long is refused",
     "unreadable": "a request that cannot be read is refused",
 }
 

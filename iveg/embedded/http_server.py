@@ -16,9 +16,13 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 import httptools
 import orjson
 
+from iveg.adapters import clock
+from iveg.adapters.connections import Connection, ConnectionCaps, ConnectionTable
+
 _log = logging.getLogger(__name__)
 _MAX_BODY = 8 << 20
 _MAX_WAITING = 64
+_PIECE = 8192
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,24 +73,39 @@ async def http_server(handler: Handler, host: str, port: int) -> AsyncIterator[i
         The port in use.
     """
     connections: set[_Connection] = set()  # from the first byte to the last response
+    table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
     server = await asyncio.get_running_loop().create_server(
-        lambda: _Connection(handler, connections), host, port
+        lambda: _Connection(handler, connections, table), host, port
     )
+    ending = asyncio.create_task(table.run(), name="embedded-late-requests")
     try:
         yield server.sockets[0].getsockname()[1]
     finally:
+        ending.cancel()
         server.close()
         tasks = [connection.close() for connection in list(connections)]
         await asyncio.gather(*tasks, return_exceptions=True)
         await server.wait_closed()
 
 
+class _HeadTooLongError(Exception):
+    """Leaves the parser."""
+
+
 class _Connection(asyncio.Protocol):
     """One client: bytes → requests → handler, in order → bytes."""
 
-    def __init__(self, handler: Handler, connections: "set[_Connection]") -> None:
+    def __init__(
+        self,
+        handler: Handler,
+        connections: "set[_Connection]",
+        table: ConnectionTable,
+    ) -> None:
         self._handler = handler
         self._connections = connections
+        self._table = table
+        self._place: Connection | None = None
+        self._head = self._unparsed = 0
         self._requests: asyncio.Queue[tuple[Request, bool] | None] = asyncio.Queue()
         self._parser = httptools.HttpRequestParser(self)
         self._transport: asyncio.Transport | None = None
@@ -94,6 +113,10 @@ class _Connection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = transport  # type: ignore[assignment]
+        peer = transport.get_extra_info("peername") or ("",)
+        self._place = self._table.admit(peer[0], transport.abort)  # type: ignore[attr-defined]
+        if self._place is None:
+            transport.close()
         self._connections.add(self)
         self._task = asyncio.get_running_loop().create_task(
             self._answer_all(), name="embedded-http-connection"
@@ -103,6 +126,8 @@ class _Connection(asyncio.Protocol):
         """The client disconnected; its request is still executed."""
         self._transport = None
         self._requests.put_nowait(None)
+        if self._place is not None:
+            self._place.leave()
 
     async def close(self) -> None:
         """Close the connection and wait until its handler has ended."""
@@ -114,12 +139,28 @@ class _Connection(asyncio.Protocol):
                 await self._task
 
     def data_received(self, data: bytes) -> None:
+        for start in range(0, len(data), _PIECE):
+            if self._transport is None or self._transport.is_closing():
+                return
+            self._feed(data[start : start + _PIECE])
+
+    def _feed(self, data: bytes) -> None:
+        self._unparsed += len(data)
         try:
             self._parser.feed_data(data)
-        except (httptools.HttpParserError, UnicodeDecodeError, ValueError):
-            if self._transport is not None:
-                self._transport.write(b"HTTP/1.1 400 Bad Request\r\n\r\n")
-                self._transport.close()
+            if self._unparsed > self._table.caps.head_bytes:
+                raise _HeadTooLongError
+        except (httptools.HttpParserError, UnicodeDecodeError, ValueError) as error:
+            is_long = isinstance(error.__context__, _HeadTooLongError)
+            self._refuse(431 if is_long else 400)
+        except _HeadTooLongError:
+            self._refuse(431)
+
+    def _refuse(self, status: int) -> None:
+        if self._transport is not None:
+            told = f"HTTP/1.1 {status} {HTTPStatus(status).phrase}\r\n\r\n"
+            self._transport.write(told.encode())
+            self._transport.close()
 
     # --- httptools callbacks ----------------------------------------------------
 
@@ -128,24 +169,40 @@ class _Connection(asyncio.Protocol):
         self._url = b""
         self._headers: dict[str, str] = {}
         self._body: list[bytes] = []
-        self._size = 0
+        self._size = self._head = self._unparsed = 0
+        if self._place is not None:
+            self._place.await_head()
 
     def on_url(self, url: bytes) -> None:
         """Part of the request target."""
+        self._count(len(url))
         self._url += url
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """One header."""
+        self._count(len(name) + len(value))
         self._headers[name.decode("latin-1").lower()] = value.decode("latin-1")
+
+    def on_headers_complete(self) -> None:
+        """The head is complete."""
+        self._unparsed = 0
+        if self._place is not None:
+            self._place.await_body()
 
     def on_body(self, body: bytes) -> None:
         """Part of the body; bytes beyond all limits are counted, not stored."""
+        self._unparsed = 0
         self._size += len(body)
         if self._size <= _MAX_BODY:
             self._body.append(body)
 
     def on_message_complete(self) -> None:
         """The request is complete."""
+        self._unparsed = 0
+        if self._place is not None:
+            # Nobody signs in here: who sends whole requests is as good as known.
+            self._place.serve()
+            self._place.vouch()
         target = urlsplit(self._url.decode("ascii"), allow_fragments=False)
         # Orion requests "//op/update" from agents, which urlsplit would read as a host.
         path = self._url.decode("ascii").partition("?")[0]
@@ -159,6 +216,12 @@ class _Connection(asyncio.Protocol):
         self._requests.put_nowait((request, self._parser.should_keep_alive()))
         if self._requests.qsize() > _MAX_WAITING and self._transport is not None:
             self._transport.pause_reading()
+
+    def _count(self, size: int) -> None:
+        self._unparsed = 0
+        self._head += size
+        if self._head > self._table.caps.head_bytes:
+            raise _HeadTooLongError
 
     # --- answers ----------------------------------------------------------------
 
@@ -175,6 +238,8 @@ class _Connection(asyncio.Protocol):
         if self._transport is None:
             return
         self._transport.write(data)
+        if self._place is not None and self._place.is_busy and self._requests.empty():
+            self._place.rest()
         if not keep:
             self._transport.close()
         elif self._requests.qsize() <= _MAX_WAITING:

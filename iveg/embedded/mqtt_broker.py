@@ -16,6 +16,8 @@ from typing import Any
 
 from amqtt.broker import Broker
 
+from iveg.adapters import clock
+from iveg.adapters.connections import ConnectionCaps, ConnectionTable
 from iveg.adapters.free_ports import bind_once
 from iveg.adapters.log_filter import quiet
 from iveg.adapters.mqtt_packets import publish_packet
@@ -65,25 +67,32 @@ async def mqtt_broker(host: str, port: int) -> AsyncIterator["MqttBroker"]:
         }
     )
     await broker.start()
+    ending = asyncio.create_task(broker.table.run(), name="mqtt-late-clients")
     try:
         yield broker
     finally:
+        ending.cancel()
         # A cancelled caller must not leave the broker partly closed.
         await asyncio.shield(broker.close())
 
 
 class MqttBroker(Broker):  # type: ignore[misc]
-    """amqtt's broker with five corrections.
+    """amqtt's broker with six corrections.
 
     It caches the subscribers of a topic; it lets code in the process listen; it
     receives publications and sends telemetry (QoS 0) without a task for each message;
     it delivers with the lesser quality of service of publication and subscription,
-    where amqtt uses the subscription's (MQTT 3.1.1 §3.8.4); and it closes connections
-    whose client vanished, which amqtt leaves to the garbage collector.
+    where amqtt uses the subscription's (MQTT 3.1.1 §3.8.4); it closes connections
+    whose client vanished, which amqtt leaves to the garbage collector; and it bounds
+    the number of connections and their time before CONNECT.
+
+    Attributes:
+        table: Its connections.
     """
 
     def __init__(self, config: dict[str, object]) -> None:
         super().__init__(config)
+        self.table = ConnectionTable(clock.mono, ConnectionCaps.on_loopback())
         self._open: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._listeners: list[Listener] = []
         self._known_audience: dict[str, tuple[tuple[Any, int], ...]] = {}
@@ -234,7 +243,7 @@ class MqttBroker(Broker):  # type: ignore[misc]
     ) -> asyncio.Server:
         connected = partial(self.stream_connected, listener_name=listener_name)
         return await asyncio.get_running_loop().create_server(
-            lambda: PacketProtocol(connected, self._take),
+            lambda: PacketProtocol(connected, self._take, self.table),
             address,
             port,
             reuse_address=True,

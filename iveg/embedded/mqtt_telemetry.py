@@ -10,14 +10,20 @@ import asyncio
 import re
 from collections.abc import Awaitable, Callable
 from functools import lru_cache
+from typing import cast
 
 from amqtt.adapters import ReaderAdapter, StreamWriterAdapter
 
+from iveg.adapters.connections import Connection, ConnectionTable
 from iveg.adapters.mqtt_packets import PUBLISH, QOS_1, packet_bounds, puback_packet
 
 _PLAIN = (PUBLISH, PUBLISH | QOS_1)
 """PUBLISH at QoS 0 and 1, neither retained nor a duplicate."""
 _FORBIDDEN = re.compile("^\\$|[+#\0\ufffd]")
+LARGEST_CONNECT = 16 << 10
+"""Of a client that is not admitted (bytes): user, password, last will."""
+LARGEST_PACKET = 8 << 20
+"""Of an admitted one (bytes); ``deploy/mosquitto.conf`` allows 128 KiB."""
 MOST_UNSENT = 512 << 10
 """Limit of the data pending for one slow client (bytes): a fifth of a second of ten
 robots' scans.  Messages to be confirmed queue behind it."""
@@ -70,13 +76,18 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
         connected: Serves the client until it leaves.
         take: Called with topic, payload and quality of service of each telemetry
             message, and with the whole packet if that is 0.
+        table: The connections of this broker.
 
     Attributes:
         packets: All other packets.
     """
 
-    def __init__(self, connected: Connected, take: Take) -> None:
+    def __init__(
+        self, connected: Connected, take: Take, table: ConnectionTable
+    ) -> None:
         super().__init__(asyncio.StreamReader(), connected)
+        self._table = table
+        self._place: Connection | None = None
         self.packets = PacketReader()
         self._take = take
         self._line: asyncio.Transport | None = None
@@ -87,13 +98,20 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start to serve a client."""
-        self._line = transport  # type: ignore[assignment]
+        self._line = line = cast("asyncio.Transport", transport)
+        peer = line.get_extra_info("peername") or ("",)
+        self._place = self._table.admit(peer[0], line.abort)
         super().connection_made(transport)
+        if self._place is None:
+            line.abort()
 
     def admit(self, writer: "BoundedWriter") -> None:
         """Handle what the client has sent since CONNECT; it has got its CONNACK."""
         self._confirming = writer
         self._holding = False
+        if self._place is not None:
+            self._place.serve()
+            self._place.vouch()
         self.data_received(b"")
         if self._line is not None and not self._holding:
             self._line.resume_reading()
@@ -108,6 +126,9 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
         start = needed = 0
         while not self._holding:
             body, end = packet_bounds(data, start)
+            if body and end - start > self._largest:
+                self._refuse()
+                return
             if not body or end > len(data):
                 needed = end - start
                 break
@@ -123,8 +144,23 @@ class PacketProtocol(asyncio.StreamReaderProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """End the packets of a lost client."""
         self._line = None
+        if self._place is not None:
+            self._place.leave()
         self.packets.feed_eof()
         super().connection_lost(exc)
+
+    @property
+    def _largest(self) -> int:
+        return LARGEST_CONNECT if self._confirming is None else LARGEST_PACKET
+
+    def _refuse(self) -> None:
+        """End a client that announces a packet beyond the limit."""
+        self._held.clear()
+        self._needed = 0
+        if self._place is not None:
+            self._table.refused(self._place.address, "packet_too_long")
+        if self._line is not None:
+            self._line.abort()
 
     def _pass_on(self, packet: bytes, body: int) -> None:
         writer = self._confirming

@@ -8,6 +8,7 @@ import aiomqtt
 import httpx
 import pytest
 
+from iveg.adapters.connections import ConnectionCaps
 from iveg.domain.errors import SettingsError
 from iveg.embedded.server import embedded_fiware, serve_fiware
 from tests.ports import free_ports
@@ -118,3 +119,75 @@ async def test_a_client_that_vanishes_hurts_nobody() -> None:
             async with asyncio.timeout(30):
                 message = await anext(aiter(mqtt.messages))
     assert message.payload == b"still here"
+
+
+CAPS = ConnectionCaps.on_loopback()
+
+
+async def ended(reader: asyncio.StreamReader) -> bytes:
+    """What a connection says until the server closes it."""
+    async with asyncio.timeout(10):
+        try:
+            return await reader.read()
+        except ConnectionResetError:
+            return b""
+
+
+@pytest.mark.parametrize(
+    "head",
+    [b"GET /" + b"a" * 50_000, b"GET / HTTP/1.1\r\nX: " + b"a" * 50_000],
+    ids=["address", "header"],
+)
+async def test_an_endless_head_is_refused(head: bytes) -> None:
+    async with embedded_fiware() as up:
+        reader, writer = await asyncio.open_connection("127.0.0.1", up.orion_port)
+        writer.write(head)
+        said = await ended(reader)
+        writer.close()
+    assert said.startswith(b"HTTP/1.1 431 ") or not said
+
+
+async def test_half_sent_requests_keep_nobody_out() -> None:
+    async with embedded_fiware() as up, AsyncExitStack() as lines:
+        for _ in range(CAPS.connections + 20):
+            _, writer = await asyncio.open_connection("127.0.0.1", up.orion_port)
+            writer.write(b"GET / HTTP/1.1\r\n")
+            lines.callback(writer.close)
+        async with httpx.AsyncClient(trust_env=False) as http:
+            told = await http.get(up.orion_url + "/version")
+    assert told.status_code == 200
+
+
+async def test_clients_that_do_not_say_connect_keep_nobody_out(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with embedded_fiware() as up, AsyncExitStack() as lines:
+        for _ in range(CAPS.connections + 20):
+            _, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
+            lines.callback(writer.close)
+        async with asyncio.timeout(10), aiomqtt.Client("127.0.0.1", up.mqtt_port) as us:
+            await us.publish("x", b"heard", qos=1)
+    assert "connections of 127.0.0.1: too many, the oldest gives way" in caplog.messages
+
+
+@pytest.mark.parametrize(
+    "packet",
+    [b"\x10\xff\xff\x7f\x00\x04MQTT", b"\x30\xff\xff\xff\x7f\x00\x01x"],
+    ids=["connect", "publish"],
+)
+async def test_a_client_that_announces_megabytes_first_is_ended(packet: bytes) -> None:
+    async with embedded_fiware() as up:
+        reader, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
+        writer.write(packet)
+        assert await ended(reader) == b""
+        writer.close()
+
+
+async def test_an_admitted_client_that_announces_megabytes_is_ended() -> None:
+    async with embedded_fiware() as up:
+        reader, writer = await asyncio.open_connection("127.0.0.1", up.mqtt_port)
+        writer.write(b"\x10\x10\x00\x04MQTT\x04\x02\x00\x00\x00\x04long")
+        await reader.readexactly(4)
+        writer.write(b"\x30\xff\xff\xff\x7f\x00\x01x")
+        assert await ended(reader) == b""
+        writer.close()
