@@ -86,16 +86,9 @@ class Authenticator:
     def sign_in(self, request: Request, token: str) -> Response | Problem:
         """Exchange the link's token for a session cookie, or say why not."""
         address = "" if request.client is None else request.client.host
-        now = self._clock().mono
-        wait_s = self._attempts.wait_s(address, now)
-        if wait_s > 0.0:
-            headers = {"Retry-After": str(math.ceil(wait_s))}
-            detail = "Too many wrong links came from your address; wait a minute."
-            return Problem(429, detail, headers=headers)
         if not _same(token, self._sign_in_token):
-            self._attempts.failed(address, now)
-            self._tell_refused(now)
-            return Problem(401, "This link does not sign in here, or not any more.")
+            return self._refuse(address, self._clock().mono)
+        # Somebody else's wrong links must not shut out whoever has the right one.
         self._attempts.succeeded(address)
         response = RedirectResponse("/", 303)
         response.headers["Cache-Control"] = "no-store"
@@ -122,6 +115,16 @@ class Authenticator:
             _cookie_name(secure=secure), secure=secure, httponly=True, samesite="strict"
         )
         return response
+
+    def _refuse(self, address: str, now: float) -> Problem:
+        wait_s = self._attempts.wait_s(address, now)
+        if wait_s > 0.0:
+            headers = {"Retry-After": str(math.ceil(wait_s))}
+            detail = "Too many wrong links came from your address; wait a minute."
+            return Problem(429, detail, headers=headers)
+        self._attempts.failed(address, now)
+        self._tell_refused(now)
+        return Problem(401, "This link does not sign in here, or not any more.")
 
     def _tell_refused(self, now: float) -> None:
         """Count a refused sign-in; log it once a minute, against floods of the log."""

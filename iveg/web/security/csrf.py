@@ -48,4 +48,8 @@ def is_own(origin: str | None, connection: HTTPConnection) -> bool:
     Only host and port are compared: behind a proxy the scheme differs.
     """
     host = connection.headers.get("host", "")
-    return bool(host) and urlsplit(origin or "").netloc.lower() == host.lower()
+    try:
+        place = urlsplit(origin or "").netloc
+    except ValueError:
+        return False  # such as brackets that do not close
+    return bool(host) and place.lower() == host.lower()

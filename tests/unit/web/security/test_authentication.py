@@ -189,6 +189,15 @@ async def test_trying_while_one_has_to_wait_does_not_make_the_wait_longer(
     assert (await client.get("/", params={"token": SIGN_IN})).status_code == 303
 
 
+async def test_the_right_link_signs_in_however_many_wrong_ones_came_before(
+    client: httpx.AsyncClient,
+) -> None:
+    for _ in range(50):
+        await client.get("/", params={"token": "wrong"})
+
+    assert (await client.get("/", params={"token": SIGN_IN})).status_code == 303
+
+
 async def test_whoever_has_to_wait_to_sign_in_can_stop_all_the_same(
     operator: httpx.AsyncClient,
 ) -> None:
@@ -299,6 +308,15 @@ async def test_without_the_setting_no_token_is_accepted(clock: Clock) -> None:
 
     assert bearer.status_code == 401
     assert "set-cookie" not in link.headers
+
+
+@pytest.mark.parametrize("origin", ["http://[::1", "//[", "null", "http://", "\xff"])
+async def test_an_origin_that_is_no_address_is_foreign(
+    operator: httpx.AsyncClient, origin: str
+) -> None:
+    headers = {b"X-IVEG": b"1", b"Origin": origin.encode("latin-1")}
+
+    assert (await operator.post("/stop", headers=headers)).status_code == 403
 
 
 # --- sessions -----------------------------------------------------------------------
