@@ -14,6 +14,8 @@ from typing import Final
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from iveg.domain.errors import UnreadableError
+from iveg.ngsi.codec import load_json
 from iveg.pipeline.ports import Clock
 from iveg.web.security.roles import Principal
 
@@ -22,10 +24,14 @@ MESSAGES_PER_S = 20
 PAINTED_PER_S = 300
 """More than frames are ever sent in a second: every honest report counts."""
 SOCKETS = 5
+PROGRAM_SOCKETS = 20
+"""Programs share one token."""
 TOO_MANY_SOCKETS: Final = 4429
 """Close code of ``/live`` for one more than ``SOCKETS`` of the same session."""
 
 _ADDRESSES = 1024
+_LONGEST_STOP = 4096
+"""Bytes of a message that is looked at beyond the limit."""
 _FAREWELL_S = 1.0
 _SILENT_S = 3.0
 """Pages ping every second; one silent for longer hangs on a dead line."""
@@ -102,7 +108,10 @@ class _Socket:
 
 
 class SocketLimits:
-    """Five WebSockets a session, twenty messages a second each (painted frames: 300).
+    """WebSockets of a principal, and the messages of each.
+
+    Five for a session, twenty for all programs together; twenty messages a second each
+    (painted frames: 300).
 
     Of more WebSockets the silent one gives way: it is a page that lost its line and
     came back.  When all of them are alive the new one is refused, so that the pages of
@@ -122,7 +131,7 @@ class SocketLimits:
         self._app = app
         self._identify = identify
         self._clock = clock
-        self._sockets: dict[bytes, list[_Socket]] = {}
+        self._sockets: dict[bytes | str, list[_Socket]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -130,12 +139,19 @@ class SocketLimits:
             await self._app(scope, receive, send)
             return
         who = self._identify(HTTPConnection(scope))
-        if who is None or who.session is None:
+        if who is None:
             await self._app(scope, receive, send)
             return
         now = self._clock().mono
-        sockets = self._sockets.setdefault(who.session, [])
-        if not _make_room(sockets, now):
+        owner = who.session or who.name
+        sockets = self._sockets.setdefault(owner, [])
+        # Programs only listen: their silence says nothing.
+        is_free = (
+            len(sockets) < PROGRAM_SOCKETS
+            if who.session is None
+            else _make_room(sockets, now)
+        )
+        if not is_free:
             await _refuse(scope, receive, send)
             return
         socket = _Socket(
@@ -147,7 +163,7 @@ class SocketLimits:
         finally:
             sockets.remove(socket)
             if not sockets:
-                self._sockets.pop(who.session, None)
+                self._sockets.pop(owner, None)
 
     async def _serve(
         self, socket: _Socket, scope: Scope, receive: Receive, send: Send
@@ -174,10 +190,11 @@ class SocketLimits:
                 message = await receive()
                 now = self._clock().mono
                 socket.heard_at = now
-                if message["type"] != "websocket.receive" or _is_stop(message):
+                if message["type"] != "websocket.receive":
                     return message
-                of = socket.painting if _is_painted(message) else socket.allowance
-                if of.take(now):
+                kind = _kind_of(message)
+                of = socket.painting if kind == "painted" else socket.allowance
+                if kind == "stop" or of.take(now):
                     return message
 
         return receive_limited
@@ -195,14 +212,16 @@ def _make_room(sockets: list[_Socket], now: float) -> bool:
     return True
 
 
-def _is_painted(message: Message) -> bool:
-    """Whether a message reports a painted frame, as pages write it."""
-    return (message.get("text") or "").startswith('{"type":"painted"')
-
-
-def _is_stop(message: Message) -> bool:
-    """Whether a message may be a STOP; its reader decides."""
-    return '"stop"' in (message.get("text") or "")
+def _kind_of(message: Message) -> object:
+    """What a message says that it is; None where it is no STOP by its length alone."""
+    text = message.get("text") or ""
+    if len(text) > _LONGEST_STOP:
+        return None
+    try:
+        read = load_json(text)
+    except UnreadableError:
+        return None
+    return read.get("type") if isinstance(read, dict) else None
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:

@@ -10,6 +10,7 @@ from starlette.types import Message, Receive, Scope, Send
 from iveg.web.security.rate_limits import (
     MESSAGES_PER_S,
     PAINTED_PER_S,
+    PROGRAM_SOCKETS,
     SOCKETS,
     TOO_MANY_SOCKETS,
     FailedAttempts,
@@ -108,6 +109,8 @@ class Bench:
 
     def identify(self, connection: HTTPConnection) -> Principal | None:
         name = connection.headers["cookie"]
+        if name == "program":
+            return Principal(name, "program")
         return Principal(name, "viewer", name.encode())
 
     async def open(self, who: str = "ana") -> Browser:
@@ -174,6 +177,44 @@ async def test_i11_a_stop_is_heard_from_a_page_that_says_too_much() -> None:
     await bench.close()
 
     assert bench.server.heard.count(STOP) == 50
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"type": "ping", "t": "\\"stop\\""}',
+        '{"type": "ping", "stop": "stop"}',
+        '["stop"]',
+        '"stop"',
+        '{"type": "stop"',
+        '{"type": "stop", "robot_id": "' + "A" * 5000 + '"}',
+        '{"type":"painted","type":"ping"}',
+    ],
+)
+async def test_what_only_looks_like_a_stop_is_limited(text: str) -> None:
+    bench = Bench()
+    page = await bench.open()
+    for _ in range(100):
+        page.say(text)
+    await settle()
+    await bench.close()
+
+    assert len(bench.server.heard) == MESSAGES_PER_S
+
+
+async def test_programs_share_their_sockets_and_are_limited_like_pages() -> None:
+    bench = Bench()
+    programs = [await bench.open("program") for _ in range(PROGRAM_SOCKETS)]
+    bench.clock.now += 5.0
+    one_more = await bench.open("program")
+    for _ in range(100):
+        programs[0].say(PING)
+    await settle()
+    await bench.close()
+
+    assert one_more.code == TOO_MANY_SOCKETS
+    assert [program.code for program in programs] == [None] * PROGRAM_SOCKETS
+    assert len(bench.server.heard) == MESSAGES_PER_S
 
 
 async def test_a_sixth_socket_of_a_session_is_refused_while_five_are_alive() -> None:
