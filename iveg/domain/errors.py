@@ -8,6 +8,7 @@ IvegError
 ├── UnknownRobotError       a robot id that is not in the fleet (HTTP 404)
 ├── CommandRefusedError     a release or resume that must not happen (HTTP 409)
 ├── OutdatedError           a change of something that has changed since (HTTP 409)
+├── VersionMissingError     a change that does not say of what (HTTP 428)
 ├── ExperimentRefusedError  an experiment that may not start now (HTTP 409)
 ├── OutboundError           an address outside iVeg that took no message
 ├── NotAllowedError         somebody without the role (HTTP 403)
@@ -79,6 +80,13 @@ class OutdatedError(IvegError):
 
     def __init__(self, what: str, seen: int, now: int) -> None:
         super().__init__(f"{what} is at version {now}; you have seen version {seen}.")
+
+
+class VersionMissingError(IvegError):
+    """Somebody changes what others change, too, and does not say what they saw."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(f"{what} is changed by naming the version that was seen.")
 
 
 class ExperimentRefusedError(IvegError):

@@ -30,6 +30,7 @@ from iveg.domain.errors import (
     OutdatedError,
     UnknownRobotError,
     UnreadableError,
+    VersionMissingError,
 )
 
 _MOST_COMPLAINTS = 20
@@ -144,6 +145,7 @@ _PLAIN: tuple[tuple[type[IvegError], int, str], ...] = (
     (UnknownRobotError, 404, "unknown-robot"),
     (NotAllowedError, 403, "not-allowed"),
     (OutdatedError, 409, "outdated"),
+    (VersionMissingError, 428, "version-missing"),
     (ForeignOriginError, 403, "foreign-origin"),
     (NotJsonError, 415, "not-json"),
 )

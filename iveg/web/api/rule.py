@@ -6,6 +6,7 @@ from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from iveg.domain.detection_rule import Class, DetectionRule
+from iveg.domain.errors import VersionMissingError
 from iveg.domain.limits import LIMITS
 from iveg.models.base import Listing
 from iveg.models.rule import Rule as RuleModel
@@ -31,7 +32,7 @@ class RuleChange(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
 
     version: int | None = None
-    """The version that the person saw; 409 when it is no longer in force."""
+    """The version that the person saw: 428 without, 409 when it is in force no more."""
     confidence_threshold: _Share | None = None
     class_thresholds: dict[Literal["person", "robot"], _Share] | None = None
     radius_m: Annotated[float, _RADIUS] | None = None
@@ -94,6 +95,8 @@ def router(rules: Rules, clock: Clock) -> APIRouter:
         body: RuleChange, who: Annotated[Principal, Depends(require("release"))]
     ) -> Response:
         """Put a new version in force at once; parameters that are not named stay."""
+        if body.version is None:
+            raise VersionMissingError("The rule")
         wanted = body.applied_to(rules.current)
         return Json(
             RuleModel.of(await rules.change(wanted, who.name, clock(), body.version))

@@ -15,8 +15,9 @@ from tests.unit.web.desk import WebDesk
 async def put(
     desk: WebDesk, role: Role = "operator", **parameters: object
 ) -> httpx.Response:
+    seen = {"version": desk.rules.current.version}
     async with desk.browser(role) as browser:
-        return await browser.put("/api/v1/rule", json=parameters)
+        return await browser.put("/api/v1/rule", json=seen | parameters)
 
 
 async def get(desk: WebDesk, path: str = "") -> Any:
@@ -131,13 +132,25 @@ async def test_a_change_of_an_older_version_is_refused() -> None:
     assert (await get(desk))["radius_m"] == 3.0
 
 
-async def test_two_changes_at_once_are_two_versions() -> None:
+async def test_a_change_that_does_not_say_of_which_version_is_refused() -> None:
     desk = WebDesk()
 
-    await asyncio.gather(put(desk, radius_m=3.0), put(desk, radius_m=4.0))
+    answer = await put(desk, version=None, radius_m=3.0)
 
-    versions = [one.version for one in desk.rules.versions]
-    assert versions == [1, 2, 3]
+    assert answer.status_code == 428
+    assert answer.json()["type"] == "urn:iveg:version-missing"
+    assert (await get(desk))["version"] == 1
+
+
+async def test_of_two_changes_at_once_one_counts() -> None:
+    desk = WebDesk()
+
+    answers = await asyncio.gather(
+        put(desk, version=1, radius_m=3.0), put(desk, version=1, radius_m=4.0)
+    )
+
+    assert sorted(answer.status_code for answer in answers) == [200, 409]
+    assert [one.version for one in desk.rules.versions] == [1, 2]
 
 
 @pytest.mark.parametrize(
