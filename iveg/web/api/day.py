@@ -24,6 +24,7 @@ from iveg.models.day import Day, Pass, Slowed, Worked
 from iveg.models.places import GreenhouseMap, Point
 from iveg.pipeline.ports import Clock
 from iveg.web.api.answers import Apart, Json
+from iveg.web.api.history_filters import HistoryDay
 from iveg.web.pages.contexts import DayPage
 from iveg.web.pages.local_time import in_madrid, start_of
 from iveg.web.pages.routes import Pages
@@ -155,7 +156,9 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
 
     @routes.get("/api/v1/day", response_model=Day, dependencies=[who], tags=["history"])
     async def numbers(
-        day: Annotated[date | None, Query(description="Today unless told")] = None,
+        day: Annotated[
+            HistoryDay | None, Query(description="Today unless told")
+        ] = None,
     ) -> Response:
         """What the fleet did on one day, Europe/Madrid, and what is due next."""
         now = clock().wall
@@ -165,7 +168,7 @@ def router(days: Days, pages: Pages, clock: Clock) -> APIRouter:
     async def sheet(
         request: Request,
         visitor: Annotated[Any, who],
-        day: Annotated[date | None, Query()] = None,
+        day: Annotated[HistoryDay | None, Query()] = None,
     ) -> Response:
         now = clock().wall
         wanted = day or in_madrid(now).date()

@@ -4,7 +4,7 @@ Times are ISO-8601; one without an offset is UTC.  A name that is not a filter i
 refused: a misspelt filter that answers everything would mislead.
 """
 
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from typing import Annotated, Literal, Self, TypeVar
 
 from fastapi.exceptions import RequestValidationError
@@ -25,6 +25,8 @@ from iveg.web.api.exports import Form
 
 R = TypeVar("R", bound=Record)
 LONGEST_RANGE_S = 31 * 86_400.0
+_FIRST_DAY, _LAST_DAY = date(1970, 1, 2), date(9000, 1, 1)
+"""Days with which time zones and ranges can be computed."""
 _USUAL_RANGE_S = 15 * 60.0
 _ROBOT_ID = r"^[A-Za-z0-9-]{1,64}$"
 _NO_CONTROLS = r"^[^\x00-\x1f]*$"
@@ -39,10 +41,19 @@ def _mend_plus(value: object) -> object:
 
 
 def _in_utc(moment: datetime) -> datetime:
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    told = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    _as_kept(told.date())
+    return told
+
+
+def _as_kept(day: date) -> date:
+    if not _FIRST_DAY <= day <= _LAST_DAY:
+        raise ValueError("no day of any history")
+    return day
 
 
 Moment = Annotated[datetime, BeforeValidator(_mend_plus), AfterValidator(_in_utc)]
+HistoryDay = Annotated[date, AfterValidator(_as_kept)]
 
 
 class Span(BaseModel):
