@@ -110,6 +110,15 @@ def put_aside(path: Path, why: str) -> None:
         _log.warning("%s stays where it is", path)
 
 
+def move_aside(path: Path, stamp: str) -> Path:
+    """Rename a damaged file, so that it can be looked at; returns its new name.
+
+    Raises:
+        OSError: it stays where it is.
+    """
+    return path.rename(path.with_name(f"{path.name}.damaged-{stamp}"))
+
+
 class AppendedFile:
     """A file that grows by lines, each on the disk before ``append`` returns."""
 

@@ -1,10 +1,13 @@
 """Versions of the rule, in a small file of JSON lines that is replaced as a whole.
 
 The settings make the first version.  A person's change outlives a restart, until the
-settings themselves change: then these are newer, and a version of their own.
+settings themselves change: then these are newer, and a version of their own.  A file
+with a line that cannot be read is put aside, and the strictest rule of what is left of
+it is in force until a person makes another.
 """
 
 import asyncio
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -12,12 +15,14 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from iveg.adapters.files import Form, read_lines, write_lines
-from iveg.domain.detection_rule import ALIASES, Class, DetectionRule
-from iveg.domain.errors import DataFileError, HopError
+from iveg.adapters.files import Form, move_aside, read_lines, write_lines
+from iveg.domain.detection_rule import ALIASES, Class, DetectionRule, strictest
+from iveg.domain.errors import HopError
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
+from iveg.domain.stamps import format_stamp
 
+_log = logging.getLogger(__name__)
 FORM = Form("rules")
 _SETTINGS = "settings"
 _FIRST = DetectionRule()
@@ -39,26 +44,31 @@ class FileRules:
             now: When settings that differ from those of last time began to count.
 
         Raises:
-            DataFileError: a line that is no version of the rule.
+            DataFileError: the file is something else, or of a newer iVeg.
         """
-        self._versions = self._read() or [settings]
-        last = self._versions[-1]
-        told = [
-            (rule.threshold, rule.radius_m)
-            for rule in self._versions
-            if rule.author == _SETTINGS
-        ]
-        if told[-1:] != [(settings.threshold, settings.radius_m)]:
-            changed = replace(
-                last,
-                threshold=settings.threshold,
-                radius_m=settings.radius_m,
-                version=last.version + 1,
-                author=_SETTINGS,
-                since=now.wall,
-            )
-            self._write([*self._versions, changed])
+        read, damage = self._read()
+        versions = _with_settings(read or [settings], settings, now.wall)
+        if damage:
+            self._recover([*versions, strictest(versions, now.wall)], damage, now)
+        elif len(versions) > max(1, len(read)):
+            self._write(versions)
+        else:
+            self._versions = versions
         return tuple(self._versions)
+
+    def _recover(
+        self, versions: list[DetectionRule], damage: str, now: Instant
+    ) -> None:
+        """Put the file aside and begin another with these versions."""
+        self._versions = versions
+        stamp = format_stamp(now.wall).replace(":", "")
+        try:
+            aside = move_aside(self._path, stamp)
+            self._write(versions)
+        except OSError as error:
+            _log.error("%s: %s; it stays as it is: %s", self._path, damage, error)
+        else:
+            _log.error("%s: %s; it is put aside as %s", self._path, damage, aside.name)
 
     async def append(self, rule: DetectionRule) -> None:
         """Write a version down; returns when it is on disk.
@@ -71,19 +81,40 @@ class FileRules:
         except OSError as error:
             raise HopError("disk", str(error)) from error
 
-    def _read(self) -> list[DetectionRule]:
-        rules = []
+    def _read(self) -> tuple[list[DetectionRule], str]:
+        """The versions that can be read, and where and why one of them cannot."""
+        rules, damage = [], ""
         for number, line in read_lines(self._path, FORM):
             try:
                 rules.append(_StoredRule.model_validate_json(line).rule())
             except ValidationError as error:
-                where = f"line {number}"
-                raise DataFileError(str(self._path), where, _first(error)) from error
-        return rules
+                damage = damage or f"line {number}: {_first(error)}"
+        return rules, damage
 
     def _write(self, versions: list[DetectionRule]) -> None:
         write_lines(self._path, FORM, map(_fields, versions))
         self._versions = versions
+
+
+def _with_settings(
+    versions: list[DetectionRule], settings: DetectionRule, wall: float
+) -> list[DetectionRule]:
+    """The versions, and one more where the settings are others than last time."""
+    last = versions[-1]
+    told = [
+        (rule.threshold, rule.radius_m) for rule in versions if rule.author == _SETTINGS
+    ]
+    if told[-1:] == [(settings.threshold, settings.radius_m)]:
+        return versions
+    changed = replace(
+        last,
+        threshold=settings.threshold,
+        radius_m=settings.radius_m,
+        version=last.version + 1,
+        author=_SETTINGS,
+        since=wall,
+    )
+    return [*versions, changed]
 
 
 class _StoredRule(BaseModel):

@@ -4,14 +4,17 @@ A detection with confidence at or above the threshold and of class person or rob
 an alert; below the threshold it is faint; any other confident class is a time stamp.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 from iveg.domain.limits import LIMITS, ring_radius
 
 Class = Literal["person", "robot"]
 Kind = Literal["alert", "faint", "other"]
+
+RECOVERED: Final = "recovered"
+"""Author of a version that was made from what could be read of a damaged file."""
 
 ALIASES: Mapping[str, Class] = {
     "person": "person",
@@ -81,3 +84,33 @@ class DetectionRule:
     def radius_at(self, age_s: float) -> float:
         """The ring of a sighting that is ``age_s`` old (m)."""
         return ring_radius(self.radius_m, age_s)
+
+
+def strictest(rules: Iterable[DetectionRule], since: float) -> DetectionRule:
+    """The next version, which slows wherever one of these would.
+
+    The least threshold of any class, the widest ring, every alias, and a word that
+    stands for a person in one of them does so here.
+
+    Args:
+        rules: At least one, oldest first.
+        since: When it is made (Unix s).
+    """
+    every = list(rules)
+    aliases: dict[str, Class] = {}
+    for rule in every:
+        aliases.update(rule.aliases)
+    for rule in every:
+        aliases.update({w: "person" for w, c in rule.aliases.items() if c == "person"})
+    return DetectionRule(
+        id=every[-1].id,
+        version=max(rule.version for rule in every) + 1,
+        threshold=min(
+            min((rule.threshold, *rule.class_thresholds.values())) for rule in every
+        ),
+        radius_m=max(rule.radius_m for rule in every),
+        aliases=aliases,
+        possible_people=any(rule.possible_people for rule in every),
+        author=RECOVERED,
+        since=since,
+    )

@@ -283,6 +283,7 @@ class Evaluator:
             yield from conditions.of_kind(robot, now)
         yield from conditions.of_fleet(self.world.live_robots(), now)
         yield from conditions.of_overload(self.world.robots.values(), now)
+        yield from conditions.of_rule(self.rule)
 
     def close_earlier(
         self,

@@ -5,6 +5,7 @@ from math import inf
 
 from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision
+from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.events import Slot
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
@@ -131,6 +132,13 @@ def of_overload(robots: Iterable[RobotState], now: Instant) -> Iterable[Conditio
     if names:
         slots: dict[str, Slot] = {"robots": ", ".join(sorted(names))}
         yield Condition("P2", "alert.pictures_not_judged", "fleet", None, slots)
+
+
+def of_rule(rule: DetectionRule) -> Iterable[Condition]:
+    """The rule in force was made from a damaged file, and nobody has looked at it."""
+    if rule.author == RECOVERED:
+        slots: dict[str, Slot] = {"version": rule.version}
+        yield Condition("P2", "alert.rule_recovered", "fleet", None, slots)
 
 
 def of_fleet(robots: Iterable[RobotState], now: Instant) -> Iterable[Condition]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.rules import FileRules
-from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detection_rule import RECOVERED, DetectionRule
 from iveg.domain.errors import DataFileError, HopError
 from tests.builders import START
 
@@ -66,18 +66,77 @@ async def test_the_same_settings_twice_are_no_new_version(tmp_path: Path) -> Non
     assert list(again) == list(first)
 
 
+def put_aside(directory: Path) -> list[str]:
+    """What the damaged files held."""
+    return [one.read_text() for one in directory.glob("rules.jsonl.damaged-*")]
+
+
 @pytest.mark.parametrize(
     "line",
-    ["nonsense", "[1]", '{"unheard": 1}', '{"threshold": "x"}', '{"threshold": 2}'],
+    [
+        "nonsense",
+        "[1]",
+        '{"unheard": 1}',
+        '{"threshold": "x"}',
+        '{"threshold": 2}',
+        '{"version": 2, "thresho',
+        "\x00\x00",
+    ],
 )
-def test_a_line_that_is_no_rule_is_named_with_its_file(
-    tmp_path: Path, line: str
+async def test_a_damaged_file_is_put_aside_and_its_strictest_rule_counts(
+    tmp_path: Path, line: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "rules.jsonl"
-    path.write_text(line + "\n")
+    rules = FileRules(path)
+    rules.load(FIRST, START)
+    await rules.append(CHANGED)
+    await rules.append(replace(FIRST, version=3, author="ben"))
+    damaged = path.read_text() + line + "\n"
+    path.write_text(damaged)
+
+    found = FileRules(path).load(FIRST, START)
+
+    assert [rule.author for rule in found] == ["settings", "ana", "ben", RECOVERED]
+    assert (found[-1].threshold, found[-1].radius_m) == (0.7, 3.0)
+    assert put_aside(tmp_path) == [damaged]
+    assert len(caplog.messages) == 1
+    assert "rules.jsonl: line 5: " in caplog.messages[0]
+    assert list(FileRules(path).load(FIRST, START)) == list(found)
+
+
+def test_a_file_of_which_nothing_can_be_read_leaves_the_settings(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "rules.jsonl"
+    path.write_text("nonsense\n")
+
+    found = FileRules(path).load(FIRST, START)
+
+    assert (found[-1].author, found[-1].version) == (RECOVERED, 2)
+    assert (found[-1].threshold, found[-1].radius_m) == (0.8, 2.0)
+
+
+def test_a_damaged_file_that_cannot_be_put_aside_is_judged_all_the_same(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "rules.jsonl"
+    path.write_text("nonsense\n")
+    (tmp_path / "rules.jsonl.damaged-2023-11-14T221320.000Z").mkdir()
+
+    found = FileRules(path).load(FIRST, START)
+
+    assert found[-1].author == RECOVERED
+    assert path.read_text() == "nonsense\n"
+    assert "it stays as it is" in caplog.messages[0]
+
+
+def test_a_file_of_a_newer_iveg_is_refused_and_stays(tmp_path: Path) -> None:
+    path = tmp_path / "rules.jsonl"
+    path.write_text('{"iveg": "rules", "version": 2}\n')
 
     with pytest.raises(DataFileError, match=r"rules\.jsonl, line 1"):
         FileRules(path).load(FIRST, START)
+    assert path.exists()
 
 
 async def test_a_disk_that_fails_is_told_and_keeps_the_old_versions(

@@ -1,8 +1,10 @@
 """The rule of Algorithm 2 and its ring, exact at the borders (fault F47)."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.detection_rule import RECOVERED, DetectionRule, strictest
 
 RULE = DetectionRule()
 
@@ -76,3 +78,40 @@ def test_a_fresh_ring_is_exactly_the_papers() -> None:
 
 def test_growth_never_makes_a_ring_smaller_than_it_was_set() -> None:
     assert DetectionRule(radius_m=7.0).radius_at(5.0) == 7.0
+
+
+_WORDS = st.sampled_from(["person", "robot", "abuela", "carro"])
+_CLASSES = st.sampled_from(["person", "robot"])
+_SHARES = st.sampled_from([0.0, 0.5, 0.6, 0.8, 1.0])
+_RULES = st.builds(
+    DetectionRule,
+    version=st.integers(1, 9),
+    threshold=_SHARES,
+    class_thresholds=st.dictionaries(_CLASSES, _SHARES),
+    radius_m=st.floats(0.5, 6.0),
+    aliases=st.dictionaries(_WORDS, _CLASSES),
+    possible_people=st.booleans(),
+)
+
+
+@given(st.lists(_RULES, min_size=1, max_size=5), _WORDS, _SHARES)
+def test_the_strictest_rule_slows_wherever_one_of_them_would(
+    rules: list[DetectionRule], word: str, confidence: float
+) -> None:
+    strict = strictest(rules, 7.0)
+
+    alerts = [rule.judge(word, confidence).kind == "alert" for rule in rules]
+    assert strict.judge(word, confidence).kind == "alert" or not any(alerts)
+    assert all(strict.radius_m >= rule.radius_m for rule in rules)
+    assert all(strict.possible_people or not rule.possible_people for rule in rules)
+    assert all(strict.version > rule.version for rule in rules)
+    assert (strict.author, strict.since) == (RECOVERED, 7.0)
+
+
+def test_a_word_for_a_person_in_one_rule_is_one_in_the_strictest() -> None:
+    rules = [
+        DetectionRule(aliases={"carro": "person"}),
+        DetectionRule(aliases={"carro": "robot"}),
+    ]
+
+    assert strictest(rules, 0.0).judge("carro", 1.0).class_ == "person"

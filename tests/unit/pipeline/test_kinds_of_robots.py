@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from iveg.domain.detection_rule import RECOVERED
 from iveg.domain.observations import CommandAnswer
 from tests.builders import hold, odometry, safety_report
 from tests.unit.pipeline.desk import Desk
@@ -59,3 +60,15 @@ async def test_robots_that_nobody_described_are_named_in_one_alert() -> None:
     await desk.wait(0.1)
 
     assert alerts(desk) == [("P3", "alert.robots_not_described", "B1, B2")]
+
+
+async def test_a_rule_that_was_recovered_is_told_until_somebody_makes_another() -> None:
+    desk = Desk(("AGI",))
+    desk.evaluator.rule = replace(desk.evaluator.rule, author=RECOVERED)
+    await desk.wait(0.1)
+    at_first = alerts(desk)
+    desk.evaluator.rule = replace(desk.evaluator.rule, author="ana")
+    await desk.wait(0.1)
+
+    assert at_first == [("P2", "alert.rule_recovered", None)]
+    assert alerts(desk) == []
