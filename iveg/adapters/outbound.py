@@ -21,6 +21,8 @@ from iveg.domain.errors import OutboundError
 
 Address = IPv4Address | IPv6Address
 _NAT64: Final = IPv6Network("64:ff9b::/96")
+_UNICAST: Final = IPv6Network("2000::/3")
+"""All of IPv6 that was given to the internet; what lies beside it is somebody's own."""
 _THREADS = 2
 TIMEOUT_S = 10.0
 
@@ -34,6 +36,8 @@ def is_public(address: Address) -> bool:
     carried = _carried(address)
     if carried is not None:
         return is_public(carried)
+    if isinstance(address, IPv6Address) and address not in _UNICAST:
+        return False
     return address.is_global and not address.is_multicast
 
 
