@@ -4,6 +4,7 @@ Each file begins with a line that names its content and version; a file without 
 line is of version 0.  A file of a newer iVeg is refused.
 """
 
+import contextlib
 import logging
 import os
 from collections.abc import Iterable, Iterator
@@ -108,6 +109,22 @@ def put_aside(path: Path, why: str) -> None:
         path.replace(aside)
     except OSError:
         _log.warning("%s stays where it is", path)
+
+
+def make_private(path: Path) -> None:
+    """Let nobody else read a file, which is made where it is missing.
+
+    One that is there is not opened: closing it would drop SQLite's locks on it.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    try:
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _OWNER_ALONE))
+    except FileExistsError:
+        # It may belong to somebody else, who chose who reads it.
+        with contextlib.suppress(PermissionError):
+            path.chmod(_OWNER_ALONE)
 
 
 def move_aside(path: Path, stamp: str) -> Path:

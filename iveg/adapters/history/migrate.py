@@ -19,6 +19,7 @@ from sqlalchemy.exc import DatabaseError, OperationalError
 
 import iveg
 from iveg.adapters import clock
+from iveg.adapters.files import make_private
 from iveg.adapters.history.engine import describe, sqlite_file, writing_engine
 from iveg.domain.errors import DataFileError, HopError
 
@@ -110,6 +111,12 @@ def _prepare_file(file: Path) -> None:
         damage = _damage(file) if file.exists() else None
         if damage is not None:
             _move_aside(file, damage)
+        # SQLite gives its write-ahead files the rights of the database.
+        make_private(file)
+        for suffix in ("-wal", "-shm"):
+            beside = file.with_name(file.name + suffix)
+            if beside.exists():
+                make_private(beside)
     except OSError as error:
         raise HopError("database", f"{file}: {error.strerror}") from error
 

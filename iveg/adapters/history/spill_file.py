@@ -15,6 +15,7 @@ from typing import Any
 
 import orjson
 
+from iveg.adapters.files import make_private
 from iveg.domain.errors import HopError
 from iveg.domain.records import RECORD_TYPES, Record
 from iveg.domain.transports import TRANSPORTS
@@ -163,6 +164,7 @@ class SpillFile:
             return
         try:
             self._reserve.parent.mkdir(parents=True, exist_ok=True)
+            make_private(self._reserve)
             with self._reserve.open("wb") as file:
                 # Zeros are written out: a hole in a sparse file reserves nothing.
                 file.write(bytes(self._reserve_bytes))

@@ -6,7 +6,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, text
 
-from iveg.adapters.history.engine import describe, writing_engine
+from iveg.adapters.history.engine import describe, sqlite_url, writing_engine
 from iveg.adapters.history.migrate import upgrade
 from iveg.adapters.history.tables import metadata
 from iveg.domain.errors import DataFileError, HopError, SettingsError
@@ -152,3 +152,25 @@ def test_sqlite_in_memory_is_refused_because_it_forgets() -> None:
 
 def test_a_password_is_not_shown() -> None:
     assert "secret" not in describe("postgresql://somebody:secret@server/history")
+
+
+@pytest.mark.parametrize("before", [(), ("iveg.sqlite",)], ids=["new", "old"])
+def test_nobody_else_reads_the_file_of_the_history(
+    tmp_path: Path, before: tuple[str, ...]
+) -> None:
+    file = tmp_path / "iveg.sqlite"
+    for name in before:
+        (tmp_path / name).touch(0o644)
+    url = sqlite_url(file)
+
+    upgrade(url)
+    engine = writing_engine(url)
+    with engine.connect() as connection:
+        connection.execute(text("DELETE FROM log"))
+        rights = {
+            one.name: one.stat().st_mode & 0o777 for one in sorted(tmp_path.iterdir())
+        }
+    engine.dispose()
+
+    names = "iveg.sqlite", "iveg.sqlite-shm", "iveg.sqlite-wal"
+    assert rights == dict.fromkeys(names, 0o600)

@@ -210,3 +210,12 @@ def test_a_field_of_the_version_before_is_read_back_under_its_name(
     [row], _ = journal.read(0, 10)
 
     assert row.record == now
+
+
+def test_nobody_else_reads_what_waits(tmp_path: Path) -> None:
+    spill = SpillFile(tmp_path / "journal.jsonl", 100)
+    spill.keep_reserve()
+    spill.append([Waiting(command_record(), 1, 0.0)])
+
+    rights = [one.stat().st_mode & 0o777 for one in tmp_path.iterdir()]
+    assert rights == [0o600, 0o600]
