@@ -127,8 +127,13 @@ class Site:
         return f"http://127.0.0.1:{self.settings['IVEG_PORT']}"
 
     @property
-    def sign_in_link(self) -> str:
+    def printed_link(self) -> str:
         """What a grower opens first."""
+        return f"{self.url}/signin#token={self.settings['IVEG_SIGN_IN_TOKEN']}"
+
+    @property
+    def sign_in_link(self) -> str:
+        """The link of earlier versions, which signs in without a script."""
         return f"{self.url}/?token={self.settings['IVEG_SIGN_IN_TOKEN']}"
 
     def start(self, *words: str, module: str = "iveg") -> Program:

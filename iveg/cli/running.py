@@ -49,10 +49,10 @@ def _read(loop: asyncio.AbstractEventLoop, task: asyncio.Task[None]) -> None:
 
 
 def sign_in_link(settings: Settings, token: str) -> str:
-    """Address that signs a browser in."""
+    """Address that signs a browser in; what is behind ``#`` stays in the browser."""
     host = reachable_host(settings.host)
     host = f"[{host}]" if ":" in host else host
-    return f"http://{host}:{settings.port}/?token={token}"
+    return f"http://{host}:{settings.port}/signin#token={token}"
 
 
 def reachable_host(host: str) -> str:

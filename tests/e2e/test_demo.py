@@ -28,7 +28,7 @@ def demo(place: Site) -> Program:
 def test_the_demo_prints_one_line_with_the_link(demo: Program, place: Site) -> None:
     lines = re.findall(r"^iVeg: (\S+)$", demo.text(), re.MULTILINE)
 
-    assert lines == [place.sign_in_link]
+    assert lines == [place.printed_link]
 
 
 def test_the_link_signs_in_and_leaves_no_token_in_the_address(place: Site) -> None:

@@ -28,7 +28,7 @@ def router(token: str) -> APIRouter:
     )
     async def code(request: Request) -> Response:
         """The link at the address by which this browser has reached iVeg."""
-        link = f"{str(request.base_url).rstrip('/')}/?token={token}"
+        link = f"{str(request.base_url).rstrip('/')}/signin#token={token}"
         image = segno.make(link, micro=False).svg_data_uri(
             scale=_SCALE, border=4, dark="#000", light="#fff"
         )

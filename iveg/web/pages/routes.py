@@ -15,6 +15,7 @@ from fastapi import APIRouter, Depends, Path, Request, Response
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
+from pydantic import BaseModel, ConfigDict, Field
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
@@ -63,6 +64,14 @@ _SCRIPTED: Final = {
 """Pages that scripts fill, and their addresses."""
 
 _Reader = Annotated[Principal, Depends(require("read"))]
+
+
+class _SignIn(BaseModel):
+    """What the sign-in page posts: the token behind the ``#`` of the link."""
+
+    model_config = ConfigDict(strict=True, extra="forbid")
+
+    token: str = Field(max_length=256)
 
 
 class Pages:
@@ -165,6 +174,13 @@ def router(
     @routes.get("/signin", response_model=None, dependencies=[Depends(require("open"))])
     async def signin(request: Request) -> Response:
         return pages.sign_in(request)
+
+    @routes.post(
+        "/signin", response_model=None, dependencies=[Depends(require("open"))]
+    )
+    async def sign_in(request: Request, body: _SignIn) -> Response:
+        found = _authenticator(request).sign_in(request, body.token)
+        return found.response() if isinstance(found, Problem) else found
 
     @routes.post("/signout", response_model=None)
     async def sign_out(request: Request, _: _Reader) -> Response:

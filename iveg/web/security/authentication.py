@@ -84,15 +84,31 @@ class Authenticator:
     # --- people sign in ---------------------------------------------------------
 
     def sign_in(self, request: Request, token: str) -> Response | Problem:
-        """Exchange the link's token for a session cookie, or say why not."""
+        """Exchange the token that a page has posted for a session cookie.
+
+        Raises:
+            ForeignOriginError: another site's page sent it.
+            NotJsonError: a body that is not JSON.
+        """
+        refuse_forgery(request)
+        refuse_other_bodies(request)
+        return self._exchange(request, token, Response(status_code=204))
+
+    def follow_link(self, request: Request, token: str) -> Response | Problem:
+        """Exchange the token in the query of an old link, or say why not."""
+        response = RedirectResponse("/", 303)
+        response.headers["Cache-Control"] = "no-store"
+        response.headers["Referrer-Policy"] = "no-referrer"
+        return self._exchange(request, token, response)
+
+    def _exchange(
+        self, request: Request, token: str, response: Response
+    ) -> Response | Problem:
         address = "" if request.client is None else request.client.host
         if not _same(token, self._sign_in_token):
             return self._refuse(address, self._clock().mono)
         # Somebody else's wrong links must not shut out whoever has the right one.
         self._attempts.succeeded(address)
-        response = RedirectResponse("/", 303)
-        response.headers["Cache-Control"] = "no-store"
-        response.headers["Referrer-Policy"] = "no-referrer"
         secure = request.url.scheme == "https"
         response.set_cookie(
             _cookie_name(secure=secure),

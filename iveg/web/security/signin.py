@@ -1,4 +1,8 @@
-"""The sign-in link: its token is taken off the URL before anything can log it."""
+"""The sign-in link of earlier versions, for one version more: a token in the query.
+
+It is taken off the URL before anything can log it.  Links now carry the token behind
+``#``, where no server and no proxy sees it; the page posts it (``POST /signin``).
+"""
 
 from collections.abc import Callable
 from urllib.parse import parse_qs
@@ -38,7 +42,7 @@ class SignInLink:
         # Servers write the query into their access log after the answer.
         scope["query_string"] = b""
         request = Request(scope)
-        response = self._authenticator.sign_in(request, token)
+        response = self._authenticator.follow_link(request, token)
         if isinstance(response, Problem):
             refuse = self._refusal or (lambda _, problem: problem.response())
             response = refuse(request, response)

@@ -2,9 +2,11 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import closing
 
 import httpx
 import pytest
+from playwright.sync_api import Browser, expect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -182,3 +184,27 @@ def _dial(stack: Site, session: str, origin: str) -> ClientConnection:
     address = httpx.URL(stack.url).copy_with(scheme="ws", path="/live")
     headers = {"Cookie": f"iveg={session}", "Origin": origin}
     return connect(str(address), additional_headers=headers, proxy=None)
+
+
+def test_the_link_signs_in_and_its_token_is_sent_in_no_address(
+    stack: Site, browser: Browser
+) -> None:
+    with closing(browser.new_context(base_url=stack.url)) as context:
+        page = context.new_page()
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+
+        page.goto(stack.printed_link)
+        page.wait_for_url(f"{stack.url}/")
+
+        assert not [url for url in asked if "token" in url]
+
+
+def test_a_wrong_link_says_so(stack: Site, browser: Browser) -> None:
+    with closing(browser.new_context(base_url=stack.url)) as context:
+        page = context.new_page()
+
+        page.goto(f"{stack.url}/signin#token={'0' * 32}")
+
+        expect(page.locator("#signin-wrong")).to_be_visible()
+        assert page.url == f"{stack.url}/signin"

@@ -166,8 +166,8 @@ def test_the_demos_fiware_is_on_loopback_alone() -> None:
 @pytest.mark.parametrize(
     ("host", "link"),
     [
-        ("127.0.0.1", "http://127.0.0.1:8000/?token=abc"),
-        ("::1", "http://[::1]:8000/?token=abc"),
+        ("127.0.0.1", "http://127.0.0.1:8000/signin#token=abc"),
+        ("::1", "http://[::1]:8000/signin#token=abc"),
     ],
 )
 def test_the_link_signs_a_browser_in(host: str, link: str) -> None:
@@ -191,7 +191,7 @@ def test_13_16_a_terminal_shows_the_link_as_a_code_too_and_a_log_does_not() -> N
     for out in (terminal, log):
         print_sign_in_link(Settings(), "abc", out)
 
-    assert log.getvalue() == "iVeg: http://127.0.0.1:8000/?token=abc\n"
+    assert log.getvalue() == "iVeg: http://127.0.0.1:8000/signin#token=abc\n"
     link, *code = terminal.getvalue().splitlines()
     assert link == log.getvalue().strip()
     assert len(code) > 10

@@ -32,7 +32,7 @@ async def ask(role: Role, base: str = "http://192.168.1.20:8123") -> httpx.Respo
 async def test_the_link_has_the_address_and_port_that_the_browser_reached() -> None:
     told = (await ask("operator")).json()
 
-    assert told["link"] == f"http://192.168.1.20:8123/?token={TOKEN}"
+    assert told["link"] == f"http://192.168.1.20:8123/signin#token={TOKEN}"
     assert told["image"].startswith("data:image/svg+xml")
     assert told["local"] is False
 

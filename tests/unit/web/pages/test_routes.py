@@ -136,7 +136,7 @@ async def test_a_stranger_is_told_how_to_get_in(
     authenticator.visitor = None
     answer = await browser.get(path)
     assert answer.status_code == 401
-    assert "?token=" in answer.text
+    assert "/signin#token=" in answer.text
     assert stops(answer.text) == []
 
 
@@ -146,7 +146,7 @@ async def test_the_way_in_is_open_to_strangers(
     authenticator.visitor = None
     answer = await browser.get("/signin")
     assert answer.status_code == 200
-    assert "?token=" in answer.text
+    assert "/signin#token=" in answer.text
 
 
 async def test_a_page_that_is_not_there_says_so_in_words(
