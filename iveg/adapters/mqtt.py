@@ -11,6 +11,7 @@ import logging
 import random
 import socket
 import ssl
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
@@ -26,6 +27,8 @@ _log = logging.getLogger(__name__)
 # aiomqtt's own: it complains of every message that finds no room or no confirmation.
 quiet("mqtt")
 NODELAY = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)]
+MOST_EARLY = 2000
+"""Messages at QoS 1 that wait until all subscriptions stand; the oldest give way."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.2, 2.0
 _KEEPALIVE_S = 5
 _ANSWERED_WITHIN_S, _CONFIRMED_WITHIN_S = 5.0, 1.5
@@ -91,7 +94,7 @@ class MqttLink:
         self._apart_s = apart_s
         self._client: OutboxClient | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
-        self._early: list[Qos1Message] = []
+        self._early: deque[Qos1Message] = deque(maxlen=MOST_EARLY)
         """Came before all subscriptions were in place, when nothing can be answered."""
         self._wake, self._drained = asyncio.Event(), asyncio.Event()
         self._drained.set()
@@ -145,7 +148,7 @@ class MqttLink:
             take=self._take,
             apart_s=self._apart_s,
         ) as client:
-            self._early = []
+            self._early.clear()
             for topic_filter, qos in self._subscriptions.items():
                 await client.subscribe(topic_filter, qos=qos)
             _heed_cancellation()
@@ -171,7 +174,7 @@ class MqttLink:
             for topic, payload in arrived.telemetry.items():
                 self._on_message(topic, payload)
             if self._client is None:
-                self._early += arrived.qos1
+                self._early.extend(arrived.qos1)
             else:
                 self._hand_qos1(arrived.qos1)
         except Exception as error:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.mqtt import MOST_EARLY, BrokerAddress, MqttLink
 from iveg.adapters.mqtt_inbox import (
     Arrived,
     InboxClient,
@@ -78,8 +78,12 @@ def test_a_line_that_was_reset_has_ended() -> None:
 
 
 @contextlib.contextmanager
-def talking(packets: bytes) -> Iterator[int]:
-    """A broker that admits one client and says everything at once."""
+def talking(packets: bytes, early: bytes = b"") -> Iterator[int]:
+    """A broker that admits one client and says everything at once.
+
+    Args:
+        packets: Said when the subscription stands; ``early`` before.
+    """
 
     def serve() -> None:
         client, _ = server.accept()
@@ -87,8 +91,10 @@ def talking(packets: bytes) -> Iterator[int]:
             client.recv(1000)
             client.sendall(CONNACK)
             subscribe = client.recv(1000)
+            client.sendall(early)
             client.sendall(b"\x90\x03" + subscribe[2:4] + b"\x00" + packets)
-            client.recv(1000)
+            while client.recv(100_000):
+                """Until it hangs up; it confirms what it was sent."""
 
     with socket.create_server(("127.0.0.1", 0)) as server:
         threading.Thread(target=serve, daemon=True).start()
@@ -116,6 +122,28 @@ async def test_a_busy_loop_reads_all_that_has_come_and_not_a_packet_a_turn() -> 
 
     assert heard == [f"t/{n}" for n in range(MANY)]
     assert turns < MANY / 3
+
+
+async def test_of_what_came_before_the_subscriptions_stood_the_newest_are_kept() -> (
+    None
+):
+    heard: list[int] = []
+    early = (confirmed_packet("t", b"%d" % n) for n in range(MOST_EARLY + 500))
+    with talking(b"", b"".join(early)) as port:
+        link = MqttLink(
+            BrokerAddress("127.0.0.1", port),
+            "test",
+            {"t": 1},
+            lambda _, payload: heard.append(int(payload)),
+        )
+        reading = asyncio.create_task(link.run())
+        async with asyncio.timeout(20.0):
+            while not heard:  # noqa: ASYNC110 - no event
+                await asyncio.sleep(0.005)
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+
+    assert heard == [*range(500, MOST_EARLY + 500)]
 
 
 REST_S = 0.1
