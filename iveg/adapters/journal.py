@@ -2,7 +2,8 @@
 
 A file of JSON lines, flushed to the disk at each; it outlives a crash of iVeg and a
 lost database.  It is read once, at the start, and then rewritten with the lines that
-still count, so that it does not grow for ever.
+still count; a line that says nothing new of its robot is not written, so that nobody
+who presses STOP for ever makes it grow for ever.
 """
 
 import asyncio
@@ -24,6 +25,7 @@ _log = logging.getLogger(__name__)
 
 FORM = Form("stop-journal")
 _STOPPED = {"stopped": True, "run": False}
+_Facts = tuple[str, str | None, tuple[str, ...], str | None]
 _NAMED_KEPT = 64
 """As many as a robot remembers to have released."""
 
@@ -38,6 +40,8 @@ class FileJournal:
         self._is_newer = False
         # Of its own: the default threads may all be busy with files of comfort.
         self._thread = ThreadPoolExecutor(1, "stop-journal")
+        self._newest: dict[str, _Facts] = {}
+        """The facts of each robot's newest line of this run."""
 
     def read(self) -> dict[str, DesiredRecord]:
         """Robots that were to stand when iVeg last ran, with their desired state.
@@ -112,17 +116,26 @@ class FileJournal:
         await self._write(entry)
 
     async def _write(self, entry: Mapping[str, Any]) -> None:
+        robot_id, facts = entry["robot_id"], _facts_of(entry)
         async with self._lock:
-            try:
-                loop = asyncio.get_running_loop()
-                await loop.run_in_executor(self._thread, self._file.append, entry)
-            except OSError:
-                _log.exception("the command journal could not be written")
+            if self._newest.pop(robot_id, None) != facts:
+                try:
+                    loop = asyncio.get_running_loop()
+                    await loop.run_in_executor(self._thread, self._file.append, entry)
+                except OSError:
+                    _log.exception("the command journal could not be written")
+                    return
+            self._newest[robot_id] = facts
 
     def close(self) -> None:
         """Let thread and file go."""
         self._thread.shutdown()
         self._file.close()
+
+
+def _facts_of(entry: Mapping[str, Any]) -> _Facts:
+    """What a line says of its robot; who said it again, and when, is in the audit."""
+    return entry["desired"], entry["hold_id"], tuple(entry["named"]), entry["ch"]
 
 
 def _entry(

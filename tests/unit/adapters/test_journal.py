@@ -54,6 +54,44 @@ async def test_a_line_is_on_disk_when_the_call_returns(tmp_path: Path) -> None:
     journal.close()
 
 
+async def test_the_same_wish_again_adds_no_line_and_another_does(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    journal = await write(path, *[("AGI", "stopped")] * 100)
+    await journal.log_release("AGI", "01A", ["01A"], "c1", "ana", START)
+    await journal.log_release("AGI", "01A", ["01A"], "c1", "ben", START)
+    await journal.log_desired("AGI", "run", None, "ana", START)
+    await journal.log_desired("AGII", "run", None, "ana", START)
+    await journal.log_desired("AGI", "stopped", "01A", "ana", START)
+    await journal.log_desired("AGI", "stopped", "01B", "ana", START)
+    journal.close()
+
+    wishes = [orjson.loads(line) for line in path.read_bytes().splitlines()[1:]]
+    assert [(one["robot_id"], one["desired"], one["hold_id"]) for one in wishes] == [
+        ("AGI", "stopped", "01A"),
+        ("AGI", "stopped", "01A"),
+        ("AGI", "run", None),
+        ("AGII", "run", None),
+        ("AGI", "stopped", "01A"),
+        ("AGI", "stopped", "01B"),
+    ]
+
+
+async def test_a_line_that_the_disk_refused_is_written_when_it_is_said_again(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "commands.jsonl"
+    path.mkdir()
+    journal = await write(path, ("AGI", "stopped"))
+    path.rmdir()
+
+    await journal.log_desired("AGI", "stopped", "01A", "ana", START)
+    journal.close()
+
+    assert FileJournal(path).read() == {"AGI": DesiredRecord("ana", "01A")}
+
+
 async def test_what_a_release_has_named_is_known_and_still_wanted(
     tmp_path: Path,
 ) -> None:
