@@ -98,7 +98,13 @@ _DirectRead = Annotated[
 _QUIET: Final = ConfigDict(hide_input_in_errors=True)
 """A secret that cannot be used stands in no traceback either."""
 _SECRETS: Final = frozenset(
-    {"IVEG_NOTIFY_TOKEN", "IVEG_API_TOKEN", "IVEG_SIGN_IN_TOKEN", "IVEG_MQTT_PASSWORD"}
+    {
+        "IVEG_NOTIFY_TOKEN",
+        "IVEG_NOTIFY_TOKEN_PREVIOUS",
+        "IVEG_API_TOKEN",
+        "IVEG_SIGN_IN_TOKEN",
+        "IVEG_MQTT_PASSWORD",
+    }
 )
 
 
@@ -144,6 +150,12 @@ class Settings:
         "IVEG_NOTIFY_TOKEN",
         "",
         "Secret that notifications must carry; empty: made at each start.",
+    )
+    notify_token_previous: _Hex = setting(
+        "IVEG_NOTIFY_TOKEN_PREVIOUS",
+        "",
+        "The secret before, which notifications may carry while it is being changed; "
+        "empty: none.",
     )
     fiware_service: _Service = setting(
         "IVEG_FIWARE_SERVICE", "agroconnect", "Tenant at Orion and the agent."
@@ -223,6 +235,13 @@ class Settings:
         "IVEG_FEEDBACK_STAND_S",
         LIMITS.feedback_stand_s,
         "Age of feedback at which a robot stands (s).",
+    )
+    on_link_loss: Literal["stop", "slow"] = setting(
+        "IVEG_ON_LINK_LOSS",
+        "stop",
+        "What a robot (`iveg robot`, emulated ones) does when feedback is older than "
+        "`IVEG_FEEDBACK_STAND_S`: `stop`, or `slow`, which goes on at half speed for as "
+        "long as nobody supervises it.",
     )
     drill_days: Annotated[float, Interval(ge=0.0, le=3650.0)] = setting(
         "IVEG_DRILL_DAYS",

@@ -85,7 +85,8 @@ class Dss:
         self.counted: list[Counter[str]] = [log_filter.counted]
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
-        self.notify_secret = NotifySecret(notify_token)
+        previous = settings.notify_token_previous
+        self.notify_secret = NotifySecret(notify_token, previous)
         self._boot, self._demo = secrets.token_hex(8), demo
         self.fleet = load_fleet(settings.fleet, settings.robots)
         self.stores = open_stores(settings, data_directory)

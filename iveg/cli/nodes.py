@@ -15,5 +15,6 @@ def node_settings(settings: Settings, directory: Path) -> NodeSettings:
         directory=directory,
         slow_s=settings.feedback_slow_s,
         stand_s=settings.feedback_stand_s,
+        on_link_loss=settings.on_link_loss,
         uplink=settings.uplink,
     )

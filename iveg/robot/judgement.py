@@ -16,6 +16,8 @@ from iveg.robot.gate import REST
 from iveg.robot.peer_feedback import PeerFeedback
 from iveg.robot.watchdog import Watchdog
 
+OnLinkLoss = Literal["stop", "slow"]
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -32,7 +34,7 @@ class Limits:
     max_turn: float = 1.0
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
-    on_link_loss: Literal["stop", "slow"] = "stop"
+    on_link_loss: OnLinkLoss = "stop"
 
 
 DEFAULT_LIMITS = Limits()

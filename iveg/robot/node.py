@@ -36,7 +36,7 @@ from iveg.robot.echo import Echo
 from iveg.robot.effects import Answer, Drive, Effect, Persist, Report
 from iveg.robot.gate import REST
 from iveg.robot.hold_file import read_holds, write_holds
-from iveg.robot.judgement import Limits
+from iveg.robot.judgement import Limits, OnLinkLoss
 from iveg.robot.lane import SafetyLane
 from iveg.robot.safety import SafetyMachine, State
 from iveg.robot.uplink import Form, Sensed, Uplink
@@ -58,6 +58,7 @@ class NodeSettings:
         directory: Where the holds of each robot survive a loss of power.
         slow_s: Feedback older than this halves the speed (s).
         stand_s: Feedback older than this stops the robot (s).
+        on_link_loss: ``slow``: it goes on at half speed instead.
         uplink: One message a topic, or Algorithm 1's single payload.
     """
 
@@ -66,6 +67,7 @@ class NodeSettings:
     directory: Path
     slow_s: float = LIMITS.feedback_slow_s
     stand_s: float = LIMITS.feedback_stand_s
+    on_link_loss: OnLinkLoss = "stop"
     uplink: Form = "per-topic"
 
 
@@ -133,7 +135,11 @@ class RobotNode:
             replay=replay,
         )
         limits = Limits(
-            profile.max_speed, profile.max_turn, settings.slow_s, settings.stand_s
+            profile.max_speed,
+            profile.max_turn,
+            settings.slow_s,
+            settings.stand_s,
+            settings.on_link_loss,
         )
         self._machine = self._new_machine(hold_file, limits)
 

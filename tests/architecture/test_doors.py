@@ -1,6 +1,7 @@
 """Every door of the finished application is declared, and every document knows it."""
 
 import re
+from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
@@ -62,6 +63,18 @@ def test_every_other_route_is_in_the_contract(app: FastAPI) -> None:
     others = {path for path, _ in _methods(app) if not path.startswith("/api/v1")}
 
     assert {path for path in others if f"{_written(path)}`" not in INTERFACES} == set()
+
+
+def test_the_settings_name_both_secrets_of_notifications(tmp_path: Path) -> None:
+    settings = Settings(notify_token="ab" * 16, notify_token_previous="cd" * 16)
+    secret = Dss(settings, tmp_path).notify_secret
+
+    assert secret.current == "ab" * 16
+    assert [secret.admits(one * 16) for one in ("ab", "cd", "ef")] == [
+        True,
+        True,
+        False,
+    ]
 
 
 def _methods(app: FastAPI) -> list[tuple[str, set[str]]]:

@@ -44,10 +44,12 @@ BAD = [
     ("IVEG_FEEDBACK_SLOW_S", "0", "a number from 0.1 to 10"),
     ("IVEG_FEEDBACK_STAND_S", "61", "a number from 0.2 to 60"),
     ("IVEG_UPLINK", "both", "one of per-topic, single"),
+    ("IVEG_ON_LINK_LOSS", "drive", "one of stop, slow"),
 ]
 SECRET = [
     ("IVEG_NOTIFY_TOKEN", "short", "32 to 128 hexadecimal digits"),
     ("IVEG_NOTIFY_TOKEN", "z" * 64, "32 to 128 hexadecimal digits"),
+    ("IVEG_NOTIFY_TOKEN_PREVIOUS", "short", "32 to 128 hexadecimal digits"),
     ("IVEG_SIGN_IN_TOKEN", "guess-me", "32 to 128 hexadecimal digits"),
     ("IVEG_API_TOKEN", "has space inside it", "16 to 256 visible characters"),
 ]
@@ -133,6 +135,7 @@ GOOD = {
     "IVEG_IOTA_CB_URL": "http://orion.internal:1026",
     "IVEG_NOTIFY_URL": "http://iveg:8000/ngsi/notifications",
     "IVEG_NOTIFY_TOKEN": "ab" * 32,
+    "IVEG_NOTIFY_TOKEN_PREVIOUS": "ef" * 32,
     "IVEG_FIWARE_SERVICE": "farm_1",
     "IVEG_FIWARE_SERVICEPATH": "/a/b",
     "IVEG_APIKEY": "key-1",
@@ -148,6 +151,7 @@ GOOD = {
     "IVEG_DIRECT_READ": "OFF",
     "IVEG_FEEDBACK_SLOW_S": "0.5",
     "IVEG_FEEDBACK_STAND_S": "2.0",
+    "IVEG_ON_LINK_LOSS": "slow",
     "IVEG_DRILL_DAYS": "7",
     "IVEG_UPLINK": "single",
     "IVEG_GREENHOUSE": "none",

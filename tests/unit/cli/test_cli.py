@@ -4,12 +4,14 @@ import io
 import socket
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 from iveg import __version__
 from iveg.cli import UNUSABLE, main
 from iveg.cli.demo import on_free_ports
+from iveg.cli.nodes import node_settings
 from iveg.cli.running import print_sign_in_link, sign_in_link
 from iveg.domain.errors import SettingsError
 from iveg.settings import Settings, describe
@@ -195,3 +197,12 @@ def test_13_16_a_terminal_shows_the_link_as_a_code_too_and_a_log_does_not() -> N
     link, *code = terminal.getvalue().splitlines()
     assert link == log.getvalue().strip()
     assert len(code) > 10
+
+
+@pytest.mark.parametrize("policy", ["stop", "slow"])
+def test_what_robots_do_without_feedback_is_a_setting(
+    tmp_path: Path, policy: Literal["stop", "slow"]
+) -> None:
+    assert node_settings(Settings(), tmp_path).on_link_loss == "stop"
+    settings = Settings(on_link_loss=policy)
+    assert node_settings(settings, tmp_path).on_link_loss == policy
