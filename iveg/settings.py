@@ -240,8 +240,8 @@ class Settings:
         "IVEG_ON_LINK_LOSS",
         "stop",
         "What a robot (`iveg robot`, emulated ones) does when feedback is older than "
-        "`IVEG_FEEDBACK_STAND_S`: `stop`, or `slow`, which goes on at half speed for as "
-        "long as nobody supervises it.",
+        "`IVEG_FEEDBACK_STAND_S`: `stop`, or `slow`, which goes on at half speed while "
+        "nobody supervises it.",
     )
     drill_days: Annotated[float, Interval(ge=0.0, le=3650.0)] = setting(
         "IVEG_DRILL_DAYS",
