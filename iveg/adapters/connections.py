@@ -60,19 +60,26 @@ class ConnectionCaps:
     body_s: float = 30.0
 
     @classmethod
-    def on_loopback(cls) -> "ConnectionCaps":
-        """Of a listener whose clients are all on this machine: one address has all."""
-        most = cls.for_this_process().connections
-        return cls(most, most, most)
+    def for_this_process(cls, listeners: int = 1) -> "ConnectionCaps":
+        """As many as leave a share of the file descriptors to everything else.
 
-    @classmethod
-    def for_this_process(cls) -> "ConnectionCaps":
-        """As many as leave half of the file descriptors to everything else."""
+        Args:
+            listeners: Of this process; each has as large a share.
+        """
         soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
         most = cls().connections
         if soft != resource.RLIM_INFINITY:
-            most = max(8, min(most, soft // 2))
+            most = max(8, min(most, soft // (listeners + 1)))
         return cls(most, most * 3 // 4, most * 3 // 8)
+
+    @classmethod
+    def on_loopback(cls) -> "ConnectionCaps":
+        """Of one of the three listeners whose clients are all on this machine.
+
+        One address has all.
+        """
+        most = cls.for_this_process(3).connections
+        return cls(most, most, most)
 
 
 @dataclass(eq=False, slots=True)

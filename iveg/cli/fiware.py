@@ -2,6 +2,7 @@
 
 from urllib.parse import urlsplit
 
+from iveg.adapters.connections import raise_descriptor_limit
 from iveg.adapters.extras import require_extra
 from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.running import report_ready
@@ -13,6 +14,7 @@ async def fiware(settings: Settings) -> None:
     require_extra("demo", "iveg fiware")
     from iveg.embedded.server import serve_fiware
 
+    raise_descriptor_limit()
     tune_garbage_collection()
     await serve_fiware(
         _address(settings.mqtt_url, 1883),

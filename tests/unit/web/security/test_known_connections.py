@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import pytest
 from starlette.requests import HTTPConnection
-from starlette.types import Message, Receive, Scope, Send
+from starlette.types import Message, Scope
 
 from iveg.adapters.connections import (
     CONNECTION,
@@ -46,7 +46,7 @@ class Door:
         await self._middleware(scope, self._receive, self._send)
         return place
 
-    async def _app(self, scope: Scope, _: Receive, send: Send) -> None:
+    async def _app(self, scope: Scope, *_: object) -> None:
         self.served.append(scope["client"][0])
 
     def _identify(self, connection: HTTPConnection) -> Principal | None:
