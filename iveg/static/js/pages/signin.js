@@ -34,8 +34,11 @@ async function signIn() {
   history.replaceState(null, "", location.pathname);
   const { status } = await sendApi("POST", "/signin", { token });
   const notice = noticeFor(status);
-  if (notice === null) location.replace("/");
-  else for (const one of [...Object.values(NOTICES), OTHERS]) {
+  if (notice === null) {
+    location.replace("/");
+    return;
+  }
+  for (const one of [...Object.values(NOTICES), OTHERS]) {
     setHidden(need(one), one !== notice);
   }
 }
