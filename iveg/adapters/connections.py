@@ -88,7 +88,6 @@ class Connection:
 
     Attributes:
         peer: Address at the other end; ``address`` that of the client behind it.
-        since: When it last began to wait or to be served (monotonic s).
         due: When what it waits for has to be here; None: it waits for nothing.
         is_busy: Whether a request of it is being answered.
         is_proxy: Whether the peer speaks for others.
@@ -98,7 +97,6 @@ class Connection:
     table: "ConnectionTable" = field(repr=False)
     peer: str
     end: Callable[[], None] = field(repr=False)
-    since: float
     address: str
     is_proxy: bool
     due: float | None = None
@@ -109,6 +107,7 @@ class Connection:
         """A request begins: nobody has vouched for it yet."""
         self._expect(self.table.caps.head_s)
         self.vouched = False
+        self.table.touch(self)
 
     def await_body(self) -> None:
         """Its head is here."""
@@ -120,8 +119,11 @@ class Connection:
 
     def rest(self) -> None:
         """The answer is out."""
-        self.since, self.due, self.is_busy = self.table.now(), None, False
-        self.address = self.peer
+        self.due, self.is_busy = None, False
+        if self.address == self.peer:
+            self.table.touch(self)
+        else:
+            self.table.move(self, self.peer)
 
     def vouch(self) -> None:
         """Its request was signed in."""
@@ -133,20 +135,21 @@ class Connection:
         """Whether nothing is awaited of it, and it waits for nothing."""
         return self.due is None and not self.is_busy
 
+    @property
+    def is_kept(self) -> bool:
+        """Whether it gives way to nobody: a signed-in request, or an open WebSocket."""
+        return self.vouched and self.is_busy
+
     def belongs_to(self, client: str) -> bool:
         """Name the client behind a proxy; whether that one may have another."""
-        if client == self.address:
-            return True
-        self.address = client
-        return self.table.has_room(self)
+        return client == self.address or self.table.move(self, client)
 
     def leave(self) -> None:
         """It is closed."""
         self.table.remove(self)
 
     def _expect(self, within_s: float) -> None:
-        self.since = self.table.now()
-        self.due, self.is_busy = self.since + within_s, False
+        self.due, self.is_busy = self.table.now() + within_s, False
 
 
 class ConnectionTable:
@@ -172,12 +175,13 @@ class ConnectionTable:
         self.caps = caps
         self.counters: Counter[str] = Counter()
         self._is_proxy = is_proxy
-        self._all: dict[Connection, None] = {}
+        self._by_address: dict[str, dict[Connection, None]] = {}
+        """Connections of each address; the one that was quiet longest comes first."""
         self._known: OrderedDict[str, float] = OrderedDict()
         self._told: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def __len__(self) -> int:
-        return len(self._all)
+        return sum(map(len, self._by_address.values()))
 
     def admit(self, peer: str, end: Callable[[], None]) -> Connection | None:
         """Take in a new connection; None where it has to be closed at once.
@@ -188,27 +192,34 @@ class ConnectionTable:
         """
         network = network_of(peer)
         is_proxy = self._is_proxy(peer)
-        new = Connection(self, network, end, self.now(), network, is_proxy)
-        self._all[new] = None
-        if self.has_room(new):
+        new = Connection(self, network, end, network, is_proxy)
+        self._put(new)
+        if self._has_room(new):
             new.await_head()
             return new
         self.remove(new)
         return None
 
-    def has_room(self, new: Connection) -> bool:
-        """Whether a connection may stay; others that must give way for it are ended."""
-        own = [one for one in self._all if one.address == new.address]
-        capped = not (new.is_proxy and new.address == new.peer)
-        if capped and len(own) > self.caps.of_an_address:
-            return self._give_way(own, new)
-        if not self._is_known(new.address):
-            strangers = [one for one in self._all if not self._is_known(one.address)]
-            if len(strangers) > self.caps.of_strangers:
-                return self._give_way(_of_the_greediest(strangers), new)
-        if len(self._all) > self.caps.connections:
-            return self._give_way(_of_the_greediest(self._all), new)
-        return True
+    def move(self, connection: Connection, address: str) -> bool:
+        """Count a connection as another address's; whether it may stay."""
+        self.remove(connection)
+        connection.address = address
+        self._put(connection)
+        return self._has_room(connection)
+
+    def touch(self, connection: Connection) -> None:
+        """Something happens on a connection: it is the last of its address to go."""
+        own = self._by_address.get(connection.address, {})
+        if connection in own:
+            del own[connection]
+            own[connection] = None
+
+    def remove(self, connection: Connection) -> None:
+        """Forget a connection."""
+        own = self._by_address.get(connection.address, {})
+        own.pop(connection, None)
+        if not own:
+            self._by_address.pop(connection.address, None)
 
     def remember(self, address: str) -> None:
         """Keep a share for an address that somebody has signed in from."""
@@ -217,15 +228,13 @@ class ConnectionTable:
         if len(self._known) > _MOST_ADDRESSES:
             self._known.popitem(last=False)
 
-    def remove(self, connection: Connection) -> None:
-        """Forget a connection."""
-        self._all.pop(connection, None)
-
     def end_overdue(self) -> None:
         """End every connection whose request did not come in time."""
         now = self.now()
-        for one in [one for one in self._all if one.due is not None and one.due < now]:
-            self._end(one, "late")
+        everyone = [one for own in self._by_address.values() for one in own]
+        for one in everyone:
+            if one.due is not None and one.due < now:
+                self._end(one, "late")
 
     async def run(self) -> None:
         """Look for requests that are late, until cancelled."""
@@ -243,13 +252,34 @@ class ConnectionTable:
             self._told.popitem(last=False)
         _log.warning("connections of %s: %s", address or "?", _SENTENCES[reason])
 
+    def _put(self, connection: Connection) -> None:
+        self._by_address.setdefault(connection.address, {})[connection] = None
+
+    def _has_room(self, new: Connection) -> bool:
+        """Whether a connection may stay; another that must give way for it is ended."""
+        caps, own = self.caps, self._by_address[new.address]
+        is_capped = not (new.is_proxy and new.address == new.peer)
+        if is_capped and len(own) > caps.of_an_address:
+            return self._give_way(own, new)
+        self._forget_known()
+        if new.address not in self._known:
+            by_address = self._by_address.items()
+            strangers = [each for one, each in by_address if one not in self._known]
+            if sum(map(len, strangers)) > caps.of_strangers:
+                return self._give_way(_longest(strangers), new)
+        if len(self) > caps.connections:
+            return self._give_way(_longest(self._by_address.values()), new)
+        return True
+
     def _give_way(self, among: Iterable[Connection], new: Connection) -> bool:
-        others = [one for one in among if one is not new]
-        free = [one for one in others if not (one.vouched and one.is_busy)]
-        if not free:
+        """End the first that nobody vouches for, else the first that is not kept."""
+        free = (one for one in among if one is not new and not one.vouched)
+        rest = (one for one in among if one is not new and not one.is_kept)
+        first = next(free, None) or next(rest, None)
+        if first is None:
             self.refused(new.address, "refused")
             return False
-        self._end(min(free, key=lambda one: (one.vouched, one.since)), "gave_way")
+        self._end(first, "gave_way")
         return True
 
     def _end(self, one: Connection, reason: str) -> None:
@@ -257,9 +287,11 @@ class ConnectionTable:
         self.remove(one)
         one.end()
 
-    def _is_known(self, address: str) -> bool:
-        at = self._known.get(address)
-        return at is not None and self.now() - at < _KNOWN_S
+    def _forget_known(self) -> None:
+        """Addresses from which nobody has signed in for long are strangers again."""
+        since = self.now() - _KNOWN_S
+        while self._known and next(iter(self._known.values())) < since:
+            self._known.popitem(last=False)
 
 
 _SENTENCES: Final = {
@@ -287,9 +319,5 @@ def network_of(address: str) -> str:
     return str(IPv6Address(int(read) >> 64 << 64))
 
 
-def _of_the_greediest(among: Iterable[Connection]) -> list[Connection]:
-    """The connections of the address that has the most."""
-    by_address: dict[str, list[Connection]] = {}
-    for one in among:
-        by_address.setdefault(one.address, []).append(one)
-    return max(by_address.values(), key=len)
+def _longest(groups: Iterable[dict[Connection, None]]) -> dict[Connection, None]:
+    return max(groups, key=lambda one: len(one))

@@ -88,6 +88,19 @@ def test_strangers_leave_a_share_to_addresses_that_have_signed_in() -> None:
     assert len(listener.table) == CAPS.connections
 
 
+def test_an_address_that_nobody_has_signed_in_from_for_long_is_a_stranger() -> None:
+    listener = Listener()
+    listener.table.remember(ANA)
+    for number in range(20):
+        listener.connected(f"eve {number}", f"10.1.{number}.1")
+    listener.ended.clear()
+    listener.time += 13 * 3600.0
+
+    listener.connected("ana", ANA)
+
+    assert len(listener.ended) == 1
+
+
 def test_what_is_open_and_signed_in_never_gives_way() -> None:
     listener = Listener()
     for number in range(4):
