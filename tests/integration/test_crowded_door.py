@@ -47,7 +47,7 @@ def answered_s(client: httpx.Client, method: str, path: str, status: int) -> flo
     return time.monotonic() - began
 
 
-def test_f54_a_stop_gets_through_a_thousand_half_sent_requests(served: Site) -> None:
+def test_f59_a_stop_gets_through_a_thousand_half_sent_requests(served: Site) -> None:
     program = served.programs[-1]
     page = {"X-IVEG": "1", "Origin": served.url}
     with ExitStack() as stack:
