@@ -9,8 +9,8 @@ from functools import cache
 import httpx
 import uvicorn
 
-from iveg.domain.greenhouse import Greenhouse
 from iveg.adapters.connections import ConnectionCaps, ConnectionTable
+from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.messages import CHANNELS
 from iveg.domain.observations import Instant
 from iveg.pipeline.build import KeptChoices, build_services
