@@ -9,13 +9,17 @@ Until then it is *missing* (docs/safety.md, "Clear"), unless an operator took it
 service.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import is_
 from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS
-from iveg.domain.observations import DetectionFrame, Instant
+from iveg.domain.observations import Detection, DetectionFrame, Instant
 
+CLASS_NAMES = 200
+"""So many different classes of one robot have a name; every further one is "other"."""
+OTHER = "other"
 FRAMES_HZ = 45.0
 """Of one robot, in the mean of a second; the contract's rate is 30 Hz."""
 
@@ -67,12 +71,14 @@ class Detector:
         flawed_at: When a frame was last not read whole, by flaw.
         worked: Whether it was ever proven to work.
         out_of_service: None: it is required.
+        class_names: Names that it gave to what is neither a person nor a robot.
     """
 
     whole_at: float | None = None
     flawed_at: dict[Flaw, float] = field(default_factory=dict)
     worked: bool = False
     out_of_service: OutOfService | None = None
+    class_names: set[str] = field(default_factory=set)
     _allowance: float = FRAMES_HZ
     _counted_at: float | None = None
 
@@ -85,6 +91,25 @@ class Detector:
         admitted = self._allowance >= 1.0
         self._allowance -= admitted
         return admitted
+
+    def bounded(self, frame: DetectionFrame, rule: DetectionRule) -> DetectionFrame:
+        """A frame whose classes are known names of this detector, or ``OTHER``.
+
+        The rule's own classes are never lost to the bound.
+        """
+        named = tuple(self._named(one, rule) for one in frame.detections)
+        if all(map(is_, named, frame.detections)):
+            return frame
+        return replace(frame, detections=named)
+
+    def _named(self, detection: Detection, rule: DetectionRule) -> Detection:
+        class_id = detection.class_id
+        if class_id in self.class_names or rule.class_of(class_id) is not None:
+            return detection
+        if len(self.class_names) >= CLASS_NAMES:
+            return replace(detection, class_id=OTHER)
+        self.class_names.add(class_id)
+        return detection
 
     def note_whole(self, measured_at: float | None) -> None:
         """Note a frame that was read whole; None: nobody knows its age."""

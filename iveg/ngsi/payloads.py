@@ -1,9 +1,9 @@
 """The shapes on the wire, strict: no coercion, no NaN, all bounded."""
 
 import unicodedata
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
@@ -101,6 +101,12 @@ class PositionValue(Wire):
     ymax: Metres
     zmin: Metres
     zmax: Metres
+
+    @model_validator(mode="after")
+    def _has_sides(self) -> Self:
+        if self.xmin > self.xmax or self.ymin > self.ymax or self.zmin > self.zmax:
+            raise ValueError("a side begins behind its end")
+        return self
 
 
 class BoxValue(Wire):

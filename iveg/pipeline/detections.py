@@ -78,6 +78,7 @@ class DetectionTracking:
             self._world.counters["pictures.not_judged"] += 1
             detector.note_flaw("overload", received.at)
             return
+        frame = detector.bounded(frame, rule)
         placed = self._look(frame, received, rule, seen_at)
         turned_away, unplaced = self._people.turned_away, self._people.unplaced
         if turned_away:

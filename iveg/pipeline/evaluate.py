@@ -13,7 +13,7 @@ from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
+from iveg.domain.feedback import HALF_SPEED, UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Climate,
@@ -24,6 +24,7 @@ from iveg.domain.observations import (
     Received,
     SafetyReport,
 )
+from iveg.domain.plausibility import ignores_limit
 from iveg.domain.records import AlertRecord, DecisionRecord
 from iveg.domain.rule.premises import Missing
 from iveg.domain.rule.speed_limits import Crossing, LimitChange, SpeedLimits
@@ -85,6 +86,7 @@ class Evaluator:
         self._event_log = event_log
         self._new_id = new_id
         self._applied: dict[str, float] = {}
+        self._limited_since: dict[str, float] = {}
         self._first_reports = FirstReports()
         self._low = LowValues()
         self._moved: dict[str, Odometry] = {}
@@ -180,10 +182,20 @@ class Evaluator:
     def _reported(self, report: SafetyReport, at: Instant) -> None:
         for decision in self.decisions.open_of(report.robot_id):
             self._advance(decision, decision.reported(report, at), at)
+        self._doubt_ignored_limit(report, at)
         self._first_reports.reported(report, self._feedback_publisher.published_at, at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
             self._log_speed(report, at)
+
+    def _doubt_ignored_limit(self, report: SafetyReport, at: Instant) -> None:
+        """Doubt a robot that drives on above a limit long after it was told."""
+        robot = self.world.robot(report.robot_id)
+        limited_at = self._limited_since.get(robot.robot_id)
+        if limited_at is None or robot.safety_received is None or robot.is_replay:
+            return
+        if ignores_limit(report, robot.safety_received.mono, limited_at):
+            robot.doubts.contradicted("limit_ignored", at)
 
     def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
         if after is not before:
@@ -199,6 +211,11 @@ class Evaluator:
         for change in changes:
             self._crossed(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
+        for robot_id, limit in speed_limits.items():
+            if limit.speed_factor > HALF_SPEED:
+                self._limited_since.pop(robot_id, None)
+            else:
+                self._limited_since.setdefault(robot_id, now.mono)
         changed = [
             robot_id
             for robot_id, speed_limit in speed_limits.items()

@@ -80,7 +80,9 @@ detections = st.builds(
     Detection,
     texts,
     thousandths(0, 1),
-    st.builds(Box3D, metres, metres, metres, metres, metres, metres),
+    st.tuples(*[st.tuples(metres, metres).map(sorted)] * 3).map(
+        lambda sides: Box3D(*(end for side in sides for end in side))
+    ),
     st.sampled_from([None, "map", "base_link", "camera_optical_frame"]),
     maybe,
 )

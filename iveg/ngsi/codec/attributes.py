@@ -1,43 +1,42 @@
 """The attributes of an entity, one reader each."""
 
-from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from iveg.domain.errors import UnreadableError
-from iveg.domain.geometry import Box3D, Pose2D, Twist2D
+from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import (
     Climate,
     CommandAnswer,
     CommandStatus,
-    Detection,
     DetectionFrame,
     HeartbeatProbe,
     LaserScan,
     Navigation,
     Observation,
     Odometry,
-    Origin,
     Overtaken,
     RefusedFrame,
     RobotFault,
     SafetyReport,
 )
 from iveg.ngsi import names, payloads
-from iveg.ngsi.codec.fields import read_holds, read_origin
+from iveg.ngsi.codec.boxes import read_frame, read_single_detection
+from iveg.ngsi.codec.fields import (
+    read_holds,
+    read_origin,
+    read_stamped,
+    refuse_unplaced,
+)
+from iveg.ngsi.codec.scans import read_scan, read_single_scan
 from iveg.ngsi.codec.untrusted import ReadResult, first_complaint, merge, unread
 from iveg.ngsi.sensors import SENSORS, Sensor
 
-_BASE_LINK = Pose2D(0.0, 0.0, 0.0)
-_LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
-_BOXES: TypeAdapter[list[payloads.BoxValue]] = TypeAdapter(list[payloads.BoxValue])
 Reader = Callable[[str, Any], Observation]
 IsPast = Callable[[str, type[Observation], str, int], bool]
 """Whether robot, kind, boot and seq tell that a message cannot be news."""
@@ -115,7 +114,7 @@ def refused_frame(robot_id: str, read: ReadResult) -> ReadResult:
 
 
 def _odometry(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
-    _refuse_unplaced(attributes[names.ODOMETRY])
+    refuse_unplaced(attributes[names.ODOMETRY])
     return _odometry_of(
         robot_id, payloads.OdometryValue.model_validate(attributes[names.ODOMETRY])
     )
@@ -128,123 +127,6 @@ def _odometry_of(robot_id: str, value: payloads.OdometryValue) -> Odometry:
         Pose2D(value.x, value.y, value.yaw),
         Twist2D(value.linear_velocity, value.angular_velocity),
     )
-
-
-def _refuse_unplaced(value: Any) -> None:
-    """Refuse data without a position: it is counted and never drawn."""
-    if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
-        raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
-
-
-def _scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
-    _refuse_unplaced(attributes.get(names.LIDAR_HEADER))
-    return _scan_of(robot_id, attributes[names.LIDAR], attributes.get("lidar_header"))
-
-
-def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
-    ranges = _ranges(points)
-    if raw_header is None:
-        return LaserScan(
-            robot_id,
-            Origin(),
-            angle_min=-np.pi,
-            angle_increment=2 * np.pi / max(1, ranges.size),
-            range_min=0.0,
-            range_max=1e4,
-            mount=_BASE_LINK,
-            ranges=ranges,
-        )
-    header = payloads.LidarHeaderValue.model_validate(raw_header)
-    return LaserScan(
-        robot_id,
-        read_origin(header),
-        header.angle_min,
-        header.angle_increment,
-        header.range_min,
-        header.range_max,
-        Pose2D(header.x, header.y, header.yaw),
-        ranges,
-    )
-
-
-def _ranges(points: Any) -> NDArray[np.float32]:
-    """A scan's numbers as one buffer; inf where nothing came back.
-
-    Raises:
-        ValidationError: not a list of at most 4,096 numbers and nulls in range.
-    """
-    if type(points) is list and 0 < len(points) <= payloads.MAX_BEAMS:
-        numbers = _plain_numbers(points)
-        if numbers is not None:
-            return numbers.astype(np.float32)
-    ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
-    ranges[np.isnan(ranges)] = np.inf
-    return ranges
-
-
-def _plain_numbers(points: list[Any]) -> NDArray[np.float64] | None:
-    """The numbers, where there is nothing to judge: no null, no bool, all in range."""
-    try:
-        numbers = np.frombuffer(array("d", points))
-    except (TypeError, OverflowError):
-        return None
-    # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
-    if not (numbers.min() >= 0.0 and numbers.max() <= payloads.MAX_RANGE_M):
-        return None
-    return None if np.any(numbers == 0.0) or np.any(numbers == 1.0) else numbers
-
-
-def _detections(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
-    boxes = attributes[names.BOXES]
-    if isinstance(boxes, dict):
-        boxes = [boxes]
-    if not isinstance(boxes, list) or len(boxes) > payloads.MAX_BOXES:
-        raise UnreadableError("bad_bounding_boxes", "neither a box nor a short list")
-    origin = Origin()
-    if attributes.get(names.BOXES_HEADER) is not None:
-        origin = read_origin(
-            payloads.OriginFields.model_validate(attributes[names.BOXES_HEADER])
-        )
-    try:
-        read = list(map(_detection_of, _BOXES.validate_python(boxes)))
-    except ValidationError:
-        read = [_detection(box) for box in boxes]
-    return _frame(robot_id, origin, boxes, read)
-
-
-def _frame(
-    robot_id: str, origin: Origin, boxes: list[Any], read: list[Detection | None]
-) -> DetectionFrame:
-    """What could be read of a frame, and the classes of the boxes that could not."""
-    found = tuple(one for one in read if one is not None)
-    if len(found) == len(boxes):
-        return DetectionFrame(robot_id, origin, found)
-    pairs = zip(boxes, read, strict=True)
-    unread = tuple(_class_of(box) for box, detection in pairs if detection is None)
-    return DetectionFrame(robot_id, origin, found, unread)
-
-
-def _class_of(box: Any) -> str | None:
-    class_id = box.get("class_id") if isinstance(box, dict) else None
-    return payloads.clean_text(class_id) if isinstance(class_id, str) else None
-
-
-def _detection(raw: Any) -> Detection | None:
-    try:
-        return _detection_of(payloads.BoxValue.model_validate(raw))
-    except ValidationError:
-        return None
-
-
-def _detection_of(box: payloads.BoxValue) -> Detection | None:
-    if box.frame_id == names.UNPLACED:
-        return None
-    sides = box.position
-    position = Box3D(
-        sides.xmin, sides.xmax, sides.ymin, sides.ymax, sides.zmin, sides.zmax
-    )
-    frame_id = box.frame_id or None
-    return Detection(box.class_id, box.probability, position, frame_id, box.det_id)
 
 
 def _safety(robot_id: str, attributes: Mapping[str, Any]) -> SafetyReport:
@@ -307,54 +189,9 @@ def _single_pose(robot_id: str, attributes: Mapping[str, Any]) -> Odometry:
     value = payloads.OdometryValue.model_validate(attributes["pose"])
     odometry = _odometry_of(robot_id, value)
     if odometry.origin.stamp is None:
-        origin = _stamped(attributes)
+        origin = read_stamped(attributes)
         return Odometry(robot_id, origin, odometry.pose, odometry.twist)
     return odometry
-
-
-def _single_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
-    return _scan_of(robot_id, attributes["laser_scan"], attributes.get("lidar_header"))
-
-
-_HALF_M = 0.25
-"""Algorithm 1 sends a point; it is drawn as a box of half a metre."""
-
-
-def _single_detection(robot_id: str, attributes: Mapping[str, Any]) -> DetectionFrame:
-    box = {
-        "class_id": attributes["class"],
-        "probability": attributes.get("conf"),
-        "frame_id": "map",
-        "position": _sides_about(attributes.get("position_3D")),
-    }
-    return _frame(robot_id, _stamped(attributes), [box], [_detection(box)])
-
-
-def _sides_about(raw: Any) -> dict[str, float] | None:
-    """Sides of the box about a point; None where it is none."""
-    try:
-        point = payloads.PointValue.model_validate(raw)
-    except ValidationError:
-        return None
-    centre = {"x": point.x, "y": point.y, "z": point.z}
-    return {
-        axis + side: value + sign * _HALF_M
-        for axis, value in centre.items()
-        for side, sign in (("min", -1), ("max", 1))
-    }
-
-
-_PROOF = ("mono", "heard", "replay")
-
-
-def _stamped(attributes: Mapping[str, Any]) -> Origin:
-    """The message's own stamp, and what proves its age, which stands at the pose."""
-    pose = attributes.get("pose")
-    if not isinstance(pose, dict):
-        pose = {}
-    fields = {key: pose[key] for key in _PROOF if key in pose}
-    fields["stamp"] = attributes.get("timestamp")
-    return read_origin(payloads.OriginFields.model_validate(fields))
 
 
 def _sensed(
@@ -366,15 +203,15 @@ def _sensed(
 
 _READERS: Mapping[str, Reader] = {
     names.ODOMETRY: _odometry,
-    names.LIDAR: _scan,
-    names.BOXES: _detections,
+    names.LIDAR: read_scan,
+    names.BOXES: read_frame,
     names.SAFETY: _safety,
     names.NAVIGATION: _navigation,
     names.COMMAND_STATUS: _command_status,
     names.COMMAND_INFO: _command_info,
     "pose": _single_pose,
-    "laser_scan": _single_scan,
-    "class": _single_detection,
+    "laser_scan": read_single_scan,
+    "class": read_single_detection,
     **{sensor.attribute: partial(_sensed, sensor) for sensor in SENSORS},
 }
 

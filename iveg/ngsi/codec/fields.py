@@ -1,14 +1,15 @@
 """Fields that several messages share: who said it and when, holds, round numbers."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iveg.domain.errors import UnreadableError
 from iveg.domain.observations import FeedbackRef, Hold, Origin
 from iveg.domain.stamps import parse_stamp
-from iveg.ngsi import payloads
+from iveg.ngsi import names, payloads
 
 
 def read_origin(value: payloads.OriginFields) -> Origin:
@@ -26,6 +27,25 @@ def read_origin(value: payloads.OriginFields) -> Origin:
         heard=None if heard is None else FeedbackRef(heard.boot, heard.seq),
         replay=value.replay,
     )
+
+
+_PROOF = ("mono", "heard", "replay")
+
+
+def read_stamped(attributes: Mapping[str, Any]) -> Origin:
+    """The message's own stamp, and what proves its age, which stands at the pose."""
+    pose = attributes.get("pose")
+    if not isinstance(pose, dict):
+        pose = {}
+    fields = {key: pose[key] for key in _PROOF if key in pose}
+    fields["stamp"] = attributes.get("timestamp")
+    return read_origin(payloads.OriginFields.model_validate(fields))
+
+
+def refuse_unplaced(value: Any) -> None:
+    """Refuse data without a position: it is counted and never drawn."""
+    if isinstance(value, dict) and value.get("frame_id") == names.UNPLACED:
+        raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
 
 
 def write_origin(origin: Origin) -> dict[str, Any]:

@@ -3,9 +3,15 @@
 import pytest
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.detector import FRAMES_HZ, Detector, OutOfService, flaw_of
+from iveg.domain.detector import (
+    CLASS_NAMES,
+    FRAMES_HZ,
+    Detector,
+    OutOfService,
+    flaw_of,
+)
 from iveg.domain.observations import DetectionFrame, Origin
-from tests.builders import at, detection_frame
+from tests.builders import at, detection, detection_frame
 
 OUT = OutOfService("maria", 1.0, "boot-a")
 
@@ -89,3 +95,27 @@ def test_a_tomato_without_depth_is_none() -> None:
 
 def test_somebody_without_room_is_one() -> None:
     assert flaw_of(detection_frame(), DetectionRule(), turned_away=1) == "overload"
+
+
+def seen(*class_ids: str) -> DetectionFrame:
+    return detection_frame("AGI", *map(detection, class_ids))
+
+
+def names(frame: DetectionFrame) -> list[str]:
+    return [one.class_id for one in frame.detections]
+
+
+def test_two_hundred_classes_of_a_robot_have_a_name_and_no_more() -> None:
+    detector, rule = Detector(), DetectionRule()
+    for number in range(CLASS_NAMES):
+        detector.bounded(seen(f"thing-{number}"), rule)
+
+    found = detector.bounded(seen("thing-7", "news", "farmer", "Husky"), rule)
+
+    assert names(found) == ["thing-7", "other", "farmer", "Husky"]
+    assert len(detector.class_names) == CLASS_NAMES
+
+
+def test_a_frame_of_known_classes_stays_as_it_is() -> None:
+    detector, frame = Detector(), seen("tomato", "farmer")
+    assert detector.bounded(frame, DetectionRule()) is frame

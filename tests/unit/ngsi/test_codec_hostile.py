@@ -410,3 +410,47 @@ def test_a_single_payload_without_a_place_keeps_its_class() -> None:
 
     assert isinstance(frame, DetectionFrame)
     assert frame.unread == ("tomato",)
+
+
+# --- scans that no laser makes -----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("header", "readable"),
+    [
+        ({}, True),
+        ({"angle_increment": 0.0}, False),
+        ({"angle_increment": 1.0}, False),
+        ({"angle_increment": -1.0}, False),
+        ({"range_min": 9.0, "range_max": 9.0}, False),
+        ({"range_min": -0.1}, False),
+    ],
+)
+def test_a_scan_that_no_laser_makes_is_refused_with_its_reason(
+    header: dict[str, float], *, readable: bool
+) -> None:
+    usual = {"angle_min": 0.0, "angle_increment": 0.01, "range_max": 25.0}
+    said = {"lidar_points": [1.5] * 360, "lidar_header": {**usual, **header}}
+
+    reading = codec.read_attributes("AGI", said)
+
+    assert bool(reading.observations) is readable
+    reasons = [one.reason for one in reading.problems]
+    assert reasons == ([] if readable else ["bad_lidar_header"])
+
+
+def test_one_beam_needs_no_increment() -> None:
+    header = {"angle_min": 0.0, "angle_increment": 0.0, "range_max": 25.0}
+    said = {"lidar_points": [1.5], "lidar_header": header}
+
+    assert codec.read_attributes("AGI", said).problems == ()
+
+
+def test_a_box_whose_side_ends_before_it_begins_cannot_be_used() -> None:
+    sides = dict.fromkeys(("ymin", "ymax", "zmin", "zmax"), 0.0)
+    box = {**BOX, "position": {**sides, "xmin": 2.0, "xmax": 1.0}}
+
+    (frame,) = codec.read_attributes("AGI", {"bounding_boxes": [box]}).observations
+
+    assert isinstance(frame, DetectionFrame)
+    assert frame.unread == ("farmer",)

@@ -1,0 +1,101 @@
+"""Scans: ranges and header to one sweep, field for field ``sensor_msgs/LaserScan``."""
+
+import math
+from array import array
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Pose2D
+from iveg.domain.observations import LaserScan, Origin
+from iveg.ngsi import names, payloads
+from iveg.ngsi.codec.fields import read_origin, refuse_unplaced
+
+_BASE_LINK = Pose2D(0.0, 0.0, 0.0)
+_LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
+_TURN = math.tau + 0.1
+"""Drivers close their turn with a beam or two more (rad)."""
+
+
+def read_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+    """Read ``lidar_points`` and its header."""
+    refuse_unplaced(attributes.get(names.LIDAR_HEADER))
+    return _scan_of(robot_id, attributes[names.LIDAR], attributes.get("lidar_header"))
+
+
+def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
+    ranges = _ranges(points)
+    if raw_header is None:
+        return LaserScan(
+            robot_id,
+            Origin(),
+            angle_min=-np.pi,
+            angle_increment=2 * np.pi / max(1, ranges.size),
+            range_min=0.0,
+            range_max=1e4,
+            mount=_BASE_LINK,
+            ranges=ranges,
+        )
+    header = payloads.LidarHeaderValue.model_validate(raw_header)
+    _refuse_impossible(header, ranges.size)
+    return LaserScan(
+        robot_id,
+        read_origin(header),
+        header.angle_min,
+        header.angle_increment,
+        header.range_min,
+        header.range_max,
+        Pose2D(header.x, header.y, header.yaw),
+        ranges,
+    )
+
+
+def _ranges(points: Any) -> NDArray[np.float32]:
+    """A scan's numbers as one buffer; inf where nothing came back.
+
+    Raises:
+        ValidationError: not a list of at most 4,096 numbers and nulls in range.
+    """
+    if type(points) is list and 0 < len(points) <= payloads.MAX_BEAMS:
+        numbers = _plain_numbers(points)
+        if numbers is not None:
+            return numbers.astype(np.float32)
+    ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
+    ranges[np.isnan(ranges)] = np.inf
+    return ranges
+
+
+def _plain_numbers(points: list[Any]) -> NDArray[np.float64] | None:
+    """The numbers, where there is nothing to judge: no null, no bool, all in range."""
+    try:
+        numbers = np.frombuffer(array("d", points))
+    except (TypeError, OverflowError):
+        return None
+    # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
+    if not (numbers.min() >= 0.0 and numbers.max() <= payloads.MAX_RANGE_M):
+        return None
+    return None if np.any(numbers == 0.0) or np.any(numbers == 1.0) else numbers
+
+
+def _refuse_impossible(header: payloads.LidarHeaderValue, beams: int) -> None:
+    """Refuse a sweep that no laser makes.
+
+    Raises:
+        UnreadableError: its beams do not turn, turn more than once, or count nothing.
+    """
+    increment = header.angle_increment
+    if increment == 0.0 and beams > 1:
+        raise UnreadableError("bad_lidar_header", "angle_increment is 0")
+    if abs(increment) * (beams - 1) > _TURN:
+        raise UnreadableError("bad_lidar_header", "beams turn more than once round")
+    if not 0.0 <= header.range_min < header.range_max:
+        raise UnreadableError("bad_lidar_header", "range_min is not below range_max")
+
+
+def read_single_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
+    """Read the sweep of Algorithm 1's payload."""
+    return _scan_of(robot_id, attributes["laser_scan"], attributes.get("lidar_header"))
