@@ -209,6 +209,7 @@ async def test_neither_a_robot_that_echoes_nor_a_recording_is_named() -> None:
     robot = Robot(desk)
     for _ in range(60):
         robot.live()
+        desk.look("AGI")
         desk.drive("AGII", 50.0)
         await desk.wait(0.1)
 
