@@ -30,7 +30,8 @@ from iveg.pipeline.waiting import wait_set
 _log = logging.getLogger(__name__)
 
 MAX_QUEUED = 2000
-_MAX_TOLD = 500
+_MOST_LOGGED = 500
+"""Kinds of rejections that are logged of one robot, or of all strangers together."""
 
 
 class Ingest:
@@ -63,6 +64,7 @@ class Ingest:
         """How much waits, by robot and kind."""
         self._wake = asyncio.Event()
         self._told: set[tuple[str, str]] = set()
+        self._logged: Counter[str | None] = Counter()
         self.counters: Counter[str] = Counter()
 
     def offer(self, received: Received) -> None:
@@ -100,11 +102,18 @@ class Ingest:
         """Count something that cannot be used; say so once for each source."""
         self.counters[f"rejected.{reason}"] += 1
         key = (source, reason)
-        if key in self._told or len(self._told) >= _MAX_TOLD:
+        if key in self._told or not self._may_log(source):
             return
         self._told.add(key)
         _log.warning("rejected from %s: %s %s", source, reason, detail)
         self._rejected(source, reason)
+
+    def _may_log(self, source: str) -> bool:
+        """Whether there is room: whoever uses up the own leaves that of others."""
+        robot_id = source.partition("_")[0]
+        owner = robot_id if self._known(robot_id) else None
+        self._logged[owner] += 1
+        return self._logged[owner] <= _MOST_LOGGED
 
     @property
     def waiting(self) -> int:

@@ -256,3 +256,16 @@ def test_a_copy_that_the_world_must_know_of_waits_for_it(copy: Overtaken) -> Non
     queue.offer(received(copy))
 
     assert queue.waiting == 1
+
+
+def test_nobody_who_is_rejected_often_hides_the_rejection_of_another() -> None:
+    told: list[tuple[str, str]] = []
+    queue = Ingest({"AGI", "AGII"}.__contains__, lambda *one: told.append(one))
+    for number in range(600):
+        queue.reject(f"stranger-{number}", "bad_robot_id")
+        queue.reject(f"AGI_{number}", "bad_robot_id")
+
+    queue.reject("AGII_odom", "not_json")
+
+    assert len(told) == 1001
+    assert told[-1] == ("AGII_odom", "not_json")
