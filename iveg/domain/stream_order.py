@@ -17,6 +17,8 @@ _REMEMBERED_SEQS = 512
 """Copies of the last ten seconds and more, at 30 Hz, are known for copies."""
 _REMEMBERED_BOOTS = 16
 _GROWN_TO_RETURN = 5
+_LEAP = 100_000
+"""No count goes on so far unheard: it is an hour of 30 messages a second."""
 
 
 @dataclass(slots=True)
@@ -25,7 +27,8 @@ class StreamOrder:
 
     A straggler of an unknown boot looks like a new start, and would make the present
     boot an old one for ever.  So an old boot that goes on counting, five times with no
-    message of the present one in between, becomes the present one again.
+    message of the present one in between, becomes the present one again.  One wrong
+    number would make all true ones late, too: a count that leaps is believed likewise.
     """
 
     boot: str | None = None
@@ -33,6 +36,8 @@ class StreamOrder:
     _old: dict[str, int] = field(default_factory=dict)
     _returning: str | None = None
     _grown: int = 0
+    _leapt_to: int | None = None
+    _leapt: int = 0
     _recent: deque[int] = field(default_factory=deque)
     _known: set[int] = field(default_factory=set)
     """The same, to look them up: what FIWARE brings is a copy nearly always."""
@@ -62,6 +67,9 @@ class StreamOrder:
             self._begin(origin.boot, origin.seq)
             return "new"
         self._returning = None
+        if origin.seq - self.seq > _LEAP and not self._goes_on(origin.seq):
+            return "late"
+        self._leapt_to = None
         if origin.seq in self._known:
             return "duplicate"
         self._remember(origin.seq)
@@ -79,6 +87,13 @@ class StreamOrder:
             self._returning, self._grown = boot, 0
         self._grown += 1
         return self._grown >= _GROWN_TO_RETURN
+
+    def _goes_on(self, seq: int) -> bool:
+        """Whether a count that leapt has gone on from there."""
+        known, self._leapt_to = self._leapt_to, seq
+        near = known is not None and 0 < seq - known <= _LEAP
+        self._leapt = self._leapt + 1 if near else 1
+        return self._leapt >= _GROWN_TO_RETURN
 
     def _begin(self, boot: str, seq: int) -> None:
         self._old.pop(boot, None)

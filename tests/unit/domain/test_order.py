@@ -40,6 +40,54 @@ def test_the_newest_is_never_new_twice_however_many_late_ones_came_between() -> 
     assert order.judge(origin(1000)) != "new"
 
 
+LEAP = 10**6
+
+
+def test_one_number_that_leaps_makes_no_true_one_late() -> None:
+    order = StreamOrder()
+    order.judge(origin(1))
+
+    said = [order.judge(origin(seq)) for seq in (2, 2**53, 3, 4, LEAP, 5)]
+
+    assert said == ["new", "late", "new", "new", "late", "new"]
+
+
+def test_numbers_that_leap_anywhere_are_never_believed() -> None:
+    order = StreamOrder()
+    order.judge(origin(1))
+
+    assert {order.judge(origin(number * LEAP)) for number in range(1, 50)} == {"late"}
+    assert order.judge(origin(2)) == "new"
+
+
+def test_a_leap_from_which_five_in_a_row_go_on_is_believed() -> None:
+    order = StreamOrder()
+    order.judge(origin(1))
+
+    said = [order.judge(origin(LEAP + number)) for number in range(6)]
+
+    assert said == ["late"] * 4 + ["new"] * 2
+    assert order.judge(origin(2)) == "late"
+
+
+def test_a_leap_that_true_numbers_interrupt_is_not_believed() -> None:
+    order = StreamOrder()
+    order.judge(origin(1))
+    said = []
+    for number in range(10):
+        said.append(order.judge(origin(LEAP + number)))
+        order.judge(origin(2 + number))
+
+    assert said == ["late"] * 10
+
+
+def test_an_hour_that_nobody_heard_is_no_leap() -> None:
+    order = StreamOrder()
+    order.judge(origin(1))
+
+    assert order.judge(origin(100_001)) == "new"
+
+
 def test_a_new_boot_counts_though_its_number_is_lower() -> None:
     order = StreamOrder()
     order.judge(origin(1000, boot="a"))
