@@ -109,7 +109,13 @@ def is_detecting(robot: RobotState, now: Instant) -> bool:
 
 
 def _camera_of(robot: RobotState, now: Instant) -> Pose2D | None:
-    """Pose of a robot's camera, if it works now and its place is certain."""
+    """Pose of a robot's camera, if it works now and its place is certain.
+
+    Who contradicts itself, however shortly, finds no spot empty, nor does a frame that
+    was not read whole.
+    """
+    if robot.doubts.is_open(now) or robot.detector.is_flawed(now):
+        return None
     age, looked = robot.age_s(now), robot.detections_at
     if robot.odometry is None or looked is None:
         return None

@@ -53,6 +53,25 @@ def test_a_look_that_was_interrupted_begins_anew() -> None:
     assert watched(scene, 0.9) == []
 
 
+def test_who_contradicts_itself_finds_no_spot_empty() -> None:
+    scene = remembered(Scene())
+    for _ in range(30):
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI")
+        scene.world.robot("AGI").doubts.contradicted("jumped", at(scene.now))
+        assert scene.sweep() == []
+        scene.now = round(scene.now + 0.1, 6)
+
+
+def test_a_frame_that_was_not_read_whole_finds_no_spot_empty() -> None:
+    scene = remembered(Scene())
+    for _ in range(30):
+        scene.drive("AGI", 0.0, linear=0.0)
+        scene.look("AGI", unreadable=1)
+        assert scene.sweep() == []
+        scene.now = round(scene.now + 0.1, 6)
+
+
 def test_somebody_who_is_still_seen_keeps_the_ring() -> None:
     scene = Scene()
     scene.look("AGII", person(4.0))
