@@ -1,9 +1,12 @@
 """The fixed names of the wire: topics, attributes, devices, entities."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
+from iveg.domain.errors import UnreadableError
 from iveg.ngsi.sensors import SENSORS
 
 ROBOT_TYPE = "Robot"
@@ -121,3 +124,21 @@ def robot_of_device(device_id: str) -> str:
         if device.suffix and device_id.endswith(device.suffix):
             return device_id.removesuffix(device.suffix)
     return device_id
+
+
+_HEADERS = {LIDAR: LIDAR_HEADER, BOXES: BOXES_HEADER}
+"""Attributes whose origin keys stand in another one."""
+
+
+def refuse_another_robot(
+    robot_id: str, attributes: Mapping[str, Any], name: str
+) -> None:
+    """Refuse what says that another robot sent it than its topic or entity does.
+
+    Raises:
+        UnreadableError: ``another_robot``.
+    """
+    value, header = attributes.get(name), attributes.get(_HEADERS.get(name, name))
+    for part in (attributes, value, header):
+        if isinstance(part, dict) and part.get("robot_id", robot_id) != robot_id:
+            raise UnreadableError("another_robot", f"{name} names another robot")

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 MAX_BEAMS = 4096
 MAX_RANGE_M = 1e6
 MAX_BOXES = 256
+MAX_ROBOTS = 256
 MAX_PATH = 1024
 MAX_TEXT = 64
 
@@ -28,7 +29,10 @@ def clean_text(text: str) -> str:
 Text = Annotated[str, AfterValidator(clean_text)]
 Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
 Radians = Annotated[float, Field(ge=-1e4, le=1e4)]
-Speed = Annotated[float, Field(ge=-1e3, le=1e3)]
+Speed = Annotated[float, Field(ge=-100, le=100)]
+"""Beyond any machine; what a robot of its profile cannot have is doubt."""
+Seconds = Annotated[float, Field(ge=0, le=1e9)]
+"""Up to thirty years."""
 
 
 class Wire(BaseModel):
@@ -55,7 +59,7 @@ class OriginFields(Wire):
     boot: Text | None = None
     seq: Count | None = None
     stamp: Text | None = None
-    mono: Annotated[float, Field(ge=0, le=1e12)] | None = None
+    mono: Seconds | None = None
     heard: FeedbackRefValue | None = None
     replay: Text | None = None
 
@@ -132,7 +136,7 @@ class FaultValue(Wire):
 
     code: Text
     about: Text = ""
-    for_s: Annotated[float, Field(ge=0)] | None = None
+    for_s: Seconds | None = None
 
 
 class SafetyValue(OriginFields):
@@ -156,7 +160,7 @@ class SafetyValue(OriginFields):
     ch: Text | None = None
     v: Speed = 0.0
     w: Speed = 0.0
-    feedback_age_s: Annotated[float, Field(ge=0)] | None = None
+    feedback_age_s: Seconds | None = None
     faults: Annotated[list[FaultValue], Field(max_length=MAX_TEXT)] = []
 
 
@@ -218,8 +222,11 @@ class SpeedLimitValue(Wire):
     speed_factor: Annotated[float, Field(ge=0, le=1)]
     reason: Text = "clear"
     cause: Text | None = None
-    distance_m: Annotated[float, Field(ge=0)] | None = None
+    distance_m: Annotated[float, Field(ge=0, le=1e7)] | None = None
     decision_id: Text | None = None
+
+
+SpeedLimitsValue = Annotated[dict[str, SpeedLimitValue], Field(max_length=MAX_ROBOTS)]
 
 
 class FeedbackPose(MotionFields):
@@ -235,10 +242,10 @@ class FeedbackValue(OriginFields):
     alert: AlertValue | None = None
     alerts: Annotated[list[AlertValue], Field(max_length=MAX_BOXES)] = []
     robot_pose: FeedbackPose | None = None
-    speed_limits: dict[str, SpeedLimitValue] = {}
-    clear: Annotated[list[Text], Field(max_length=MAX_BOXES)] | None = None
-    mandates: dict[str, SpeedLimitValue] = {}
-    seen: dict[str, int] = {}
+    speed_limits: SpeedLimitsValue = {}
+    clear: Annotated[list[Text], Field(max_length=MAX_ROBOTS)] | None = None
+    mandates: SpeedLimitsValue = {}
+    seen: Annotated[dict[str, int], Field(max_length=MAX_ROBOTS)] = {}
     backlog: Any = None
 
 

@@ -97,6 +97,7 @@ def read_one(
 ) -> ReadResult:
     """Result of one reader on an entity, or the reason of its failure."""
     try:
+        names.refuse_another_robot(source, attributes, name)
         return ReadResult((reader(source, attributes),))
     except ValidationError as error:
         read = unread(source, f"bad_{name or 'entity'}", first_complaint(error))

@@ -356,6 +356,56 @@ def test_a_scan_with_a_bad_header_is_refused_whole() -> None:
     assert not [one for one in reading.observations if isinstance(one, LaserScan)]
 
 
+@pytest.mark.parametrize("speed", [100.1, -100.1])
+def test_a_speed_that_no_machine_has_is_refused(speed: float) -> None:
+    for key in ("linear_velocity", "angular_velocity"):
+        value = {**pose_value(), key: speed}
+        payload = orjson.dumps({"base_pose_ground_truth": value})
+        assert codec.read_measure("AGI_odom", payload).problems
+
+
+@pytest.mark.parametrize(
+    ("said", "refused"),
+    [
+        ({"robot_id": "AGII"}, True),
+        ({"robot_id": 7}, True),
+        ({"robot_id": "AGI"}, False),
+        ({"robot_id": None}, True),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_message_that_names_another_robot_than_its_topic_is_refused(
+    said: dict[str, object], *, refused: bool, inside: bool
+) -> None:
+    value = pose_value() | (said if inside else {})
+    beside = {} if inside else said
+    body = {"base_pose_ground_truth": value, **beside}
+
+    direct = codec.read_measure("AGI_odom", orjson.dumps(body))
+    _, notified = codec.read_notification(notification(body))
+
+    for reading in (direct, notified):
+        assert [one.reason for one in reading.problems] == ["another_robot"] * refused
+        assert bool(reading.observations) is not refused
+
+
+def test_a_picture_of_another_robot_is_a_refused_frame() -> None:
+    body = {"bounding_boxes": [BOX], "detection_header": HEADER | {"robot_id": "AGII"}}
+
+    reading = codec.read_measure("AGI_yolox_bounding_boxes", orjson.dumps(body))
+
+    assert reading.observations == (RefusedFrame("AGI"),)
+    assert [one.reason for one in reading.problems] == ["another_robot"]
+
+
+def test_feedback_about_more_robots_than_a_fleet_has_counts_as_none() -> None:
+    limits = {f"R{number}": {"speed_factor": 1.0} for number in range(257)}
+    for key in ("speed_limits", "mandates"):
+        with pytest.raises(UnreadableError):
+            codec.read_feedback(orjson.dumps({"robot_id": "AGI", key: limits}))
+
+
 # --- frames that cannot be read --------------------------------------------------
 
 HEADER = {"boot": "b", "seq": 1, "stamp": "2026-11-21T03:31:20.000Z"}
