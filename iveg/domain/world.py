@@ -62,7 +62,6 @@ class World:
         bounds: Rectangle | None = None,
     ) -> None:
         self.ledger = FeedbackLedger()
-        self._plausibility = Plausibility(bounds, self.ledger)
         self._probe = probe
         if not isinstance(fleet, FleetDescription):
             fleet = FleetDescription.undescribed(fleet)
@@ -70,6 +69,7 @@ class World:
             robot_id: RobotState(robot_id, one)
             for robot_id, one in fleet.members.items()
         }
+        self._plausibility = Plausibility(bounds, self.ledger, self.robots)
         self.climate: Climate | None = None
         self.climate_received: Instant | None = None
         self.counters: Counter[str] = Counter()
