@@ -201,9 +201,7 @@ def _clock_leapt(robot: RobotState, origin: Origin, at: float) -> bool:
     return own < 0.0 or own > at - received.mono + _LATE_S
 
 
-def _boots_often(
-    memory: _Memory, said: Observation, origin: Origin, at: float
-) -> bool:
+def _boots_often(memory: _Memory, said: Observation, origin: Origin, at: float) -> bool:
     """Whether a stream began anew just after it had begun anew."""
     kind, boot = kind_of(said), origin.boot
     known, changed_at = memory.boots.get(kind, (None, None))

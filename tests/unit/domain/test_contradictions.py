@@ -1,0 +1,354 @@
+"""Contradictions that last are doubts; one alone, lateness and a reboot are none."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from iveg.domain.geometry import Rectangle
+from iveg.domain.observations import (
+    FeedbackRef,
+    Hold,
+    Observation,
+    Origin,
+    Received,
+    SafetyReport,
+)
+from iveg.domain.transports import DIRECT, FIWARE, TransportId
+from iveg.domain.world import World
+from tests.builders import (
+    at,
+    fleet_of,
+    hold,
+    odometry,
+    origin,
+    safety_report,
+)
+
+BOUNDS = Rectangle(0.0, 0.0, 50.0, 30.0)
+STEP_S = 0.1
+
+
+@dataclass
+class Robot:
+    """AGI, ten messages a second; ``x`` is where it is (m).
+
+    Attributes:
+        word: The fleet's word for it; ``transport`` what its messages come by.
+        mono: Whether it sends its own seconds.
+    """
+
+    word: str = "AGI"
+    transport: TransportId = DIRECT.id
+    mono: bool = True
+    now: float = 0.0
+    x: float = 5.0
+    boot: str = "boot-a"
+    ahead_s: float = 0.0
+    seq: int = 0
+    told: int = 0
+    met: set[str] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.world = World(fleet_of(self.word), bounds=BOUNDS)
+        self.robot = self.world.robot("AGI")
+
+    def origin(self) -> Origin:
+        """Of its next message, with the newest feedback echoed."""
+        self.seq += 1
+        one = origin(self.seq, boot=self.boot, after=self.now)
+        mono = 5.0 + self.now + self.ahead_s if self.mono else None
+        return replace(
+            one,
+            mono=mono,
+            acknowledgements=True,
+            heard=FeedbackRef("iveg", self.told),
+            replay="AGI" if self.world.robot("AGI").is_replay else None,
+        )
+
+    def tell(self) -> None:
+        """iVeg sends a feedback."""
+        self.told += 1
+        self.world.ledger.composed("iveg", self.told, self.told, at(self.now).mono)
+
+    def say(self, said: Observation) -> None:
+        """A message comes; what is doubted then is met."""
+        self.world.apply(Received(said, at(self.now), self.transport))
+        self.met |= set(self.robot.doubts.active(at(self.now)))
+
+    def drive(self, seconds: float, *, speed: float = 0.5) -> None:
+        """It drives along x and says so."""
+        for _ in range(round(seconds / STEP_S)):
+            self.wait(STEP_S)
+            self.x += speed * STEP_S
+            self.say(odometry(x=self.x, y=5.0, linear=speed, origin=self.origin()))
+
+    def wait(self, seconds: float) -> None:
+        """Time passes, and iVeg tells what it tells."""
+        self.now = round(self.now + seconds, 6)
+        self.tell()
+
+    def report(
+        self, *holds: Hold, factor: float = 0.0, released: tuple[str, ...] = ()
+    ) -> SafetyReport:
+        return safety_report(
+            "AGI",
+            *holds,
+            speed_factor=factor,
+            released=released,
+            origin=self.origin(),
+        )
+
+    def come_to_reason(self) -> None:
+        """It is where it was, and holds nothing."""
+        self.x = 5.0
+        self.say(replace(self.report(), linear=0.5))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubted now."""
+        return self.robot.doubts.active(at(self.now))
+
+
+def _outside(robot: Robot) -> None:
+    robot.x = 101.0
+    robot.drive(STEP_S, speed=0.0)
+
+
+def _fast(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    robot.say(odometry(x=robot.x, y=5.0, linear=1.6, origin=robot.origin()))
+
+
+def _spinning(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    robot.say(odometry(x=robot.x, y=5.0, angular=-2.1, origin=robot.origin()))
+
+
+def _fast_report(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    robot.say(replace(robot.report(), linear=-1.6))
+
+
+def _jumping(robot: Robot) -> None:
+    robot.x += 4.0
+    robot.drive(STEP_S)
+
+
+def _leaping_clock(robot: Robot) -> None:
+    robot.ahead_s += 11.0
+    robot.drive(STEP_S)
+
+
+def _falling_clock(robot: Robot) -> None:
+    robot.ahead_s -= 1.0
+    robot.drive(STEP_S)
+
+
+def _booting(robot: Robot) -> None:
+    robot.boot = f"boot-{robot.seq}"
+    robot.drive(STEP_S)
+
+
+def _prophetic(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    heard = FeedbackRef("iveg", robot.told + 1)
+    said = odometry(x=robot.x, y=5.0, origin=replace(robot.origin(), heard=heard))
+    robot.say(said)
+
+
+def _standing_on_wheels(robot: Robot) -> None:
+    robot.drive(STEP_S)
+    robot.say(robot.report())
+
+
+def _holding_what_was_released(robot: Robot) -> None:
+    robot.wait(STEP_S)
+    robot.say(robot.report(hold("01X"), released=("01X",)))
+
+
+LIES: list[tuple[str, Callable[[Robot], None]]] = [
+    ("pose_outside", _outside),
+    ("too_fast", _fast),
+    ("too_fast", _spinning),
+    ("too_fast", _fast_report),
+    ("jumped", _jumping),
+    ("clock_leapt", _leaping_clock),
+    ("clock_leapt", _falling_clock),
+    ("boots_often", _booting),
+    ("heard_unsent", _prophetic),
+    ("stands_moving", _standing_on_wheels),
+    ("foreign_hold", _holding_what_was_released),
+]
+kinds_of_lies = pytest.mark.parametrize(
+    ("code", "lie"), LIES, ids=[lie.__name__.strip("_") for _, lie in LIES]
+)
+
+
+@kinds_of_lies
+def test_what_contradicts_for_longer_than_a_round_trip_is_doubted(
+    code: str, lie: Callable[[Robot], None]
+) -> None:
+    robot = Robot()
+    robot.drive(1.0)
+
+    for _ in range(20):
+        lie(robot)
+
+    assert code in robot.doubts
+
+
+@kinds_of_lies
+def test_what_contradicts_once_is_no_doubt(
+    code: str, lie: Callable[[Robot], None]
+) -> None:
+    robot = Robot()
+    robot.drive(6.0)
+
+    lie(robot)
+    robot.come_to_reason()
+    robot.drive(3.0)
+
+    assert robot.met == set()
+
+
+@kinds_of_lies
+def test_a_doubt_ends_after_a_second_of_consistency(
+    code: str, lie: Callable[[Robot], None]
+) -> None:
+    robot = Robot()
+    robot.drive(1.0)
+    for _ in range(20):
+        lie(robot)
+    robot.come_to_reason()
+
+    robot.drive(1.0)
+    shortly_before = robot.doubts
+    robot.drive(0.2)
+
+    assert code in shortly_before
+    assert robot.doubts == ()
+
+
+@kinds_of_lies
+def test_a_recording_may_say_anything(code: str, lie: Callable[[Robot], None]) -> None:
+    robot = Robot("AGI:recording")
+    for _ in range(20):
+        lie(robot)
+
+    assert robot.robot.is_replay
+    assert robot.met == set()
+
+
+# --- what is no contradiction -------------------------------------------------------
+
+
+def test_a_relocalisation_is_accepted_with_its_first_jump() -> None:
+    robot = Robot()
+    robot.drive(2.0)
+
+    robot.x += 30.0
+    robot.drive(3.0)
+
+    assert robot.met == set()
+
+
+def test_many_small_steps_that_add_up_are_a_jump() -> None:
+    robot = Robot()
+    robot.drive(2.0)
+    for _ in range(20):
+        robot.x += 0.4
+        robot.drive(STEP_S, speed=0.0)
+
+    assert robot.doubts == ("jumped",)
+
+
+def test_full_speed_and_a_turn_on_the_spot_are_plausible() -> None:
+    robot = Robot()
+    robot.drive(3.0, speed=1.0)
+    for _ in range(30):
+        robot.wait(STEP_S)
+        said = odometry(x=robot.x, y=5.0, linear=0.0, angular=1.0)
+        robot.say(replace(said, origin=robot.origin()))
+
+    assert robot.met == set()
+
+
+def test_a_robot_that_nobody_described_may_drive_as_any_robot_does() -> None:
+    robot = Robot()
+    robot.world = World(["AGI"], bounds=BOUNDS)
+    robot.robot = robot.world.robot("AGI")
+    robot.drive(3.0, speed=9.0)
+    slow_enough = robot.met.copy()
+    robot.drive(1.0, speed=11.0)
+
+    assert slow_enough == set()
+    assert robot.doubts == ("too_fast",)
+
+
+def test_the_edge_of_a_greenhouses_size_around_it_is_not_outside() -> None:
+    robot = Robot(x=100.0)
+    robot.drive(3.0, speed=0.0)
+
+    assert robot.met == set()
+
+
+def test_without_a_greenhouse_nothing_is_outside() -> None:
+    robot = Robot(x=1e5)
+    robot.world = World(fleet_of("AGI"))
+    robot.robot = robot.world.robot("AGI")
+    robot.drive(3.0, speed=0.0)
+
+    assert robot.met == set()
+
+
+@pytest.mark.parametrize("mono", [True, False])
+def test_what_fiware_keeps_and_lets_go_at_once_is_no_jump(mono: bool) -> None:
+    robot = Robot(transport=FIWARE.id, mono=mono)
+    robot.drive(2.0, speed=1.0)
+    kept = []
+    for _ in range(80):
+        robot.wait(STEP_S)
+        robot.x += STEP_S
+        kept.append(odometry(x=robot.x, y=5.0, linear=1.0, origin=robot.origin()))
+    for one in kept[::3]:
+        robot.now = round(robot.now + 0.02, 6)
+        robot.say(one)
+    for one in reversed(kept):
+        robot.now = round(robot.now + 0.02, 6)
+        robot.say(one)
+    robot.drive(1.0, speed=1.0)
+
+    assert robot.met == set()
+
+
+def test_poses_of_a_robot_that_does_not_count_may_come_mixed() -> None:
+    robot = Robot(transport=FIWARE.id)
+    for late in (0.0, 3.0, 0.0, 2.0) * 10:
+        robot.wait(STEP_S)
+        x = 5.0 + robot.now - late
+        robot.say(odometry(x=x, y=5.0, linear=1.0, origin=Origin()))
+
+    assert robot.met == set()
+
+
+def test_a_reboot_and_a_straggler_of_the_boot_before_are_no_doubt() -> None:
+    robot = Robot()
+    robot.drive(2.0)
+    robot.boot, robot.ahead_s = "boot-b", -2.0
+    robot.drive(0.3)
+    late = odometry(x=5.0, y=5.0, origin=origin(3, boot="boot-z"))
+    robot.say(late)
+    robot.drive(3.0)
+
+    assert robot.met == set()
+
+
+def test_orions_answer_to_a_question_contradicts_nothing() -> None:
+    robot = Robot()
+    for _ in range(20):
+        robot.wait(STEP_S)
+        said = odometry(x=1e4, linear=50.0, origin=robot.origin())
+        robot.world.apply(Received(said, at(robot.now), FIWARE.id, asked=True))
+
+    assert robot.doubts == ()
