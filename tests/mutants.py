@@ -308,6 +308,48 @@ MUTANTS = (
         "return index",
         ("unit/domain/tracking/test_frames.py",),
     ),
+    Mutant(
+        "clear: a robot may be at any place outside",
+        "return not bounds.contains(pose.x, pose.y, size)",
+        "return False",
+        ("unit/domain/test_contradictions.py",),
+    ),
+    Mutant(
+        "clear: a robot may have any speed",
+        "return abs(twist.linear_x) > _most_speed(robot) or abs(twist.angular_z) > turn",
+        "return False",
+        ("unit/domain/test_contradictions.py",),
+    ),
+    Mutant(
+        "clear: small steps of a robot add up to any distance",
+        "if jumped or at - anchor.at >= _ANCHOR_S:",
+        "if True:",
+        ("unit/domain/test_contradictions.py",),
+    ),
+    Mutant(
+        "clear: a robot may have heard what was never sent",
+        "if self._ledger.is_unsent(origin.heard):",
+        "if False:",
+        ("unit/domain/test_contradictions.py",),
+    ),
+    Mutant(
+        "clear: whoever contradicts itself finds a spot empty",
+        "if robot.doubts.is_open(now) or robot.detector.is_flawed(now):",
+        "if False:",
+        ("unit/domain/tracking/test_sight.py",),
+    ),
+    Mutant(
+        "clear: a message that names another robot counts for its topic's",
+        """if isinstance(part, dict) and part.get("robot_id", robot_id) != robot_id:""",
+        "if False:",
+        ("unit/ngsi/test_codec_hostile.py",),
+    ),
+    Mutant(
+        "freshness: one number that leaps makes all true ones late",
+        "if origin.seq - self.seq > _LEAP and not self._goes_on(origin.seq):",
+        "if False:",
+        ("unit/domain/test_order.py",),
+    ),
 )
 
 

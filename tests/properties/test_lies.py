@@ -123,7 +123,7 @@ async def play(script: list[list[Observation]]) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.lists(lies, max_size=4), min_size=5, max_size=30))
-def test_lies_of_one_robot_make_no_other_faster_and_end_nothing(
+def test_f65_lies_of_one_robot_make_no_other_faster_and_end_nothing(
     script: list[list[Observation]],
 ) -> None:
     asyncio.run(play(script))

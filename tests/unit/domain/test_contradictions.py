@@ -186,7 +186,7 @@ kinds_of_lies = pytest.mark.parametrize(
 
 
 @kinds_of_lies
-def test_what_contradicts_for_longer_than_a_round_trip_is_doubted(
+def test_f65_what_contradicts_for_longer_than_a_round_trip_is_doubted(
     code: str, lie: Callable[[Robot], None]
 ) -> None:
     robot = Robot()
@@ -213,7 +213,7 @@ def test_what_contradicts_once_is_no_doubt(
 
 
 @kinds_of_lies
-def test_a_doubt_ends_after_a_second_of_consistency(
+def test_f65_a_doubt_ends_after_a_second_of_consistency(
     code: str, lie: Callable[[Robot], None]
 ) -> None:
     robot = Robot()
