@@ -279,3 +279,67 @@ async def test_what_the_agent_brings_late_shows_no_ghosts(late_s: float) -> None
         await desk.wait(0.1)
 
     assert len(desk.evaluator.people.known) == 1
+
+
+# --- reports that may not act ---------------------------------------------------------
+
+OLD = Hold("01JOLDSTOP0000000000000000", "iveg", "remote")
+
+
+def kept_by_orion(seq: int, *holds: Hold, boot: str = "earlier") -> SafetyReport:
+    """A report that Orion kept for 200 s: it echoes feedback of another iVeg."""
+    moment = replace(
+        origin(seq, boot=boot, after=-200.0),
+        mono=5.0 + 0.1 * seq,
+        acknowledgements=True,
+        heard=FeedbackRef("iveg before", 10**6),
+    )
+    return safety_report("AGI", *holds, speed_factor=0.0, origin=moment)
+
+
+async def test_a_hold_of_an_earlier_boot_that_orion_kept_is_not_adopted() -> None:
+    desk = Desk(direct=False)
+    robot = Robot(desk)
+    for number in range(5):
+        desk.hear(kept_by_orion(number, OLD), FIWARE.id)
+        await desk.wait(0.1)
+    await robot.live_for(2.0)
+
+    assert robot.state == "RUNNING"
+    assert desk.journal.lines == []
+    assert desk.broker.asked == []
+    assert not [key for key in conditions_of(desk) if key.startswith("alert.stop")]
+
+
+async def test_a_hold_that_a_young_report_proves_is_adopted() -> None:
+    desk = Desk()
+    robot = Robot(desk)
+    await robot.live_for(0.5)
+    desk.hear(safety_report("AGI", OLD, origin=robot._origin("safety")))
+    await desk.wait(0.1)
+
+    assert desk.commander.machine("AGI").hold_id == OLD.id
+
+
+async def test_an_old_report_without_the_hold_moves_no_robot_that_stands() -> None:
+    desk = Desk()
+    robot = Robot(desk)
+    await robot.live_for(0.5)
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+    robot.speed = 0.0
+    await robot.live_for(2.0)
+    stood = robot.state
+    desk.hear(kept_by_orion(1), FIWARE.id)
+    await desk.wait(0.05)
+
+    assert (stood, robot.state) == ("STANDING", "STANDING")
+    assert "alert.stop_moved" not in conditions_of(desk)
+
+
+async def test_a_report_of_no_known_age_that_holds_our_hold_has_received_it() -> None:
+    desk = Desk()
+    await desk.commander.stop(["AGI"], "ana", desk.clock())
+    hold = Hold(desk.commander.machine("AGI").hold_id or "", "iveg", "remote")
+    desk.hear(kept_by_orion(1, hold))
+
+    assert desk.commander.machine("AGI").state == "DELIVERED"
