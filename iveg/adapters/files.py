@@ -101,14 +101,16 @@ def _is_head(path: Path, form: Form, line: bytes) -> bool:
     return True
 
 
-def put_aside(path: Path, why: str) -> None:
-    """Rename a file that cannot be read, so that the next one is whole."""
-    aside = path.with_name(path.name + ".unreadable")
-    _log.error("%s cannot be read (%s): put aside as %s", path, why, aside)
+def put_aside(path: Path, why: str, ending: str = "unreadable") -> bool:
+    """Rename a damaged file, so that it can be looked at; whether that was possible."""
+    aside = path.with_name(f"{path.name}.{ending}")
     try:
         path.replace(aside)
-    except OSError:
-        _log.warning("%s stays where it is", path)
+    except OSError as error:
+        _log.error("%s: %s; it stays as it is: %s", path, why, error)
+        return False
+    _log.error("%s: %s; it is put aside as %s", path, why, aside.name)
+    return True
 
 
 def make_private(path: Path) -> None:
@@ -125,15 +127,6 @@ def make_private(path: Path) -> None:
         # It may belong to somebody else, who chose who reads it.
         with contextlib.suppress(PermissionError):
             path.chmod(_OWNER_ALONE)
-
-
-def move_aside(path: Path, stamp: str) -> Path:
-    """Rename a damaged file, so that it can be looked at; returns its new name.
-
-    Raises:
-        OSError: it stays where it is.
-    """
-    return path.rename(path.with_name(f"{path.name}.damaged-{stamp}"))
 
 
 class AppendedFile:

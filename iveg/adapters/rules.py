@@ -15,7 +15,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from iveg.adapters.files import Form, move_aside, read_lines, write_lines
+from iveg.adapters.files import Form, put_aside, read_lines, write_lines
 from iveg.domain.detection_rule import ALIASES, Class, DetectionRule, strictest
 from iveg.domain.errors import HopError
 from iveg.domain.limits import LIMITS
@@ -62,13 +62,11 @@ class FileRules:
         """Put the file aside and begin another with these versions."""
         self._versions = versions
         stamp = format_stamp(now.wall).replace(":", "")
-        try:
-            aside = move_aside(self._path, stamp)
-            self._write(versions)
-        except OSError as error:
-            _log.error("%s: %s; it stays as it is: %s", self._path, damage, error)
-        else:
-            _log.error("%s: %s; it is put aside as %s", self._path, damage, aside.name)
+        if put_aside(self._path, damage, f"damaged-{stamp}"):
+            try:
+                self._write(versions)
+            except OSError as error:
+                _log.error("%s could not be written: %s", self._path, error)
 
     async def append(self, rule: DetectionRule) -> None:
         """Write a version down; returns when it is on disk.
