@@ -19,6 +19,8 @@ _BASE_LINK = Pose2D(0.0, 0.0, 0.0)
 _LIDAR_POINTS: TypeAdapter[list[float | None]] = TypeAdapter(payloads.LidarPoints)
 _TURN = math.tau + 0.1
 """Drivers close their turn with a beam or two more (rad)."""
+_FINEST = 1e-4
+"""No laser is finer (rad); whoever draws a turn of beams needs room for each."""
 
 
 def read_scan(robot_id: str, attributes: Mapping[str, Any]) -> LaserScan:
@@ -46,7 +48,8 @@ def _scan_of(robot_id: str, points: Any, raw_header: Any) -> LaserScan:
         robot_id,
         read_origin(header),
         header.angle_min,
-        header.angle_increment,
+        # The one beam of a scan needs none, but whoever draws it does.
+        header.angle_increment if ranges.size > 1 else _FINEST,
         header.range_min,
         header.range_max,
         Pose2D(header.x, header.y, header.yaw),
@@ -88,8 +91,8 @@ def _refuse_impossible(header: payloads.LidarHeaderValue, beams: int) -> None:
         UnreadableError: its beams do not turn, turn more than once, or count nothing.
     """
     increment = header.angle_increment
-    if increment == 0.0 and beams > 1:
-        raise UnreadableError("bad_lidar_header", "angle_increment is 0")
+    if abs(increment) < _FINEST and beams > 1:
+        raise UnreadableError("bad_lidar_header", "angle_increment is 0 or nearly so")
     if abs(increment) * (beams - 1) > _TURN:
         raise UnreadableError("bad_lidar_header", "beams turn more than once round")
     if not 0.0 <= header.range_min < header.range_max:

@@ -470,6 +470,9 @@ def test_a_single_payload_without_a_place_keeps_its_class() -> None:
     [
         ({}, True),
         ({"angle_increment": 0.0}, False),
+        ({"angle_increment": 1e-8}, False),
+        ({"angle_increment": -1e-300}, False),
+        ({"angle_increment": 1e-4}, True),
         ({"angle_increment": 1.0}, False),
         ({"angle_increment": -1.0}, False),
         ({"range_min": 9.0, "range_max": 9.0}, False),
