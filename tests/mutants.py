@@ -230,6 +230,12 @@ MUTANTS = (
         ("unit/ngsi",),
     ),
     Mutant(
+        "STOP: a report of an earlier boot that Orion kept begins and moves a STOP",
+        "if isinf(age_s) and hold_id not in {hold.id for hold in report.holds}:",
+        "if False:",
+        ("unit/pipeline/test_age.py",),
+    ),
+    Mutant(
         "freshness: feedback of another start of iVeg proves an age",
         "if heard is None or heard.boot != self._boot or heard.seq > self._last:",
         "if heard is None or heard.seq > self._last:",

@@ -10,10 +10,8 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from tests.processes import Site, site, until
+from tests.processes import Site, site
 from tests.strangers import Field, Json, Stranger, box_about, strangers
-
-ALERT_S = 10.0
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +43,9 @@ def alerts(api: httpx.Client) -> dict[str, str]:
     return {one["key"]: one["priority"] for one in items if one["cleared_at"] is None}
 
 
-def raised(api: httpx.Client, key: str) -> None:
-    until(lambda: alerts(api).get(key) == "P2", ALERT_S, f"{key}: {alerts(api)}")
+async def raised(field: Field, api: httpx.Client, key: str) -> None:
+    """Wait for an alert, while the robots go on speaking."""
+    await field.until(lambda: alerts(api).get(key) == "P2", key)
 
 
 @pytest.mark.slow
@@ -69,7 +68,7 @@ async def _unreadable_from_the_first_on(
     forms = spoiled()
     watcher.spoil = lambda _: next(forms)
     await field.until(lambda: "AGI" in field.limits, "a limit")
-    raised(api, "alert.unreadable_detection")
+    await raised(field, api, "alert.unreadable_detection")
     assert (field.factor("AGI"), field.factor("AGII")) == (0.5, 0.5)
     watcher.spoil = json.dumps
     await field.until(lambda: {"AGI", "AGII"} == set(field.clear), "both clear")
@@ -83,7 +82,7 @@ async def _stamped_by_another_clock(
     await field.until(
         lambda: field.limits.get("AGII", {}).get("reason") == "person", "a person"
     )
-    raised(api, "alert.detector_clock")
+    await raised(field, api, "alert.detector_clock")
     watcher.detector_off_s, watcher.boxes = 0.0, []
     await field.until(lambda: {"AGI", "AGII"} == set(field.clear), "both clear")
 
@@ -93,7 +92,7 @@ async def _silent(
 ) -> None:
     watcher.boxes = None
     await field.until(lambda: field.factor("AGII") == 0.5, "AGII slow")
-    raised(api, "alert.detector_silent")
+    await raised(field, api, "alert.detector_silent")
     near.x = 19.0  # farther away than the camera reaches, and 6 m
     watcher.x = 1.0
     await field.until(lambda: field.clear == ["AGII"], "AGII clear")

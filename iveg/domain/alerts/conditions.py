@@ -53,7 +53,7 @@ def of_robot(robot: RobotState, now: Instant) -> Iterable[Condition]:
         yield Condition("P3", "alert.clock_offset", name, name, slots)
     doubts = robot.doubts.active(now)
     if doubts:
-        slots = {"robot": name, "codes": ", ".join(doubts)}
+        slots = {"robot": name, "code": doubts[0]}
         yield Condition("P2", "alert.doubt", name, name, slots)
 
 

@@ -1,7 +1,7 @@
 """The robot's newest report, its age, and its evidence of motion."""
 
 from collections import deque
-from math import inf, isfinite
+from math import inf, isfinite, isinf
 from typing import Literal
 
 from iveg.domain.limits import LIMITS
@@ -28,10 +28,19 @@ class Evidence:
         self._standstill = Standstill()
         self._answers: deque[tuple[str, int]] = deque(maxlen=_REMEMBERED_ANSWERS)
 
-    def take(self, report: SafetyReport, at: Instant, age_s: float) -> None:
-        """A new report, at most ``age_s`` old."""
+    def take(
+        self, report: SafetyReport, at: Instant, age_s: float, hold_id: str | None
+    ) -> bool:
+        """A new report, at most ``age_s`` old; whether it counts.
+
+        One of no known age does only where it holds ``hold_id``, the hold that iVeg
+        asked for: nothing from before that STOP can name it.
+        """
+        if isinf(age_s) and hold_id not in {hold.id for hold in report.holds}:
+            return False
         self.report, self.report_at, self.report_age_then = report, at, age_s
         self.speed = abs(report.linear)
+        return True
 
     def motion(
         self, report: SafetyReport, at: Instant, *, sparse: bool

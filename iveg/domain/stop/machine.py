@@ -21,7 +21,6 @@ this module: nothing changes, ``OffTable`` tells of it, and STOP is sent on.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from math import isinf
 from typing import Literal, get_args
 
 from iveg.domain.limits import LIMITS
@@ -190,20 +189,15 @@ class StopMachine(StopStatus):
     ) -> list[Effect]:
         """Take the robot's safety report, new by (boot, seq), ``age_s`` old at most.
 
-        What is of no known age acts only where it holds our hold: nothing from before
-        the STOP can name it.
-
         ``sparse``: it came on a topic that has two of them a second, not ten.
         """
-        if isinf(age_s) and self.hold_id not in {hold.id for hold in report.holds}:
+        if not self.take(report, at, age_s, self.hold_id):
             return []
-        self.take(report, at, age_s)
         is_later = at.mono - age_s >= self._begun_at
         if self.state == "READY" and drives(report) and is_later:
             return self._take(Event("running", at))
         if self.state in ("RUNNING", "READY"):
-            # A hold of iVeg that this process did not ask for is never dropped; one
-            # that was there long ago may have been released since.
+            # A hold of iVeg that this process did not ask for is not dropped while young.
             ours = self.ours[-1:] if age_s <= LIMITS.report_stale_s else []
             return self._take(Event("adopted", at, ours[0])) if ours else []
         if self.attempt is not None:

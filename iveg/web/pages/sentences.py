@@ -19,6 +19,7 @@ _NAMED: Final = {
     "why": "why",
     "hop": "hop",
     "part": "part",
+    "doubt": "doubt",
 }
 _LANES: Final = (
     (re.compile(r"(?:Pasillo )?(\d+)"), "lane.number"),

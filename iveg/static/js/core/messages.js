@@ -32,6 +32,7 @@ const FORMATS = {
   why: (value, messages) => messages.named("why", value),
   hop: (value, messages) => messages.named("hop", value),
   part: (value, messages) => messages.named("part", value),
+  doubt: (value, messages) => messages.named("doubt", value),
   data: (value, messages) => messages.named("stream", value),
   drive: (value, messages) => messages.named("drive", value),
   lane: (value, messages) => laneName(String(value), messages.say),
