@@ -197,7 +197,7 @@ class StopMachine(StopStatus):
         if self.state == "READY" and drives(report) and is_later:
             return self._take(Event("running", at))
         if self.state in ("RUNNING", "READY"):
-            # A hold of iVeg that this process did not ask for is not dropped while young.
+            # A hold that this process did not ask for is not dropped while it is news.
             ours = self.ours[-1:] if age_s <= LIMITS.report_stale_s else []
             return self._take(Event("adopted", at, ours[0])) if ours else []
         if self.attempt is not None:
