@@ -170,6 +170,7 @@ def test_a_day_of_the_climate_is_drawn_in_the_readers_words(
 
     page.click('[data-language="en"]')
     expect(page.locator("#trend-temperature")).to_contain_text("21.5")
+    page.unroute_all(behavior="wait")
 
 
 def test_a_day_without_climate_says_so(open_page: OpenPage) -> None:
@@ -182,6 +183,7 @@ def test_a_day_without_climate_says_so(open_page: OpenPage) -> None:
         "Aún no hay datos de las últimas 24 h."
     )
     expect(page.locator("#trends")).to_be_hidden()
+    page.unroute_all(behavior="wait")
 
 
 def test_the_latency_page_shows_the_papers_table_live_beside_what_it_printed(
