@@ -122,8 +122,10 @@ class Detector:
 
     def is_flawed(self, now: Instant) -> bool:
         """Whether a frame was not read whole within the silence limit."""
-        moments = self.flawed_at.values()
-        return any(now.mono - moment <= LIMITS.silence_s for moment in moments)
+        if not self.flawed_at:
+            return False
+        newest = max(self.flawed_at.values())
+        return now.mono - newest <= LIMITS.silence_s
 
     def is_missing(self, now: Instant) -> bool:
         """Whether nothing proves that it works; one out of service is not waited for.

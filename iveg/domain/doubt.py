@@ -38,6 +38,8 @@ class Doubts:
 
     def active(self, now: Instant) -> tuple[str, ...]:
         """Codes of the doubts that count now, the oldest first."""
+        if not self._spells:
+            return ()
         return tuple(
             code
             for code, spell in self._spells.items()

@@ -14,7 +14,7 @@ from iveg.adapters.connections import CONNECTION, Connection, ConnectionTable
 from iveg.web.notification_http import NotificationHttp
 from iveg.web.notifications import NotificationEndpoint
 
-_PIECE: Final = 8192
+_PIECE: Final = 16384
 _TOO_LONG: Final = b"".join(
     (STATUS_LINE[431], b"content-length: 0\r\nconnection: close\r\n\r\n")
 )
@@ -51,6 +51,8 @@ class BoundedHttp(NotificationHttp):
 
     table: ConnectionTable
     _connection: Connection | None = None
+    _most = 0
+    """Bytes that a head may have."""
     _head = 0
     _unparsed = 0
     """Bytes since the parser last gave anything back."""
@@ -60,6 +62,7 @@ class BoundedHttp(NotificationHttp):
     ) -> None:
         """Somebody has connected."""
         super().connection_made(transport)
+        self._most = self.table.caps.head_bytes
         peer = "" if self.client is None else self.client[0]
         self._connection = self.table.admit(peer, transport.abort)
         if self._connection is None:
@@ -95,14 +98,14 @@ class BoundedHttp(NotificationHttp):
         self._unparsed += len(data)
         super().data_received(data)
         is_closing = self.transport.is_closing()
-        if self._unparsed > self.table.caps.head_bytes and not is_closing:
+        if self._unparsed > self._most and not is_closing:
             self._head = self._unparsed
             self.send_400_response("")
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what cannot be read; 431 where it is the length of the head."""
         address = "" if self._connection is None else self._connection.address
-        if self._head <= self.table.caps.head_bytes:
+        if self._head <= self._most:
             self.table.refused(address, "unreadable")
             super().send_400_response(msg)
             return
@@ -126,7 +129,11 @@ class BoundedHttp(NotificationHttp):
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """A header, or a trailer behind the body."""
-        self._count(len(name) + len(value))
+        # As ``_count``: a notification has ten, and hundreds come in a second.
+        self._unparsed = 0
+        self._head += len(name) + len(value)
+        if self._head > self._most:
+            raise _HeadTooLongError
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
@@ -159,5 +166,5 @@ class BoundedHttp(NotificationHttp):
     def _count(self, size: int) -> None:
         self._unparsed = 0
         self._head += size
-        if self._head > self.table.caps.head_bytes:
+        if self._head > self._most:
             raise _HeadTooLongError

@@ -43,16 +43,22 @@ def missing_premises(world: World, now: Instant) -> Mapping[str, tuple[Missing, 
         for premise in _gaps(observer, now)
     ]
     return {
-        robot.robot_id: tuple(_missing_of(robot, gaps, now))
+        robot.robot_id: ()
+        if not gaps and _is_pose_young(robot, now)
+        else tuple(_missing_of(robot, gaps, now))
         for robot in world.robots.values()
     }
+
+
+def _is_pose_young(robot: RobotState, now: Instant) -> bool:
+    age = robot.age_s(now)
+    return age is not None and age <= LIMITS.silence_s
 
 
 def _missing_of(
     robot: RobotState, gaps: list[tuple[RobotState, Premise]], now: Instant
 ) -> Iterator[Missing]:
-    age = robot.age_s(now)
-    if age is None or age > LIMITS.silence_s:
+    if not _is_pose_young(robot, now):
         yield Missing("pose", robot.robot_id)
     for observer, premise in gaps:
         if _concerns(observer, robot):
