@@ -31,7 +31,7 @@ def boxes(
         ("base_link", "base_link"),
         ("AGI/base_link", "base_link"),
         ("/agi/base_link", "base_link"),
-        ("/farm/agi/base_link", "base_link"),
+        ("/greenhouse/agi/base_link", "base_link"),
         ("agi_base_link", "base_link"),
         ("camera_link", "camera_link"),
         ("/AGI/camera_link", "camera_link"),
