@@ -2,8 +2,8 @@
 
 All transports end here.  When more comes than can be taken, the oldest telemetry of the
 same robot and kind is dropped and counted, or of the stream that has most waiting;
-safety reports, answers and detection frames only where no telemetry waits.  So a robot
-that floods drops its own.  A detection frame that is dropped counts as one that could
+safety reports, answers and detection frames only where they are most of what waits, or
+no telemetry does.  So a robot that floods drops its own.  A detection frame that is dropped counts as one that could
 not be read: somebody may have been in it.
 """
 
@@ -154,18 +154,14 @@ class Ingest:
 
     def _victim_for(self, stream: "_Stream") -> "_Stream | None":
         """The stream that loses its oldest; None: what comes is itself dropped."""
-        if _may_drop(stream) and self._waiting[stream]:
+        count = self._waiting.__getitem__
+        largest = max(self._waiting, key=count)
+        if count(stream) and (_may_drop(stream) or stream == largest):
             return stream
-        waiting = max(
-            filter(_may_drop, self._waiting),
-            key=self._waiting.__getitem__,
-            default=None,
-        )
-        if waiting is not None or _may_drop(stream):
-            return waiting
-        if self._waiting[stream]:
-            return stream
-        return max(self._waiting, key=self._waiting.__getitem__)
+        telemetry = max(filter(_may_drop, self._waiting), key=count, default=None)
+        if telemetry is not None or _may_drop(stream):
+            return telemetry
+        return stream if count(stream) else largest
 
     def _note_dropped(self, received: Received, stream: "_Stream") -> None:
         robot_id, kind = stream
