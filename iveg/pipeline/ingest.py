@@ -3,8 +3,8 @@
 All transports end here.  When more comes than can be taken, the oldest telemetry of the
 same robot and kind is dropped and counted, or of the stream that has most waiting;
 safety reports, answers and detection frames only where they are most of what waits, or
-no telemetry does.  So a robot that floods drops its own.  A detection frame that is dropped counts as one that could
-not be read: somebody may have been in it.
+no telemetry does.  So a robot that floods drops its own.  A detection frame that is
+dropped counts as one that could not be read: somebody may have been in it.
 """
 
 import asyncio
