@@ -159,8 +159,8 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: a message that comes again is news",
-        "if origin.seq <= self.seq:",
-        "if origin.seq < self.seq - 1:",
+        "if seq <= self.seq:",
+        "if seq < self.seq - 1:",
         ("unit/domain/test_order.py",),
     ),
     Mutant(
@@ -260,6 +260,24 @@ MUTANTS = (
         ("unit/pipeline/test_age.py",),
     ),
     Mutant(
+        "STOP: a hold is adopted from a report however old it is",
+        "self.ours[-1:] if age_s <= LIMITS.report_stale_s else []",
+        "self.ours[-1:]",
+        ("unit/pipeline/test_earlier_boots.py",),
+    ),
+    Mutant(
+        "STOP: what an earlier boot reported acts",
+        "return not present_boot.is_past(origin.boot, proven_at)",
+        "return True",
+        ("unit/pipeline/test_earlier_boots.py",),
+    ),
+    Mutant(
+        "freshness: a straggler of an earlier boot holds up the present one",
+        "if proven_at is not None and proven_at > self._began and not self._is_proven:",
+        "if False:",
+        ("unit/pipeline/test_earlier_boots.py",),
+    ),
+    Mutant(
         "STOP: motion from before the rest contradicts it when it comes late",
         "if began is None or since is None or moment.boot is None:",
         "if True:",
@@ -352,7 +370,7 @@ MUTANTS = (
     ),
     Mutant(
         "freshness: one number that leaps makes all true ones late",
-        "if origin.seq - self.seq > _LEAP and not self._goes_on(origin.seq):",
+        "if seq - self.seq > _LEAP and not self._goes_on(seq):",
         "if False:",
         ("unit/domain/test_order.py",),
     ),

@@ -22,11 +22,12 @@ from iveg.domain.observations import (
     Observation,
     Odometry,
     Origin,
+    Received,
     SafetyReport,
     UnreadScan,
     kind_of,
 )
-from iveg.domain.stream_order import OrderVerdict, StreamOrder
+from iveg.domain.stream_order import OrderVerdict, PresentBoot, StreamOrder
 from iveg.domain.transports import FIWARE, TransportId
 
 Link = Literal["UNKNOWN", "LIVE", "LATE", "LOST"]
@@ -73,6 +74,7 @@ class RobotState:
         sensed: The newest of each kind that has no member of its own.
         doubts: What it says that contradicts itself or physics.
         trusted_pose: The newest pose from before anything was contradicted.
+        present_boot: Which messages are proven to be of no earlier boot.
     """
 
     robot_id: str
@@ -105,6 +107,7 @@ class RobotState:
     doubts: Doubts = field(default_factory=Doubts)
     trusted_pose: Pose2D | None = None
     clock: RobotClock = field(default_factory=RobotClock)
+    present_boot: PresentBoot = field(default_factory=PresentBoot)
     _orders: defaultdict[type[Observation], StreamOrder] = field(
         default_factory=lambda: defaultdict(StreamOrder)
     )
@@ -202,17 +205,21 @@ class RobotState:
             self._speeds.popleft()
 
     def judge(
-        self, observation: Observation, origin: Origin, *, asked: bool = False
+        self, received: Received, origin: Origin, proven_at: float | None
     ) -> OrderVerdict:
         """Place a message in its stream's order.
 
-        A message of an earlier boot that Orion kept must not make the present boot look
-        old.
+        A message of an earlier boot, which Orion kept or which its echo proves to be
+        one, must not make the present boot look old.  ``proven_at``: when the feedback
+        that it echoes was composed (monotonic, s); None where that proves nothing.
         """
-        order = self._orders[kind_of(observation)]
-        if asked and order.knows_better_than(origin):
+        order, is_earlier = self._orders[kind_of(received.observation)], received.asked
+        if proven_at is not None:
+            self.present_boot.meet(origin.boot, proven_at)
+            is_earlier |= self.present_boot.is_past(origin.boot, proven_at)
+        if is_earlier and order.knows_better_than(origin):
             return "late"
-        return order.judge(origin)
+        return order.judge(origin, received.at.mono, proven_at)
 
     def is_past(self, kind: type[Observation], boot: str, seq: int) -> bool:
         """Whether a message of this identity cannot be new."""

@@ -6,6 +6,7 @@ newer.
 
 from collections import deque
 from dataclasses import dataclass, field
+from math import inf
 from typing import Literal
 
 from iveg.domain.observations import Origin
@@ -19,6 +20,37 @@ _REMEMBERED_BOOTS = 16
 _GROWN_TO_RETURN = 5
 _LEAP = 100_000
 """No count goes on so far unheard: it is an hour of 30 messages a second."""
+_ROUNDING_S = 1e-6
+
+
+@dataclass(slots=True)
+class PresentBoot:
+    """The present boot of a robot, by the feedback that its messages echo.
+
+    A boot has heard no feedback from before its start.  So a message that echoes older
+    feedback than the first that a later boot echoed is of an earlier boot.
+    """
+
+    _boot: str | None = None
+    _since: float = -inf
+    """The first feedback that it echoed was composed then (monotonic, s)."""
+    _met: deque[str | None] = field(
+        default_factory=lambda: deque(maxlen=_REMEMBERED_BOOTS)
+    )
+
+    def meet(self, boot: str | None, proven_at: float) -> None:
+        """Note that this boot has heard feedback that was composed then."""
+        if boot in self._met:
+            return
+        self._met.append(boot)
+        if proven_at > self._since:
+            self._boot, self._since = boot, proven_at
+
+    def is_past(self, boot: str | None, proven_at: float | None) -> bool:
+        """Whether a message is of an earlier boot; unproven, of any but the present."""
+        if proven_at is None:
+            return bool(self._met) and boot != self._boot
+        return proven_at < self._since - _ROUNDING_S
 
 
 @dataclass(slots=True)
@@ -27,12 +59,17 @@ class StreamOrder:
 
     A straggler of an unknown boot looks like a new start, and would make the present
     boot an old one for ever.  So an old boot that goes on counting, five times with no
-    message of the present one in between, becomes the present one again.  One wrong
-    number would make all true ones late, too: a count that leaps is believed likewise.
+    message of the present one in between, becomes the present one again; and at once
+    when it has heard feedback from after the straggler, which itself proves nothing.
+    One wrong number would make all true ones late, too: a count that leaps is believed
+    when five go on from there.
     """
 
     boot: str | None = None
     seq: int = -1
+    _began: float = inf
+    """Arrival of the boot's first message (monotonic, s)."""
+    _is_proven: bool = False
     _old: dict[str, int] = field(default_factory=dict)
     _returning: str | None = None
     _grown: int = 0
@@ -54,35 +91,43 @@ class StreamOrder:
         """Whether :meth:`judge` will call this message a duplicate."""
         return boot == self.boot and seq in self._known
 
-    def judge(self, origin: Origin) -> OrderVerdict:
+    def judge(
+        self, origin: Origin, arrived: float = inf, proven_at: float | None = None
+    ) -> OrderVerdict:
         """Judge whether a message is newer than all before, and remember it.
 
-        A message without identity is new by arrival.
+        A message without identity is new by arrival.  It ``arrived`` then, and the
+        feedback that it echoes was composed at ``proven_at`` (monotonic, s); None where
+        that proves nothing.
         """
-        if origin.boot is None or origin.seq is None:
+        boot, seq = origin.boot, origin.seq
+        if boot is None or seq is None:
             return "new"
-        if origin.boot != self.boot:
-            if origin.boot in self._old and not self._returns(origin.boot, origin.seq):
+        if boot != self.boot:
+            if boot in self._old and not self._returns(boot, seq, proven_at):
                 return "late"
-            self._begin(origin.boot, origin.seq)
+            self._begin(boot, seq, arrived, is_proven=proven_at is not None)
             return "new"
         self._returning = None
-        if origin.seq - self.seq > _LEAP and not self._goes_on(origin.seq):
+        self._is_proven |= proven_at is not None
+        if seq - self.seq > _LEAP and not self._goes_on(seq):
             return "late"
         self._leapt_to = None
-        if origin.seq in self._known:
+        if seq in self._known:
             return "duplicate"
-        self._remember(origin.seq)
-        if origin.seq <= self.seq:
+        self._remember(seq)
+        if seq <= self.seq:
             return "late"
-        self.seq = origin.seq
+        self.seq = seq
         return "new"
 
-    def _returns(self, boot: str, seq: int) -> bool:
-        """Whether an old boot has gone on counting while the present one was silent."""
+    def _returns(self, boot: str, seq: int, proven_at: float | None) -> bool:
+        """Whether an old boot lives: it echoes that, or goes on counting alone."""
         if seq <= self._old[boot]:
             return False
         self._old[boot] = seq
+        if proven_at is not None and proven_at > self._began and not self._is_proven:
+            return True
         if boot != self._returning:
             self._returning, self._grown = boot, 0
         self._grown += 1
@@ -95,13 +140,14 @@ class StreamOrder:
         self._leapt = self._leapt + 1 if near else 1
         return self._leapt >= _GROWN_TO_RETURN
 
-    def _begin(self, boot: str, seq: int) -> None:
+    def _begin(self, boot: str, seq: int, arrived: float, *, is_proven: bool) -> None:
         self._old.pop(boot, None)
         if self.boot is not None:
             self._old[self.boot] = self.seq
         while len(self._old) > _REMEMBERED_BOOTS:
             del self._old[next(iter(self._old))]
         self.boot, self.seq, self._returning = boot, seq, None
+        self._began, self._is_proven = arrived, is_proven
         self._recent.clear()
         self._known.clear()
         self._remember(seq)

@@ -114,7 +114,7 @@ class World:
             self.counters[f"{kind_of(observation).__name__}.refused"] += 1
             return "refused"
         learn_kind(robot, received, origin)
-        verdict = robot.judge(observation, origin, asked=received.asked)
+        verdict = robot.judge(received, origin, self.ledger.composed_at(origin.heard))
         if isinstance(observation, Overtaken) and verdict == "new":
             # Its stream was past it, and has since met sixteen other boots.
             verdict = "late"
@@ -211,14 +211,36 @@ class World:
         Infinite where nobody knows, and for odometry whose age is only estimated: an
         estimate proves nothing.
         """
-        observation, moment = received.observation, None
+        moment = self._newest_at(received.observation)
+        return inf if moment is None else max(0.0, received.at.mono - moment)
+
+    def may_act(self, received: Received) -> bool:
+        """Whether the newest of its kind may change anything of a STOP.
+
+        Not what Orion kept, nor a replay of a live robot; of a robot that echoes no
+        report or odometry of an earlier boot.  An answer names its order, and so is of
+        no time before it.
+        """
+        if received.asked or self.refuses(received):
+            return False
+        observation = received.observation
+        if not isinstance(observation, SafetyReport | Odometry):
+            return True
+        origin, proven_at = observation.origin, self._newest_at(observation)
+        if not origin.acknowledgements:
+            return True  # Its age is an estimate, which is judged where it matters.
+        present_boot = self.robot(observation.robot_id).present_boot
+        return not present_boot.is_past(origin.boot, proven_at)
+
+    def _newest_at(self, observation: Observation) -> float | None:
+        """The moment that the newest of this kind was not measured before."""
         if isinstance(observation, SafetyReport):
             reported = self.robot(observation.robot_id).safety_received
-            moment = None if reported is None else reported.mono
-        elif isinstance(observation, Odometry):
+            return None if reported is None else reported.mono
+        if isinstance(observation, Odometry):
             robot = self.robot(observation.robot_id)
-            moment = robot.pose_at if robot.estimated_since is None else None
-        return inf if moment is None else max(0.0, received.at.mono - moment)
+            return robot.pose_at if robot.estimated_since is None else None
+        return None
 
     def _fed(
         self,

@@ -117,7 +117,7 @@ class RuleLoop:
             # The second transport's answer is no news, but its time is kept.
             if not fresh and not isinstance(received.observation, CommandAnswer):
                 continue
-            if not received.asked and not self._evaluator.world.refuses(received):
+            if self._evaluator.world.may_act(received):
                 self._commander.take(received, self._evaluator.world.age_then(received))
         if judges:
             self._evaluator.settle()

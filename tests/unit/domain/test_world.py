@@ -1,5 +1,6 @@
 """Ages, links, and what a message may change."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
@@ -16,9 +17,11 @@ from iveg.domain.observations import (
     HeartbeatProbe,
     Navigation,
     Observation,
+    Odometry,
     Origin,
     Received,
     RefusedFrame,
+    SafetyReport,
 )
 from iveg.domain.probe import ProbeLag
 from iveg.domain.robot_state import RobotState
@@ -169,10 +172,81 @@ def test_what_is_newer_is_no_older_than_what_was_proven_before() -> None:
 @pytest.mark.parametrize("heard", [1, None])
 def test_another_boot_inherits_no_proof(heard: int | None) -> None:
     world = world_that_told(0.0, 5.0)
-    world.apply(received(odometry(origin=echoing(1, heard=2)), after=5.1))
+    world.apply(received(odometry(origin=echoing(1, heard=1)), after=1.0))
+    world.apply(received(odometry(origin=echoing(2, heard=2)), after=5.1))
     world.apply(received(odometry(origin=echoing(1, heard=heard, boot="b")), after=5.2))
 
     assert world.robot("AGI").link(at(5.2)) in ("LOST", "UNKNOWN")
+
+
+def test_a_boot_that_echoes_older_feedback_than_another_began_with_is_earlier() -> None:
+    world = world_that_told(0.0, 5.0)
+    later = received(odometry(origin=echoing(1, heard=2, boot="b")), after=5.1)
+    earlier = received(odometry(origin=echoing(900, heard=1)), after=5.2)
+
+    assert [world.apply(later), world.apply(earlier)] == ["new", "late"]
+
+
+def test_a_boot_displaced_by_an_unproven_one_returns_by_feedback_from_after_that() -> (
+    None
+):
+    world = world_that_told(0.0, 5.0, 6.0)
+    said = [
+        (5.1, echoing(1, heard=2)),
+        (5.5, echoing(900, heard=None, boot="earlier")),
+        (5.6, echoing(2, heard=2)),
+        (6.1, echoing(3, heard=3)),
+        (6.2, echoing(901, heard=None, boot="earlier")),
+    ]
+
+    verdicts = [world.apply(received(odometry(origin=o), after=s)) for s, o in said]
+
+    assert verdicts == ["new", "new", "late", "new", "late"]
+
+
+def test_two_robots_of_one_name_that_both_echo_do_not_take_turns() -> None:
+    world = world_that_told(*(0.1 * number for number in range(20)))
+    said = [
+        (0.1 * number + 0.05, echoing(number, heard=number, boot=f"b{number % 2}"))
+        for number in range(1, 20)
+    ]
+
+    verdicts = [world.apply(received(odometry(origin=o), after=s)) for s, o in said]
+
+    assert verdicts[2:] == ["late", "new"] * 8 + ["late"]
+
+
+# --- what may act on a STOP -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("of_now", "may_act"),
+    [
+        (echoing(1, heard=2), True),
+        (echoing(1, heard=1), False),
+        (echoing(1, heard=None), False),
+        (origin(1), True),
+    ],
+    ids=["proven", "earlier boot", "unproven", "estimated"],
+)
+@pytest.mark.parametrize("build", [safety_report, odometry])
+def test_where_a_robot_proves_ages_only_a_proof_of_its_present_boot_acts(
+    build: Callable[..., Odometry | SafetyReport], of_now: Origin, may_act: bool
+) -> None:
+    world = world_that_told(0.0, 5.0)
+    look = detection_frame(origin=echoing(1, heard=2, boot="present"))
+    world.apply(received(look, after=5.1))
+    one = received(build(origin=of_now), after=5.2)
+    world.apply(one)
+
+    assert world.may_act(one) is may_act
+
+
+def test_an_answer_acts_for_it_names_its_order() -> None:
+    world = world_that_told(0.0)
+    answer = CommandAnswer("AGI", echoing(1, heard=None), "01STOP", "LATCHED")
+
+    assert world.may_act(received(answer))
 
 
 def test_a_robot_that_moves_is_a_hazard_though_nobody_knows_how_old_its_pose_is() -> (
