@@ -19,6 +19,9 @@ const STEPS = {
   End: -MINUTES,
 };
 const MARK_WIDTH = 2;
+const MARK_S = (MINUTES * 60 * MARK_WIDTH) / WIDTH;
+/** What is newer than the page's clock says stands at the end (marks). */
+const AHEAD = -3;
 /** Detections come by the dozen: their marks are low, those of changes are high. */
 const HEIGHTS = { detection: 5, link: 9, system: 9, speed: 14, command: 20, alert: 20 };
 
@@ -59,14 +62,19 @@ export function createTimebar({ store, i18n, line }) {
     );
   }
 
-  /** @param {number} nowS Unix time */
+  /**
+   * Where marks stand: by steps of the clock, so that all of them move together.
+   *
+   * @param {number} nowS Unix time
+   */
   function marksOf(nowS) {
     /** @type {Map<string, {x: number, kind: string}>} one a kind and place */
     const marks = new Map();
+    const now = Math.round(nowS / MARK_S);
     for (const { at, kind } of store.log()) {
-      const share = 1 - (nowS - Date.parse(at) / 1000) / (MINUTES * 60);
-      if (share < 0 || share > 1.01) continue;
-      const x = Math.round((share * (WIDTH - MARK_WIDTH)) / MARK_WIDTH) * MARK_WIDTH;
+      const ago = now - Math.round(Date.parse(at) / 1000 / MARK_S);
+      const x = WIDTH - MARK_WIDTH * (1 + Math.max(0, ago));
+      if (ago < AHEAD || x < 0) continue;
       marks.set(`${kind}:${x}`, { x, kind });
     }
     return [...marks.values()];
