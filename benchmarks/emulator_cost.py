@@ -10,10 +10,10 @@ import time
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import Instant
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import Camera, SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import Camera, SimulatedWorld
 from iveg.robot.uplink import Uplink
 
 RATE_HZ = 30.0

@@ -23,7 +23,7 @@ from benchmarks.process import Usage, machine, pause, percentile, print_table
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.adapters.subscriptions import ensure_subscriptions, wanted_for
-from iveg.embedded.server import embedded_fiware
+from iveg.lab.embedded.server import embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
 _DRAIN_S = 1.5

@@ -15,8 +15,8 @@ from iveg.adapters.fleet_files import built_in
 from iveg.domain.geometry import Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Origin
-from iveg.emulator.depth import DepthCamera, DepthView, Foliage, person_shape, take
-from iveg.emulator.greenhouse import Disc, Scenery
+from iveg.lab.emulator.depth import DepthCamera, DepthView, Foliage, person_shape, take
+from iveg.lab.emulator.greenhouse import Disc, Scenery
 from iveg.robot.grounding.locate import Mount, body_of, ground_frame
 
 ROUNDS, REPEATS = 5, 20

@@ -9,10 +9,10 @@ from collections.abc import Callable
 from functools import partial
 
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import RobotHardware, SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.ngsi.codec import write_scan
 
 RATE_HZ = 30.0

@@ -19,7 +19,7 @@ import orjson
 from benchmarks.process import print_table
 from iveg.app.dss import Dss
 from iveg.asgi import create_app
-from iveg.embedded.orion_numbers import print_value
+from iveg.lab.embedded.orion_numbers import print_value
 from iveg.ngsi.codec import read_notification
 from iveg.settings import Settings
 

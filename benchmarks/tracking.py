@@ -24,10 +24,10 @@ from iveg.domain.observations import Instant, Origin, Received
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.sight import AllClear
 from iveg.domain.world import World
-from iveg.emulator.camera import DETECTORS, person_target
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import RobotHardware, SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS, person_target
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")
 SEEDS = (1, 2, 3, 4, 5)

@@ -17,13 +17,13 @@ from urllib.parse import urlsplit
 import orjson
 
 from iveg.cli.running import report_ready, run_until_stopped
-from iveg.embedded.context_broker import ContextBroker
-from iveg.embedded.devices import Tenancy
-from iveg.embedded.http_server import Request, Response
-from iveg.embedded.iot_agent import IotAgent
-from iveg.embedded.iota_api import IotaApi
-from iveg.embedded.mqtt_broker import MqttBroker
-from iveg.embedded.server import Running, embedded_fiware, serve_fiware
+from iveg.lab.embedded.context_broker import ContextBroker
+from iveg.lab.embedded.devices import Tenancy
+from iveg.lab.embedded.http_server import Request, Response
+from iveg.lab.embedded.iot_agent import IotAgent
+from iveg.lab.embedded.iota_api import IotaApi
+from iveg.lab.embedded.mqtt_broker import MqttBroker
+from iveg.lab.embedded.server import Running, embedded_fiware, serve_fiware
 from iveg.settings import Settings
 
 MODULE = "tests.faulty_fiware"

@@ -6,12 +6,12 @@ from typing import Any, TypeVar
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import SimulatedWorld
-from iveg.experiment import stage as staging
-from iveg.experiment.stage import STEP_S
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
+from iveg.lab.experiment import stage as staging
+from iveg.lab.experiment.stage import STEP_S
 from iveg.web.views import Views
 from tests.unit.pipeline.desk import Desk, settle
 

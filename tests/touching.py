@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from iveg.emulator.greenhouse import Body, Floats, Scenery
+from iveg.lab.emulator.greenhouse import Body, Floats, Scenery
 
 
 def _box_corners(xmin: float, ymin: float, xmax: float, ymax: float) -> Floats:

@@ -38,7 +38,7 @@ from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.experiment.runner import ExperimentRunner
+from iveg.lab.experiment.runner import ExperimentRunner
 from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.loop import reading_apart_s

@@ -50,7 +50,7 @@ from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
 from iveg.domain.hops import Check, Hop
-from iveg.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.ngsi import names
 from iveg.settings import Settings
 

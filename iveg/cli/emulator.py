@@ -12,10 +12,10 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import report_ready
-from iveg.emulator.emulated_robot import FleetSettings
-from iveg.emulator.fleet import run_emulator
-from iveg.emulator.orders import read_fault_arguments
-from iveg.emulator.truth import TruthLog
+from iveg.lab.emulator.emulated_robot import FleetSettings
+from iveg.lab.emulator.fleet import run_emulator
+from iveg.lab.emulator.orders import read_fault_arguments
+from iveg.lab.emulator.truth import TruthLog
 from iveg.settings import Settings
 
 if TYPE_CHECKING:

@@ -26,20 +26,20 @@ from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
-from iveg.experiment import compare
-from iveg.experiment.files import directory_of, read_json
-from iveg.experiment.observer import watch
-from iveg.experiment.outcome import (
+from iveg.lab.experiment import compare
+from iveg.lab.experiment.files import directory_of, read_json
+from iveg.lab.experiment.observer import watch
+from iveg.lab.experiment.outcome import (
     Outcome,
     counted_of,
     outcome_of,
     read_truth,
     stack_of,
 )
-from iveg.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, PlannedRun
-from iveg.experiment.progress import Progress
-from iveg.experiment.run_store import RunStore
-from iveg.experiment.virtual_run import VirtualRun
+from iveg.lab.experiment.plan import GREENHOUSE, PLANS, ROBOTS, WATCHED, PlannedRun
+from iveg.lab.experiment.progress import Progress
+from iveg.lab.experiment.run_store import RunStore
+from iveg.lab.experiment.virtual_run import VirtualRun
 from iveg.settings import Settings
 
 _STOPS_WITHIN_S = 4.0

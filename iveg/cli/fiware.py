@@ -12,7 +12,7 @@ from iveg.settings import Settings
 async def fiware(settings: Settings) -> None:
     """The embedded MQTT broker, Orion and IoT Agent."""
     require_extra("demo", "iveg fiware")
-    from iveg.embedded.server import serve_fiware
+    from iveg.lab.embedded.server import serve_fiware
 
     raise_descriptor_limit()
     tune_garbage_collection()

@@ -30,7 +30,7 @@ import aiomqtt
 import httpx
 import orjson
 
-from iveg.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.http_server import Request, Response, http_server
 from tests.faulty_fiware import faulty_fiware
 
 PATIENCE_S = 30.0

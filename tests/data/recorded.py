@@ -14,10 +14,10 @@ import pytest
 
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
 
 ROBOTS = ("AGI", "AGII")
 _SETTING = "IVEG_TEST_RECORDINGS"

@@ -22,8 +22,8 @@ from iveg.adapters.orion import OrionClient
 from iveg.cli.diagnosis import judge
 from iveg.cli.doctor import Examination
 from iveg.domain.hops import Check
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
 from iveg.settings import Settings
 from tests.bonds import bound

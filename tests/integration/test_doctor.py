@@ -17,8 +17,8 @@ from iveg.cli.diagnosis import State, exit_code, judge
 from iveg.cli.doctor import Examination
 from iveg.cli.probe import DESCRIPTION, PROBE_ID
 from iveg.domain.hops import Check
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import Running
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.server import Running
 from iveg.settings import Settings
 from tests.faulty_fiware import MODULE, Faults, fail, faulty_fiware, heard_late
 from tests.integration.emulator_cloud import until

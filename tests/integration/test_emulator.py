@@ -23,14 +23,14 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.emulated_robot import FleetSettings
-from iveg.emulator.fleet import SimulatedFleet, run_emulator
-from iveg.emulator.layout import lay_out
-from iveg.emulator.orders import FaultOrder
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.scripts import Incident
-from iveg.emulator.world import SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.emulated_robot import FleetSettings
+from iveg.lab.emulator.fleet import SimulatedFleet, run_emulator
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.scripts import Incident
+from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.node import NodeSettings
 from tests.integration.emulator_cloud import Cloud, broker, running, until
 

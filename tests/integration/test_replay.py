@@ -19,7 +19,7 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.emulator.replay import ReplaySettings, run_replay
+from iveg.lab.emulator.replay import ReplaySettings, run_replay
 from iveg.robot.node import NodeSettings
 from tests import data
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag

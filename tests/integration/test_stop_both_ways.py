@@ -9,7 +9,7 @@ from iveg.adapters.orion import OrionClient
 from iveg.adapters.transports import OrionTransport
 from iveg.domain.errors import HopError
 from iveg.domain.transports import DIRECT
-from iveg.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.http_server import Request, Response, http_server
 from tests.fakes.context_broker import FakeContextBroker
 from tests.unit.pipeline.desk import Desk, settle
 

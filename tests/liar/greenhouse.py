@@ -18,12 +18,12 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.limits import LIMITS
 from iveg.domain.observations import Instant
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.truth import in_view
-from iveg.emulator.world import RobotHardware, SimulatedWorld
-from iveg.experiment.stage import Stage
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.truth import in_view
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+from iveg.lab.experiment.stage import Stage
 from iveg.ngsi import codec
 from tests.builders import notification
 from tests.unit.pipeline.desk import settle

@@ -14,7 +14,7 @@ from iveg.adapters.iot_agent import (
 )
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import names
 
 TENANT = ("agroconnect", "/greenhouse")

@@ -7,7 +7,7 @@ import pytest
 
 from iveg.adapters import log_filter
 from iveg.adapters.log_filter import OVER_S, LossFilter
-from iveg.embedded import mqtt_broker
+from iveg.lab.embedded import mqtt_broker
 
 
 class Clockwork(asyncio.SelectorEventLoop):

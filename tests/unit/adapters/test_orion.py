@@ -8,8 +8,8 @@ from iveg.adapters import clock
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import Running
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.server import Running
 from iveg.ngsi import codec, names
 from tests.faulty_fiware import faulty_fiware
 

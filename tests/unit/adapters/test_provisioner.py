@@ -17,8 +17,8 @@ from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.subscriptions import wanted_for
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Odometry, Origin, Received
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.server import Running, embedded_fiware
 from iveg.ngsi import codec, names
 from iveg.pipeline.health_monitor import HealthMonitor
 from iveg.pipeline.ingest import Ingest

@@ -14,8 +14,8 @@ from iveg.adapters.subscriptions import (
     ensure_subscriptions,
     wanted_for,
 )
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.server import embedded_fiware
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.server import embedded_fiware
 from iveg.ngsi import codec, names
 from tests.builders import detection_frame, odometry, safety_report, scan
 

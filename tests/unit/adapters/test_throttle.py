@@ -13,7 +13,7 @@ from iveg.domain.errors import HopError
 from iveg.domain.feeds import Feeds
 from iveg.domain.observations import LaserScan, Odometry
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.embedded.server import embedded_fiware
+from iveg.lab.embedded.server import embedded_fiware
 from tests.fakes.clock import FakeClock
 from tests.unit.adapters.test_subscriptions import FakeStore
 

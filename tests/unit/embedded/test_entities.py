@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from iveg.embedded.entities import Entity, EntityChange, Touched, apply
-from iveg.embedded.orion_dates import date_text
-from iveg.embedded.subscriptions import Subscription, read_subscription
+from iveg.lab.embedded.entities import Entity, EntityChange, Touched, apply
+from iveg.lab.embedded.orion_dates import date_text
+from iveg.lab.embedded.subscriptions import Subscription, read_subscription
 
 UNPRINTABLE = object()
 EARLIER, LATER = {"TimeInstant": b"1"}, {"TimeInstant": b"2"}

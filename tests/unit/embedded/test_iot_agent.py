@@ -8,7 +8,7 @@ import pytest
 from iveg.adapters.iot_agent import IotAgentClient, provision
 from iveg.adapters.orion import OrionClient
 from iveg.domain.errors import HopError
-from iveg.embedded.server import Running, embedded_fiware
+from iveg.lab.embedded.server import Running, embedded_fiware
 
 TENANT = ("agroconnect", "/greenhouse")
 

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 import aiomqtt
 import pytest
 
-from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
 
 
 @pytest.fixture

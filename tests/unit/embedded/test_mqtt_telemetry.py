@@ -8,9 +8,9 @@ import aiomqtt
 import pytest
 
 from iveg.adapters.mqtt_packets import publish_packet
-from iveg.embedded import mqtt_telemetry
-from iveg.embedded.mqtt_broker import MqttBroker, mqtt_broker
-from iveg.embedded.mqtt_telemetry import PacketReader
+from iveg.lab.embedded import mqtt_telemetry
+from iveg.lab.embedded.mqtt_broker import MqttBroker, mqtt_broker
+from iveg.lab.embedded.mqtt_telemetry import PacketReader
 
 CONNACK = b"\x20\x02\x00\x00"
 PINGREQ, PINGRESP = b"\xc0\x00", b"\xd0\x00"

@@ -5,9 +5,9 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from iveg.embedded import notifier
-from iveg.embedded.http_server import Request, Response, http_server
-from iveg.embedded.notifier import (
+from iveg.lab.embedded import notifier
+from iveg.lab.embedded.http_server import Request, Response, http_server
+from iveg.lab.embedded.notifier import (
     CLOSED,
     REFUSED,
     TIMED_OUT,

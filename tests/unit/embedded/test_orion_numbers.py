@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from iveg.embedded.orion_numbers import print_value
+from iveg.lab.embedded.orion_numbers import print_value
 
 FLOATS = st.floats(-1e15, 1e15, allow_nan=False)
 NUMBERS = FLOATS | st.integers(-(2**53), 2**53)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from iveg.embedded.orion_errors import NgsiError
-from iveg.embedded.orion_text import (
+from iveg.lab.embedded.orion_errors import NgsiError
+from iveg.lab.embedded.orion_text import (
     check_name,
     holds_forbidden,
     looks_clean,

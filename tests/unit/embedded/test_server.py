@@ -10,7 +10,7 @@ import pytest
 
 from iveg.adapters.connections import ConnectionCaps
 from iveg.domain.errors import SettingsError
-from iveg.embedded.server import embedded_fiware, serve_fiware
+from iveg.lab.embedded.server import embedded_fiware, serve_fiware
 from tests.ports import free_ports
 
 LOOPBACK = ("127.0.0.1", 0)

@@ -1,4 +1,4 @@
-from iveg.emulator.emulated_robot import battery_after
+from iveg.lab.emulator.emulated_robot import battery_after
 from iveg.pipeline.kinds import KINDS
 
 TWENTY_MINUTES_S, TWO_DAYS_S = 1_200, 172_800

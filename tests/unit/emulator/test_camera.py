@@ -8,7 +8,7 @@ import pytest
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import Detection
-from iveg.emulator.camera import (
+from iveg.lab.emulator.camera import (
     DETECTORS,
     FIELD_COUNTS,
     Detector,
@@ -17,7 +17,7 @@ from iveg.emulator.camera import (
     person_target,
     robot_target,
 )
-from iveg.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from tests.builders import AGI
 
 BOUNDS = Rectangle(-20.0, -20.0, 20.0, 20.0)

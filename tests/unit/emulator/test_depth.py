@@ -7,7 +7,7 @@ import pytest
 from iveg.domain.fleet import RobotProfile
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Post
-from iveg.emulator.depth import (
+from iveg.lab.emulator.depth import (
     DepthCamera,
     DepthView,
     Foliage,
@@ -16,7 +16,7 @@ from iveg.emulator.depth import (
     robot_shape,
     take,
 )
-from iveg.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
 from iveg.robot.grounding.cloud import DepthPicture, Pinhole
 from iveg.robot.grounding.locate import (
     DEFAULT,

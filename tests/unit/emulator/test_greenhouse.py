@@ -4,7 +4,7 @@ import pytest
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Obstacle, Post
-from iveg.emulator.greenhouse import Body, Scenery
+from iveg.lab.emulator.greenhouse import Body, Scenery
 from tests.touching import bodies_touch, touches
 
 GREENHOUSE = Greenhouse(

@@ -9,7 +9,7 @@ import pytest
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.emulator.camera import (
+from iveg.lab.emulator.camera import (
     DETECTORS,
     Detector,
     Found,
@@ -17,11 +17,11 @@ from iveg.emulator.camera import (
     person_target,
     robot_target,
 )
-from iveg.emulator.greenhouse import Body, Disc, Scenery
-from iveg.emulator.grounded import GroundedCamera
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import SimulatedWorld
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.grounded import GroundedCamera
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
 from tests.builders import AGI
 
 GREENHOUSE = Greenhouse(

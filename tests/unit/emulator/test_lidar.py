@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse, Post
-from iveg.emulator.greenhouse import Body, Disc, Scenery
-from iveg.emulator.lidar import LaserModel, sweep
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.lidar import LaserModel, sweep
 
 EXACT = LaserModel(beams=720, noise=0.0)
 ROOM = Greenhouse("room", Rectangle(-10.0, -5.0, 10.0, 5.0))

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from iveg.domain.errors import DataFileError, UnreadableError
-from iveg.emulator.orders import (
+from iveg.lab.emulator.orders import (
     FaultOrder,
     OrderPlace,
     PersonOrder,

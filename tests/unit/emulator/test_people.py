@@ -4,8 +4,8 @@ import numpy as np
 
 from iveg.domain.geometry import Pose2D, Rectangle
 from iveg.domain.greenhouse import Greenhouse
-from iveg.emulator.greenhouse import Body, Scenery
-from iveg.emulator.people import RADIUS_M, WALKING_SPEED, SimulatedPerson, WalkStop
+from iveg.lab.emulator.greenhouse import Body, Scenery
+from iveg.lab.emulator.people import RADIUS_M, WALKING_SPEED, SimulatedPerson, WalkStop
 
 DT = 0.05
 OPEN = Scenery.of(Greenhouse("yard", Rectangle(-10.0, -10.0, 20.0, 10.0)))

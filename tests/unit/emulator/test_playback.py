@@ -5,8 +5,8 @@ import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
-from iveg.emulator.logs import LogReader, RecordingEntry
-from iveg.emulator.playback import Playback
+from iveg.lab.emulator.logs import LogReader, RecordingEntry
+from iveg.lab.emulator.playback import Playback
 from tests import data
 from tests.builders import scan
 from tests.unit.domain.scene import Scene

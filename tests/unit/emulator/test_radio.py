@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from iveg.emulator.radio import LinkFaults, Packet, Radio
-from iveg.emulator.relay import read_packet
+from iveg.lab.emulator.radio import LinkFaults, Packet, Radio
+from iveg.lab.emulator.relay import read_packet
 
 ODOMETRY, SCAN = "/iveg/AGI_odom/attrs", "/iveg/AGI_lidar2D/attrs"
 EVERY_S = 1 / 30

@@ -9,9 +9,9 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.emulator.bags import BagTopics
-from iveg.emulator.logs import RecordingEntry
-from iveg.emulator.recordings import open_recording
+from iveg.lab.emulator.bags import BagTopics
+from iveg.lab.emulator.logs import RecordingEntry
+from iveg.lab.emulator.recordings import open_recording
 from tests.data.bags import (
     ODOMETRY,
     SCAN,

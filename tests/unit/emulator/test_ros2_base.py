@@ -9,13 +9,13 @@ from iveg.adapters import clock
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.geometry import Twist2D
 from iveg.domain.observations import DetectionFrame, LaserScan, Navigation, Odometry
-from iveg.emulator.camera import DETECTORS
-from iveg.emulator.layout import lay_out
-from iveg.emulator.orders import FaultOrder
-from iveg.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
-from iveg.emulator.ros2_base import SimulatedNavigation as Nav
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.world import SimulatedWorld
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.ros2_base import TIMEOUT_S, DriveWatchdog, Ros2Base
+from iveg.lab.emulator.ros2_base import SimulatedNavigation as Nav
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.world import SimulatedWorld
 from iveg.robot.gate import REST
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.inputs import TOPICS, SensorInputs

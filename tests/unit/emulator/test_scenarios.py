@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from iveg.emulator.scenarios import SCENARIOS
+from iveg.lab.emulator.scenarios import SCENARIOS
 from tests.stage import Json, Stage, links_of
 
 CRUISE = 0.8

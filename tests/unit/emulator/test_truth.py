@@ -4,12 +4,12 @@ from contextlib import closing
 from pathlib import Path
 
 from iveg.adapters.greenhouses import load_greenhouse
-from iveg.emulator.camera import Counts, DetectorModel
-from iveg.emulator.layout import lay_out
-from iveg.emulator.scenarios import scenario_named
-from iveg.emulator.truth import TruthLog
-from iveg.emulator.world import SimulatedWorld
-from iveg.experiment.outcome import read_truth
+from iveg.lab.emulator.camera import Counts, DetectorModel
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.truth import TruthLog
+from iveg.lab.emulator.world import SimulatedWorld
+from iveg.lab.experiment.outcome import read_truth
 
 BLIND = DetectorModel(0.9, counts={"farmer": Counts(0, 0, 1), "AGI": Counts(0, 0, 1)})
 

@@ -7,11 +7,11 @@ from iveg.adapters.greenhouses import load_greenhouse
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Twist2D
 from iveg.domain.greenhouse import Greenhouse
-from iveg.emulator.camera import DETECTORS, PERSON
-from iveg.emulator.layout import lay_out
-from iveg.emulator.people import RADIUS_M
-from iveg.emulator.scenarios import SCENARIOS, scenario_named
-from iveg.emulator.world import SimulatedWorld, climate_at
+from iveg.lab.emulator.camera import DETECTORS, PERSON
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.people import RADIUS_M
+from iveg.lab.emulator.scenarios import SCENARIOS, scenario_named
+from iveg.lab.emulator.world import SimulatedWorld, climate_at
 from tests.touching import bodies_touch, touches
 
 FLEET = ("AGI", "AGII")

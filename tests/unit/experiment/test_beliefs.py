@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from iveg.domain.costmap import Costmap, Grid
-from iveg.experiment.beliefs import Belief, belief_in, belief_of, injections
-from iveg.experiment.observer import picture_of, slowdowns_of
-from iveg.experiment.scoring import Picture, SeenObject
+from iveg.lab.experiment.beliefs import Belief, belief_in, belief_of, injections
+from iveg.lab.experiment.observer import picture_of, slowdowns_of
+from iveg.lab.experiment.scoring import Picture, SeenObject
 
 FARMER = SeenObject("person-0", "farmer", 1.0, 1.0)
 

@@ -2,7 +2,7 @@
 
 import asyncio
 
-from iveg.experiment.observer import watch
+from iveg.lab.experiment.observer import watch
 from tests.builders import detection
 from tests.unit.web.desk import API_TOKEN, WebDesk
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from iveg.experiment.files import read_json
-from iveg.experiment.plan import PlannedRun
-from iveg.experiment.progress import Progress, expected_s
+from iveg.lab.experiment.files import read_json
+from iveg.lab.experiment.plan import PlannedRun
+from iveg.lab.experiment.progress import Progress, expected_s
 
 STEPS = [PlannedRun("peers", n, 20.0, n) for n in (1, 2)]
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from iveg.domain.errors import ExperimentRefusedError
-from iveg.experiment.files import read_json, write_json
-from iveg.experiment.plan import PLANS
-from iveg.experiment.progress import expected_s
-from iveg.experiment.runner import ExperimentRunner
+from iveg.lab.experiment.files import read_json, write_json
+from iveg.lab.experiment.plan import PLANS
+from iveg.lab.experiment.progress import expected_s
+from iveg.lab.experiment.runner import ExperimentRunner
 from iveg.models.experiment import Experiment
 from tests.processes import is_alive
 

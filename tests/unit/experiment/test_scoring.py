@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from iveg.experiment.scoring import (
+from iveg.lab.experiment.scoring import (
     Picture,
     Score,
     SeenObject,

@@ -2,8 +2,14 @@
 
 import pytest
 
-from iveg.experiment.paper_tables import disagreements
-from iveg.experiment.statistics import Interval, difference, thinned, verdict, wilson
+from iveg.lab.experiment.paper_tables import disagreements
+from iveg.lab.experiment.statistics import (
+    Interval,
+    difference,
+    thinned,
+    verdict,
+    wilson,
+)
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,9 @@
 from typing import Any
 
 from iveg.domain.detection_rule import DetectionRule
-from iveg.experiment.outcome import counted_of
-from iveg.experiment.plan import ROBOTS, PlannedRun
-from iveg.experiment.virtual_run import VirtualRun
+from iveg.lab.experiment.outcome import counted_of
+from iveg.lab.experiment.plan import ROBOTS, PlannedRun
+from iveg.lab.experiment.virtual_run import VirtualRun
 
 RULE = DetectionRule()
 

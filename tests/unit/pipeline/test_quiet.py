@@ -9,7 +9,7 @@ from functools import partial
 
 import pytest
 
-from iveg.emulator.orders import FaultOrder
+from iveg.lab.emulator.orders import FaultOrder
 from tests.stage import Stage
 
 QUIET_S = 60 * int(os.environ.get("IVEG_QUIET_MINUTES", "1"))

@@ -18,7 +18,7 @@ from iveg.domain.observations import (
     Origin,
     SafetyReport,
 )
-from iveg.embedded.orion_numbers import print_value
+from iveg.lab.embedded.orion_numbers import print_value
 from iveg.ngsi import codec
 from iveg.robot.echo import Echo
 from iveg.robot.rates import LEVELS

@@ -1,0 +1,363 @@
+"""Entities as Orion stores them, and their changes.
+
+A value is printed as JSON text at its first use: most values of a fleet's telemetry are
+replaced before anything uses them, the others are sent many times.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import orjson
+
+from iveg.lab.embedded.orion_dates import date_json, date_text
+from iveg.lab.embedded.orion_errors import bad_request, too_many
+from iveg.lab.embedded.orion_numbers import print_value
+from iveg.lab.embedded.orion_text import (
+    UNRESTRICTED,
+    check_name,
+    holds_forbidden,
+    quoted,
+)
+
+_BUILTIN = ("dateCreated", "dateModified")
+
+
+class Value:
+    """Value of an attribute, printed once at its first use.
+
+    Args:
+        given: The value as parsed JSON.
+        json: The printed value, where it is known.
+    """
+
+    __slots__ = ("_given", "_json")
+
+    def __init__(self, given: Any = None, json: bytes = b"") -> None:
+        self._given = given
+        self._json = json
+
+    @property
+    def json(self) -> bytes:
+        """JSON text that Orion would print."""
+        if not self._json:
+            self._json, self._given = print_value(self._given), None
+        return self._json
+
+
+class Attribute(NamedTuple):
+    """One attribute of an entity.
+
+    Attributes:
+        type: NGSI type.
+        value: The value.
+        metadata: Name → ``{"type": …, "value": …}`` as Orion prints it.
+        created: Creation time (s, Unix time).
+        modified: Last change of value or metadata (s, Unix time).
+    """
+
+    type: str
+    value: Value
+    metadata: Mapping[str, bytes]
+    created: float
+    modified: float
+
+    @property
+    def json(self) -> bytes:
+        """JSON text of the value."""
+        return self.value.json
+
+    def normalized(self, wanted: Iterable[str] = ()) -> bytes:
+        """``{"type", "value", "metadata"}``, with the wanted metadata first."""
+        metadata = self._metadata(wanted) if wanted else self.metadata
+        inner = b",".join(quoted(name) + b":" + text for name, text in metadata.items())
+        return b'{"type":%b,"value":%b,"metadata":{%b}}' % (
+            quoted(self.type),
+            self.json,
+            inner,
+        )
+
+    def noted(self, notes: Mapping[str, bytes]) -> "Attribute":
+        """The same with metadata that are not stored."""
+        return self._replace(metadata={**self.metadata, **notes})
+
+    def _metadata(self, wanted: Iterable[str]) -> dict[str, bytes]:
+        chosen: dict[str, bytes] = {}
+        for name in wanted:
+            if name == "*":
+                chosen.update(self.metadata)
+            elif name in _BUILTIN:
+                at = self.created if name == "dateCreated" else self.modified
+                chosen[name] = b'{"type":"DateTime","value":%b}' % date_json(at)
+            elif name in self.metadata:
+                chosen[name] = self.metadata[name]
+        return chosen
+
+
+class EntityChange(NamedTuple):
+    """Requested change of one attribute; ``None`` leaves the present value.
+
+    Attributes:
+        value: Parsed JSON, or a printed ``Value``.
+    """
+
+    type: str | None
+    value: Any
+    metadata: Mapping[str, bytes] | None = None
+
+
+@dataclass(slots=True)
+class Entity:
+    """One entity; its attributes are replaced, never altered.
+
+    Attributes:
+        path: Service path.
+        created: Creation time (s, Unix time).
+        modified: Last change (s, Unix time).
+    """
+
+    id: str
+    type: str
+    path: str
+    created: float
+    modified: float
+    attributes: dict[str, Attribute] = field(default_factory=dict)
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """Unique key within a tenant."""
+        return self.path, self.id, self.type
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """Effect of a change, for the evaluation of subscriptions.
+
+    Attributes:
+        now: New state of the attributes that the request named, in its order.
+        before: Earlier state of these attributes.
+        all: Whether each of them counts as changed.
+    """
+
+    now: Mapping[str, Attribute]
+    before: Mapping[str, Attribute] = field(default_factory=dict)
+    all: bool = False
+
+    def has_changed(self, name: str, *, metadata_too: bool = True) -> bool:
+        """Whether value, or metadata or type, of an attribute differ from before."""
+        new, old = self.now.get(name), self.before.get(name)
+        if new is None or old is None or self.all:
+            return new is not None
+        # Metadata first: values must be printed to be compared.
+        return (
+            metadata_too and (old.metadata != new.metadata or old.type != new.type)
+        ) or old.json != new.json
+
+
+class EntityStore:
+    """All entities of one tenant."""
+
+    def __init__(self) -> None:
+        self._by_key: dict[tuple[str, str, str], Entity] = {}
+        self._by_id: dict[str, list[Entity]] = {}
+
+    def get(self, path: str, entity_id: str, entity_type: str) -> Entity | None:
+        """The entity of exactly this key."""
+        return self._by_key.get((path, entity_id, entity_type))
+
+    def find(self, paths: str, entity_id: str, entity_type: str = "") -> Entity | None:
+        """Find the entity of an id and an optional type.
+
+        Raises:
+            NgsiError: 409, several entities match.
+        """
+        found = [
+            entity
+            for entity in self._by_id.get(entity_id, ())
+            if (not entity_type or entity.type == entity_type)
+            and under(paths, entity.path)
+        ]
+        if len(found) > 1:
+            raise too_many()
+        return found[0] if found else None
+
+    def all(self, paths: str) -> list[Entity]:
+        """Every entity under a service path, oldest first."""
+        return [one for one in self._by_key.values() if under(paths, one.path)]
+
+    def add(self, entity: Entity) -> None:
+        """Store a new entity."""
+        self._by_key[entity.key] = entity
+        self._by_id.setdefault(entity.id, []).append(entity)
+
+    def remove(self, entity: Entity) -> None:
+        """Delete an entity."""
+        del self._by_key[entity.key]
+        self._by_id[entity.id].remove(entity)
+
+
+def under(paths: str, path: str) -> bool:
+    """Whether a service path is one of the requested ones (``/a,/b/#``)."""
+    for wanted in paths.split(","):
+        if wanted == path or wanted == "/#":
+            return True
+        if wanted.endswith("/#") and (path + "/").startswith(wanted[:-1]):
+            return True
+    return False
+
+
+def apply(
+    entity: Entity,
+    changes: Mapping[str, EntityChange],
+    now: float,
+    *,
+    forced: bool = False,
+) -> Touched:
+    """Apply changes; missing attributes are created.
+
+    Args:
+        entity: Changed in place.
+        changes: By attribute name.
+        now: Seconds, Unix time.
+        forced: Count every named attribute as changed (``forcedUpdate``).
+    """
+    before, after = {}, {}
+    for name, change in changes.items():
+        old = entity.attributes.get(name)
+        if old is not None:
+            before[name] = old
+        after[name] = _changed(old, change, now)
+    entity.attributes.update(after)
+    entity.modified = now
+    return Touched(after, before, all=forced)
+
+
+def _changed(old: Attribute | None, change: EntityChange, now: float) -> Attribute:
+    kind = change.type or (old.type if old else default_type(change.value))
+    value = change.value
+    if isinstance(value, dict) and "$" in "".join(value):
+        value = _operated(old, value)
+    kept = value if isinstance(value, Value) else _value(kind, value)
+    if old is None:
+        return Attribute(kind, kept, change.metadata or {}, now, now)
+    metadata = old.metadata
+    if change.metadata is not None:
+        metadata = _merged(metadata, change.metadata)
+    return Attribute(kind, kept, metadata, old.created, now)
+
+
+def _value(kind: str, value: Any) -> Value:
+    return Value(json=date_text(value)) if kind == "DateTime" else Value(value)
+
+
+def _merged(old: Mapping[str, bytes], new: Mapping[str, bytes]) -> Mapping[str, bytes]:
+    return new if old.keys() <= new.keys() else {**old, **new}
+
+
+def _operated(attribute: Attribute | None, value: Mapping[str, Any]) -> Any:
+    """The value after Orion's update operators; a key that begins with ``$`` is one."""
+    name = next((key for key in value if key.startswith("$")), "")
+    if not name:
+        return value
+    argument = value[name]
+    old = None if attribute is None else orjson.loads(attribute.json)
+    number = old if isinstance(old, int | float) else 0
+    if name == "$inc" and isinstance(argument, int | float):
+        return number + argument
+    if name in ("$min", "$max") and isinstance(argument, int | float):
+        return (min if name == "$min" else max)(number, argument)
+    items = old if isinstance(old, list) else []
+    if name == "$push":
+        return [*items, argument]
+    if name == "$addToSet":
+        return items if argument in items else [*items, argument]
+    if name == "$pull":
+        return [item for item in items if item != argument]
+    return argument
+
+
+def default_type(value: Any) -> str:
+    """Type that Orion assigns to a value without type."""
+    if isinstance(value, bool):
+        return "Boolean"
+    if isinstance(value, int | float):
+        return "Number"
+    if value is None:
+        return "None"
+    return "Text" if isinstance(value, str) else "StructuredValue"
+
+
+# --- requests ---------------------------------------------------------------------
+
+
+def read_changes(
+    attributes: Mapping[str, Any], *, key_values: bool, clean: bool
+) -> dict[str, EntityChange]:
+    """Read attributes from a request.
+
+    Args:
+        attributes: Name → attribute, without ``id`` and ``type``.
+        key_values: Whether an attribute is its bare value.
+        clean: Whether the body is known to hold no forbidden character.
+
+    Raises:
+        NgsiError: 400, with the sentence of the first complaint.
+    """
+    return {
+        name: _read_change(name, attribute, key_values=key_values, clean=clean)
+        for name, attribute in attributes.items()
+    }
+
+
+def _read_change(name: str, raw: Any, *, key_values: bool, clean: bool) -> EntityChange:
+    check_name(name, "attribute name")
+    if key_values:
+        raw = {"value": raw}
+    elif not isinstance(raw, dict):
+        raise bad_request(
+            "attribute must be a JSON object, unless keyValues option is used"
+        )
+    if not raw.keys() <= {"type", "value", "metadata"}:
+        raise bad_request("unrecognized property for context attribute")
+    kind = _read_type(raw, "attribute type")
+    value = raw.get("value")
+    if not clean and kind != UNRESTRICTED and holds_forbidden(value):
+        raise bad_request("Invalid characters in attribute value")
+    if kind == "DateTime" and value is not None:
+        date_text(value)
+    metadata = raw.get("metadata")
+    return EntityChange(
+        kind, value, None if metadata is None else _read_metadata(metadata, clean=clean)
+    )
+
+
+def _read_type(raw: Mapping[str, Any], what: str) -> str | None:
+    kind = raw.get("type")
+    if kind is None:
+        return None
+    if not isinstance(kind, str):
+        raise bad_request(f"invalid JSON type for {what}")
+    check_name(kind, what)
+    return kind
+
+
+def _read_metadata(raw: Any, *, clean: bool) -> dict[str, bytes]:
+    if not isinstance(raw, dict):
+        raise bad_request("metadata must be a JSON object")
+    metadata = {}
+    for name, one in raw.items():
+        check_name(name, "metadata name")
+        if not isinstance(one, dict) or not one.keys() <= {"type", "value"}:
+            raise bad_request("unrecognized property for metadata")
+        value = one.get("value")
+        if not clean and holds_forbidden(value):
+            raise bad_request("Invalid characters in metadata value")
+        kind = _read_type(one, "metadata type") or default_type(value)
+        metadata[name] = metadata_json(kind, value)
+    return metadata
+
+
+def metadata_json(kind: str, value: Any) -> bytes:
+    """One metadata entry as Orion prints it."""
+    text = date_text(value) if kind == "DateTime" else print_value(value)
+    return b'{"type":%b,"value":%b}' % (quoted(kind), text)

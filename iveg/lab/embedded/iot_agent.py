@@ -1,0 +1,239 @@
+"""An IoT Agent for JSON: measures from MQTT to the context broker, commands back.
+
+It runs in the process of both brokers: messages of devices and measures are passed by
+function calls.  Topics, payloads and the north port match the real agent; its limits
+are listed in ``docs/fiware.md``.
+"""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import orjson
+
+from iveg.adapters import clock
+from iveg.lab.embedded.context_broker import ContextBroker
+from iveg.lab.embedded.devices import (
+    DEFAULT_APIKEY,
+    AgentError,
+    Device,
+    Registry,
+    Tenancy,
+    read_device,
+)
+from iveg.lab.embedded.entities import EntityChange
+from iveg.lab.embedded.measures import read_measures, read_single, status_changes
+from iveg.lab.embedded.mqtt_broker import MqttBroker
+from iveg.lab.embedded.orion_errors import NgsiError
+from iveg.lab.embedded.orion_text import load_json
+from iveg.lab.embedded.registrations import Registration, read_registration
+from iveg.lab.embedded.scope import Scope
+
+_log = logging.getLogger(__name__)
+
+
+_Topic = tuple[str, str, str, str | None]
+"""API key, device, ``attrs`` or ``cmdexe``, attribute if the topic names one."""
+
+
+@lru_cache(maxsize=2048)
+def _read_topic(topic: str) -> _Topic | None:
+    parts = topic.split("/")
+    if parts[:2] == ["", "json"]:
+        del parts[0]
+    named = len(parts) == 5 and parts[3] == "attrs"
+    plain = len(parts) == 4 and parts[3] in ("attrs", "cmdexe")
+    if not (named or plain) or parts[0] not in ("", "json"):
+        return None
+    return parts[1], parts[2], parts[3], parts[4] if named else None
+
+
+def _read_answer(
+    device: Device, payload: bytes, now: float
+) -> list[dict[str, EntityChange]]:
+    """Read the payload of a ``cmdexe`` topic; answers to unknown commands are left."""
+    answers = load_json(payload)
+    if not isinstance(answers, dict):
+        return []
+    known = {name: ("OK", answers[name]) for name in answers if name in device.commands}
+    return [status_changes(known, now)] if known else []
+
+
+class IotAgent:
+    """Devices with their measures and commands.
+
+    Args:
+        broker: The context broker.
+        mqtt: The MQTT broker that devices use.
+    """
+
+    def __init__(self, broker: ContextBroker, mqtt: MqttBroker) -> None:
+        self._broker = broker
+        self._mqtt = mqtt
+        self.registry = Registry()
+        self.url = ""
+        """Address of the north port, for registrations; set when it is known."""
+        mqtt.listen(self.hear)
+
+    # --- measures ---------------------------------------------------------------
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """Handle an MQTT message, if it is for the agent.
+
+        Topics are ``/{apikey}/{device}/attrs``, ``…/attrs/{name}`` and ``…/cmdexe``,
+        the first slash or nothing also as ``/json/`` or ``json/``.
+        """
+        spoken = _read_topic(topic)
+        if spoken is None:
+            return
+        try:
+            self._take_from(spoken, payload, clock.wall())
+        except (NgsiError, AgentError) as error:
+            # Devices get no error.
+            _log.debug("a message on %s was discarded: %s", topic, error)
+
+    def _take_from(self, spoken: _Topic, payload: bytes, now: float) -> None:
+        apikey, device_id, kind, name = spoken
+        device = self.registry.device_of(apikey, device_id)
+        if device is None:
+            device = self._autoprovision(apikey, device_id)
+        if device is None:
+            return
+        if kind == "cmdexe":
+            measures = _read_answer(device, payload, now)
+        elif name is None:
+            measures = read_measures(device, payload, now)
+        else:
+            measures = read_single(device, name, payload, now)
+        for changes in measures:
+            self._write(device, changes, now)
+
+    def _write(
+        self, device: Device, changes: Mapping[str, EntityChange], now: float
+    ) -> None:
+        tenancy = device.tenancy
+        # A correlator is made if somebody is notified.
+        scope = Scope(tenancy.service, tenancy.subservice, "", now)
+        self._broker.upsert(scope, device.entity_name, device.entity_type, changes)
+
+    def _autoprovision(self, apikey: str, device_id: str) -> Device | None:
+        group = None if apikey == DEFAULT_APIKEY else self.registry.group_of(apikey)
+        if group is None or group.document.get("autoprovision") is False:
+            return None
+        raw: dict[str, Any] = {"device_id": device_id}
+        if group.commands:
+            raw["commands"] = group.commands
+        device = read_device(raw, group.tenancy, group)
+        return self._keep(device)
+
+    # --- devices ----------------------------------------------------------------
+
+    def provision(self, raw: Any, tenancy: Tenancy) -> None:
+        """Create one device from a ``POST``.
+
+        Raises:
+            AgentError: 400, or 409 if the device exists.
+        """
+        apikey = raw.get("apikey") if isinstance(raw, dict) else None
+        device = read_device(raw, tenancy, self.registry.group_in(tenancy, apikey))
+        if self.registry.is_known(device):
+            raise AgentError(
+                409,
+                "DUPLICATE_DEVICE_ID",
+                "A device with the same info (DeviceId, ApiKey, Service, Subservice) "
+                f"was found:{device.device_id}",
+            )
+        self._keep(device)
+
+    def _keep(self, device: Device) -> Device:
+        if device.commands:
+            device = self._register(device)
+        self.registry.put(device)
+        return device
+
+    def _register(self, device: Device) -> Device:
+        """Register the commands of an entity at the context broker."""
+        entity = {"type": device.entity_type, "id": device.entity_name}
+        document = {
+            "dataProvided": {"entities": [entity], "attrs": list(device.commands)},
+            "provider": {"http": {"url": self.url}},
+        }
+        registration = read_registration(document, device.tenancy.subservice)
+        self._registrations(device)[registration.id] = registration
+        return replace(device, registration_id=registration.id)
+
+    def change(self, old: Device, new: Device) -> None:
+        """Replace a device; new attributes are written as null."""
+        self.forget(old)
+        self._keep(replace(new, registration_id=""))
+        gained = dict(new.mapping.values()).items() - dict(old.mapping.values()).items()
+        tenant = self._broker.tenant(new.tenancy.service)
+        key = (new.tenancy.subservice, new.entity_name, new.entity_type)
+        if gained and tenant.entities.get(*key) is not None:
+            nothing = {name: EntityChange(kind, None) for name, kind in gained}
+            self._write(new, nothing, clock.wall())
+
+    def forget(self, device: Device) -> None:
+        """Delete a device and its registration."""
+        self._registrations(device).pop(device.registration_id, None)
+        self.registry.remove(device)
+
+    def _registrations(self, device: Device) -> dict[str, Registration]:
+        return self._broker.tenant(device.tenancy.service).registrations
+
+    # --- commands ----------------------------------------------------------------
+
+    async def command(
+        self, tenancy: Tenancy, name: str, kind: str, values: Mapping[str, Any]
+    ) -> None:
+        """Execute an ``op/update`` of one entity: publish its commands.
+
+        An unknown command is ignored, and one without a connected robot is lost: the
+        agent answers 204 to both.
+
+        Raises:
+            AgentError: 404, no device has this entity.
+        """
+        device = self._device_for(tenancy, name, kind)
+        now = clock.wall()
+        known = {one: values[one] for one in values if one in device.commands}
+        for command, value in known.items():
+            await self._publish(device, command, value)
+        if known:
+            pending = dict.fromkeys(known, ("PENDING", None))
+            self._write(device, status_changes(pending, now), now)
+
+    async def _publish(self, device: Device, command: str, value: Any) -> None:
+        options = device.commands[command].get("mqtt") or {}
+        await self._mqtt.publish(
+            f"/{device.apikey}/{device.device_id}/cmd",
+            orjson.dumps({command: value}),
+            int(options.get("qos", 0)),
+            retain=bool(options.get("retain", False)),
+        )
+
+    async def query(
+        self, tenancy: Tenancy, name: str, kind: str, names: list[str]
+    ) -> dict[str, Any]:
+        """Execute an ``op/query`` of one entity: its commands, with empty values.
+
+        Raises:
+            AgentError: 404, no device has this entity.
+        """
+        device = self._device_for(tenancy, name, kind)
+        told = {
+            command: {"type": "command", "value": ""}
+            for command in device.commands
+            if not names or command in names
+        }
+        return {"type": kind, "id": name, **told}
+
+    def _device_for(self, tenancy: Tenancy, name: str, kind: str) -> Device:
+        device = self.registry.device_for(tenancy, name, kind)
+        if device is None:
+            raise AgentError(
+                404, "DEVICE_NOT_FOUND", f"No device was found with id:{name}"
+            )
+        return device

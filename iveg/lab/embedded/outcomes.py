@@ -1,0 +1,130 @@
+"""Result of an update, and Orion's error sentence for it.
+
+An update of one entity and a batch do the possible part and then report the rest.  The
+error depends on whether any part was done::
+
+    none of the entities exists                → 404 NotFound (batch)
+    no attribute could be changed              → 422 Unprocessable
+    some attributes could be changed           → 422 PartialUpdate
+    a provider took part, and not all was done → 404 PartialUpdate
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from iveg.lab.embedded.orion_errors import NgsiError, not_found
+
+MISSING = "do not exist: "
+EXISTING = "one or more of the attributes in the request already exist: "
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Result of an update of one entity.
+
+    Attributes:
+        asked_kind: The type that the request named; empty if none.
+        kind: The type of the entity, as far as known.
+        exists: Whether the entity is stored here.
+        updated: Own attributes that were changed.
+        passed: Attributes that a provider accepted.
+        failed: Attributes that a provider did not accept.
+        refused: Attributes that do not exist, or that exist and must not.
+    """
+
+    entity_id: str
+    asked_kind: str
+    kind: str
+    exists: bool
+    updated: tuple[str, ...] = ()
+    passed: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether the whole request was done."""
+        return self.exists_somewhere and not self.refused and not self.failed
+
+    @property
+    def exists_somewhere(self) -> bool:
+        """Whether the broker or a provider knows the entity."""
+        return self.exists or self.forwarded
+
+    @property
+    def forwarded(self) -> bool:
+        """Whether a provider took part."""
+        return bool(self.passed or self.failed)
+
+    @property
+    def named(self) -> str:
+        """The entity as in Orion's sentences."""
+        return f"{self.entity_id}/{self.asked_kind}".removesuffix("/")
+
+    def raise_for_one(self, sentence: str = MISSING) -> None:
+        """Raise Orion's error for an update of one entity, if there is one.
+
+        A changed own attribute hides a command that was not forwarded.
+
+        Raises:
+            NgsiError: 404 or 422.
+        """
+        if self.complete or (self.updated and not self.refused):
+            return
+        if not self.updated and not self.passed and (self.failed or not self.exists):
+            raise not_found()
+        if self.forwarded:
+            raise _not_passed_on([self])
+        raise _refused(
+            bool(self.updated), f"{sentence}{self.named} - {_listed(self.refused)}"
+        )
+
+
+def raise_for_batch(outcomes: Sequence[Outcome], sentence: str = MISSING) -> None:
+    """Raise Orion's error for ``op/update``, if there is one.
+
+    Raises:
+        NgsiError: 404 or 422.
+    """
+    bad = [one for one in outcomes if not one.complete]
+    if any(one.forwarded for one in outcomes):
+        if len(outcomes) == 1:
+            outcomes[0].raise_for_one()
+        elif bad:
+            raise _not_passed_on(bad)
+    if not bad:
+        return
+    description = sentence + ", ".join(
+        _complaint(one, first=number == 0) for number, one in enumerate(bad)
+    )
+    if not any(one.exists for one in outcomes):
+        raise not_found(description)
+    some = len(bad) < len(outcomes) or any(one.updated for one in bad)
+    raise _refused(some, description)
+
+
+def _complaint(outcome: Outcome, *, first: bool) -> str:
+    if outcome.exists:
+        return f"{outcome.named} - {_listed(outcome.refused)}"
+    # Orion omits the dash for all but the first.
+    return f"{outcome.named} {'- ' if first else ''}[entity itself]"
+
+
+def _refused(some: bool, description: str) -> NgsiError:
+    return NgsiError(422, "PartialUpdate" if some else "Unprocessable", description)
+
+
+def _not_passed_on(outcomes: Iterable[Outcome]) -> NgsiError:
+    named = ", ".join(
+        f"{one.entity_id}-{one.kind} : [{', '.join((*one.refused, *one.failed))}]"
+        for one in outcomes
+    )
+    return NgsiError(
+        404,
+        "PartialUpdate",
+        f"Some of the following attributes were not updated: {{ {named} }}",
+    )
+
+
+def _listed(names: Iterable[str]) -> str:
+    return f"[ {', '.join(names)} ]"

@@ -1,0 +1,347 @@
+"""Pictures of a depth camera: people, robots, crop and leaves with their occlusion.
+
+Everything is upright on a flat floor - a footprint from one height to another - so a
+pixel's ray meets it where its column meets the footprint and its row the heights: two
+small problems instead of 307,200.  Depth runs along the optical axis (m).
+
+Sources: Intel's D400 tuning paper (disparity error 0.08 pixels, baseline 50 mm) and
+Point Grey's Bumblebee2 sheet (120 mm) for noise; sizes of leaves are assumed.  Left
+out: arms and legs, lens distortion, shadows of the second imager, flying pixels.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Pose2D
+from iveg.lab.emulator.camera import ROBOT_HEIGHT_M
+from iveg.lab.emulator.greenhouse import Body, Disc, Floats, Scenery
+from iveg.lab.emulator.people import HEIGHT_M
+from iveg.robot.grounding.cloud import DepthPicture, Pinhole
+from iveg.robot.grounding.locate import Segment
+from iveg.robot.grounding.mask import Mask, write_mask
+
+_CROP_HEIGHT_M = 2.0
+_SHOULDERS_M = 1.5
+_HEAD_RADIUS_M = 0.1
+_LEAST_SLOPE = 1e-9
+"""Stands for zero in a direction, so that no division is by zero."""
+_NOISE_PATCH = 8
+"""Pixels across: stereo matches windows, so neighbours err together."""
+
+
+@dataclass(frozen=True, slots=True)
+class DepthCamera:
+    """Depth camera on a robot, looking level.
+
+    Attributes:
+        lens: Of the picture that the depth is registered to.
+        height: Above the floor (m).
+        most: Largest measured depth (m).
+        baseline: Between the two imagers (m).
+        disparity_error: Standard deviation (pixels); depth errs by z² · e / (f · b).
+        dropouts: Share of pixels that are not measured, 0 to 1.
+    """
+
+    lens: Pinhole
+    height: float
+    most: float
+    baseline: float = 0.05
+    disparity_error: float = 0.08
+    dropouts: float = 0.005
+
+    @classmethod
+    def of(cls, profile: RobotProfile, baseline: float = 0.05) -> "DepthCamera":
+        """The camera of a kind of robot, 640 × 480."""
+        lens = Pinhole.across(profile.camera_fov)
+        return cls(lens, profile.camera_height, profile.camera_range, baseline)
+
+
+@dataclass(frozen=True, slots=True)
+class Foliage:
+    """Leaves about a target's outline that the mask network assigns to the target.
+
+    Attributes:
+        leaves: How many.
+        least_radius: (m); ``most_radius`` (m).
+        least_gap: How far behind or before the target they hang (m); ``most_gap`` (m).
+        before: Share that hangs in front of the target and hides a part of it, 0 to 1.
+    """
+
+    leaves: int = 30
+    least_radius: float = 0.01
+    most_radius: float = 0.03
+    least_gap: float = 0.2
+    most_gap: float = 0.8
+    before: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Upright:
+    """A footprint from one height to another (m)."""
+
+    footprint: Disc | Body
+    bottom: float
+    top: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthView:
+    """A rendered picture.
+
+    Attributes:
+        depth: As measured (m).
+        instances: Shape (height, width); 0 scenery, n the n-th target from 1.
+        leaked: Likewise, leaves that the mask network assigns to the n-th target.
+    """
+
+    depth: DepthPicture
+    instances: NDArray[np.int16]
+    leaked: NDArray[np.int16]
+
+    def segment(self, number: int, class_id: str, probability: float) -> Segment | None:
+        """Output of detector and mask network for target ``number``; None if unseen."""
+        mask: Mask = (self.instances == number) | (self.leaked == number)
+        if not (self.instances == number).any():
+            return None
+        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+        top, bottom = int(rows[0]), int(rows[-1]) + 1
+        left, right = int(columns[0]), int(columns[-1]) + 1
+        return Segment(
+            class_id,
+            probability,
+            (left + right) / 2,
+            (top + bottom) / 2,
+            right - left,
+            bottom - top,
+            write_mask(mask[top:bottom, left:right]),
+        )
+
+
+def person_shape(person: Disc) -> tuple[Upright, ...]:
+    """A body and a head."""
+    head = Disc(person.x, person.y, _HEAD_RADIUS_M)
+    return (
+        Upright(person, 0.0, _SHOULDERS_M),
+        Upright(head, _SHOULDERS_M, HEIGHT_M),
+    )
+
+
+def robot_shape(body: Body) -> tuple[Upright, ...]:
+    """A box."""
+    return (Upright(body, 0.0, ROBOT_HEIGHT_M),)
+
+
+def take(
+    camera: DepthCamera,
+    sensor: Pose2D,
+    targets: Sequence[tuple[Upright, ...]],
+    scenery: Scenery,
+    foliage: Foliage | None,
+    rng: np.random.Generator,
+) -> DepthView:
+    """Render one picture.
+
+    Args:
+        camera: Its data sheet.
+        sensor: Its pose in ``map``.
+        targets: Visible objects; the first is number 1 of ``DepthView.instances``.
+        scenery: Static objects.
+        foliage: Leaves about every target; None where nothing grows.
+        rng: Random source of leaves and noise.
+    """
+    rays = _Rays.of(camera, sensor)
+    depth = _background(rays, sensor, scenery)
+    instances = np.zeros(depth.shape, np.int16)
+    for number, shape in enumerate(targets, start=1):
+        for part in shape:
+            seen = _paint(rays, sensor, part, depth)
+            instances[seen] = number
+    leaked = np.zeros_like(instances)
+    if foliage is not None:
+        for number in range(1, len(targets) + 1):
+            _hang(camera.lens, foliage, number, depth, instances, leaked, rng)
+    measured = _measure(camera, depth, rng)
+    return DepthView(DepthPicture(camera.lens, measured), instances, leaked)
+
+
+# --- rays -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rays:
+    """Directions whose length along the optical axis is one, so that t is depth.
+
+    Attributes:
+        across: Shape (2, width): each column's direction on the floor, in ``map``.
+        up: Shape (height,): each row's slope.
+        height: Of the camera (m).
+    """
+
+    across: Floats
+    up: Floats
+    height: float
+
+    @classmethod
+    def of(cls, camera: DepthCamera, sensor: Pose2D) -> "_Rays":
+        lens = camera.lens
+        left = (lens.cx - np.arange(lens.width, dtype=np.float64)) / lens.focal
+        up = (lens.cy - np.arange(lens.height, dtype=np.float64)) / lens.focal
+        c, s = math.cos(sensor.yaw), math.sin(sensor.yaw)
+        across: Floats = np.stack((c - s * left, s + c * left))
+        return cls(across, up, camera.height)
+
+
+Span = tuple[Floats, Floats]
+"""Where rays enter and leave (m); a ray that leaves before it enters misses."""
+
+
+def _background(rays: _Rays, sensor: Pose2D, scenery: Scenery) -> Floats:
+    """Depth of floor, wall and crop."""
+    bounds = scenery.bounds
+    greenhouse = _box_span(
+        rays.across, sensor, (bounds.xmin, bounds.ymin, bounds.xmax, bounds.ymax)
+    )
+    depth = np.minimum(
+        greenhouse[1][None, :], _height_span(rays, 0.0, math.inf)[1][:, None]
+    )
+    for xmin, ymin, xmax, ymax in scenery.rectangles:
+        centre = Pose2D((xmin + xmax) / 2, (ymin + ymax) / 2, 0.0)
+        crop = Body("crop", centre, xmax - xmin, ymax - ymin)
+        _paint(rays, sensor, Upright(crop, 0.0, _CROP_HEIGHT_M), depth)
+    for x, y, radius in scenery.posts:
+        _paint(rays, sensor, Upright(Disc(x, y, radius), 0.0, math.inf), depth)
+    return depth
+
+
+def _paint(rays: _Rays, sensor: Pose2D, thing: Upright, depth: Floats) -> Mask:
+    """Shorten ``depth`` where an object stands in front; returns where it does."""
+    enter, leave = _footprint_span(rays.across, sensor, thing.footprint)
+    columns = np.flatnonzero((enter <= leave) & (leave > 0.0))
+    seen = np.zeros(depth.shape, np.bool_)
+    if not columns.size:
+        return seen
+    low, high = _height_span(rays, thing.bottom, thing.top)
+    near = np.maximum(enter[columns], low[:, None])
+    far = np.minimum(leave[columns], high[:, None])
+    hit = (near <= far) & (near > 0.0) & (near < depth[:, columns])
+    seen[:, columns] = hit
+    depth[:, columns] = np.where(hit, near, depth[:, columns])
+    return seen
+
+
+def _footprint_span(across: Floats, sensor: Pose2D, footprint: Disc | Body) -> Span:
+    if isinstance(footprint, Disc):
+        return _disc_span(across, sensor, footprint)
+    inner, turned = footprint.rays_into(sensor, across)
+    x, y = footprint.length / 2, footprint.width / 2
+    return _box_span(turned, inner, (-x, -y, x, y))
+
+
+def _disc_span(across: Floats, sensor: Pose2D, disc: Disc) -> Span:
+    """The quadratic of a ray and a circle."""
+    x, y = sensor.x - disc.x, sensor.y - disc.y
+    a = (across**2).sum(axis=0)
+    b = x * across[0] + y * across[1]
+    inside = b**2 - a * (x**2 + y**2 - disc.radius**2)
+    root = np.sqrt(np.maximum(inside, 0.0))
+    miss = inside < 0.0
+    return np.where(miss, np.inf, (-b - root) / a), np.where(
+        miss, -np.inf, (root - b) / a
+    )
+
+
+def _box_span(
+    across: Floats, sensor: Pose2D, box: tuple[float, float, float, float]
+) -> Span:
+    """The slab method on the floor; ``box`` is xmin, ymin, xmax, ymax."""
+    x = _slab(across[0], box[0] - sensor.x, box[2] - sensor.x)
+    y = _slab(across[1], box[1] - sensor.y, box[3] - sensor.y)
+    return np.maximum(x[0], y[0]), np.minimum(x[1], y[1])
+
+
+def _height_span(rays: _Rays, bottom: float, top: float) -> Span:
+    return _slab(rays.up, bottom - rays.height, top - rays.height)
+
+
+def _slab(slope: Floats, low: float, high: float) -> Span:
+    """Between two parallel planes."""
+    steep = np.where(np.abs(slope) < _LEAST_SLOPE, _LEAST_SLOPE, slope)
+    one, other = low / steep, high / steep
+    return np.minimum(one, other), np.maximum(one, other)
+
+
+# --- leaves -----------------------------------------------------------------------
+
+
+def _hang(
+    lens: Pinhole,
+    foliage: Foliage,
+    number: int,
+    depth: Floats,
+    instances: NDArray[np.int16],
+    leaked: NDArray[np.int16],
+    rng: np.random.Generator,
+) -> None:
+    """Hang leaves about one target's outline, each a disc that faces the camera."""
+    rows, columns = np.nonzero(_outline(instances == number))
+    if not rows.size:
+        return
+    for pick in rng.integers(0, rows.size, foliage.leaves):
+        row, column = int(rows[pick]), int(columns[pick])
+        gap = rng.uniform(foliage.least_gap, foliage.most_gap)
+        side = -1.0 if rng.random() < foliage.before else 1.0
+        away = max(depth[row, column] + side * gap, 0.3)
+        radius = rng.uniform(foliage.least_radius, foliage.most_radius)
+        leaf = _disc(depth.shape, row, column, radius / away * lens.focal)
+        shows = leaf & (away < depth)
+        depth[shows] = away
+        instances[shows], leaked[shows] = 0, number
+
+
+def _outline(mask: Mask) -> Mask:
+    """Pixels of a mask that have one outside beside them."""
+    wide = np.pad(mask, 1, constant_values=True)
+    inner = wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:]
+    return mask & ~inner
+
+
+def _disc(shape: tuple[int, ...], row: int, column: int, radius: float) -> Mask:
+    rows = np.arange(shape[0])[:, None] - row
+    columns = np.arange(shape[1])[None, :] - column
+    disc: Mask = rows**2 + columns**2 <= radius**2
+    return disc
+
+
+# --- what is measured -------------------------------------------------------------
+
+
+def _measure(
+    camera: DepthCamera, depth: Floats, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Depth with its errors; 0 where nothing was measured."""
+    scale = camera.disparity_error / (camera.lens.focal * camera.baseline)
+    measured = depth + depth**2 * scale * _patches(depth.shape, rng)
+    lost = rng.random(depth.shape) < camera.dropouts
+    measured[lost | (depth > camera.most) | (measured < 0.0)] = 0.0
+    return measured.astype(np.float32)
+
+
+def _patches(shape: tuple[int, ...], rng: np.random.Generator) -> Floats:
+    """Normal noise that neighbours share: drawn every few pixels, linear between."""
+    rows, columns = shape[0] / _NOISE_PATCH, shape[1] / _NOISE_PATCH
+    knots = rng.normal(0.0, 1.0, (math.ceil(rows) + 1, math.ceil(columns) + 1))
+    return _between(_between(knots, shape[0]).T, shape[1]).T
+
+
+def _between(knots: Floats, count: int) -> Floats:
+    """Linear between rows of knots; shape (count, …)."""
+    at = np.arange(count) / _NOISE_PATCH
+    below = at.astype(int)
+    share = (at - below)[:, None]
+    between: Floats = knots[below] * (1.0 - share) + knots[below + 1] * share
+    return between

@@ -1,0 +1,119 @@
+"""Robot motion: drives with limits, and odometry with noise.
+
+Source: the seed paper (AGI turns on the spot, AGII has a turning radius of 2 m).  Left
+out: slip, load, slopes.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Pose2D, Twist2D, wrap_angle
+from iveg.lab.emulator.greenhouse import Body
+
+_TURN_ACCELERATION = 1.5
+"""Angular acceleration of a differential drive (rad/s²); assumed."""
+
+_STEERING_RATE = 0.6
+"""Change of curvature of an Ackermann drive (1/m per s); assumed."""
+
+
+class Vehicle:
+    """A vehicle that executes drive commands within the limits of its profile."""
+
+    def __init__(self, profile: RobotProfile, pose: Pose2D) -> None:
+        self.profile = profile
+        self.pose = pose
+        self.twist = Twist2D(0.0, 0.0)
+        self._curvature = 0.0
+
+    def step(self, command: Twist2D, dt: float) -> None:
+        """Drive for ``dt`` (s) as commanded, within the limits."""
+        speed = self._speed(command.linear_x, dt)
+        if self.profile.drive == "ackermann":
+            turn = speed * self._steer(command, dt)
+        else:
+            turn = _towards(
+                self.twist.angular_z,
+                clip(command.angular_z, self.profile.max_turn),
+                _TURN_ACCELERATION * dt,
+            )
+        middle = self.pose.yaw + turn * dt / 2
+        self.pose = Pose2D(
+            self.pose.x + speed * dt * math.cos(middle),
+            self.pose.y + speed * dt * math.sin(middle),
+            wrap_angle(self.pose.yaw + turn * dt),
+        )
+        self.twist = Twist2D(speed, turn)
+
+    def _speed(self, wanted: float, dt: float) -> float:
+        now, wanted = self.twist.linear_x, clip(wanted, self.profile.max_speed)
+        slower = abs(wanted) < abs(now) or now * wanted < 0.0
+        limit = self.profile.braking if slower else self.profile.acceleration
+        return _towards(now, wanted, limit * dt)
+
+    def _steer(self, command: Twist2D, dt: float) -> float:
+        # A command without speed defines no steering angle: it stays as it is.
+        if abs(command.linear_x) > 1e-3:
+            wanted = command.angular_z / command.linear_x
+            wanted = clip(wanted, 1.0 / self.profile.turning_radius)
+            self._curvature = _towards(self._curvature, wanted, _STEERING_RATE * dt)
+        return self._curvature
+
+    def body(self, robot_id: str) -> Body:
+        """Footprint of the vehicle."""
+        return Body(robot_id, self.pose, self.profile.length, self.profile.width)
+
+
+def clip(value: float, limit: float) -> float:
+    """The value clipped to ±``limit``."""
+    return min(max(value, -limit), limit)
+
+
+def _towards(value: float, target: float, step: float) -> float:
+    return value + clip(target - value, step)
+
+
+@dataclass(slots=True)
+class Odometer:
+    """Odometry: the true pose with a bounded error.
+
+    Each metre adds an error of about 2 % along and 1 % across, each radian turned one
+    of 3 %, and earlier errors decay, as with the localizer behind
+    ``base_pose_ground_truth``; the error is therefore bounded, and a robot at rest
+    reports a constant pose.
+
+    Attributes:
+        along: Standard deviation, part of the way driven; ``across`` likewise.
+        turning: Standard deviation, part of the angle turned.
+        memory_m: Distance (m) over which an error decays; ``memory_rad`` likewise.
+    """
+
+    rng: np.random.Generator
+    along: float = 0.02
+    across: float = 0.01
+    turning: float = 0.03
+    memory_m: float = 2.0
+    memory_rad: float = 1.0
+    _error: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+
+    def measure(self, truth: Pose2D, twist: Twist2D, dt: float) -> Pose2D:
+        """The reported pose after moving with ``twist`` for ``dt`` (s)."""
+        way, angle = abs(twist.linear_x) * dt, abs(twist.angular_z) * dt
+        self._walk(0, self.along, way, self.memory_m)
+        self._walk(1, self.across, way, self.memory_m)
+        self._walk(2, self.turning, angle, self.memory_rad)
+        # Driving along a row also corrects the heading of a localizer.
+        self._error[2] *= math.exp(-way / self.memory_m)
+        x, y = truth.transform(self._error[0], self._error[1])
+        return Pose2D(x, y, wrap_angle(truth.yaw + self._error[2]))
+
+    def _walk(self, which: int, part: float, moved: float, memory: float) -> None:
+        # Ornstein-Uhlenbeck over the distance, not over time; its deviation is
+        # part × memory, e.g. 2 % of 2 m = 4 cm.
+        keep = math.exp(-moved / memory)
+        spread = part * memory * math.sqrt(1.0 - keep * keep)
+        fresh = float(self.rng.normal(0.0, spread)) if moved else 0.0
+        self._error[which] = self._error[which] * keep + fresh

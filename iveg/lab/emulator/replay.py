@@ -1,0 +1,225 @@
+"""Replays recorded runs as robots: the safety node decides the speed of the playback.
+
+The node's drive output is the pace of the log: full speed plays it as recorded, a limit
+of 0.5 at half the pace, a hold pauses it, and the replayed robot then reports a
+standstill.  Poses between two recorded ones are interpolated, because a safety node
+requires odometry more often than logs have it.  While the log pauses, the newest scan
+and detections are repeated, as the sensors of a robot at rest do.
+"""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from iveg.adapters import clock
+from iveg.domain.errors import DataFileError
+from iveg.domain.fleet import NOBODY, FleetDescription, RobotProfile
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import (
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+)
+from iveg.lab.emulator.bags import BagTopics
+from iveg.lab.emulator.pacing import every
+from iveg.lab.emulator.playback import Playback
+from iveg.lab.emulator.recordings import open_recording
+from iveg.robot.gate import REST
+from iveg.robot.node import NodeSettings, RobotNode
+
+TASK = "replay"
+"""Task of a replayed robot; iVeg recognises replays by the mark of their messages."""
+
+_PERIOD_S = 0.05
+_SCAN_AGAIN_S = 0.5
+_LOOK_EVERY_S = 0.2
+_NAVIGATION_EVERY_S = 1.0
+_LONGEST_STEP_S = 0.2
+_STANDS_AT_END_S = 2.0
+_FASTEST = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaySettings:
+    """Settings shared by all replayed robots of a run.
+
+    Attributes:
+        speed: Pace; 2 is twice as fast as recorded.
+        loop: Starts over at the end.
+        frame: Map frame of all recordings; None: each has a frame of its own, and its
+            detections slow no other robot.
+    """
+
+    node: NodeSettings
+    speed: float = 1.0
+    loop: bool = False
+    frame: str | None = None
+
+
+async def run_replay(
+    files: Sequence[Path],
+    robots: Sequence[str],
+    settings: ReplaySettings,
+    *,
+    topics: BagTopics | None = None,
+    bag_time: bool = False,
+    fleet: FleetDescription | None = None,
+    poses: Mapping[str, Pose2D] | None = None,
+) -> None:
+    """Play recordings; returns when all have ended, never with ``loop``.
+
+    Args:
+        files: One recording a robot.
+        robots: Their ids, in the order of the files.
+        settings: Those of all robots; the directory of the hold files is made if
+            missing.
+        topics: Topics of a ROS bag; see ``open_recording``.
+        bag_time: Bags use recording times; see ``open_recording``.
+        fleet: Fleet description; None: no description.
+        poses: By robot, the fixed pose of a recording without odometry.
+
+    Raises:
+        DataFileError: files and robots do not match, or a file cannot be used.
+    """
+    _check(files, robots, settings.speed)
+    known, stands = fleet or NOBODY, poses or {}
+    profiles = [known.of_robot(robot_id).profile for robot_id in robots]
+    recordings = [
+        open_recording(
+            file, profile.laser, topics, bag_time=bag_time, pose=stands.get(robot_id)
+        )
+        for file, robot_id, profile in zip(files, robots, profiles, strict=True)
+    ]
+    playbacks = [Playback(one, loop=settings.loop) for one in recordings]
+    replayed = [
+        ReplayedRobot(robot_id, profile, playback, settings)
+        for robot_id, profile, playback in zip(robots, profiles, playbacks, strict=True)
+    ]
+    try:
+        await _play(replayed)
+    except BaseExceptionGroup as group:
+        broken = _first_of_files(group)
+        if broken is None:
+            raise
+        raise broken from group
+
+
+async def _play(replayed: "Sequence[ReplayedRobot]") -> None:
+    async with asyncio.TaskGroup() as tasks:
+        playing = [
+            tasks.create_task(robot.run(), name=f"replay-{robot.robot_id}")
+            for robot in replayed
+        ]
+        for robot in replayed:
+            await robot.ended.wait()
+        for task in playing:
+            task.cancel()
+
+
+def _check(files: Sequence[Path], robots: Sequence[str], speed: float) -> None:
+    if len(files) != len(robots) or not files:
+        reason = f"{len(files)} files for {len(robots)} robots: each robot needs one."
+        raise DataFileError("replay", "", reason)
+    if len(set(robots)) != len(robots):
+        raise DataFileError("replay", "", "a robot is named twice.")
+    if not 0.0 < speed <= _FASTEST:
+        reason = f"speed must be more than 0 and at most {_FASTEST:g}, not {speed:g}."
+        raise DataFileError("replay", "", reason)
+
+
+def _first_of_files(group: BaseExceptionGroup[BaseException]) -> DataFileError | None:
+    """The error about a file among those that ended the tasks."""
+    found: BaseException | None = group.subgroup(DataFileError)
+    while isinstance(found, BaseExceptionGroup):
+        found = found.exceptions[0]
+    return found if isinstance(found, DataFileError) else None
+
+
+# --- one replayed robot -----------------------------------------------------------
+
+
+class ReplayedRobot:
+    """One recording under its own safety node."""
+
+    def __init__(
+        self,
+        robot_id: str,
+        profile: RobotProfile,
+        playback: Playback,
+        settings: ReplaySettings,
+    ) -> None:
+        self.robot_id = robot_id
+        self.ended = asyncio.Event()
+        self._playback = playback
+        self._speed = settings.speed
+        self._profile = profile
+        self._told = dict.fromkeys((LaserScan, DetectionFrame, Navigation), -1e9)
+        self._told_scan: LaserScan | None = None
+        self._command = REST
+        self._pace = 0.0
+        self._stood_s = 0.0
+        settings.node.directory.mkdir(parents=True, exist_ok=True)
+        self._node = RobotNode(
+            robot_id,
+            settings.node,
+            profile=self._profile,
+            drive=self._drive,
+            replay=settings.frame or robot_id,
+        )
+
+    async def run(self) -> None:
+        """Play until cancelled; ``ended`` is set when the recording is over."""
+        self._node.release_locally()
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._node.run(), name=f"node-{self.robot_id}")
+            await every(_PERIOD_S, self._step)
+
+    def _drive(self, command: Twist2D) -> None:
+        self._command = command
+
+    def _step(self, dt: float) -> None:
+        node, step = self._node, min(dt, _LONGEST_STEP_S)
+        full = Twist2D(self._profile.max_speed, 0.0)
+        node.request_twist(
+            full if node.may_drive and not self._playback.ended else REST
+        )
+        self._pace = self._slowed(self._command.linear_x, step)
+        self._playback.advance(self._pace * self._speed * step)
+        if self._playback.ended:
+            self._pace = 0.0
+            self._stood_s += step
+        if self._stood_s >= _STANDS_AT_END_S:
+            self.ended.set()
+        self._tell(clock.mono())
+
+    def _slowed(self, command: float, dt: float) -> float:
+        """The pace, 0 to 1: it falls no faster than the robot's brakes allow."""
+        wanted = max(0.0, command / self._profile.max_speed)
+        braking = self._profile.braking / self._profile.max_speed
+        return max(wanted, self._pace - braking * dt)
+
+    def _tell(self, now: float) -> None:
+        pose, twist = self._playback.motion
+        rate = self._pace * self._speed
+        moving = Twist2D(twist.linear_x * rate, twist.angular_z * rate)
+        self._node.sense(Odometry(self.robot_id, Origin(), pose, moving))
+        if self._is_due(Navigation, _NAVIGATION_EVERY_S, now):
+            self._node.sense(Navigation(self.robot_id, Origin(), TASK))
+        scan = self._playback.scan
+        is_new = scan is not self._told_scan
+        if scan and (is_new or self._is_due(LaserScan, _SCAN_AGAIN_S, now)):
+            self._told_scan, self._told[LaserScan] = scan, now
+            self._node.sense(scan)
+        looks = self._playback.has_detector
+        if looks and self._is_due(DetectionFrame, _LOOK_EVERY_S, now):
+            seen = self._playback.detections
+            self._node.sense(DetectionFrame(self.robot_id, Origin(), seen))
+
+    def _is_due(self, kind: type, period: float, now: float) -> bool:
+        if now - self._told[kind] < period:
+            return False
+        self._told[kind] = now
+        return True

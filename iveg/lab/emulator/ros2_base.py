@@ -1,0 +1,252 @@
+"""An emulated ROS 2 base: publishes its topics and executes ``cmd_vel``.
+
+It stands for the base and Nav2 of a real robot, without safety node and MQTT; ``iveg
+robot`` connects it to iVeg. A base without a command for half a second halts by itself,
+whatever the last command was.
+"""
+
+import asyncio
+import logging
+import math
+
+from iveg.adapters import clock
+from iveg.domain.errors import UnreadableError
+from iveg.domain.geometry import Pose2D, Twist2D
+from iveg.domain.observations import Detection
+from iveg.lab.emulator.greenhouse import into
+from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.pacing import LONGEST_STEP_S, SLOTS, every, in_slots
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+from iveg.robot.gate import REST
+from iveg.robot.ros2.config import RobotConfig
+from iveg.robot.ros2.reading import read_twist, write_twist
+from iveg.robot.ros2.rig import Network, Writer
+from iveg.ros2 import cdr
+from iveg.ros2 import messages as m
+from iveg.ros2.schema import Message
+
+_log = logging.getLogger(__name__)
+TIMEOUT_S = 0.5
+"""A base without a command for this long halts (s)."""
+_SECOND = 1.0
+_LASER = "laser"
+_GIVES_UP_S, _RESTS_S = 1.0, 0.8
+
+
+class SimulatedNavigation:
+    """Nav2 as a gate meets it: requests twists, gives up without progress, tries again.
+
+    After a resume the gate stays closed until zero was requested; a real navigation
+    without progress cancels its goal and requests zero.
+    """
+
+    def __init__(self) -> None:
+        self._stuck_since: float | None = None
+        self._rests_until = -math.inf
+
+    def requested_twist(
+        self, requested: Twist2D, driven: Twist2D, now: float
+    ) -> Twist2D:
+        """The twist requested now; ``driven`` was the last command of the base."""
+        if now < self._rests_until:
+            return REST
+        if requested == REST or driven != REST:
+            self._stuck_since = None
+        elif self._stuck_since is None:
+            self._stuck_since = now
+        elif now - self._stuck_since > _GIVES_UP_S:
+            self._stuck_since, self._rests_until = None, now + _RESTS_S
+            return REST
+        return requested
+
+
+class DriveWatchdog:
+    """The drive's own watchdog: the newest command while it is valid."""
+
+    def __init__(self) -> None:
+        self._command, self._at = REST, -math.inf
+
+    def take(self, command: Twist2D, now: float) -> None:
+        """Take a command."""
+        self._command, self._at = command, now
+
+    def command(self, now: float) -> Twist2D:
+        """Command for the wheels; zero when none came for half a second."""
+        return self._command if now - self._at <= TIMEOUT_S else REST
+
+
+class Ros2Base:
+    """One rig on ROS 2 topics.
+
+    Args:
+        rig: The machine.
+        world: World it drives in.
+        network: DDS.
+        config: Names of its topics and frames.
+        rate_hz: Of odometry, laser and camera each.
+
+    Attributes:
+        started: Set when fault orders are accepted.
+    """
+
+    def __init__(
+        self,
+        rig: RobotHardware,
+        world: SimulatedWorld,
+        network: Network,
+        config: RobotConfig,
+        rate_hz: float,
+    ) -> None:
+        self.robot_id = rig.robot_id
+        self.started = asyncio.Event()
+        self._rig, self._world = rig, world
+        self._frames = config.frames
+        self._rate_hz = rate_hz
+        self._base, self._navigation = DriveWatchdog(), SimulatedNavigation()
+        self._odom_in_map = rig.vehicle.pose
+        self._run_began = 0.0
+        self._is_odometry_frozen = False
+        names = config.full_topics
+
+        def writer(topic: str, message: type[Message]) -> Writer:
+            name = getattr(names, topic)
+            return network.writer(name, message, config.qualities[topic])
+
+        self._commands = network.reader(
+            names.cmd_vel_out, m.Twist, config.qualities["cmd_vel_out"].newest(50)
+        )
+        self._wishes = writer("cmd_vel_in", m.Twist)
+        self._tf, self._tf_static = (
+            writer("tf", m.TFMessage),
+            writer("tf_static", m.TFMessage),
+        )
+        self._odometry = writer("odometry", m.Odometry)
+        self._scans = writer("scan", m.LaserScan)
+        self._seen = writer("detections_3d", m.Detection3DArray)
+        self._paths = writer("path", m.Path)
+        self._batteries = writer("battery", m.BatteryState)
+
+    async def run(self, began: float, phase: float) -> None:
+        """Drive and sense until cancelled; ``began`` is when the run began."""
+        self._run_began = began
+        self._tf_static.write(cdr.write(self._mounts()))
+        self.started.set()
+        await asyncio.sleep(phase)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(every(_SECOND, self._tell_slowly), name="slow")
+            slots = self._drive, self._scan, self._look
+            await in_slots(1.0 / self._rate_hz, slots)
+
+    def obey(self, order: FaultOrder) -> None:
+        """Execute the sensor faults of an order; the others concern its software."""
+        if order.freeze_odometry is not None:
+            self._is_odometry_frozen = bool(order.freeze_odometry)
+        self._rig.blind(order)
+
+    # --- the slots ----------------------------------------------------------------
+
+    def _drive(self, dt: float) -> None:
+        now = clock.now()
+        self._take_commands(now.mono)
+        command = self._base.command(now.mono)
+        self._rig.drive(command)
+        requested = self._rig.requested_twist(now.mono - self._run_began, self._world)
+        asked = self._navigation.requested_twist(requested, command, now.mono)
+        self._wishes.write(cdr.write(write_twist(asked)))
+        self._rig.move(min(dt * SLOTS, LONGEST_STEP_S))
+        if not self._is_odometry_frozen:
+            self._tell_place(m.Time.of(now.wall))
+
+    def _take_commands(self, now: float) -> None:
+        waited = self._commands.take()
+        if not waited:
+            return
+        try:
+            twist = read_twist(cdr.read(m.Twist, waited[-1]))
+        except UnreadableError as error:
+            _log.warning("%s: unusable command: %s", self.robot_id, error)
+            return
+        self._base.take(twist, now)
+
+    def _tell_place(self, stamp: m.Time) -> None:
+        measured = self._rig.odometry()
+        in_odom = _relative(self._odom_in_map, measured.pose)
+        frames = self._frames
+        odometry = m.Odometry(
+            m.Header(stamp, frames.odom),
+            frames.base_link,
+            m.PoseWithCovariance(_pose(in_odom)),
+            m.TwistWithCovariance(write_twist(measured.twist)),
+        )
+        links = (
+            _link(stamp, frames.map, frames.odom, self._odom_in_map),
+            _link(stamp, frames.odom, frames.base_link, in_odom),
+        )
+        self._tf.write(cdr.write(m.TFMessage(links)))
+        self._odometry.write(cdr.write(odometry))
+
+    def _scan(self, _: float) -> None:
+        sweep = self._rig.scan(self._world)
+        message = m.LaserScan(
+            m.Header(m.Time.of(clock.wall()), _LASER),
+            sweep.angle_min,
+            sweep.angle_min + sweep.angle_increment * (sweep.ranges.size - 1),
+            sweep.angle_increment,
+            0.0,
+            1.0 / self._rate_hz,
+            sweep.range_min,
+            sweep.range_max,
+            sweep.ranges,
+        )
+        self._scans.write(cdr.write(message))
+
+    def _look(self, _: float) -> None:
+        now = clock.now()
+        frame = self._rig.detect(now.mono - self._run_began, self._world)
+        header = m.Header(m.Time.of(now.wall), self._frames.base_link)
+        seen = tuple(_detection(one, header) for one in frame.detections)
+        self._seen.write(cdr.write(m.Detection3DArray(header, seen)))
+
+    def _tell_slowly(self, _: float) -> None:
+        header = m.Header(m.Time.of(clock.wall()), self._frames.map)
+        path = self._rig.navigation().path
+        poses = tuple(m.PoseStamped(header, _pose(Pose2D(x, y, 0.0))) for x, y in path)
+        self._paths.write(cdr.write(m.Path(header, poses)))
+        battery = m.BatteryState(header, voltage=25.6, percentage=0.8)
+        self._batteries.write(cdr.write(battery))
+
+    def _mounts(self) -> m.TFMessage:
+        stamp = m.Time.of(clock.wall())
+        laser = self._rig.profile.laser
+        return m.TFMessage((_link(stamp, self._frames.base_link, _LASER, laser),))
+
+
+def _relative(outer: Pose2D, pose: Pose2D) -> Pose2D:
+    """A pose of ``map`` in a frame whose pose in ``map`` is ``outer``."""
+    return Pose2D(*into(outer, pose.x, pose.y), pose.yaw - outer.yaw)
+
+
+def _turned(yaw: float) -> m.Quaternion:
+    return m.Quaternion(z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+
+
+def _pose(pose: Pose2D) -> m.Pose:
+    return m.Pose(m.Point(pose.x, pose.y), _turned(pose.yaw))
+
+
+def _link(stamp: m.Time, outer: str, inner: str, pose: Pose2D) -> m.TransformStamped:
+    transform = m.Transform(m.Vector3(pose.x, pose.y), _turned(pose.yaw))
+    return m.TransformStamped(m.Header(stamp, outer), inner, transform)
+
+
+def _detection(one: Detection, header: m.Header) -> m.Detection3D:
+    box, (x, y, z) = one.box, one.box.centre
+    size = m.Vector3(box.xmax - box.xmin, box.ymax - box.ymin, box.zmax - box.zmin)
+    sure = m.ObjectHypothesis(one.class_id, one.probability)
+    centre = m.Pose(m.Point(x, y, z))
+    return m.Detection3D(
+        header,
+        (m.ObjectHypothesisWithPose(sure, m.PoseWithCovariance(centre)),),
+        m.BoundingBox3D(centre, size),
+        one.det_id or "",
+    )

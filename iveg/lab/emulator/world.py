@@ -1,0 +1,235 @@
+"""The simulated world: robots, people and climate, and each robot's sensor values.
+
+Deterministic for a seed: time is an argument, so an hour is a loop of steps.
+``fleet.py`` runs the same world in real time over MQTT.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from iveg.domain.fleet import RobotProfile
+from iveg.domain.geometry import Twist2D
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import (
+    Climate,
+    DetectionFrame,
+    LaserScan,
+    Navigation,
+    Odometry,
+    Origin,
+)
+from iveg.lab.emulator.camera import (
+    PERSON,
+    Detector,
+    DetectorModel,
+    Target,
+    person_target,
+    robot_target,
+    upright_box,
+)
+from iveg.lab.emulator.following import Follower
+from iveg.lab.emulator.greenhouse import Body, Disc, Scenery
+from iveg.lab.emulator.grounded import GroundedCamera
+from iveg.lab.emulator.kinematics import Odometer, Vehicle
+from iveg.lab.emulator.layout import Layout
+from iveg.lab.emulator.lidar import LaserModel, sweep
+from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.people import SimulatedPerson
+from iveg.lab.emulator.scripts import RobotScript
+from iveg.robot.gate import REST
+
+Camera = Literal["boxes", "grounding"]
+_LASER = LaserModel()
+_FALSE_PERSON_CONFIDENCE = 0.95
+
+
+class RobotHardware:
+    """Hardware and navigation of one robot; the safety node sits in between.
+
+    Attributes:
+        command: Last command of the drive.
+        false_person: Fault: a position in ``map`` where the camera detects a person.
+        hides_people: Fault: the camera detects no person.
+    """
+
+    def __init__(
+        self,
+        robot_id: str,
+        profile: RobotProfile,
+        script: RobotScript,
+        detector: DetectorModel,
+        rng: np.random.Generator,
+        camera: Camera = "boxes",
+    ) -> None:
+        self.robot_id = robot_id
+        self.profile = profile
+        self.command = REST
+        self.false_person: tuple[float, float] | None = None
+        self.hides_people = False
+        self._script = script
+        self._rng = rng
+        self._odometer = Odometer(rng)
+        place = None
+        if camera == "grounding":
+            place = GroundedCamera(profile, rng.spawn(1)[0]).place
+        self._detector = Detector(profile, detector, rng, place)
+        self.vehicle = Vehicle(self.profile, script.start)
+        self._believed = script.start
+        self._follower = Follower(
+            self.profile, script.route(), script.start, script.cruise, script.stations
+        )
+
+    def drive(self, command: Twist2D) -> None:
+        """Set the command of the drive; it holds until the next."""
+        self.command = command
+
+    def move(self, dt: float) -> None:
+        """Move the wheels for ``dt`` seconds."""
+        self.vehicle.step(self.command, dt)
+        truth, twist = self.vehicle.pose, self.vehicle.twist
+        self._believed = self._odometer.measure(truth, twist, dt)
+
+    def blind(self, order: FaultOrder) -> None:
+        """Set the camera faults of an order."""
+        if order.hide_people is not None:
+            self.hides_people = order.hide_people
+        if "false_person" in order.model_fields_set:
+            place = order.false_person
+            self.false_person = None if place is None else (place.x, place.y)
+
+    def requested_twist(self, now: float, around: "SimulatedWorld") -> Twist2D:
+        """Twist that navigation requests; ``now`` in seconds into the run."""
+        discs = around.discs()
+        for body in around.bodies_but(self.robot_id):
+            discs.extend(body.discs())
+        return self._follower.requested_twist(self.vehicle.pose, now, discs)
+
+    # --- sensors ------------------------------------------------------------------
+
+    def odometry(self) -> Odometry:
+        """Estimated pose, measured speeds."""
+        return Odometry(self.robot_id, Origin(), self._believed, self.vehicle.twist)
+
+    def scan(self, around: "SimulatedWorld") -> LaserScan:
+        """One turn of the laser."""
+        sensor = self.vehicle.pose.compose(self.profile.laser)
+        others = around.bodies_but(self.robot_id)
+        ranges = sweep(
+            sensor, _LASER, around.scenery, around.discs(), others, self._rng
+        )
+        return LaserScan(
+            self.robot_id,
+            Origin(),
+            -math.pi,
+            _LASER.angle_increment,
+            _LASER.range_min,
+            _LASER.range_max,
+            self.profile.laser,
+            ranges,
+        )
+
+    def detect(self, now: float, around: "SimulatedWorld") -> DetectionFrame:
+        """One frame of camera and detector; empty when nothing is seen."""
+        pose = self.vehicle.pose
+        targets = around.targets_for(self.robot_id)
+        if self.hides_people:
+            targets = [target for target in targets if target.class_id != PERSON]
+        found = self._detector.detect(now, pose, targets, around.scenery)
+        if self.false_person is not None:
+            x, y = self.false_person
+            ghost = upright_box(pose, PERSON, x, y, _FALSE_PERSON_CONFIDENCE)
+            found = (*found, ghost)
+        return DetectionFrame(self.robot_id, Origin(), found, self._detector.lost)
+
+    def part_seen(self, target: Target, around: "SimulatedWorld") -> float:
+        """Visible share of a target from its camera, whatever the detector reports."""
+        camera = self.vehicle.pose.compose(self.profile.camera)
+        return self._detector.part_seen(camera, target.body, around.scenery)
+
+    def navigation(self) -> Navigation:
+        """The intent: task, goal and path."""
+        path = self._follower.path()
+        task = "waiting" if self._follower.at_station else self._script.task
+        return Navigation(self.robot_id, Origin(), task, path[-1], path)
+
+
+class SimulatedWorld:
+    """Scenery, robots and people.
+
+    Args:
+        greenhouse: The greenhouse.
+        layout: Robots and people with their routes.
+        detector: Error model of the robots' detectors.
+        seed: The same seed gives the same people and the same noise.
+        camera: Source of the boxes: drawn about the truth, or by grounding.
+    """
+
+    def __init__(
+        self,
+        greenhouse: Greenhouse,
+        layout: Layout,
+        detector: DetectorModel,
+        seed: int,
+        camera: Camera = "boxes",
+    ) -> None:
+        streams = np.random.SeedSequence(seed).spawn(
+            len(layout.robots) + len(layout.people)
+        )
+        generators = [np.random.default_rng(stream) for stream in streams]
+        self.scenery = Scenery.of(greenhouse)
+        self.rigs: Mapping[str, RobotHardware] = {
+            robot_id: RobotHardware(
+                robot_id, layout.profiles[robot_id], script, detector, rng, camera
+            )
+            for (robot_id, script), rng in zip(
+                layout.robots.items(), generators, strict=False
+            )
+        }
+        self.people = [
+            SimulatedPerson(round_, rng)
+            for round_, rng in zip(
+                layout.people, generators[len(layout.robots) :], strict=True
+            )
+        ]
+
+    def walk(self, dt: float) -> None:
+        """Move the people for ``dt`` seconds."""
+        bodies = self.bodies()
+        for person in self.people:
+            person.step(dt, bodies, self.scenery)
+
+    def bodies(self) -> list[Body]:
+        """Footprints of all robots."""
+        return [rig.vehicle.body(rig.robot_id) for rig in self.rigs.values()]
+
+    def bodies_but(self, robot_id: str) -> list[Body]:
+        """The other robots, as obstacles for one of them."""
+        return [body for body in self.bodies() if body.robot_id != robot_id]
+
+    def discs(self) -> list[Disc]:
+        """Footprints of all people."""
+        return [person.disc for person in self.people]
+
+    def targets_for(self, robot_id: str) -> list[Target]:
+        """Possible targets of a robot's camera."""
+        people = [person_target(n, disc) for n, disc in enumerate(self.discs())]
+        return people + [robot_target(body) for body in self.bodies_but(robot_id)]
+
+
+_DAY_S = 86_400.0
+
+
+def climate_at(wall: float) -> Climate:
+    """Climate at a time of day (Unix s): warm and dry at 14 h UTC, humid at night.
+
+    Typical of a Mediterranean greenhouse in spring; CO₂ falls while the crop works.
+    """
+    warmth = math.cos((wall % _DAY_S - 14 * 3600.0) / _DAY_S * math.tau)
+    return Climate(
+        temperature=round(22.0 + 6.0 * warmth, 2),
+        relative_humidity=round(0.70 - 0.12 * warmth, 3),
+        co2=round(430.0 - 60.0 * warmth, 1),
+    )

@@ -1,0 +1,82 @@
+"""An experiment's directory: one file per run, so that an interrupted one can continue.
+
+::
+
+    plan.json                     whose runs these are
+    progress.json                 how far it is
+    together-1.json … one for each finished run
+    partial.json, partial.html    it broke off: what there is so far
+    result.json, result.html      it is whole
+"""
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from iveg.domain.errors import DataFileError
+from iveg.lab.experiment.files import claim, read_json, write_json
+from iveg.lab.experiment.outcome import Outcome, result_of
+from iveg.lab.experiment.plan import Plan, PlannedRun
+from iveg.lab.experiment.report import write_report
+
+
+class RunStore:
+    """Stored results of one experiment.
+
+    Raises:
+        DataFileError: the directory contains another one.
+    """
+
+    def __init__(self, plan: Plan, directory: Path) -> None:
+        self.directory = directory
+        self._plan = plan
+        claim(directory, plan)
+
+    def steps_left(self) -> list[PlannedRun]:
+        """Steps that no earlier start has finished."""
+        known = {(one["family"], one["number"]) for one in self._outcomes()}
+        return [s for s in self._plan.steps() if (s.family, s.number) not in known]
+
+    @property
+    def done(self) -> int:
+        """Number of finished runs."""
+        return len(self._outcomes())
+
+    def is_last(self, step: PlannedRun) -> bool:
+        """Whether no step follows."""
+        return step == [*self._plan.steps()][-1]
+
+    def keep(self, step: PlannedRun, outcome: Outcome) -> None:
+        """Store a finished run."""
+        write_json(self._file(step), outcome)
+
+    def finish(self, chosen: Mapping[str, Any], why: str) -> Path:
+        """Write the result, or the part that exists.
+
+        Args:
+            chosen: Settings that influence it.
+            why: Reason of an early end, or empty.
+
+        Returns:
+            The report.
+        """
+        for file in self.directory.glob("partial.*"):
+            file.unlink()
+        name = "partial" if why else "result"
+        result = result_of(self._plan, self._outcomes(), chosen, why)
+        write_json(self.directory / f"{name}.json", result)
+        report = self.directory / f"{name}.html"
+        report.write_text(write_report(result), encoding="utf-8")
+        return report
+
+    def _outcomes(self) -> list[Outcome]:
+        found = []
+        for step in self._plan.steps():
+            # A run with an unreadable file counts as not done.
+            with contextlib.suppress(DataFileError):
+                found.append(read_json(self._file(step)))
+        return found
+
+    def _file(self, step: PlannedRun) -> Path:
+        return self.directory / f"{step.name}.json"

@@ -1,0 +1,112 @@
+"""Latencies in slices of a few seconds, from the latency API.
+
+The API reports totals since iVeg's start; the difference of two responses is a slice.
+The slices of all runs add up to the experiment, and resampling them gives the interval
+of a mean or a quantile: messages of one slice are not independent.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iveg.domain.latency.account import Cell
+from iveg.domain.latency.segments import DATA, SEGMENTS
+from iveg.domain.latency.sketch import Sketch, from_bins, merged
+from iveg.lab.experiment.statistics import Interval
+
+Slice = dict[str, dict[str, dict[str, Any]]]
+"""By kind of data and hop: ``edges_ms``, ``counts``, ``total_ms``; empty cells are
+left out."""
+_EMPTY: Final[Mapping[str, Any]] = {"edges_ms": [], "counts": [], "total_ms": 0.0}
+_DRAWS: Final = 1000
+_FEWEST: Final = 4
+"""Least number of slices for an interval."""
+_SEED: Final = 14
+
+
+def slice_between(before: Sequence[Any], after: Sequence[Any]) -> Slice:
+    """Measurements between two responses' ``rows``."""
+    old = {row["data"]: row["bins"] for row in before}
+    found: Slice = {}
+    for row in after:
+        for hop, bins in row["bins"].items():
+            more = _less(bins, old.get(row["data"], {}).get(hop, _EMPTY))
+            if more["counts"]:
+                found.setdefault(row["data"], {})[hop] = more
+    return found
+
+
+def _less(after: Mapping[str, Any], before: Mapping[str, Any]) -> dict[str, Any]:
+    known = dict(zip(before["edges_ms"], before["counts"], strict=True))
+    told = zip(after["edges_ms"], after["counts"], strict=True)
+    more = [(edge, count - known.get(edge, 0)) for edge, count in told]
+    kept = [(edge, count) for edge, count in more if count > 0]
+    total = after["total_ms"] - before["total_ms"]
+    return {
+        "edges_ms": [edge for edge, _ in kept],
+        "counts": [count for _, count in kept],
+        "total_ms": round(total, 3),
+    }
+
+
+def sketches_of(slices: Iterable[Slice], cell: Cell) -> list[Sketch]:
+    """One hop of one kind of data, slice by slice."""
+    data, hop = cell
+    return [_sketch(one.get(data, {}).get(hop, _EMPTY)) for one in slices]
+
+
+def _sketch(bins: Mapping[str, Any]) -> Sketch:
+    edges = [edge / 1000.0 for edge in bins["edges_ms"]]
+    return from_bins(edges, bins["counts"], bins["total_ms"] / 1000.0)
+
+
+def whole(slices: Sequence[Slice]) -> dict[Cell, Sketch]:
+    """All slices combined."""
+    cells: list[Cell] = [(data, hop) for data in DATA for hop in SEGMENTS]
+    return {cell: merged(sketches_of(slices, cell)) for cell in cells}
+
+
+def latency_changes(
+    before: Sequence[Slice], after: Sequence[Slice], cell: Cell
+) -> Iterator[tuple[str, Interval]]:
+    """Increase of a hop's mean and P95 (ms), with bootstrapped intervals.
+
+    Slices are drawn with replacement (Efron 1979), a thousand times, seeded.
+    """
+    old, new = sketches_of(before, cell), sketches_of(after, cell)
+    if min(_filled(old), _filled(new)) < _FEWEST:
+        return
+    drawn = _drawn(old, _SEED), _drawn(new, _SEED + 1)
+    now = _numbers(merged(old)), _numbers(merged(new))
+    for place, name in enumerate(("mean", "P95")):
+        differences = drawn[1][:, place] - drawn[0][:, place]
+        low, high = np.percentile(differences, (2.5, 97.5))
+        middle = now[1][place] - now[0][place]
+        yield name, Interval(middle, float(low), float(high))
+
+
+def _filled(sketches: Iterable[Sketch]) -> int:
+    return sum(one.count > 0 for one in sketches)
+
+
+def _numbers(sketch: Sketch) -> tuple[float, float]:
+    return 1000.0 * (sketch.mean or 0.0), 1000.0 * (sketch.quantile(0.95) or 0.0)
+
+
+def _drawn(sketches: Sequence[Sketch], seed: int) -> NDArray[np.float64]:
+    """Mean and P95 (ms) of each draw, shape (draws, 2)."""
+    parts = [one for one in sketches if one.count]
+    keys = np.unique(np.concatenate([one.keys for one in parts]))
+    counts = np.zeros((len(parts), keys.size))
+    for row, one in zip(counts, parts, strict=True):
+        row[np.searchsorted(keys, one.keys)] = one.counts
+    totals = np.array([one.total for one in parts])
+    even = np.full(len(parts), 1.0 / len(parts))
+    weights = np.random.default_rng(seed).multinomial(len(parts), even, _DRAWS)
+    bins = weights @ counts
+    n = bins.sum(axis=1)
+    reached = np.argmax(np.cumsum(bins, axis=1) >= 0.95 * n[:, None], axis=1)
+    edges = np.array(Sketch(keys=keys, counts=np.ones_like(keys, np.int64)).bins()[0])
+    return np.stack((weights @ totals / n, edges[reached]), axis=1) * 1000.0

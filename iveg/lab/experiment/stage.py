@@ -1,0 +1,210 @@
+"""A greenhouse on a virtual clock.
+
+The emulator's world, the robots' own safety machines and iVeg's pipeline, without a
+socket or a process.  Their messages are encoded and decoded by the codec, as on the
+wire.  The same seed gives the same run on any machine, however busy it is.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import count
+from typing import Final
+
+from iveg.domain.feedback import Feedback
+from iveg.domain.observations import Instant, Received
+from iveg.domain.transports import DIRECT
+from iveg.lab.emulator.orders import FaultOrder
+from iveg.lab.emulator.scripts import Incident
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+from iveg.ngsi import codec
+from iveg.pipeline.ingest import Ingest
+from iveg.pipeline.loop import RuleLoop
+from iveg.robot.echo import Echo
+from iveg.robot.effects import Answer, Drive, Effect, Report
+from iveg.robot.gate import REST
+from iveg.robot.holds import HoldSet
+from iveg.robot.judgement import Limits
+from iveg.robot.safety import SafetyMachine
+from iveg.robot.uplink import Uplink
+
+STEP_S: Final = 0.05
+_LOOK_EVERY, _NAVIGATION_EVERY = 2, 20
+"""Steps between two camera frames, the first once all odometry was sent, and between
+two messages of navigation."""
+Looked = Callable[[RobotHardware], None]
+
+
+class StagedRobot:
+    """One rig with its safety machine, whose effects are executed at once.
+
+    Args:
+        hear: Called with the topic and payload of its messages.
+        looked: Called when its camera has taken a picture.
+        scan_every: Steps between two sweeps of its laser; 0: none.
+    """
+
+    def __init__(
+        self,
+        rig: RobotHardware,
+        now: Instant,
+        hear: Callable[[str, bytes], None],
+        looked: Looked = lambda _: None,
+        scan_every: int = 0,
+    ) -> None:
+        texts = count(1)
+        self._faults = FaultOrder(robot=rig.robot_id)
+        self._rig = rig
+        self._hear = hear
+        self._looked = looked
+        self._scan_every = scan_every
+        self._echo = Echo()
+        self._uplink = Uplink(rig.robot_id, "iveg", "b1", self._say, echo=self._echo)
+        self._machine = SafetyMachine(
+            rig.robot_id,
+            "b1",
+            now.mono,
+            stored=HoldSet(),
+            fresh=lambda: f"{rig.robot_id}-{next(texts)}",
+            limits=Limits(rig.profile.max_speed, rig.profile.max_turn),
+        )
+        self._perform(self._machine.release_locally(now.mono), now)
+
+    def step(self, number: int, world: SimulatedWorld, now: Instant) -> None:
+        """Navigate, drive, sense."""
+        into_run = number * STEP_S
+        free = self._machine.may_drive
+        requested = self._rig.requested_twist(into_run, world) if free else REST
+        self._perform(self._machine.request_twist(requested, now.mono), now)
+        if self._faults.deaf and free:
+            self._rig.drive(requested)
+        self._rig.move(STEP_S)
+        moved = self._rig.odometry()
+        self._perform(self._machine.odometry(moved.pose, moved.twist, now.mono), now)
+        now = self._dated(now)
+        self._uplink.send(moved, now)
+        if self._scan_every and number % self._scan_every == 0:
+            self._uplink.send(self._rig.scan(world), now)
+        if number % _LOOK_EVERY == 1:
+            self._uplink.send(self._rig.detect(into_run, world), now)
+            self._looked(self._rig)
+        if number % _NAVIGATION_EVERY == 0:
+            self._uplink.send(self._rig.navigation(), now)
+
+    def _dated(self, now: Instant) -> Instant:
+        """Readings of its own clocks."""
+        return Instant(now.mono, now.wall + (self._faults.clock_offset_s or 0.0))
+
+    def obey(self, order: FaultOrder) -> None:
+        """Take ``mute``, ``deaf`` and ``clock_offset_s`` of an order that has them.
+
+        A mute robot's messages do not arrive; a deaf one ignores iVeg's speed limits,
+        but not holds.
+        """
+        named = order.model_dump(exclude_none=True)
+        self._faults = self._faults.model_copy(update=named)
+
+    def listen(self, topic: str, payload: bytes, now: Instant) -> None:
+        """Take iVeg's feedback to a robot of the fleet."""
+        feedback = codec.read_feedback(payload)
+        self._echo.take(feedback.origin)
+        self._perform(self._machine.feedback(topic, feedback, now.mono), now)
+
+    def order(self, payload: bytes, now: Instant) -> None:
+        """Take an order that iVeg sends to this robot."""
+        self._perform(self._machine.command(payload, now.mono), now)
+
+    @property
+    def speed(self) -> float:
+        """True speed (m/s)."""
+        return abs(self._rig.vehicle.twist.linear_x)
+
+    def _perform(self, effects: Sequence[Effect], now: Instant) -> None:
+        for effect in effects:
+            match effect:
+                case Drive(twist):
+                    self._rig.drive(twist)
+                case Report(report):
+                    seq, (_, message) = self._uplink.report(report, self._dated(now))
+                    self._machine.reported(seq, now.mono)
+                    self._say(message.topic, message.payload)
+                case Answer(answer):
+                    message = self._uplink.answer(answer, self._dated(now))
+                    self._say(message.topic, message.payload)
+
+    def _say(self, topic: str, payload: bytes) -> None:
+        if not self._faults.mute:
+            self._hear(topic, payload)
+
+
+def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
+    """Decode a direct message as iVeg does."""
+    reading = codec.read_measure(topic.split("/")[2], payload)
+    assert reading.problems == ()  # noqa: S101 - both ends are ours
+    for observation in reading.observations:
+        yield Received(observation, now, DIRECT.id)
+
+
+class Stage:
+    """One scenario in steps of a twentieth of a second.
+
+    Args:
+        incidents: Its faults.
+        told: Feedback that iVeg has published; it grows.
+        move_clock: Advances the clock by seconds; returns the time.
+        hear: Called with each message of a robot, from its creation on.
+        looked, scan_every: As for ``StagedRobot``.
+
+    Attributes:
+        robots: Its robots, by id.
+    """
+
+    def __init__(
+        self,
+        world: SimulatedWorld,
+        incidents: Iterable[Incident],
+        ingest: Ingest,
+        loop: RuleLoop,
+        told: Sequence[Feedback],
+        move_clock: Callable[[float], Instant],
+        hear: Callable[[str, bytes], None],
+        *,
+        looked: Looked = lambda _: None,
+        scan_every: int = 0,
+    ) -> None:
+        self._world = world
+        self._incidents = [(one.at_s, one.order) for one in incidents]
+        self._ingest, self._loop, self._told = ingest, loop, told
+        self._move_clock = move_clock
+        self.now = move_clock(0.0)
+        self.robots = {
+            robot_id: StagedRobot(rig, self.now, hear, looked, scan_every)
+            for robot_id, rig in world.rigs.items()
+        }
+        self._delivered = 0
+        self._steps = 0
+
+    def step(self) -> None:
+        """Advance everything by a twentieth of a second."""
+        number = self._steps
+        self._steps += 1
+        self.now = self._move_clock(round(self._steps * STEP_S, 6))
+        for at_s, order in self._incidents:
+            if number == round(at_s / STEP_S):
+                self.happen(order)
+        self._world.walk(STEP_S)
+        for robot in self.robots.values():
+            robot.step(number, self._world, self.now)
+        self._loop.step(self._ingest.drain(), self.now)
+        self._deliver()
+
+    def happen(self, order: FaultOrder) -> None:
+        """Inject a fault into a robot, or end it."""
+        self.robots[order.robot].obey(order)
+
+    def _deliver(self) -> None:
+        """Deliver new feedback to every robot."""
+        told = self._told[self._delivered :]
+        self._delivered += len(told)
+        for feedback in told:
+            payload = codec.write_feedback(feedback)
+            for robot in self.robots.values():
+                robot.listen(feedback.robot_id, payload, self.now)

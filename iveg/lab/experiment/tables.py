@@ -1,0 +1,206 @@
+"""Tables of the report: the paper's numbers beside the measured ones."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from statistics import fmean
+from typing import Any, Final
+
+from iveg.domain.latency.paper import PAPER, Place
+from iveg.domain.latency.segments import DATA
+from iveg.lab.experiment.paper_tables import (
+    CLASSES,
+    COMPLETION,
+    CONFIDENCE,
+    GLOBAL,
+    MEANS,
+    P95_BELOW_MS,
+    PRINTED,
+    PaperScore,
+    disagreements,
+)
+
+Result = Mapping[str, Any]
+Rows = Iterator[Sequence[object]]
+
+DETECTION: Final = ("class", "source", "TP", "FP", "FN", "precision", "recall", "AP")
+
+
+def detection(result: Result) -> Rows:
+    """Per class, in total and in the mean."""
+    real = result["stack"]
+    for class_id in CLASSES:
+        yield _counts(class_id, "here", result["detection"][class_id])
+        yield _counts(class_id, "here, real time", real["detection"][class_id])
+        for place, rows in PRINTED.items():
+            yield _printed(class_id, place, rows[class_id])
+    yield _counts("total", "here", result["global"])
+    yield _counts("total", "here, real time", real["global"])
+    for place, row in GLOBAL.items():
+        yield _printed("total", place, row)
+    yield _means(result)
+    for place, (precision, recall, ap) in MEANS.items():
+        rates = (f"{precision:.2f} %", f"{recall:.2f} %")
+        yield "mean", f"paper, {place}", "", "", "", *rates, ap
+
+
+def _printed(name: str, place: Place, row: PaperScore) -> Sequence[object]:
+    """A row of the paper's table."""
+    rates = (f"{row.precision:.2f} %", f"{row.recall:.2f} %")
+    ap = "–" if row.ap is None else row.ap
+    return name, f"paper, {place}", row.tp, row.fp, row.fn, *rates, ap
+
+
+def _counts(name: str, source: str, told: Mapping[str, Any]) -> Sequence[object]:
+    ap = "–" if told["ap"] is None else f"{told['ap']:.2f}"
+    rates = (_interval(told["precision"]), _interval(told["recall"]))
+    return name, source, told["tp"], told["fp"], told["fn"], *rates, ap
+
+
+def _means(result: Result) -> Sequence[object]:
+    rows = [result["detection"][name] for name in CLASSES]
+    cells = []
+    for rate in ("precision", "recall"):
+        shares = [row[rate]["share"] for row in rows if row[rate] is not None]
+        cells.append(f"{100.0 * fmean(shares):.1f} %" if shares else "–")
+    areas = [row["ap"] for row in rows if row["ap"] is not None]
+    ap = f"{fmean(areas):.2f}" if areas else "–"
+    return "mean", "here", "", "", "", *cells, ap
+
+
+DISAGREES: Final = ("row", "table", "number", "printed", "follows")
+
+
+def disagreeing() -> Rows:
+    """Numbers of the paper's tables that do not follow from those beside them."""
+    for one in disagreements():
+        yield one.row, one.place, one.what, f"{one.printed:g}", f"{one.follows:g}"
+
+
+CLAIMS: Final = ("what the text says", "here", "paper, simulation", "paper, field")
+
+
+def claims(result: Result) -> Rows:
+    """Numbers of the paper's text."""
+    done, real = result["completion"], result["stack"]["completion"]
+    here = f"{done['completed']} of {done['runs']}"
+    through = f"{real['completed']} of {real['runs']}"
+    shares = [f"{COMPLETION[place]:.0%}" for place in PRINTED]
+    yield "runs completed", f"{here}; through all programs {through}", *shares
+    told = result["global"]["confidence"]
+    sure = [f"{CONFIDENCE[place]:.0%}" for place in PRINTED]
+    yield "mean confidence", "–" if told is None else f"{told:.0%}", *sure
+    yield "…of these at or above the rule's threshold", _confident(result), "", ""
+    order = result["stack"]["order"]
+    yield "messages that never came out of Orion", _lost(order["fiware"]), "none", ""
+    skipped = "messages that iVeg's own reading of the broker skipped for newer ones"
+    yield skipped, _lost(order["uplink"]), "", ""
+    below = [f"below {P95_BELOW_MS[place]:.0f} ms" for place in PRINTED]
+    yield "P95 from robot to Orion", _worst(result), *below
+
+
+def _confident(result: Result) -> str:
+    threshold = result["configuration"].get("confidence_threshold")
+    tallies = (one["counted"]["classes"].values() for one in result["runs"])
+    found = [sure for each in tallies for one in each for sure in one["found"]]
+    if threshold is None or not found:
+        return "–"
+    return f"{sum(one >= threshold for one in found) / len(found):.0%} ({threshold})"
+
+
+def _lost(order: Mapping[str, int]) -> str:
+    if not order:
+        return "–"
+    return f"{order['missing']} of {order['passed'] + order['missing']}"
+
+
+def _worst(result: Result) -> str:
+    hops = [row["hops"]["robot_orion"] for row in result["latency"]["rows"]]
+    worst = max((one["p95_ms"] or 0.0 for one in hops), default=0.0)
+    return f"{worst:.1f} ms" if worst else "–"
+
+
+SIGHT: Final = ("what", "here", "here, real time")
+_SLOWDOWNS: Final = {
+    "decided": "slow-downs decided",
+    "applied": "…applied by the robot, by its own report",
+    "observed": "…observed in its speed",
+    "out_of_sight": "…for somebody whom the robot could not see",
+}
+_INJECTION: Final = {
+    "asked": "moments in which another saw a person and AGII did not",
+    "injected": "…with the person in AGII's costmap",
+    "people": "people whom another saw before AGII's own camera did",
+    "ahead": "…who stood in AGII's costmap before",
+}
+
+
+def out_of_sight(result: Result) -> Rows:
+    """Slow-downs, and people out of AGII's sight that were reported to it."""
+    yield from _both(result, "slowdowns", _SLOWDOWNS)
+    yield from _both(result, "injection", _INJECTION)
+
+
+def _both(result: Result, what: str, names: Mapping[str, str]) -> Rows:
+    """Counts of both halves of the runs, one row for each key of ``names``."""
+    for key, name in names.items():
+        yield name, *(half[what].get(key, 0) for half in (result, result["stack"]))
+
+
+STOPS: Final = ("robot", "robot's answer", "standing")
+
+
+def stops(result: Result) -> Rows:
+    """STOP of the fleet (ms since the request)."""
+    for one in result["stack"]["stops"]:
+        answered = ms(one["answer_direct"]["p50_ms"])
+        yield one["robot_id"], answered, ms(one["standing"]["p50_ms"])
+
+
+LATENCY: Final = (
+    *("data", "source", "n", "Δt₁", "P95", "Δt₂", "P95", "total", "P95"),
+    *("Δt₃", "P95"),
+)
+
+
+def latency(result: Result) -> Rows:
+    """The paper's table (ms)."""
+    rows = {one["data"]: one["hops"] for one in result["latency"]["rows"]}
+    for data in DATA:
+        hops = [rows[data][h] for h in ("uplink", "fiware", "robot_orion", "iveg")]
+        cells = [ms(hop[name]) for hop in hops for name in ("mean_ms", "p95_ms")]
+        yield data, "here", hops[2]["count"], *cells
+        for place, printed in PAPER.items():
+            row = printed[data]
+            told = (
+                *(row.uplink_mean, row.uplink_p95, row.fiware_mean, row.fiware_p95),
+                *(row.total_mean, row.total_p95),
+            )
+            yield data, f"paper, {place}", "", *map(ms, told), "", ""
+
+
+RUNS: Final = (
+    *("run", "scenario", "seed", "pictures", "completed"),
+    *("in real time", "completed"),
+)
+
+
+def runs(result: Result) -> Rows:
+    """One line per run."""
+    for one in result["runs"]:
+        cells = [
+            cell
+            for half in (one["counted"], one["stack"])
+            for cell in (half["pictures"], "yes" if half["completed"] else "no")
+        ]
+        yield one["number"], one["family"], one["seed"], *cells
+
+
+def _interval(told: Mapping[str, float] | None) -> str:
+    if told is None:
+        return "–"
+    share, low, high = (100.0 * told[name] for name in ("share", "low", "high"))
+    return f"{share:.1f} % [{low:.1f}, {high:.1f}]"
+
+
+def ms(value: float | None) -> str:
+    """One duration in a table."""
+    return "–" if value is None else f"{value:.1f}"

@@ -1,0 +1,223 @@
+"""One run on the virtual clock, which gives all counts.
+
+Real programs depend on the scheduling of the processor; this run does not, so that two
+runs of one seed give the same counts on any machine.
+"""
+
+import asyncio
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Literal
+
+from iveg.adapters.fleet_files import load_fleet
+from iveg.adapters.greenhouses import load_greenhouse
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import Feedback
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant
+from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.rule.zones import zones_of
+from iveg.lab.emulator.camera import DETECTORS
+from iveg.lab.emulator.layout import lay_out
+from iveg.lab.emulator.scenarios import scenario_named
+from iveg.lab.emulator.truth import in_view
+from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
+from iveg.lab.experiment.beliefs import Belief, belief_of
+from iveg.lab.experiment.plan import ROBOTS, PlannedRun
+from iveg.lab.experiment.scoring import Pair, Picture, SeenObject
+from iveg.lab.experiment.stage import STEP_S, Stage, heard
+from iveg.pipeline.build import Choices, Ports, build
+from iveg.pipeline.mapping import Mapper
+from iveg.web.views import Views
+
+_EPOCH = Instant(0.0, 1_700_000_000.0)
+_SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
+"""Steps between two sweeps, two looks into a costmap, and two rests for others."""
+
+
+@dataclass(slots=True)
+class VirtualRunResult:
+    """Result of a run.
+
+    Attributes:
+        pairs: Each detection frame, true and as iVeg reported it.
+        beliefs: At some moments (s), the content of a robot's costmap.
+        decisions: All decisions in their final state.
+        touched: Moments at which a robot touched a person.
+        lost: Robots that were not live at the end.
+    """
+
+    pairs: list[Pair] = field(default_factory=list)
+    beliefs: list[tuple[float, Belief]] = field(default_factory=list)
+    decisions: list[DecisionRecord] = field(default_factory=list)
+    touched: int = 0
+    lost: int = 0
+
+    @property
+    def completed(self) -> bool:
+        """Whether it completed: all robots live, no collision."""
+        return bool(self.pairs) and not self.touched and not self.lost
+
+
+class _Outside:
+    """Ports of a pipeline without an operator.
+
+    Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
+    """
+
+    def __init__(self) -> None:
+        self.told: list[Feedback] = []
+        self.decisions: dict[str, DecisionRecord] = {}
+
+    def tell(self, feedback: Feedback) -> None:
+        self.told.append(feedback)
+
+    def offer(self, record: Record) -> None:
+        if isinstance(record, DecisionRecord):
+            self.decisions[record.decision_id] = record
+
+    async def flushed(self) -> None:
+        """Return; nothing is stored here."""
+
+    async def set_desired_state(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        """Ignore; no robot is stopped here."""
+
+    async def log_desired(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Ignore; no robot is stopped here."""
+
+    async def log_release(
+        self,
+        robot_id: str,
+        hold_id: str,
+        ids: Sequence[str],
+        challenge: str,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Ignore; no robot is released here."""
+
+
+class VirtualRun:
+    """One scenario in a pipeline of its own.
+
+    Args:
+        watched: Robot whose costmap is examined.
+    """
+
+    def __init__(
+        self, step: PlannedRun, profile: str, rule: DetectionRule, watched: str
+    ) -> None:
+        scenario = scenario_named(step.family)
+        greenhouse = load_greenhouse(scenario.greenhouse)
+        layout = lay_out(scenario, ROBOTS, greenhouse)
+        self._now = _EPOCH
+        self._outside = _Outside()
+        self._watched = watched
+        self._result = VirtualRunResult()
+        self._detections: list[Picture] = []
+        self._wire(greenhouse, rule)
+        detector = DETECTORS[layout.detector or profile]
+        self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
+        self._stage = Stage(
+            self._world,
+            layout.incidents,
+            self._parts.ingest,
+            self._parts.loop,
+            self._outside.told,
+            self._move,
+            self._hear,
+            looked=self._looked,
+            scan_every=_SCAN_EVERY,
+        )
+
+    def _wire(self, greenhouse: Greenhouse, rule: DetectionRule) -> None:
+        ids = count(1)
+        outside = self._outside
+        ports = Ports(
+            outside,
+            {},
+            outside,
+            outside,
+            lambda: self._now,
+            lambda: f"{next(ids):026d}",
+        )
+        parts = build(load_fleet(words=ROBOTS), greenhouse, ports, Choices(rule))
+        self._parts = parts
+        self._mapper = Mapper(parts.world, greenhouse.bounds)
+        self._views = Views(parts)
+
+    async def play(self, seconds: float) -> VirtualRunResult:
+        """Run from the start; yields to other tasks once a virtual second."""
+        for number in range(round(seconds / STEP_S)):
+            self._stage.step()
+            self._mapper.tick(self._now)
+            self._result.pairs += self._told()
+            if number % _BELIEVE_EVERY == 1:
+                self._believe()
+            self._result.touched += self._touches()
+            if number % _REST_EVERY == 0:
+                await asyncio.sleep(0)
+        self._result.decisions = list(self._outside.decisions.values())
+        live = (self._views.robot(one, self._now).link for one in ROBOTS)
+        self._result.lost = sum(link != "LIVE" for link in live)
+        return self._result
+
+    def _move(self, seconds: float) -> Instant:
+        self._now = _EPOCH.later(seconds)
+        return self._now
+
+    def _hear(self, topic: str, payload: bytes) -> None:
+        for received in heard(topic, payload, self._now):
+            self._parts.ingest.offer(received)
+
+    def _looked(self, rig: RobotHardware) -> None:
+        """Targets in view at the moment of the picture."""
+        seen = (
+            SeenObject(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
+            for one, _ in in_view(rig, self._world)
+        )
+        self._detections.append(Picture(rig.robot_id, self._now.mono, tuple(seen)))
+
+    def _told(self) -> Iterator[Pair]:
+        """Detections that iVeg reports for the frames of this step."""
+        looks, self._detections = self._detections, []
+        for real in looks:
+            frame = self._views.frame(real.robot_id, self._now)
+            items = [] if frame is None else frame.items
+            seen = (
+                SeenObject(
+                    str(place),
+                    one.class_id,
+                    one.position.x,
+                    one.position.y,
+                    one.probability,
+                )
+                for place, one in enumerate(items)
+            )
+            yield real, Picture(real.robot_id, real.at, tuple(seen))
+
+    def _believe(self) -> None:
+        evaluator, now = self._parts.evaluator, self._now
+        zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
+        own = self._mapper.of(self._watched, (), now)
+        told = self._mapper.of(self._watched, zones, now)
+        if own is not None and told is not None:
+            self._result.beliefs.append((now.mono, belief_of(own, told)))
+
+    def _touches(self) -> int:
+        people = self._world.discs()
+        return sum(
+            body.gap_to(one.x, one.y)[0] < one.radius
+            for body in self._world.bodies()
+            for one in people
+        )
