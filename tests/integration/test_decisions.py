@@ -1,7 +1,7 @@
 """A decision in force is told, and what a kill leaves open is closed.
 
 That nearly every slow-down carries every link is proven on the virtual clock, in
-``tests/unit/emulator/test_scenarios.py``.
+``tests/unit/lab/emulator/test_scenarios.py``.
 """
 
 from typing import Any

@@ -1,8 +1,8 @@
 """Two scenarios through the whole running stack: what they promise is seen in iVeg.
 
-All are played on the virtual clock in ``tests/unit/emulator/test_scenarios.py``.  These
-two prove that real processes behave as it says: one is about what is told, the other
-about silence.  The world moves in real time, so each test waits for facts with a
+All are played on the virtual clock in ``tests/unit/lab/emulator/test_scenarios.py``.
+These two prove that real processes behave as it says: one is about what is told, the
+other about silence.  The world moves in real time, so each test waits for facts with a
 deadline and says nothing of the moment at which they come.  Both run at a time, each
 with a stack of its own.
 """
