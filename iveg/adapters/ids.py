@@ -2,11 +2,14 @@
 
 import os
 from base64 import b32encode
+from functools import lru_cache
 
 from iveg.adapters import clock
 
-_PADDED, _LEFT_OUT = 20, 6
-"""Bytes that are whole groups of base 32, and leading digits that are always zero."""
+_RANDOM_BYTES, _RANDOM_DIGITS = 10, 16
+_MADE_AT_ONCE = 64
+_LEFT_OUT = 6
+"""Digits of ten bytes that are always zero where six hold the time."""
 _CROCKFORD = bytes.maketrans(
     b"ABCDEFGHIJKLMNOPQRSTUVWXYZ234567", b"0123456789ABCDEFGHJKMNPQRSTVWXYZ"
 )
@@ -17,6 +20,20 @@ def new_id() -> str:
 
     Ids of one millisecond are in no order.
     """
-    milliseconds = int(clock.wall() * 1000).to_bytes(_PADDED - 10, "big")
-    digits = b32encode(milliseconds + os.urandom(10))[_LEFT_OUT:]
-    return digits.translate(_CROCKFORD).decode()
+    if not _unused:
+        digits = _digits(os.urandom(_MADE_AT_ONCE * _RANDOM_BYTES))
+        starts = range(0, len(digits), _RANDOM_DIGITS)
+        _unused.extend(digits[start : start + _RANDOM_DIGITS] for start in starts)
+    return _of_moment(int(clock.wall() * 1000)) + _unused.pop()
+
+
+_unused: list[str] = []
+
+
+@lru_cache(maxsize=1)
+def _of_moment(milliseconds: int) -> str:
+    return _digits(milliseconds.to_bytes(_RANDOM_BYTES, "big"))[_LEFT_OUT:]
+
+
+def _digits(data: bytes) -> str:
+    return b32encode(data).translate(_CROCKFORD).decode()

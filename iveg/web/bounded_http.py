@@ -53,9 +53,9 @@ class BoundedHttp(NotificationHttp):
     _connection: Connection | None = None
     _most = 0
     """Bytes that a head may have."""
-    _head = 0
+    _is_too_long = False
     _unparsed = 0
-    """Bytes since the parser last gave anything back."""
+    """Bytes since the parser last finished a head, a part of a body, or a request."""
 
     def connection_made(  # type: ignore[override]
         self, transport: asyncio.Transport
@@ -97,15 +97,14 @@ class BoundedHttp(NotificationHttp):
             connection.await_head()
         self._unparsed += len(data)
         super().data_received(data)
-        is_closing = self.transport.is_closing()
-        if self._unparsed > self._most and not is_closing:
-            self._head = self._unparsed
+        if self._unparsed > self._most and not self.transport.is_closing():
+            self._is_too_long = True
             self.send_400_response("")
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what cannot be read; 431 where it is the length of the head."""
         address = "" if self._connection is None else self._connection.address
-        if self._head <= self._most:
+        if not self._is_too_long:
             self.table.refused(address, "unreadable")
             super().send_400_response(msg)
             return
@@ -117,28 +116,19 @@ class BoundedHttp(NotificationHttp):
 
     def on_message_begin(self) -> None:
         """A request begins."""
-        self._head = self._unparsed = 0
-        if self._connection is not None:
-            self._connection.await_head()
+        connection = self._connection
+        if connection is not None and connection.is_busy:
+            # It came behind one that is still being answered.
+            connection.await_head()
         super().on_message_begin()
-
-    def on_url(self, url: bytes) -> None:
-        """A part of the request's address."""
-        self._count(len(url))
-        super().on_url(url)
-
-    def on_header(self, name: bytes, value: bytes) -> None:
-        """A header, or a trailer behind the body."""
-        # As ``_count``: a notification has ten, and hundreds come in a second.
-        self._unparsed = 0
-        self._head += len(name) + len(value)
-        if self._head > self._most:
-            raise _HeadTooLongError
-        super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
         """The head is here."""
         self._unparsed = 0
+        size = sum([len(name) + len(value) for name, value in self.headers])
+        if size + len(self.url) > self._most:
+            self._is_too_long = True
+            raise _HeadTooLongError
         if self._connection is not None:
             self._connection.await_body()
         super().on_headers_complete()
@@ -162,9 +152,3 @@ class BoundedHttp(NotificationHttp):
         super().on_response_complete()
         if self._connection is not None and not self.pipeline:
             self._connection.rest()
-
-    def _count(self, size: int) -> None:
-        self._unparsed = 0
-        self._head += size
-        if self._head > self._most:
-            raise _HeadTooLongError

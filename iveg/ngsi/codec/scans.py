@@ -63,25 +63,32 @@ def _ranges(points: Any) -> NDArray[np.float32]:
     Raises:
         ValidationError: not a list of at most 4,096 numbers and nulls in range.
     """
-    if type(points) is list and 0 < len(points) <= payloads.MAX_BEAMS:
-        numbers = _plain_numbers(points)
-        if numbers is not None:
-            return numbers.astype(np.float32)
+    buffer = compact(points)
+    if isinstance(buffer, np.ndarray):
+        return buffer
     ranges = np.array(_LIDAR_POINTS.validate_python(points), np.float32)
     ranges[np.isnan(ranges)] = np.inf
     return ranges
 
 
-def _plain_numbers(points: list[Any]) -> NDArray[np.float64] | None:
-    """The numbers, where there is nothing to judge: no null, no bool, all in range."""
+def compact(points: object) -> object:
+    """Numbers as one buffer where nothing has to be judged; else what was given.
+
+    That is: no null, no bool, all in range.  Hundreds of Python's numbers would have
+    left the processor's cache when the scan is drawn.
+    """
+    if type(points) is not list or not 0 < len(points) <= payloads.MAX_BEAMS:
+        return points
     try:
         numbers = np.frombuffer(array("d", points))
     except (TypeError, OverflowError):
-        return None
+        return points
     # A bool looks like 0 or 1 here.  "Not" also refuses NaN, which no JSON has.
     if not (numbers.min() >= 0.0 and numbers.max() <= payloads.MAX_RANGE_M):
-        return None
-    return None if np.any(numbers == 0.0) or np.any(numbers == 1.0) else numbers
+        return points
+    if np.any(numbers == 0.0) or np.any(numbers == 1.0):
+        return points
+    return numbers.astype(np.float32)
 
 
 def _refuse_impossible(header: payloads.LidarHeaderValue, beams: int) -> None:

@@ -9,6 +9,7 @@ from iveg.domain.observations import LaserScan, Origin, UnreadScan
 from iveg.ngsi import names, payloads
 from iveg.ngsi.codec.attributes import Reader, read_attributes
 from iveg.ngsi.codec.fields import read_origin
+from iveg.ngsi.codec.scans import compact
 
 
 def _unread_scan(name: str, robot_id: str, attributes: Mapping[str, Any]) -> UnreadScan:
@@ -19,7 +20,7 @@ def _unread_scan(name: str, robot_id: str, attributes: Mapping[str, Any]) -> Unr
         origin = read_origin(payloads.OriginFields.model_validate(header))
         if header.get("frame_id") == names.UNPLACED:
             raise UnreadableError(names.UNPLACED, "the robot knows no place for it")
-    kept = {name: attributes[name], names.LIDAR_HEADER: header}
+    kept = {name: compact(attributes[name]), names.LIDAR_HEADER: header}
     return UnreadScan(robot_id, origin, partial(_read, robot_id, kept))
 
 
