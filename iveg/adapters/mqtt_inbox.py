@@ -24,8 +24,12 @@ from iveg.adapters.mqtt_packets import (
     packet_bounds,
 )
 
-READ_AHEAD = 256 << 10
-"""Taken from the wire in one call (bytes): some thirty scans."""
+READ_AHEAD = 1 << 20
+"""Taken from the wire in one call (bytes).
+
+More than a fleet sends in a long turn of the loop: what is passed over has to be old, and
+what waits in the socket is older than anything.
+"""
 _TELEMETRY, _CONFIRMED = PUBLISH, PUBLISH | QOS_1
 """First bytes of a PUBLISH at QoS 0 and at QoS 1, without flags."""
 

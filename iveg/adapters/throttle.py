@@ -21,6 +21,7 @@ from iveg.domain.feeds import Feeds
 from iveg.domain.observations import Instant
 
 _LOOKS_EVERY_S, _AGAIN_S = 0.2, 1.0
+_AT_ONCE = 10
 
 
 class Throttle:
@@ -97,8 +98,7 @@ class Throttle:
         if changes := self._changes():
             self._must_read = True
             self.switches += 1
-            for want, throttled in changes.items():
-                await self._switch(want, throttled)
+            await self._switch_all(changes)
             await self._verify(changes)
         if self._must_read:
             await self._reread()
@@ -115,6 +115,22 @@ class Throttle:
             if wish is not None and (wish and self.allowed) != throttled:
                 changes[want] = wish and self.allowed
         return changes
+
+    async def _switch_all(self, changes: Mapping[WantedSubscription, bool]) -> None:
+        """Switch a few at a time: one by one would take as long as the overload lasts.
+
+        Raises:
+            HopError: Orion did not do one of them; it is tried again.
+        """
+        waiting = list(changes.items())
+        while waiting:
+            now, waiting = waiting[:_AT_ONCE], waiting[_AT_ONCE:]
+            done = await asyncio.gather(
+                *(self._switch(want, throttled) for want, throttled in now),
+                return_exceptions=True,
+            )
+            for error in filter(None, done):
+                raise error
 
     async def _switch(self, want: WantedSubscription, throttled: bool) -> None:
         known, _ = self.copies[want]
