@@ -25,10 +25,9 @@ from iveg.adapters.mqtt_packets import (
 )
 
 READ_AHEAD = 1 << 20
-"""Taken from the wire in one call (bytes).
+"""Taken from the wire in one call (bytes): more than comes in a long turn of the loop.
 
-More than a fleet sends in a long turn of the loop: what is passed over has to be old, and
-what waits in the socket is older than anything.
+What is passed over has to be what is old, and the oldest waits in the socket.
 """
 _TELEMETRY, _CONFIRMED = PUBLISH, PUBLISH | QOS_1
 """First bytes of a PUBLISH at QoS 0 and at QoS 1, without flags."""

@@ -13,7 +13,7 @@ from iveg.domain.alerts.alert_book import Condition
 from iveg.domain.decisions import Decision, Decisions
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.events import LogEvent, Slot
-from iveg.domain.feedback import HALF_SPEED, UNSUPERVISED, SpeedLimit
+from iveg.domain.feedback import UNSUPERVISED, SpeedLimit
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.observations import (
     Climate,
@@ -86,7 +86,6 @@ class Evaluator:
         self._event_log = event_log
         self._new_id = new_id
         self._applied: dict[str, float] = {}
-        self._limited_since: dict[str, float] = {}
         self._first_reports = FirstReports()
         self._low = LowValues()
         self._moved: dict[str, Odometry] = {}
@@ -191,7 +190,7 @@ class Evaluator:
     def _doubt_ignored_limit(self, report: SafetyReport, at: Instant) -> None:
         """Doubt a robot that drives on above a limit long after it was told."""
         robot = self.world.robot(report.robot_id)
-        limited_at = self._limited_since.get(robot.robot_id)
+        limited_at = self._speed_limits.limited_since.get(robot.robot_id)
         if limited_at is None or robot.safety_received is None or robot.is_replay:
             return
         if ignores_limit(report, robot.safety_received.mono, limited_at):
@@ -211,11 +210,6 @@ class Evaluator:
         for change in changes:
             self._crossed(change, now)
         before, self.speed_limits = self.speed_limits, speed_limits
-        for robot_id, limit in speed_limits.items():
-            if limit.speed_factor > HALF_SPEED:
-                self._limited_since.pop(robot_id, None)
-            else:
-                self._limited_since.setdefault(robot_id, now.mono)
         changed = [
             robot_id
             for robot_id, speed_limit in speed_limits.items()

@@ -67,6 +67,7 @@ class SpeedLimits:
 
     Attributes:
         missing: What the claim "clear" lacks for each robot, since the last judgement.
+        limited_since: When each limited robot was first limited (monotonic, s).
     """
 
     def __init__(self, greenhouse: Greenhouse) -> None:
@@ -74,6 +75,7 @@ class SpeedLimits:
         self._open: dict[str, dict[str, Crossing]] = {}
         """By robot and cause."""
         self.missing: Mapping[str, tuple[Missing, ...]] = {}
+        self.limited_since: dict[str, float] = {}
         self._zones = ZoneFinder()
 
     @property
@@ -98,7 +100,13 @@ class SpeedLimits:
                 name = f"{new_id}-{len(changes)}"
                 changes += self._cross(robot, zones, now, name)
         self.missing = missing_premises(world, now)
-        return {name: self._speed_limit(name) for name in world.robots}, changes
+        limits = {name: self._speed_limit(name) for name in world.robots}
+        for name, limit in limits.items():
+            if limit.speed_factor > HALF_SPEED:
+                self.limited_since.pop(name, None)
+            else:
+                self.limited_since.setdefault(name, now.mono)
+        return limits, changes
 
     def _cross(
         self, robot: RobotState, zones: Iterable[Zone], now: Instant, new_id: str
