@@ -14,7 +14,7 @@ through a light curtain here.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -27,6 +27,7 @@ from iveg.domain.tracking.person import Person, Sighting
 
 Band = Literal["clear", "tight", "inside", "unknown"]
 
+_Floats = NDArray[np.float64]
 _Placed = tuple[RobotState, Odometry, float]
 """A robot, its newest odometry, and the age of that (s)."""
 _UNKNOWN_M = 1e4
@@ -78,13 +79,6 @@ class Margin:
         return "tight" if self.margin_m < LIMITS.margin_clear_m else "clear"
 
 
-def _is_known(pose_age_s: float, look_age_s: float, margin_m: float) -> bool:
-    """Whether the margin is known; of a far person the least possible one is."""
-    if pose_age_s > LIMITS.pose_lost_s:
-        return False
-    return look_age_s <= LIMITS.pose_lost_s or margin_m >= LIMITS.margin_clear_m
-
-
 class LeastMargins:
     """The margin to show first of each robot and each person, all pairs at once.
 
@@ -99,38 +93,37 @@ class LeastMargins:
     def __init__(
         self, robots: Iterable[RobotState], people: Iterable[Person], now: Instant
     ) -> None:
-        self._now = now
         self._robots: list[_Placed] = []
         for robot in robots:
             age = robot.age_s(now)
             if robot.odometry is not None and age is not None:
                 self._robots.append((robot, robot.odometry, age))
-        self._detections = [
-            (person, look)
+        seen = [
+            (person.person_id, look)
             for person in people
             for look in person.sightings
             if look.age_s(now) <= LIMITS.ring_lasts_s
         ]
+        self._persons = [person_id for person_id, _ in seen]
         self._row = {one.robot_id: row for row, (one, *_) in enumerate(self._robots)}
         self._columns: dict[str, list[int]] = {}
-        for column, (person, _) in enumerate(self._detections):
-            self._columns.setdefault(person.person_id, []).append(column)
-        looks = [look for _, look in self._detections]
-        self._margins = _all_pairs(self._robots, looks, now)
+        for column, person_id in enumerate(self._persons):
+            self._columns.setdefault(person_id, []).append(column)
+        self._pairs = _Pairs.of(self._robots, [look for _, look in seen], now)
 
     def of_robot(self, robot_id: str) -> Margin | None:
         """The least margin of this robot to anybody."""
         row = self._row.get(robot_id)
-        if row is None or not self._detections:
+        if row is None or not self._persons:
             return None
-        return self._pair(row, int(np.argmin(self._margins[row])))
+        return self._pair(row, int(np.argmin(self._pairs.rank[row])))
 
     def of_person(self, person_id: str) -> Margin | None:
         """The least margin of any robot to this person."""
         columns = self._columns.get(person_id)
         if columns is None or not self._robots:
             return None
-        found = self._margins[:, columns]
+        found = self._pairs.rank[:, columns]
         row, column = np.unravel_index(int(np.argmin(found)), found.shape)
         return self._pair(int(row), columns[int(column)])
 
@@ -143,16 +136,14 @@ class LeastMargins:
             return []
         nearest = np.array(
             [
-                np.array(columns)[self._margins[:, columns].argmin(axis=1)]
+                np.array(columns)[self._pairs.rank[:, columns].argmin(axis=1)]
                 for columns in self._columns.values()
             ]
         )
-        looks = np.array([look.age_s(self._now) for _, look in self._detections])
-        ages = np.array([age for _, _, age in self._robots])
-        age = np.maximum(ages, looks[nearest])
-        margins = self._margins[np.arange(len(self._robots)), nearest]
+        rows = np.arange(len(self._robots))
+        margins = self._pairs.rank[rows, nearest]
         known = (margins > -_UNKNOWN_M / 2) | (margins < -_INSIDE_M / 2)
-        seen = known & (age <= LIMITS.seen_s)
+        seen = known & (self._pairs.age[rows, nearest] <= LIMITS.seen_s)
         places = [np.where(seen, margins, np.inf).argmin(), seen.argmin()]
         return [
             self._pair(place % len(self._robots), int(nearest.flat[place]))
@@ -160,59 +151,64 @@ class LeastMargins:
         ]
 
     def _pair(self, row: int, column: int) -> Margin:
-        return _to_look(self._robots[row], *self._detections[column], self._now)
+        pairs, robot = self._pairs, self._robots[row][0]
+        parts = pairs.gap, pairs.walks, pairs.reaction, pairs.braking, pairs.age
+        gap, walks, reaction, braking, age = (float(one[row, column]) for one in parts)
+        return Margin(
+            robot.robot_id,
+            self._persons[column],
+            gap,
+            walks,
+            reaction,
+            braking,
+            age,
+            robot.profile.assumed_braking,
+            bool(pairs.known[row, column]),
+        )
 
 
-def _all_pairs(
-    robots: Sequence[_Placed], looks: Sequence[Sighting], now: Instant
-) -> NDArray[np.float64]:
-    """Rank of each robot with each look, shape (robots, looks), (m).
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Each robot with each look; all of shape (robots, looks), in metres and seconds.
 
-    The margin as ``_to_look`` has it; unknown ones rank before all that are known, and
-    negative ones before those.
+    Attributes:
+        rank: The margin; unknown ones rank before all that are known, and negative
+            ones before those.
+        known: Of a far person the least possible margin is, however old the look.
     """
-    told = np.array([_facts(*one) for one in robots], float)
-    x, y, speed, braking, half, age = told.reshape(-1, 6).T[:, :, np.newaxis]
-    seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
-    to_x, to_y, look_age = seen.reshape(-1, 3).T
-    reaction = np.maximum(
-        LIMITS.reaction_s, np.maximum(age, look_age) + LIMITS.onward_s
-    )
-    gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
-    walks = LIMITS.walking_m_s * (reaction + speed / braking)
-    needs = (
-        walks + speed * reaction + speed * speed / (2 * braking) + LIMITS.uncertainty_m
-    )
-    margins = gap - needs
-    unseen = (look_age > LIMITS.pose_lost_s) & (margins < LIMITS.margin_clear_m)
-    is_lost = (age > LIMITS.pose_lost_s) | unseen
-    is_inside = ~is_lost & (margins < 0.0)
-    found: NDArray[np.float64] = margins - _UNKNOWN_M * is_lost - _INSIDE_M * is_inside
-    return found
+
+    gap: _Floats
+    walks: _Floats
+    reaction: _Floats
+    braking: _Floats
+    age: _Floats
+    known: NDArray[np.bool_]
+    rank: _Floats
+
+    @classmethod
+    def of(
+        cls, robots: Sequence[_Placed], looks: Sequence[Sighting], now: Instant
+    ) -> "_Pairs":
+        """Margins of all pairs at once."""
+        placed = np.array([_facts(*one) for one in robots], float)
+        x, y, speed, brakes, half, pose_age = placed.reshape(-1, 6).T[:, :, np.newaxis]
+        seen = np.array([(one.x, one.y, one.age_s(now)) for one in looks], float)
+        to_x, to_y, look_age = seen.reshape(-1, 3).T
+        age = np.maximum(pose_age, look_age)
+        reacts_s = np.maximum(LIMITS.reaction_s, age + LIMITS.onward_s)
+        gap = np.hypot(x - to_x, y - to_y) - half - LIMITS.person_radius_m
+        walks = LIMITS.walking_m_s * (reacts_s + speed / brakes)
+        reaction = speed * reacts_s
+        braking = np.broadcast_to(speed * speed / (2 * brakes), gap.shape)
+        margin = gap - (walks + reaction + braking + LIMITS.uncertainty_m)
+        is_seen = look_age <= LIMITS.pose_lost_s
+        is_far = margin >= LIMITS.margin_clear_m
+        known = (pose_age <= LIMITS.pose_lost_s) & (is_seen | is_far)
+        rank = margin - _UNKNOWN_M * ~known - _INSIDE_M * (known & (margin < 0.0))
+        return cls(gap, walks, reaction, braking, age, known, rank)
 
 
 def _facts(robot: RobotState, odometry: Odometry, age_s: float) -> tuple[float, ...]:
     """x, y (m), speed (m/s), braking (m/s²), half the length (m), age (s)."""
     place, speed, profile = odometry.pose, abs(odometry.twist.linear_x), robot.profile
     return place.x, place.y, speed, profile.assumed_braking, profile.length / 2, age_s
-
-
-def _to_look(placed: _Placed, person: Person, look: Sighting, now: Instant) -> Margin:
-    robot, odometry, pose_age = placed
-    profile = robot.profile
-    braking, speed = profile.assumed_braking, abs(odometry.twist.linear_x)
-    age = max(pose_age, look.age_s(now))
-    reaction = max(LIMITS.reaction_s, age + LIMITS.onward_s)
-    footprints = profile.length / 2 + LIMITS.person_radius_m
-    one = Margin(
-        robot.robot_id,
-        person.person_id,
-        gap_m=odometry.pose.distance_to(look.x, look.y) - footprints,
-        walks_m=LIMITS.walking_m_s * (reaction + speed / braking),
-        reaction_m=speed * reaction,
-        braking_m=speed * speed / (2 * braking),
-        age_s=age,
-        braking=braking,
-    )
-    known = _is_known(pose_age, look.age_s(now), one.margin_m)
-    return one if known else replace(one, known=False)

@@ -7,9 +7,11 @@ goes farther, only what was within reach is looked at (Verlet's neighbour list).
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.limits import LIMITS, ring_radius
@@ -17,9 +19,9 @@ from iveg.domain.observations import Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.people import People
 from iveg.domain.tracking.person import Person, Sighting
-from iveg.domain.tracking.point_index import Floats
 from iveg.domain.world import World
 
+_Floats = NDArray[np.float64]
 NOT_FAR_M = 0.01
 """So far outside a ring nobody can be inside, whatever rounding does."""
 _FEW_PAIRS = 150
@@ -111,7 +113,7 @@ class ZoneFinder:
         people: People,
         rule: DetectionRule,
         now: Instant,
-        inside: Mapping[str, Mapping[str, Any]],
+        inside: Mapping[str, Mapping[str, object]],
     ) -> Near:
         """Find the robots that are near each circle now.
 
@@ -128,54 +130,40 @@ class ZoneFinder:
         known = self._known
         if known is None or not known.hold(world, people, rule, now):
             known = self._known = _Neighbours.of(world, people, rule, now)
-        return _Circles(known, world, people, rule, now, inside).near
+        return partial(_near, known, world, people, rule, now, inside, {})
 
 
-class _Circles:
-    """The circles of one judgement, each made once and only if a robot may be near."""
+def _near(
+    neighbours: "_Neighbours",
+    world: World,
+    people: People,
+    rule: DetectionRule,
+    now: Instant,
+    inside: Mapping[str, Mapping[str, object]],
+    made: dict[str, list[Zone]],
+    robot: RobotState,
+) -> Iterator[Zone]:
+    """``Near``: people in the order of their numbers, then peers.
 
-    def __init__(
-        self,
-        neighbours: "_Neighbours",
-        world: World,
-        people: People,
-        rule: DetectionRule,
-        now: Instant,
-        inside: Mapping[str, Mapping[str, Any]],
-    ) -> None:
-        self._neighbours, self._inside = neighbours, inside
-        self._world, self._people = world, people
-        self._rule, self._now = rule, now
-        self._made: dict[str, list[Zone]] = {}
-
-    def near(self, robot: RobotState) -> Iterable[Zone]:
-        """``Near``: people in the order of their numbers, then peers."""
-        robot_id, known = robot.robot_id, self._people.known
-        inside = self._inside.get(robot_id, {}).keys()
-        people = self._neighbours.people.get(robot_id, _NOBODY) | inside
-        here = [known[one] for one in people if one in known]
-        here.sort(key=lambda one: one.number)
-        for person in here:
-            yield from self._of(person.person_id, self._of_person)
-        robots = self._world.robots
-        peers = self._neighbours.peers.get(robot_id, _NOBODY) | inside
-        for peer in robots if len(peers) > 1 else peers:
-            if peer in peers and peer in robots:
-                yield from self._of(peer, self._of_peer)
-
-    def _of(self, name: str, make: Callable[[str], list[Zone]]) -> list[Zone]:
-        made = self._made.get(name)
-        if made is None:
-            made = self._made[name] = make(name)
-        return made
-
-    def _of_person(self, person_id: str) -> list[Zone]:
-        person = self._people.known[person_id]
-        return list(_zones_of(person, self._world, self._rule, self._now))
-
-    def _of_peer(self, robot_id: str) -> list[Zone]:
-        peer = self._world.robots[robot_id]
-        return list(_circle_of(peer, self._rule, self._now))
+    ``made``: the circles of this judgement, each made once and only if a robot may be
+    near.
+    """
+    robots, known = world.robots, people.known
+    mine = inside.get(robot.robot_id, {}).keys()
+    persons = neighbours.people.get(robot.robot_id, _NOBODY) | mine
+    here = [known[one] for one in persons if one in known]
+    for person in sorted(here, key=lambda one: one.number):
+        if person.person_id not in made:
+            circles = _zones_of(person, world, rule, now)
+            made[person.person_id] = list(circles)
+        yield from made[person.person_id]
+    peers = neighbours.peers.get(robot.robot_id, _NOBODY) | mine
+    for peer in robots if len(peers) > 1 else peers:
+        if peer not in peers or peer not in robots:
+            continue
+        if peer not in made:
+            made[peer] = list(_circle_of(robots[peer], rule, now))
+        yield from made[peer]
 
 
 _NOBODY: frozenset[str] = frozenset()
@@ -213,13 +201,19 @@ class _Neighbours:
             if (place := _place_of(robot)) is not None
         }
         robots = np.array(list(places.values())).reshape(-1, 3).T
-        spots, names = people.spots, list(places)
-        x, y, since, reach = spots.columns
+        names = list(places)
+        seen = [
+            (person.person_id, look)
+            for person in people.known.values()
+            for look in person.sightings
+        ]
+        spots = [(look.x, look.y, look.at.mono, look.reach_m) for _, look in seen]
+        x, y, since, reach = np.array(spots).reshape(-1, 4).T
         near, beside = dict[str, set[str]](), dict[str, set[str]]()
         age, limit = _reach(rule, now, since, reach)
         limit[age > LIMITS.ring_lasts_s] = -1.0
         for row, column in _within(robots, x, y, limit):
-            near.setdefault(names[row], set()).add(spots.owners[column])
+            near.setdefault(names[row], set()).add(seen[column][0])
         x, y, since = robots
         # A peer that has long been silent may speak again.
         for row, column in _within(robots, x, y, _reach(rule, now, since)[1]):
@@ -287,16 +281,16 @@ def _is_as_near(now: _Place, before: _Place) -> bool:
 
 
 def _reach(
-    rule: DetectionRule, now: Instant, since: Floats, reach: Floats | float = 0.0
-) -> tuple[Floats, Floats]:
+    rule: DetectionRule, now: Instant, since: _Floats, reach: _Floats | float = 0.0
+) -> tuple[_Floats, _Floats]:
     """Ages (s), and how near a robot must be to come into such a ring soon (m)."""
-    age: Floats = np.maximum(0.0, now.mono - since)
+    age: _Floats = np.maximum(0.0, now.mono - since)
     ring = ring_radius(rule.radius_m, age + _HOLDS_S, np.minimum, np.maximum)
     return age, np.maximum(reach, ring) + 2 * _ROOM_M + 2 * NOT_FAR_M
 
 
 def _within(
-    robots: Floats, x: Floats, y: Floats, limit: Floats
+    robots: _Floats, x: _Floats, y: _Floats, limit: _Floats
 ) -> Iterator[tuple[int, int]]:
     """Which robots (columns of x, y, …) are within ``limit`` (m) of which places."""
     dx, dy = x - robots[0][:, None], y - robots[1][:, None]

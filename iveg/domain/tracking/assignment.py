@@ -7,8 +7,12 @@ Volgenant 1987), O(n^3); pictures hold few people, so n is small.
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 _NEVER = 1e9
 """Stands for a pair that cannot be; far above any sum of distances (m)."""
+_FREE = -1
 
 
 def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
@@ -25,16 +29,12 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
     plain = _undisputed(costs)
     if plain is not None:
         return plain
+    table = np.minimum(np.array(costs), _NEVER)
     if len(costs) > len(costs[0]):
-        flipped = assign([list(column) for column in zip(*costs, strict=True)])
-        return sorted((row, column) for column, row in flipped)
-    finite = [[min(cost, _NEVER) for cost in row] for row in costs]
-    columns = _columns_of_rows(finite)
-    return [
-        (row, column)
-        for row, column in enumerate(columns)
-        if math.isfinite(costs[row][column])
-    ]
+        pairs = sorted((row, column) for column, row in _matched(table.T))
+    else:
+        pairs = _matched(table)
+    return [(row, column) for row, column in pairs if math.isfinite(costs[row][column])]
 
 
 def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | None:
@@ -52,66 +52,29 @@ def _undisputed(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]] | Non
     return pairs if len(taken) == len(pairs) else None
 
 
-def _columns_of_rows(costs: Sequence[Sequence[float]]) -> list[int]:
-    """The column of each row; there are at least as many columns as rows.
-
-    Column 0 and row 0 are virtual; real ones count from 1.
-    """
-    rows, columns = len(costs), len(costs[0])
-    row_potential = [0.0] * (rows + 1)
-    column_potential = [0.0] * (columns + 1)
-    row_of = [0] * (columns + 1)
-    for row in range(1, rows + 1):
-        row_of[0] = row
-        way = _shortest_way(costs, row_of, row_potential, column_potential)
-        _flip(way, row_of)
-    out = [0] * rows
-    for column in range(1, columns + 1):
-        if row_of[column]:
-            out[row_of[column] - 1] = column - 1
-    return out
-
-
-def _shortest_way(
-    costs: Sequence[Sequence[float]],
-    row_of: Sequence[int],
-    row_potential: list[float],
-    column_potential: list[float],
-) -> list[int]:
-    """From the new row in column 0 to a free column; the last entry is that column."""
-    columns = len(row_of) - 1
-    least = [math.inf] * (columns + 1)
-    before = [0] * (columns + 1)
-    used = [False] * (columns + 1)
-    column = 0
-    while row_of[column]:
-        used[column] = True
-        row, delta, nearest = row_of[column], math.inf, 0
-        for other in range(1, columns + 1):
-            if used[other]:
-                continue
-            reduced = (
-                costs[row - 1][other - 1] - row_potential[row] - column_potential[other]
-            )
-            if reduced < least[other]:
-                least[other], before[other] = reduced, column
-            if least[other] < delta:
-                delta, nearest = least[other], other
-        for other in range(columns + 1):
-            if used[other]:
-                row_potential[row_of[other]] += delta
-                column_potential[other] -= delta
-            else:
-                least[other] -= delta
-        column = nearest
-    before[0] = column
-    return before
-
-
-def _flip(before: Sequence[int], row_of: list[int]) -> None:
-    """Give every row on the way the next column."""
-    column = before[0]
-    while column:
-        previous = before[column]
-        row_of[column] = row_of[previous]
-        column = previous
+def _matched(costs: NDArray[np.float64]) -> list[tuple[int, int]]:
+    """The column of each row; there are at least as many columns as rows."""
+    rows, columns = costs.shape
+    row_potential, column_potential = np.zeros(rows), np.zeros(columns)
+    row_of, column_of = np.full(columns, _FREE), np.full(rows, _FREE)
+    for new in range(rows):
+        least, before = np.full(columns, math.inf), np.full(columns, _FREE)
+        reached, done = [], np.zeros(columns, np.bool_)
+        row, length = new, 0.0
+        while row != _FREE:
+            reached.append(row)
+            reduced = length + costs[row] - row_potential[row] - column_potential
+            nearer = ~done & (reduced < least)
+            least[nearer], before[nearer] = reduced[nearer], row
+            column = int(np.where(done, math.inf, least).argmin())
+            length, done[column] = float(least[column]), True
+            row = int(row_of[column])
+        row_potential[new] += length
+        earlier = reached[1:]
+        row_potential[earlier] += length - least[column_of[earlier]]
+        column_potential[done] -= length - least[done]
+        while column != _FREE:  # every row on the way takes the next column
+            row = int(before[column])
+            row_of[column] = row
+            column_of[row], column = column, int(column_of[row])
+    return [(row, int(column)) for row, column in enumerate(column_of)]

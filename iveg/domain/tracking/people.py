@@ -17,7 +17,6 @@ from iveg.domain.observations import Detection, DetectionFrame, Instant
 from iveg.domain.robot_state import RobotState
 from iveg.domain.tracking.person import Person, Sighting
 from iveg.domain.tracking.picture import PlacedDetection
-from iveg.domain.tracking.point_index import PointIndex
 from iveg.domain.tracking.possible_people import POSSIBLE_FROM, PossiblePeople
 from iveg.domain.tracking.tracker import Tracker
 from iveg.domain.world import World
@@ -67,29 +66,12 @@ class People:
         self._possible_people = PossiblePeople()
         self._tracker = Tracker()
         self._faint: dict[str, list[Placed]] = {}
-        self._spots = PointIndex()
-        self._indexed: dict[str, Person] = {}
         self.turned_away = 0
         """Detections of the last frame without room."""
         self.unplaced = 0
         """Detections of the last frame that may be somebody, with an unknown place."""
         self.unknown_frames: frozenset[str] = frozenset()
         """Frames that the last frame named and nobody described."""
-
-    @property
-    def spots(self) -> PointIndex:
-        """Positions of all sightings."""
-        for person_id in self._indexed.keys() - self.known.keys():
-            del self._indexed[person_id]
-            self._spots.remove(person_id)
-        for person_id, person in self.known.items():
-            if self._indexed.get(person_id) is not person:
-                self._indexed[person_id] = person
-                spots = [
-                    (one.x, one.y, one.at.mono, one.reach_m) for one in person.sightings
-                ]
-                self._spots.put(person_id, spots)
-        return self._spots
 
     @property
     def known(self) -> dict[str, Person]:
