@@ -111,7 +111,7 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a hold that a late release may still lift is held on to for good",
-        "return now.mono - max(heard_at, self._begun_at) > LIMITS.report_fresh_s",
+        "return min(since_report, now.mono - self._begun_at) > LIMITS.report_fresh_s",
         "return False",
         ("unit/domain/test_stop_release.py",),
     ),
@@ -261,8 +261,8 @@ MUTANTS = (
     ),
     Mutant(
         "STOP: a hold is adopted from a report however old it is",
-        "self.ours[-1:] if age_s <= LIMITS.report_stale_s else []",
-        "self.ours[-1:]",
+        "self.evidence.ours[-1:] if age_s <= LIMITS.report_stale_s else []",
+        "self.evidence.ours[-1:]",
         ("unit/pipeline/test_earlier_boots.py",),
     ),
     Mutant(

@@ -140,7 +140,7 @@ class Command(Model):
             agent_lag_s=rounded(of.agent_lag_s, 1),
             note=_note(of),
             robot=_robot(machine, now),
-            challenge_fresh=machine.report_age(now) <= LIMITS.report_fresh_s,
+            challenge_fresh=machine.evidence.report_age(now) <= LIMITS.report_fresh_s,
             steps=[],
         )
 
@@ -189,11 +189,11 @@ def _times(of: Times) -> CommandTimes:
 
 
 def _robot(machine: StopMachine, now: Instant) -> CommandRobot:
-    report, age = machine.report, machine.evidence_age(now)
+    report, age = machine.evidence.report, machine.evidence.evidence_age(now)
     return CommandRobot(
         v=0.0 if report is None else report.linear,
         report_age_s=rounded(age) if isfinite(age) else None,
-        moved_m=round(machine.moved_m(now), 2),
+        moved_m=round(machine.evidence.moved_m(now), 2),
     )
 
 

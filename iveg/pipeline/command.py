@@ -293,14 +293,14 @@ class Commander:
             match effect:
                 case SendStop():
                     machine.note_lag(self._agent_lag_s(at))
-                    self._sender.send(machine, effect)
+                    self._sender.send_stop(machine, effect)
                     # A silent robot says nothing that would carry the new count.
                     self._show(machine)
                 case SendOnce():
                     machine.note_lag(self._agent_lag_s(at))
-                    self._sender.send(machine, effect)
+                    self._sender.send_once(machine, effect)
                 case SetDesiredState():
-                    self._sender.send(machine, effect)
+                    self._sender.set_desired_state(effect)
                 case Changed():
                     self._tell(machine, effect, at)
                     self._sender.start(

@@ -7,7 +7,7 @@ way, and a failure of one transport holds up no other.
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any
+from functools import partial
 
 from iveg.domain.errors import HopError
 from iveg.domain.observations import Instant
@@ -24,6 +24,7 @@ from iveg.pipeline.ports import Clock, CommandPort, FleetPort, StopJournal
 
 _log = logging.getLogger(__name__)
 CameBack = Callable[[StopMachine, list[Effect], Instant], None]
+_Send = Callable[[], Coroutine[None, None, None]]
 IsCut = Callable[[TransportId, Instant], bool]
 
 
@@ -60,27 +61,28 @@ class OrderSender:
         self._desired_states: dict[str, SetDesiredState] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
-    def send(
-        self, machine: StopMachine, effect: SendStop | SendOnce | SetDesiredState
-    ) -> None:
-        """Begin to send; the result comes back later."""
-        match effect:
-            case SendStop():
-                name = f"stop-{effect.transport}-{effect.robot_id}"
-                self.start(self._send_stop(machine, effect), name)
-            case SendOnce():
-                name = f"{effect.kind}-{effect.robot_id}"
-                self.start(self._send_once(machine, effect), name)
-            case SetDesiredState():
-                self._desired_states[effect.robot_id] = effect
-                self._start_desired_state(effect)
+    def send_stop(self, machine: StopMachine, effect: SendStop) -> None:
+        """Begin to send a STOP on one transport; the result comes back later."""
+        port, order = self._ports[effect.transport], effect.command_id
+        send = partial(port.stop, effect.robot_id, effect.hold_id, order[-6:])
+        self._start_attempt(machine, "stop", effect.transport, order, send)
+
+    def send_once(self, machine: StopMachine, effect: SendOnce) -> None:
+        """Begin to send a release or resume; the results come back later."""
+        name = f"{effect.attempt.command.kind}-{machine.robot_id}"
+        self.start(self._send_once(machine, effect), name)
+
+    def set_desired_state(self, effect: SetDesiredState) -> None:
+        """Begin to publish a robot's desired state."""
+        self._desired_states[effect.robot_id] = effect
+        self._start_desired_state(effect)
 
     def levels_again(self) -> None:
         """Publish every desired state again: the broker is connected."""
         for level in self._desired_states.values():
             self._start_desired_state(level)
 
-    def start(self, work: Coroutine[Any, Any, None], name: str) -> None:
+    def start(self, work: Coroutine[None, None, None], name: str) -> None:
         """Run this as a task; a failure is logged."""
         task = asyncio.get_running_loop().create_task(work, name=name)
         self._tasks.add(task)
@@ -100,26 +102,26 @@ class OrderSender:
 
     # --- the transports -----------------------------------------------------------
 
-    async def _send_stop(self, machine: StopMachine, effect: SendStop) -> None:
-        port = self._ports[effect.transport]
-        by = effect.command_id[-6:]
-        sending = port.stop(effect.robot_id, effect.hold_id, by)
-        await self._attempt(machine, effect.transport, effect.command_id, sending)
-
     async def _send_once(self, machine: StopMachine, effect: SendOnce) -> None:
         """Send once, after the audit row is on disk."""
         await asyncio.gather(
             self._event_log.flushed(), self._note_named(machine, effect)
         )
-        if machine.once is None or machine.once.command_id != effect.command_id:
+        command, attempt = effect.attempt.command, effect.attempt
+        if machine.once is None or machine.once.command_id != command.command_id:
             # The disk took so long that a STOP has come, or taken its place.
             return
-        for transport in effect.transports:
-            sending = self._once(self._ports[transport], effect)
-            self.start(
-                self._attempt(machine, transport, effect.command_id, sending),
-                f"{effect.kind}-{transport}-{effect.robot_id}",
-            )
+        challenge, order = attempt.challenge, command.command_id
+        for transport, way in command.transports.items():
+            if way == "off":
+                continue
+            port = self._ports[transport]
+            if command.kind == "resume":
+                send = partial(port.resume, machine.robot_id, challenge, order)
+            else:
+                names = machine.robot_id, attempt.ids
+                send = partial(port.release, *names, challenge, order)
+            self._start_attempt(machine, command.kind, transport, order, send)
 
     async def _note_named(self, machine: StopMachine, effect: SendOnce) -> None:
         """Write down which STOPs a release names: none is asserted as new again."""
@@ -127,27 +129,31 @@ class OrderSender:
             return
         by = "iveg" if machine.stop is None else machine.stop.requesters[0]
         await self._journal.log_release(
-            effect.robot_id,
+            machine.robot_id,
             machine.hold_id,
             effect.ours,
-            effect.challenge,
+            effect.attempt.challenge,
             by,
             self._clock(),
         )
 
-    @staticmethod
-    def _once(port: CommandPort, effect: SendOnce) -> Coroutine[Any, Any, None]:
-        robot_id, challenge = effect.robot_id, effect.challenge
-        if effect.kind == "resume":
-            return port.resume(robot_id, challenge, effect.command_id)
-        return port.release(robot_id, effect.ids, challenge, effect.command_id)
+    def _start_attempt(
+        self,
+        machine: StopMachine,
+        kind: str,
+        transport: TransportId,
+        command_id: str,
+        send: _Send,
+    ) -> None:
+        work = self._attempt(machine, transport, command_id, send)
+        self.start(work, f"{kind}-{transport}-{machine.robot_id}")
 
     async def _attempt(
         self,
         machine: StopMachine,
         transport: TransportId,
         command_id: str,
-        sending: Coroutine[Any, Any, None],
+        send: _Send,
     ) -> None:
         """Send, and report the result to the machine, whatever went wrong.
 
@@ -155,7 +161,7 @@ class OrderSender:
         """
         ok, left = False, self._clock()
         try:
-            await sending
+            await send()
             ok = True
         except HopError as error:
             _log.info("order by transport %s: %s", transport, error)

@@ -151,7 +151,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         for effect in effects:
             assert not isinstance(effect, OffTable), effect
             if isinstance(effect, SendStop):
-                shown = {hold.id for hold in self.iveg.holds}
+                shown = {hold.id for hold in self.iveg.evidence.holds}
                 assert effect.hold_id not in self.ended - shown, "an old id came again"
                 assert effect.hold_id == self.iveg.hold_id
                 self.last_send = max(self.last_send, self.now)
@@ -180,13 +180,14 @@ class StopOverBadTransports(RuleBasedStateMachine):
     def _send_once(self, effect: SendOnce) -> None:
         assert self.asking, "I2, I6: nobody asked for this"
         self.sent_once += 1
-        challenge, attempt = effect.challenge, effect.command_id
-        if effect.kind == "release":
-            value = codec.write_release(effect.ids, challenge, attempt)
+        attempt, command = effect.attempt, effect.attempt.command
+        challenge = attempt.challenge
+        if command.kind == "release":
+            value = codec.write_release(attempt.ids, challenge, command.command_id)
             self.remember(effect)
         else:
-            value = codec.write_resume(challenge, attempt)
-        for transport in effect.transports:
+            value = codec.write_resume(challenge, command.command_id)
+        for transport in command.transports:
             self.transports[transport].put(codec.write_command(value))
 
     def remember(self, effect: SendOnce) -> None:
@@ -196,7 +197,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
             self.disk,
             named=(*self.disk.named, *effect.ours),
             asked=effect.ours,
-            challenge=effect.challenge,
+            challenge=effect.attempt.challenge,
         )
 
     def _changed(self, changed: Changed) -> None:
@@ -217,7 +218,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
         self.disk = replace(self.disk, hold_id=new)
         if new == self.episode:
             return
-        assert new not in self.ended - {hold.id for hold in self.iveg.holds}
+        assert new not in self.ended - {hold.id for hold in self.iveg.evidence.holds}
         if self.episode is not None:
             self.ended.add(self.episode)
         self.episode = new
@@ -360,7 +361,7 @@ class StopOverBadTransports(RuleBasedStateMachine):
 
     @rule()
     def somebody_releases(self) -> None:
-        seen = [hold.id for hold in self.iveg.holds if hold.ack == "remote"]
+        seen = [hold.id for hold in self.iveg.evidence.holds if hold.ack == "remote"]
         self._ask(lambda: self.iveg.release("ana", seen, self.at(), self.new_id()))
 
     @rule()

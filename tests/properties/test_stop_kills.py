@@ -59,7 +59,7 @@ class Watched(StopOverBadTransports):
     def let_go(self) -> None:
         """Release if that is allowed now, else resume if that is."""
         before = self.asked
-        holds = {hold.id for hold in self.iveg.holds}
+        holds = {hold.id for hold in self.iveg.evidence.holds}
         self.somebody_releases()
         if self.asked > before:
             self.licence.lifted |= holds

@@ -88,34 +88,14 @@ class SendStop:
 
 @dataclass(frozen=True, slots=True)
 class SendOnce:
-    """Send a release (with ids) or a resume (without), once on each transport.
+    """Send a release or a resume, once on each transport.
 
     Attributes:
-        command_id: Of the order; the attempt that its answers name.
-        ours: Those of ``ids`` that are STOPs of iVeg.
+        ours: Those of its holds that are STOPs of iVeg.
     """
 
-    robot_id: str
-    command_id: str
-    kind: Literal["release", "resume"]
-    challenge: str
-    transports: tuple[TransportId, ...]
-    ids: tuple[str, ...] = ()
+    attempt: Attempt
     ours: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, attempt: Attempt, ours: Iterable[str]) -> "SendOnce":
-        """Message of an attempt; ``ours`` are STOPs of iVeg that the robot holds."""
-        command, ids = attempt.command, attempt.ids
-        return cls(
-            command.robot_id,
-            command.command_id,
-            "release" if command.kind == "release" else "resume",
-            attempt.challenge,
-            tuple(one for one, way in command.transports.items() if way != "off"),
-            ids,
-            tuple(one for one in ours if one in ids),
-        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,7 +35,6 @@ from iveg.domain.stop.effects import (
     SendOnce,
     SetDesiredState,
 )
-from iveg.domain.stop.sends import Sends
 from iveg.domain.stop.status import StopStatus
 from iveg.domain.stop.wanted import DesiredRecord
 from iveg.domain.transports import TRANSPORTS, Transport, TransportId
@@ -61,13 +60,8 @@ class StopMachine(StopStatus):
         transports: Iterable[Transport] = TRANSPORTS,
         steps: "Mapping[tuple[State, Key], Step] | None" = None,
     ) -> None:
-        super().__init__(robot_id)
-        self._transports = {one.id: one for one in transports}
+        super().__init__(robot_id, transports)
         self._steps = STEPS if steps is None else steps
-        self._sends = Sends(self._transports.values())
-        self._deadline = 0.0
-        self._is_lost = False
-        """An event had no row in the state that still is."""
 
     # --- people -------------------------------------------------------------------
 
@@ -91,23 +85,25 @@ class StopMachine(StopStatus):
     def restore(self, wanted: DesiredRecord, at: Instant, new_id: str) -> list[Effect]:
         """STOP again a robot that an earlier run had stopped."""
         kept = wanted.hold_to_assert()
-        return self._take(Event("reasserted", at, new_id, wanted.by, kept=kept))
+        return self._step(Event("reasserted", at, new_id, wanted.by, kept=kept))
 
     def drill(self, by: str, at: Instant, new_id: str, press: Press) -> list[Effect]:
         """Begin a STOP drill. Raises CommandRefusedError where a guard objects."""
-        self._guard_drill(at)
-        return self._take(Event("requested", at, new_id, by, press))
+        self.evidence.check_drill(self.state, at)
+        return self._step(Event("requested", at, new_id, by, press))
 
     def release(
         self, by: str, seen: Iterable[str], at: Instant, new_id: str
     ) -> list[Effect]:
         """Lift exactly the holds that a person saw. Raises likewise."""
-        challenge, remote = self._guard_release(at, seen)
+        challenge, remote = self.evidence.check_release(
+            self.state, at, seen, self._joined_at
+        )
         return self._order(Event("releasing", at, new_id, by), challenge, remote)
 
     def resume(self, by: str, at: Instant, new_id: str) -> list[Effect]:
         """Let a released robot drive. Raises likewise."""
-        challenge = self._guard_resume(at)
+        challenge = self.evidence.check_resume(self.state, at)
         return self._order(Event("resuming", at, new_id, by), challenge)
 
     def _order(
@@ -117,7 +113,7 @@ class StopMachine(StopStatus):
         before: State = "RUNNING" if self.stop is None else self.state
         command = event.begins(self.robot_id, self._transports.values())
         attempt = Attempt(command, challenge, ids, before)
-        return self._take(replace(event, attempt=attempt))
+        return self._step(replace(event, attempt=attempt))
 
     # --- transports ---------------------------------------------------------------
 
@@ -145,7 +141,7 @@ class StopMachine(StopStatus):
         self._keep(command.sent(way, left or at, ok=ok, doubtful=doubtful))
         if not ok or doubtful or self.state != "REQUESTED":
             return []
-        return self._take(Event("sent", at))
+        return self._step(Event("sent", at))
 
     def note_lag(self, lag_s: float | None) -> None:
         """Note the lag of the IoT Agent while an order is being sent (s)."""
@@ -159,15 +155,15 @@ class StopMachine(StopStatus):
         self, answer: CommandAnswer, at: Instant, transport: TransportId, new_id: str
     ) -> list[Effect]:
         """Take the robot's own answer on ``cmdexe`` or ``cmd_info``."""
-        is_news = self.is_news(answer.origin)
+        is_news = self.evidence.is_news(answer.origin)
         if self.attempt is not None:
             if not self.attempt.is_meant_by(answer, is_news=is_news):
                 return []
             self.attempt = self.attempt.answered(answer, transport, at)
             # Its report may have come before the answer.
-            decided = self.attempt.is_refused(self.report, self.hold_id)
+            decided = self.attempt.is_refused(self.evidence.report, self.hold_id)
             refused = answer.result == "REFUSED" and decided
-            return self._take(Event("refused", at)) if refused else []
+            return self._step(Event("refused", at)) if refused else []
         if self.wants_stop and answer.result == "RELEASED":
             # It will never hold by that name again: only a new one can.
             return self._lifted(at, new_id) if answer.id == self.hold_id else []
@@ -191,33 +187,33 @@ class StopMachine(StopStatus):
 
         ``sparse``: it came on a topic that has two of them a second, not ten.
         """
-        if not self.take(report, at, age_s, self.hold_id):
+        if not self.evidence.note_report(report, at, age_s, self.hold_id):
             return []
         is_later = at.mono - age_s >= self._begun_at
         if self.state == "READY" and drives(report) and is_later:
-            return self._take(Event("running", at))
+            return self._step(Event("running", at))
         if self.state in ("RUNNING", "READY"):
             # A hold that this process did not ask for is not dropped while it is news.
-            ours = self.ours[-1:] if age_s <= LIMITS.report_stale_s else []
-            return self._take(Event("adopted", at, ours[0])) if ours else []
+            ours = self.evidence.ours[-1:] if age_s <= LIMITS.report_stale_s else []
+            return self._step(Event("adopted", at, ours[0])) if ours else []
         if self.attempt is not None:
             verdict = self.attempt.verdict(report, self.hold_id)
-            return [] if verdict is None else self._take(Event(verdict, at))
+            return [] if verdict is None else self._step(Event(verdict, at))
         assert self.stop is not None  # noqa: S101 - every such state has an episode
         has_stood = self.state in ("STANDING", "STALE")
         if self.hold_id not in {hold.id for hold in report.holds}:
-            self._standstill.forget()
+            self.evidence.standstill.forget()
             lifted = has_stood or self.hold_id in report.released
             return self._lifted(at, new_id) if lifted and is_later else []
         if report.challenge != self._doubt:
             self._doubt = None
         self.stop = self.stop.heard_of(transport, at)
         effects = self._delivered(at)
-        match self.motion(report, at, sparse=sparse):
+        match self.evidence.motion(report, at, sparse=sparse):
             case "moves" if has_stood:
                 effects += self._stop_again("moved", at, new_id)
             case "stands" if self.state != "STANDING":
-                effects += self._take(Event("standing", at))
+                effects += self._step(Event("standing", at))
         return effects
 
     def odometry(
@@ -230,13 +226,12 @@ class StopMachine(StopStatus):
         age_s: float,
     ) -> list[Effect]:
         """Take a speed, proven to be no older than ``age_s``."""
-        contradicted = self.is_contradicted(linear, angular, at, origin, age_s)
+        contradicted = self.evidence.is_contradicted(linear, angular, at, origin, age_s)
         moved = contradicted and self.state == "STANDING"
         return self._stop_again("moved", at, new_id) if moved else []
 
     def _delivered(self, at: Instant) -> list[Effect]:
-        is_news = self.state in _UNHEARD
-        return self._take(Event("delivered", at)) if is_news else []
+        return self._step(Event("delivered", at)) if self.state in _UNHEARD else []
 
     def _lifted(self, at: Instant, new_id: str) -> list[Effect]:
         """The hold is lost without a release."""
@@ -255,14 +250,14 @@ class StopMachine(StopStatus):
     def _overdue(self, now: Instant, new_id: str) -> list[Effect]:
         late = now.mono >= self._deadline
         if self._is_doubtful(now):
-            return self._take(Event("release_unconfirmed", now, new_id))
+            return self._step(Event("release_unconfirmed", now, new_id))
         match self.state:
             case "REQUESTED" | "SENT" if late:
-                return self._take(Event("unconfirmed", now))
+                return self._step(Event("unconfirmed", now))
             case "DELIVERED" if late:
-                return self._take(Event("still_moving", now))
-            case "STANDING" if self.evidence_age(now) > LIMITS.report_stale_s:
-                return self._take(Event("stale", now))
+                return self._step(Event("still_moving", now))
+            case "STANDING" if self.evidence.evidence_age(now) > LIMITS.report_stale_s:
+                return self._step(Event("stale", now))
             case "RELEASING" if late:
                 # Nothing decided it in time: it becomes a STOP (I7).
                 return self._stop_again("release_unconfirmed", now, new_id)
@@ -273,12 +268,12 @@ class StopMachine(StopStatus):
     ) -> list[Effect]:
         """A new episode of a robot that may be held already."""
         kept = self._hold_to_keep(at, expired=key == "release_unconfirmed")
-        return self._take(Event(key, at, new_id, by, press, kept))
+        return self._step(Event(key, at, new_id, by, press, kept))
 
     # --- a step -------------------------------------------------------------------
 
-    def _take(self, event: Event) -> list[Effect]:
-        """Take the step of the table, or report that there is none."""
+    def _step(self, event: Event) -> list[Effect]:
+        """Carry out the step of the table, or report that there is none."""
         step = self._steps.get((self.state, event.key))
         self._is_lost = step is None
         if step is None:
@@ -311,32 +306,39 @@ class StopMachine(StopStatus):
         self.stop = event.begins(self.robot_id, self._transports.values())
         self.attempt, self._doubt = None, event.kept.challenge
         self._begun_at, self._deadline = event.at.mono, event.at.mono + within_s
-        self._standstill.forget()
+        self.evidence.standstill.forget()
         self._sends.begin(event.at)
         hold_id = event.kept.hold_id or event.new_id
         return [SetDesiredState(self.robot_id, "stopped", (hold_id,)), *closed]
 
     def _allow_braking(self, event: Event) -> list[Effect]:
-        braking = self.speed / LIMITS.least_braking_m_s2 + LIMITS.braking_extra_s
+        braking = (
+            self.evidence.speed / LIMITS.least_braking_m_s2 + LIMITS.braking_extra_s
+        )
         # From the robot's word on: before it, a robot out of reach could not brake.
         self._deadline = event.at.mono + min(braking, LIMITS.braking_most_s)
         return []
 
     def _note_standstill(self, event: Event) -> list[Effect]:
         if self.stop is not None:
-            self.stop = self.stop.stood(self._standstill.since or event.at)
+            self.stop = self.stop.stood(self.evidence.standstill.since or event.at)
         return []
 
-    def _ask_at_once(self, event: Event) -> list[Effect]:
-        self._standstill.forget()
-        self._sends.repeat_now(event.at)
+    def _ask_at_once(self, _: Event) -> list[Effect]:
+        self.evidence.standstill.forget()
+        self._sends.repeat_now()
         return []
 
     def _send_once(self, event: Event) -> list[Effect]:
         self.attempt = event.attempt
         assert self.attempt is not None  # noqa: S101 - whoever orders makes one
         self._deadline = event.at.mono + LIMITS.release_within_s
-        return [SendOnce.of(self.attempt, self.ours)]
+        named = self.attempt.ids
+        return [
+            SendOnce(
+                self.attempt, tuple(one for one in self.evidence.ours if one in named)
+            )
+        ]
 
     def _say_why(self, _: Event) -> list[Effect]:
         if self.attempt is not None:

@@ -30,98 +30,37 @@ _PROGRESS: Mapping[str, Progress] = {
 }
 
 
-class Repeated:
-    """One transport that takes a STOP whenever it is due."""
-
-    def __init__(self) -> None:
-        self._sent_at = float("-inf")
-        self._age_then = 0.0
-
-    def now(self, _: Instant) -> None:
-        """Make the next check send."""
-        self._sent_at = float("-inf")
-
-    def begin(self) -> None:
-        """A new episode."""
-
-    def came_back(self, at: Instant) -> None:
-        """Without effect: the result does not change the timetable."""
-
-    def is_due(self, at: Instant, age_s: float, progress: Progress) -> bool:
-        """Whether to send now; that counts as sent."""
-        pause = _pause(self._age_then, progress)
-        if at.mono - self._sent_at < pause - _EARLY_S:
-            return False
-        self._sent_at, self._age_then = at.mono, age_s
-        return True
-
-
-class OneAtATime:
-    """One transport with at most one request under way.
-
-    Args:
-        alone: There is no other way to the robot.
-    """
-
-    def __init__(self, *, alone: bool) -> None:
-        self._alone = alone
-        self._next = 0.0
-        self._busy = False
-
-    def now(self, at: Instant) -> None:
-        """Send as soon as no request is under way."""
-        self._next = at.mono
-
-    def begin(self) -> None:
-        """A new episode: what is still on its way belongs to an earlier one."""
-        self._busy = False
-
-    def came_back(self, at: Instant) -> None:
-        """Note that the request has ended."""
-        self._busy = False
-        self._next = at.mono + FIWARE_PAUSE_S
-
-    def is_due(self, at: Instant, _: float, progress: Progress) -> bool:
-        """Whether to send now; that counts as sent."""
-        if self._busy or (progress != "asked" and not self._alone):
-            return False
-        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
-        self._busy = at.mono >= self._next + rest
-        return self._busy
-
-
 class Sends:
     """The timetable of one robot's STOP."""
 
     def __init__(self, transports: Iterable[Transport]) -> None:
-        carriers = [one for one in transports if one.can_stop]
-        alone = all(one.one_at_a_time for one in carriers)
-        self._ways: dict[TransportId, Repeated | OneAtATime] = {
-            one.id: OneAtATime(alone=alone) if one.one_at_a_time else Repeated()
-            for one in carriers
-        }
+        self._ways = {one.id: one for one in transports if one.can_stop}
+        self._is_alone = all(one.one_at_a_time for one in self._ways.values())
+        self._sent: dict[TransportId, tuple[float, float]] = {}
+        """When a STOP was last sent (monotonic, s), and how old it was then (s)."""
+        self._busy: set[TransportId] = set()
+        """Those of one at a time with a request under way."""
+        self._next: dict[TransportId, float] = {}
+        """When those may be asked again (monotonic, s)."""
 
     def begin(self, at: Instant) -> None:
-        """A new episode: on every transport at once."""
-        for way in self._ways.values():
-            way.begin()
+        """A new episode, on all at once; what is under way is of an earlier one."""
+        self._busy.clear()
         self.now(at)
 
     def now(self, at: Instant) -> None:
         """Make every transport due now."""
-        for way in self._ways.values():
-            way.now(at)
+        self._sent.clear()
+        self._next = dict.fromkeys(self._ways, at.mono)
 
-    def repeat_now(self, at: Instant) -> None:
+    def repeat_now(self) -> None:
         """Make those that take any number due at the next check."""
-        for way in self._ways.values():
-            if isinstance(way, Repeated):
-                way.now(at)
+        self._sent.clear()
 
     def came_back(self, transport: TransportId, at: Instant) -> None:
         """Note that a transport's request has ended."""
-        if transport in self._ways:
-            self._ways[transport].came_back(at)
+        self._busy.discard(transport)
+        self._next[transport] = at.mono + FIWARE_PAUSE_S
 
     def due(self, stop: Command, at: Instant) -> list[SendStop]:
         """Sends that are due now; they count as sent."""
@@ -129,10 +68,34 @@ class Sends:
         progress = _PROGRESS.get(stop.state, "asked")
         hold_id = stop.hold_id or stop.command_id
         return [
-            SendStop(stop.robot_id, hold_id, name, stop.command_id)
-            for name, way in self._ways.items()
-            if way.is_due(at, age_s, progress)
+            SendStop(stop.robot_id, hold_id, way.id, stop.command_id)
+            for way in self._ways.values()
+            if (
+                self._is_free(way.id, at, progress)
+                if way.one_at_a_time
+                else self._is_due(way.id, at, age_s, progress)
+            )
         ]
+
+    def _is_due(
+        self, way: TransportId, at: Instant, age_s: float, progress: Progress
+    ) -> bool:
+        """Whether to repeat it on a transport that takes any number."""
+        sent_at, age_then = self._sent.get(way, (float("-inf"), 0.0))
+        if at.mono - sent_at < _pause(age_then, progress) - _EARLY_S:
+            return False
+        self._sent[way] = at.mono, age_s
+        return True
+
+    def _is_free(self, way: TransportId, at: Instant, progress: Progress) -> bool:
+        """Whether to ask a transport that takes one at a time."""
+        if way in self._busy or (progress != "asked" and not self._is_alone):
+            return False
+        rest = STANDING_RESEND_S - FIWARE_PAUSE_S if progress == "standing" else 0.0
+        if at.mono < self._next.get(way, 0.0) + rest:
+            return False
+        self._busy.add(way)
+        return True
 
 
 def _pause(age_s: float, progress: Progress) -> float:

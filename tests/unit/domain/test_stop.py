@@ -636,11 +636,11 @@ def test_a_press_on_a_standing_robot_joins_and_sends_nothing() -> None:
 
 def test_how_far_it_may_have_driven_grows_with_its_last_speed() -> None:
     bench = Bench()
-    assert bench.machine.moved_m(at(0.0)) == 0.0
+    assert bench.machine.evidence.moved_m(at(0.0)) == 0.0
     bench.press()
     bench.report(linear=0.8, factor=1.0)
 
-    assert bench.machine.moved_m(at(2.5)) == pytest.approx(2.0)
+    assert bench.machine.evidence.moved_m(at(2.5)) == pytest.approx(2.0)
 
 
 # --- the table ------------------------------------------------------------------

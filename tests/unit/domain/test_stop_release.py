@@ -30,10 +30,13 @@ def test_i2_a_release_is_sent_once_with_exactly_the_holds_and_the_challenge() ->
     effects = bench.log + bench.wait(1.5)
 
     (sent,) = once(effects)
-    assert set(sent.ids) == {bench.ours.id, BOOT_HOLD.id}
+    assert set(sent.attempt.ids) == {bench.ours.id, BOOT_HOLD.id}
     assert sent.ours == (bench.ours.id,)
-    assert sent.challenge == "0123456789abcdef"
-    assert sent.transports == ("direct", "fiware")
+    assert sent.attempt.challenge == "0123456789abcdef"
+    assert sent.attempt.command.transports == {
+        "direct": "pending",
+        "fiware": "pending",
+    }
 
 
 def test_without_the_direct_transport_a_release_takes_the_other_alone() -> None:
@@ -43,9 +46,7 @@ def test_without_the_direct_transport_a_release_takes_the_other_alone() -> None:
 
     (sent,) = once(bench.release(bench.ours.id))
 
-    assert sent.transports == ("fiware",)
-    assert bench.machine.once is not None
-    assert bench.machine.once.transports == {"direct": "off", "fiware": "pending"}
+    assert sent.attempt.command.transports == {"direct": "off", "fiware": "pending"}
 
 
 def test_nothing_is_sent_again_while_a_release_is_on_its_way() -> None:
@@ -78,7 +79,7 @@ def test_a_person_may_name_local_holds_too_but_they_are_not_sent() -> None:
 
     effects = bench.release(bench.ours.id, RED_BUTTON.id)
 
-    assert once(effects)[0].ids == (bench.ours.id,)
+    assert once(effects)[0].attempt.ids == (bench.ours.id,)
 
 
 def test_i2_a_robot_that_only_local_holds_keep_cannot_be_released() -> None:
@@ -484,7 +485,7 @@ def test_a_resume_is_sent_once_without_ids() -> None:
     effects = bench.resume() + bench.wait(1.5)
 
     (sent,) = once(effects)
-    assert (sent.kind, sent.ids) == ("resume", ())
+    assert (sent.attempt.command.kind, sent.attempt.ids) == ("resume", ())
     assert bench.state == "RELEASING"
 
 
