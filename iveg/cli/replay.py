@@ -11,8 +11,8 @@ from iveg.cli.nodes import node_settings
 from iveg.cli.running import LOOPBACK
 from iveg.domain.errors import DataFileError
 from iveg.domain.fleet import FleetDescription
-from iveg.lab.emulator.bags import BagTopics
-from iveg.lab.emulator.replay import ReplaySettings, run_replay
+from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.replay import ReplaySettings, run_replay
 from iveg.settings import Settings
 
 

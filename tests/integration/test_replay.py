@@ -19,8 +19,8 @@ from iveg.domain.observations import (
     Odometry,
     SafetyReport,
 )
-from iveg.lab.emulator.replay import ReplaySettings, run_replay
 from iveg.robot.node import NodeSettings
+from iveg.robot.replay.replay import ReplaySettings, run_replay
 from tests import data
 from tests.data.bags import Said, bag_directory, db3_bag, drive, mcap_bag, ros1_bag
 from tests.data.recorded import emulated_logs, real_log

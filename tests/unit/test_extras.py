@@ -12,7 +12,7 @@ from iveg.adapters.history.engine import writing_engine
 from iveg.cli import UNUSABLE, main
 from iveg.domain.errors import MissingExtraError
 from iveg.domain.geometry import Pose2D
-from iveg.lab.emulator.recordings import open_recording
+from iveg.robot.replay.recordings import open_recording
 from iveg.settings import Settings
 from tests.processes import ROOT
 

@@ -22,7 +22,6 @@ from iveg.lab.emulator.emulated_robot import EmulatedRobot, FleetSettings
 from iveg.lab.emulator.faults import open_fault_port
 from iveg.lab.emulator.layout import lay_out
 from iveg.lab.emulator.orders import FaultOrder, Order
-from iveg.lab.emulator.pacing import LONGEST_STEP_S, SLOTS, every
 from iveg.lab.emulator.radio import Radio
 from iveg.lab.emulator.relay import Relay
 from iveg.lab.emulator.ros2_base import Ros2Base
@@ -31,6 +30,7 @@ from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import Camera, RobotHardware, SimulatedWorld, climate_at
 from iveg.ngsi import names
 from iveg.ngsi.codec import write_climate
+from iveg.robot.pacing import LONGEST_STEP_S, SLOTS, every
 from iveg.robot.ros2.config import RobotConfig
 from iveg.robot.ros2.rig import Network
 from iveg.ros2.names import namespace_of

@@ -10,7 +10,7 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry
-from iveg.lab.emulator.logs import LogReader
+from iveg.robot.replay.logs import LogReader
 from tests import data
 from tests.data.recorded import ROBOTS, emulated_logs, real_log
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D
 from iveg.domain.observations import Odometry, Origin
-from iveg.lab.emulator.bags import Bag, BagTopics
-from iveg.lab.emulator.logs import LogReader, RecordingEntry
 from iveg.robot.gate import REST
+from iveg.robot.replay.bags import Bag, BagTopics
+from iveg.robot.replay.logs import LogReader, RecordingEntry
 
 _LOGS, _BAGS = (".jsonl", ".gz"), (".db3", ".mcap", ".bag")
 _LONGEST_S = 1e7

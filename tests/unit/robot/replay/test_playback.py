@@ -5,8 +5,8 @@ import pytest
 
 from iveg.domain.geometry import Box3D, Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry, Origin
-from iveg.lab.emulator.logs import LogReader, RecordingEntry
-from iveg.lab.emulator.playback import Playback
+from iveg.robot.replay.logs import LogReader, RecordingEntry
+from iveg.robot.replay.playback import Playback
 from tests import data
 from tests.builders import scan
 from tests.unit.domain.scene import Scene

@@ -23,12 +23,12 @@ from iveg.domain.observations import (
     Odometry,
     Origin,
 )
-from iveg.lab.emulator.bags import BagTopics
-from iveg.lab.emulator.pacing import every
-from iveg.lab.emulator.playback import Playback
-from iveg.lab.emulator.recordings import open_recording
 from iveg.robot.gate import REST
 from iveg.robot.node import NodeSettings, RobotNode
+from iveg.robot.pacing import every
+from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.playback import Playback
+from iveg.robot.replay.recordings import open_recording
 
 TASK = "replay"
 """Task of a replayed robot; iVeg recognises replays by the mark of their messages."""

@@ -9,9 +9,9 @@ import pytest
 from iveg.domain.errors import DataFileError
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import LaserScan, Odometry
-from iveg.lab.emulator.bags import BagTopics
-from iveg.lab.emulator.logs import RecordingEntry
-from iveg.lab.emulator.recordings import open_recording
+from iveg.robot.replay.bags import BagTopics
+from iveg.robot.replay.logs import RecordingEntry
+from iveg.robot.replay.recordings import open_recording
 from tests.data.bags import (
     ODOMETRY,
     SCAN,

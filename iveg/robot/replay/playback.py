@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 
 from iveg.domain.geometry import Pose2D, Twist2D
 from iveg.domain.observations import Detection, LaserScan, Odometry
-from iveg.lab.emulator.logs import RecordingEntry
+from iveg.robot.replay.logs import RecordingEntry
 
 _READ_AHEAD = 256
 """Entries searched for the next pose; beyond, the last pose is kept."""
