@@ -1,5 +1,8 @@
 # iVeg as an image: libraries from the hashed lock files, then the code, no build tools,
 # a user without rights, nothing to write to but /data and /tmp.
+#
+# Two targets: `server` (the last, hence the usual one) carries the product alone;
+# `laboratory` adds iveg/lab, for `iveg emulator`.
 
 FROM python:3.12.11-slim-bookworm AS libraries
 WORKDIR /build
@@ -10,21 +13,30 @@ RUN awk '/^[^ #]/ { wanted = /^psycopg/ } wanted' dev.lock > postgresql.lock \
     && /opt/iveg/bin/pip install --no-cache-dir --disable-pip-version-check \
         --require-hashes -r run.lock -r postgresql.lock
 
-FROM python:3.12.11-slim-bookworm
+# Compiled here: the file system is read-only later.
+FROM python:3.12.11-slim-bookworm AS code
+WORKDIR /app
+COPY iveg iveg
+COPY migrations migrations
+RUN python -m compileall -q iveg migrations && mv iveg/lab /lab
+
+FROM python:3.12.11-slim-bookworm AS product
 RUN groupadd --gid 10001 iveg \
     && useradd --uid 10001 --gid iveg --no-create-home --shell /usr/sbin/nologin iveg \
     && install --directory --owner iveg --group iveg --mode 700 /data
 COPY --from=libraries /opt/iveg /opt/iveg
 WORKDIR /app
-COPY iveg iveg
-COPY migrations migrations
+COPY --from=code /app /app
 ENV PATH=/opt/iveg/bin:$PATH PYTHONPATH=/app PYTHONUNBUFFERED=1 \
-    XDG_DATA_HOME=/data HOME=/tmp IVEG_HOST=0.0.0.0
-# Compiled now: the file system is read-only later.
-RUN python -m compileall -q iveg migrations
-ENV PYTHONDONTWRITEBYTECODE=1
+    XDG_DATA_HOME=/data HOME=/tmp IVEG_HOST=0.0.0.0 PYTHONDONTWRITEBYTECODE=1
 USER 10001:10001
 VOLUME /data
 EXPOSE 8000
 ENTRYPOINT ["python", "-m", "iveg"]
+
+FROM product AS laboratory
+COPY --from=code /lab /app/iveg/lab
+CMD ["emulator"]
+
+FROM product AS server
 CMD ["serve"]

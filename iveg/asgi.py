@@ -11,7 +11,8 @@ from starlette.staticfiles import StaticFiles
 
 from iveg import __version__
 from iveg.app.dss import Dss
-from iveg.web.api import day, experiments, history, sign_in_code, stop_records
+from iveg.app.laboratory import find_laboratory
+from iveg.web.api import day, history, sign_in_code, stop_records
 from iveg.web.api.answers import Json
 from iveg.web.build import build_app, live_routers
 from iveg.web.pages import openapi, routes, service_worker
@@ -49,7 +50,7 @@ def create_app(dss: Dss) -> FastAPI:
 
 
 def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
-    """History, experiments, and what a browser needs besides."""
+    """History, what a browser needs besides, and the laboratory's own."""
     queries, face = dss.stores.queries, dss.face
     views, evaluator, clock = face.views, dss.pipeline.evaluator, face.clock
     yield stop_records.router(queries, clock, views.find_command)
@@ -65,5 +66,7 @@ def _past_routers(dss: Dss, pages: routes.Pages) -> Iterator[APIRouter]:
         fleet=dss.fleet,
     )
     yield sign_in_code.router(dss.sign_in_token)
-    yield experiments.router(dss.experiments)
     yield service_worker.router()
+    laboratory = find_laboratory("pages")
+    if laboratory is not None:
+        yield from laboratory.routers(dss, pages)

@@ -28,6 +28,7 @@ from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
 from iveg.adapters.worker import Worker
+from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
 from iveg.app.stores import open_stores
 from iveg.domain.detection_rule import DetectionRule
@@ -38,7 +39,6 @@ from iveg.domain.messages import Channel
 from iveg.domain.observations import Instant, Observation
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.lab.experiment.runner import ExperimentRunner
 from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
 from iveg.pipeline.loop import reading_apart_s
@@ -66,6 +66,7 @@ class Dss:
     Attributes:
         on_failure: Called when a vital part has ended.
         failure: What ended it; None while all is well.
+        on_close: Called when it ends, before its own parts do.
         counted: Counters of parts beside it, told with its own.
         stores: What outlives a restart.
         pipeline: Everything between the doors; ``services`` beside it.
@@ -82,6 +83,7 @@ class Dss:
         self.settings = settings
         self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
+        self.on_close: list[Work] = []
         self.counted: list[Counter[str]] = [log_filter.counted]
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
@@ -102,9 +104,6 @@ class Dss:
         self.pipeline = build(self.fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
         self.provisioner = self._provisioner()
-        self.experiments = ExperimentRunner(
-            self.stores.directory / "experiments", self._is_robot_there
-        )
         self.face = self._face(tenant)
 
     # --- what the parts are given -------------------------------------------------
@@ -216,7 +215,13 @@ class Dss:
             views=Views(parts, self.counters),
             authenticator=authenticator,
             orion=orion,
-            site=Site(greenhouse, self.fleet.ids, __version__, self._demo),
+            site=Site(
+                greenhouse,
+                self.fleet.ids,
+                __version__,
+                self._demo,
+                laboratory=find_laboratory("pages") is not None,
+            ),
             boot=self._boot,
             queues=self.queues,
             clock=clock.now,
@@ -237,7 +242,8 @@ class Dss:
             living.remove_done_callback(self._ended)
             living.cancel()
             await asyncio.gather(living, return_exceptions=True)
-            await self.experiments.close()
+            for close in self.on_close:
+                await close()
             self.pipeline.evaluator.leave(clock.now())
             await self.pipeline.commander.close()
             await self.stores.close()
@@ -323,7 +329,7 @@ class Dss:
         event = LogEvent("system", "log.rejected", {"source": source, "reason": reason})
         self.pipeline.event_log.log(event, clock.now())
 
-    def _is_robot_there(self) -> bool:
+    def is_robot_there(self) -> bool:
         """Whether a robot is connected that is not known to be emulated."""
         now, robots = clock.now(), self.pipeline.world.live_robots()
         return not self._demo and any(

@@ -1,14 +1,22 @@
 """Command line: arguments and settings to parts (docs/interfaces/cli.md)."""
 
-import argparse
 import logging
 import os
 import sys
-from collections.abc import Coroutine, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from iveg.cli.arguments import parser
+from iveg.app.laboratory import find_laboratory
+from iveg.cli.arguments import (
+    Call,
+    Command,
+    add_db,
+    add_replay,
+    add_robot,
+    add_serve,
+    parser,
+)
+from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import (
     DataFileError,
     IvegError,
@@ -23,7 +31,7 @@ UNUSABLE = 2
 
 def main(arguments: Sequence[str]) -> int:
     """Run one command; returns the exit code."""
-    options = parser().parse_args(arguments)
+    options = parser(_commands()).parse_args(arguments)
     logging.basicConfig(
         level=logging.INFO if options.verbose else logging.WARNING,
         format="%(asctime)s %(levelname)s %(name)s: %(message)s",
@@ -33,76 +41,79 @@ def main(arguments: Sequence[str]) -> int:
         logging.getLogger(noisy).setLevel(logging.WARNING)
     try:
         settings = Settings.from_environment(os.environ)
-        return _run(options, settings)
+        data = settings.data_directory or default_data_directory(
+            os.environ, Path.home()
+        )
+        code: int = options.run(Call(options, settings, os.environ, Path(data)))
     except (SettingsError, DataFileError, MissingExtraError) as error:
         print(f"iveg: {error}", file=sys.stderr)
         return UNUSABLE
     except IvegError as error:
         print(f"iveg: {error}", file=sys.stderr)
         return 1
+    return code
 
 
-def _run(options: argparse.Namespace, settings: Settings) -> int:
-    data = Path(
-        settings.data_directory or default_data_directory(os.environ, Path.home())
-    )
-    match options.command:
-        case "settings":
-            print(describe(), end="")
-            return 0
-        case "db":
-            from iveg.cli.serve import upgrade_database
-
-            return upgrade_database(settings, data)
-        case "provision":
-            from iveg.cli.provision import provision_fleet
-
-            return provision_fleet(settings)
-        case "doctor":
-            from iveg.cli.doctor import run_doctor
-
-            return run_doctor(settings, data)
-        case "robot":
-            from iveg.cli.robot import run_robot
-
-            return run_robot(options, settings, data, os.environ)
-        case "experiment":
-            from iveg.cli.experiment import experiment
-
-            return experiment(options, settings, os.environ, data)
-        case "demo":
-            from iveg.cli.demo import demo
-
-            emulator = not options.no_emulator
-            return demo(
-                settings, os.environ, data, emulator=emulator, ros2=options.ros2
-            )
-        case _:
-            from iveg.cli.running import run_until_stopped
-
-            work = _part(options, settings, data)
-            return run_until_stopped(work, until_eof=options.until_eof)
+def _commands() -> Sequence[Command]:
+    """Commands of the product, and of the laboratory where it is installed."""
+    laboratory = find_laboratory("commands")
+    return COMMANDS if laboratory is None else (*COMMANDS, *laboratory.COMMANDS)
 
 
-def _part(
-    options: argparse.Namespace, settings: Settings, data: Path
-) -> Coroutine[Any, Any, None]:
-    """A part as a process; FIWARE and robots start without the page's libraries."""
-    match options.command:
-        case "serve":
-            from iveg.cli.serve import serve
+# Each command imports what it needs when it runs: a robot starts without the libraries
+# of page and history.
 
-            data.mkdir(parents=True, exist_ok=True)
-            return serve(settings, data, demo=options.demo)
-        case "fiware":
-            from iveg.cli.fiware import fiware
 
-            return fiware(settings)
-        case "emulator":
-            from iveg.cli.emulator import emulator
+def _serve(call: Call) -> int:
+    from iveg.cli.serve import serve
 
-            return emulator(options, settings)
-        case _:
-            from iveg.cli.replay import replay
+    call.data.mkdir(parents=True, exist_ok=True)
+    work = serve(call.settings, call.data, demo=call.options.demo)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
 
-            return replay(options, settings)
+
+def _replay(call: Call) -> int:
+    from iveg.cli.replay import replay
+
+    work = replay(call.options, call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
+
+
+def _robot(call: Call) -> int:
+    from iveg.cli.robot import run_robot
+
+    return run_robot(call.options, call.settings, call.data, call.environment)
+
+
+def _provision(call: Call) -> int:
+    from iveg.cli.provision import provision_fleet
+
+    return provision_fleet(call.settings)
+
+
+def _doctor(call: Call) -> int:
+    from iveg.cli.doctor import run_doctor
+
+    return run_doctor(call.settings, call.data)
+
+
+def _settings(_: Call) -> int:
+    print(describe(), end="")
+    return 0
+
+
+def _db(call: Call) -> int:
+    from iveg.cli.serve import upgrade_database
+
+    return upgrade_database(call.settings, call.data)
+
+
+COMMANDS = (
+    Command("serve", "the DSS and its page", _serve, add_serve),
+    Command("replay", "recorded logs as robots", _replay, add_replay),
+    Command("robot", "a ROS 2 robot joins", _robot, add_robot),
+    Command("provision", "make devices and subscriptions", _provision),
+    Command("doctor", "try every hop once and say what is broken", _doctor),
+    Command("settings", "print docs/settings.md", _settings),
+    Command("db", "the history's database", _db, add_db),
+)

@@ -46,11 +46,11 @@ from iveg.cli.diagnosis import (
     missing,
     table,
 )
+from iveg.cli.post_listener import post_listener
 from iveg.cli.probe import Probe
 from iveg.cli.running import run_until_stopped
 from iveg.domain.errors import HopError, IvegError
 from iveg.domain.hops import Check, Hop
-from iveg.lab.embedded.http_server import Request, Response, http_server
 from iveg.ngsi import names
 from iveg.settings import Settings
 
@@ -275,14 +275,10 @@ class Examination:
         """Be notified of a change made at Orion itself, without the agent."""
         ear = TopicListener()
 
-        async def take(request: Request) -> Response:
-            ear.hear(request.body)
-            return Response(204)
-
         # As an iVeg with these settings names itself to Orion.
         settings = self._settings
         host = urlsplit(settings.notify_address).hostname or settings.host
-        async with http_server(take, _bind_to(host), 0) as port:
+        async with post_listener(ear.hear, _bind_to(host)) as port:
             self._listening_at = f"http://{_in_url(host)}:{port}/"
             subscription = await self._probe.subscribe(self._listening_at)
             mark = ear.mark()

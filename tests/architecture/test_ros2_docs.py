@@ -6,6 +6,7 @@ from dataclasses import fields
 
 import pytest
 
+from iveg import cli
 from iveg.cli.arguments import parser
 from iveg.robot.ros2.config import RobotConfig, Topics, read_config
 from iveg.robot.ros2.inputs import TOPICS
@@ -45,8 +46,8 @@ def test_every_type_that_is_read_is_in_the_contract(message: str) -> None:
 
 
 def test_every_word_of_the_command_line_is_in_the_contract() -> None:
-    usage = vars(parser().parse_args(["robot", "--id", "AGI"]))
-    names = usage.keys() - {"action", "command", "verbose"}
+    usage = vars(parser(cli.COMMANDS).parse_args(["robot", "--id", "AGI"]))
+    names = usage.keys() - {"action", "command", "run", "verbose"}
     words = {f"--{name.replace('_', '-')}" for name in names}
 
     assert {word for word in words if word not in COMMANDS} == set()

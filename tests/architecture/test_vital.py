@@ -38,6 +38,5 @@ def test_what_the_page_calls_comfort_is_comfort() -> None:
         "iveg.pipeline.messenger",
         "iveg.adapters.history",
         "iveg.adapters.provisioner",
-        "iveg.lab.experiment",
         "iveg.web",
     }

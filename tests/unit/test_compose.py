@@ -272,6 +272,23 @@ def test_the_image_is_made_of_files_that_the_build_may_see() -> None:
     assert [source for source in sources if not (ROOT / source).exists()] == []
 
 
+def test_the_image_of_the_server_carries_no_laboratory() -> None:
+    targets = {
+        name: one["build"]["target"] for name, one in SERVICES.items() if "build" in one
+    }
+
+    assert DOCKERFILE.index("mv iveg/lab") < DOCKERFILE.index("AS product")
+    assert re.findall(r"^COPY.* /lab .+$", DOCKERFILE, re.MULTILINE) == [
+        "COPY --from=code /lab /app/iveg/lab"
+    ]
+    assert DOCKERFILE.rstrip().endswith('FROM product AS server\nCMD ["serve"]')
+    assert targets == {
+        "iveg": "server",
+        "iveg-migrate": "server",
+        "emulator": "laboratory",
+    }
+
+
 def test_no_secret_gets_into_the_image() -> None:
     ignore = (ROOT / ".dockerignore").read_text().splitlines()
     allowed = [line[1:] for line in ignore if line.startswith("!")]

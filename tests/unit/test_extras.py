@@ -21,7 +21,7 @@ PRODUCTION = """
 import sys
 for name in sys.argv[1:]:
     sys.modules[name] = None
-import iveg.cli.doctor, iveg.cli.emulator, iveg.cli.replay, iveg.cli.robot
+import iveg.cli.doctor, iveg.cli.replay, iveg.cli.robot, iveg.lab.commands.emulator
 import iveg.cli.serve
 """
 

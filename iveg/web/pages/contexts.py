@@ -25,6 +25,7 @@ class Site:
         greenhouse: Name as people say it.
         robots: Ids in fleet order; the order decides each robot's colour.
         demo: The robots are emulated.
+        laboratory: Experiments can be started from the page.
         transports: Ids, in the order of their columns.
     """
 
@@ -32,6 +33,7 @@ class Site:
     robots: tuple[str, ...]
     version: str
     demo: bool
+    laboratory: bool = False
     transports: tuple[str, ...] = tuple(one.id for one in TRANSPORTS)
 
 

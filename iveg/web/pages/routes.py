@@ -55,7 +55,6 @@ _SCRIPTED: Final = {
     "alerts": "/alerts",
     "climate": "/climate",
     "commands": "/commands",
-    "experiments": "/experiments",
     "fleet": "/fleet",
     "history": "/history",
     "latency": "/latency",
@@ -150,7 +149,7 @@ def router(
     """
     routes = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
     for route, path in _SCRIPTED.items():
-        _add_scripted(routes, pages, route, path)
+        add_scripted(routes, pages, route, path)
 
     @routes.get("/decisions/{decision_id}", response_model=None)
     async def decision(
@@ -189,7 +188,9 @@ def router(
     return routes
 
 
-def _add_scripted(routes: APIRouter, pages: Pages, route: str, path: str) -> None:
+def add_scripted(routes: APIRouter, pages: Pages, route: str, path: str) -> None:
+    """Add a page that its script fills; ``route`` names template and script."""
+
     @routes.get(path, name=route, response_model=None)
     async def scripted(request: Request, visitor: _Reader) -> Response:
         return pages.draw(Page(pages.frame(request, route, visitor)))

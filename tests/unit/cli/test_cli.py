@@ -10,10 +10,10 @@ import pytest
 
 from iveg import __version__
 from iveg.cli import UNUSABLE, main
-from iveg.cli.demo import on_free_ports
 from iveg.cli.nodes import node_settings
 from iveg.cli.running import print_sign_in_link, sign_in_link
 from iveg.domain.errors import SettingsError
+from iveg.lab.commands.demo import on_free_ports
 from iveg.settings import Settings, describe
 
 

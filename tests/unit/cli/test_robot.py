@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from iveg.cli import main
+from iveg.cli import COMMANDS, main
 from iveg.cli.arguments import parser
 from iveg.cli.robot import load_config, refuse_second_gate, run_robot
 from iveg.domain.errors import DataFileError, HopError, SettingsError
@@ -17,7 +17,7 @@ from tests.fakes.ros2_network import Endpoint, FakeNetwork
 
 
 def options(*words: str) -> argparse.Namespace:
-    return parser().parse_args(["robot", "--id", "AGI", *words])
+    return parser(COMMANDS).parse_args(["robot", "--id", "AGI", *words])
 
 
 @pytest.mark.parametrize("robot_id", ["climate", "A B", "a" * 65, "AGI;"])

@@ -5,7 +5,6 @@ All programs belong to this experiment alone: it starts its own iVeg beside the 
 on free ports, with a data directory of its own.
 """
 
-import argparse
 import asyncio
 import contextlib
 import secrets
@@ -20,12 +19,13 @@ import httpx
 
 from iveg.adapters import clock
 from iveg.adapters.extras import require_extra
-from iveg.cli.demo import on_free_ports, start_part, stop_parts, wait_ready
+from iveg.cli.arguments import Call
 from iveg.cli.live_robots import live_robot
 from iveg.cli.running import run_until_stopped
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import DataFileError, HopError, SettingsError
 from iveg.domain.stamps import format_stamp
+from iveg.lab.commands.demo import on_free_ports, start_part, stop_parts, wait_ready
 from iveg.lab.experiment import compare
 from iveg.lab.experiment.files import directory_of, read_json
 from iveg.lab.experiment.observer import watch
@@ -47,13 +47,9 @@ _LIVE_WITHIN_S = 30.0
 T = TypeVar("T")
 
 
-def experiment(
-    options: argparse.Namespace,
-    settings: Settings,
-    environment: Mapping[str, str],
-    data: Path,
-) -> int:
+def experiment(call: Call) -> int:
     """Run or compare; returns the exit code."""
+    options, settings, environment = call.options, call.settings, call.environment
     if options.word == "compare":
         before, after = read_json(options.before), read_json(options.after)
         print(compare.write_comparison(before, after), end="")
@@ -61,7 +57,7 @@ def experiment(
     plan = replace(PLANS[options.size], profile=options.profile)
     if options.seed is not None:
         plan = replace(plan, seed=options.seed)
-    directory = options.out or directory_of(data / "experiments", plan)
+    directory = options.out or directory_of(call.data / "experiments", plan)
     embedded = options.fiware == ["embedded"]
     if embedded:
         require_extra("demo", "iveg experiment")

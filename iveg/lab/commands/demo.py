@@ -12,13 +12,13 @@ import socket
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from iveg.adapters.extras import require_extra
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.free_ports import bind_once
+from iveg.cli.arguments import Call
 from iveg.cli.running import LOOPBACK, print_sign_in_link, run_until_stopped
 from iveg.domain.errors import SettingsError
 from iveg.ros2.names import namespace_of
@@ -35,17 +35,11 @@ _FIWARE = (
 """Setting of each address, its variable and its scheme's port."""
 
 
-def demo(
-    settings: Settings,
-    environment: Mapping[str, str],
-    data: Path,
-    *,
-    emulator: bool = True,
-    ros2: bool = False,
-) -> int:
+def demo(call: Call) -> int:
     """Run the demo; returns the exit code."""
     require_extra("demo", "iveg demo")
-    directory = data / "demo"
+    settings, environment = call.settings, call.environment
+    directory = call.data / "demo"
     placed = replace(
         on_free_ports(settings, environment),
         sign_in_token=settings.sign_in_token or secrets.token_hex(32),
@@ -55,9 +49,9 @@ def demo(
     # Each demo starts anew: no hold of the last demo's robots remains.
     (directory / "commands.jsonl").unlink(missing_ok=True)
     parts = [["fiware"], ["serve", "--demo"]]
-    if ros2:
+    if call.options.ros2:
         parts += _ros2_parts(load_fleet(placed.fleet, placed.robots).ids)
-    elif emulator:
+    elif not call.options.no_emulator:
         parts.append(["emulator"])
     return run_until_stopped(
         _supervise(parts, placed, {**environment, **placed.to_environment()})

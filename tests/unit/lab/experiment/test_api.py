@@ -5,12 +5,10 @@ from typing import Any
 
 import pytest
 
-from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import ExperimentRefusedError
+from iveg.lab.experiment import api
+from iveg.lab.pages import page
 from iveg.models.experiment import Experiment, Experiments
-from iveg.web.api import experiments
-from iveg.web.pages import routes
-from iveg.web.pages.openapi import ApiDoc
 from iveg.web.security.authentication import Role
 from tests.unit.web.desk import WebDesk
 
@@ -30,7 +28,7 @@ ONE = Experiment(
 
 
 class FakeRunner:
-    """Implements ``web.experiments.ExperimentRunner``; ``asked`` is what came."""
+    """Implements ``lab.experiment.api.ExperimentRunner``; ``asked`` is what came."""
 
     def __init__(self, place: Path, refused: str | None = None) -> None:
         self.asked: list[str] = []
@@ -56,11 +54,8 @@ class FakeRunner:
 
 def desk_with(bench: FakeRunner) -> WebDesk:
     desk = WebDesk()
-    desk.app.include_router(experiments.router(bench))
-    nothing = ApiDoc("", "", (), ())
-    desk.app.include_router(
-        routes.router(desk.pages, document=lambda: nothing, rule=DetectionRule)
-    )
+    desk.app.include_router(api.router(bench))
+    desk.app.include_router(page(desk.pages))
     return desk
 
 

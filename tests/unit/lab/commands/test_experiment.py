@@ -5,8 +5,12 @@ from pathlib import Path
 import pytest
 
 from iveg.adapters.orion import OrionClient
-from iveg.cli.experiment import experiment_settings, refuse_live_robots, with_fiware
 from iveg.domain.errors import DataFileError, HopError, SettingsError
+from iveg.lab.commands.experiment import (
+    experiment_settings,
+    refuse_live_robots,
+    with_fiware,
+)
 from iveg.settings import Settings
 from tests.faulty_fiware import faulty_fiware
 

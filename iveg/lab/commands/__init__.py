@@ -1,0 +1,142 @@
+"""Commands of the laboratory (docs/interfaces/cli.md); each is imported when it runs.
+
+FIWARE and robots start without the libraries of page and history.
+"""
+
+import argparse
+from pathlib import Path
+
+from iveg.cli.arguments import Call, Command, add_end, add_network
+from iveg.cli.running import run_until_stopped
+
+
+def _demo(call: Call) -> int:
+    from iveg.lab.commands.demo import demo
+
+    return demo(call)
+
+
+def _fiware(call: Call) -> int:
+    from iveg.lab.commands.fiware import fiware
+
+    work = fiware(call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
+
+
+def _emulator(call: Call) -> int:
+    from iveg.lab.commands.emulator import emulator
+
+    work = emulator(call.options, call.settings)
+    return run_until_stopped(work, until_eof=call.options.until_eof)
+
+
+def _experiment(call: Call) -> int:
+    from iveg.lab.commands.experiment import experiment
+
+    return experiment(call)
+
+
+def _add_demo(demo: argparse.ArgumentParser) -> None:
+    demo.add_argument(
+        "--no-emulator", action="store_true", help="no robots: for `iveg replay`"
+    )
+    demo.add_argument(
+        "--ros2", action="store_true", help="the robots speak ROS 2, as real ones do"
+    )
+
+
+def _add_emulator(emulator: argparse.ArgumentParser) -> None:
+    emulator.add_argument("--scenario", default="demo", metavar="NAME")
+    emulator.add_argument(
+        "--robots", type=_positive, metavar="N", help="how many (default: the fleet)"
+    )
+    emulator.add_argument("--seed", type=int, default=1, metavar="S")
+    emulator.add_argument(
+        "--profile", default="simulation", choices=("simulation", "field", "perfect")
+    )
+    emulator.add_argument(
+        "--camera",
+        default="boxes",
+        choices=("boxes", "grounding"),
+        help="draw boxes about the truth, or ground masks in depth pictures",
+    )
+    emulator.add_argument(
+        "--held", action="store_true", help="robots stay held after they boot"
+    )
+    emulator.add_argument(
+        "--hz",
+        type=_rate,
+        default=30.0,
+        metavar="RATE",
+        help="of odometry, laser and camera each (default: 30)",
+    )
+    emulator.add_argument(
+        "--fault",
+        nargs="+",
+        default=[],
+        metavar="[ROBOT:]FIELD=VALUE",
+        help="what is wrong from the start, such as drop_percent=10 AGI:deaf=true",
+    )
+    emulator.add_argument(
+        "--fault-port", type=int, metavar="PORT", help="take fault orders over HTTP"
+    )
+    emulator.add_argument(
+        "--truth", type=Path, metavar="FILE", help="write down what is really in view"
+    )
+    emulator.add_argument(
+        "--dds", action="store_true", help="they speak ROS 2, for `iveg robot`"
+    )
+    add_network(emulator)
+    add_end(emulator)
+
+
+def _add_experiment(experiment: argparse.ArgumentParser) -> None:
+    words = experiment.add_subparsers(dest="word", required=True)
+    run = words.add_parser("run", help="run it; what broke off is taken up again")
+    size = run.add_mutually_exclusive_group()
+    for name, told in (
+        ("minimal", "one scenario, seconds: whether it works at all"),
+        ("quick", "every scenario once, three minutes (the usual)"),
+        ("full", "every scenario five times, over 100,000 messages"),
+    ):
+        size.add_argument(
+            f"--{name}", dest="size", action="store_const", const=name, help=told
+        )
+    run.set_defaults(size="quick")
+    run.add_argument(
+        "--fiware",
+        nargs="+",
+        default=["embedded"],
+        metavar="URL",
+        help="a FIWARE of its own (embedded, the usual), the one that the settings "
+        "name (settings), or Orion's address, the IoT Agent's and the broker's",
+    )
+    run.add_argument("--profile", choices=("field", "simulation"), default="field")
+    run.add_argument("--seed", type=int, metavar="S")
+    run.add_argument("--out", type=Path, metavar="DIR", help="where results go")
+    add_end(run)
+    compare = words.add_parser("compare", help="two results beside each other")
+    compare.add_argument("before", type=Path, metavar="A")
+    compare.add_argument("after", type=Path, metavar="B")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= 100:
+        raise argparse.ArgumentTypeError("a number from 1 to 100")
+    return number
+
+
+def _rate(text: str) -> float:
+    rate = float(text)
+    if not 1.0 <= rate <= 60.0:
+        raise argparse.ArgumentTypeError("a rate from 1 to 60 (Hz)")
+    return rate
+
+
+COMMANDS = (
+    Command("demo", "everything on one machine", _demo, _add_demo),
+    Command("fiware", "MQTT broker, Orion and IoT Agent", _fiware, add_end),
+    Command("emulator", "simulated robots", _emulator, _add_emulator),
+    Command("experiment", "the paper's evaluation", _experiment, _add_experiment),
+)
