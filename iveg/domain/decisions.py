@@ -10,13 +10,14 @@ A link is ``open`` while it may still come and never for longer: it comes, is mi
 or iVeg itself is interrupted and its end is ``unknown``.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.feedback import HALF_SPEED
-from iveg.domain.observations import Instant, SafetyReport
+from iveg.domain.first_reports import FirstReports
+from iveg.domain.observations import Instant, Odometry, SafetyReport
 from iveg.domain.rule.speed_limits import Crossing
 
 LinkVerdict = Literal["ok", "late", "missing", "n/a", "open", "unknown"]
@@ -202,38 +203,94 @@ class Decision:
 
 
 class Decisions:
-    """Open decisions, and the last few that ended."""
+    """Open decisions, and the last few that ended.
+
+    What happens to the fleet is a method, which returns the decisions that it changed.
+    """
 
     def __init__(self, keep: int = 200) -> None:
         self._keep = keep
         self._all: dict[str, Decision] = {}
+        self._first_reports = FirstReports()
 
     def get(self, decision_id: str) -> Decision | None:
         """One decision that is still in memory."""
         return self._all.get(decision_id)
-
-    def open_of(self, robot_id: str) -> Iterable[Decision]:
-        """The open decisions that slow one robot."""
-        return [
-            one
-            for one in self._all.values()
-            if one.ended is None and one.crossing.robot_id == robot_id
-        ]
-
-    def put(self, decision: Decision) -> None:
-        """Keep a decision, new or changed; the oldest ended ones make room."""
-        self._all[decision.decision_id] = decision
-        if len(self._all) > self._keep:
-            for key, one in list(self._all.items()):
-                if one.ended is not None:
-                    del self._all[key]
-                    break
 
     @property
     def known(self) -> Iterable[Decision]:
         """All that are in memory: the open ones and the newest that ended."""
         return self._all.values()
 
-    def every_open(self) -> Iterable[Decision]:
+    @property
+    def open(self) -> list[Decision]:
         """All open decisions."""
         return [one for one in self._all.values() if one.ended is None]
+
+    def begin(
+        self, crossing: Crossing, rule: DetectionRule, places: Iterable[Place] = ()
+    ) -> Decision:
+        """Open the decision of a crossing; the oldest ended ones make room."""
+        notice = self._first_reports.of(crossing)
+        noticed, answered = (None, None) if notice is None else notice
+        decision = Decision(
+            crossing,
+            rule,
+            noticed=noticed,
+            answered=answered,
+            places=tuple(places),
+        )
+        self._all[decision.decision_id] = decision
+        if len(self._all) > self._keep:
+            ended = (key for key, one in self._all.items() if one.ended is not None)
+            self._all.pop(next(ended, ""), None)
+        return decision
+
+    def end(self, decision_id: str, at: Instant) -> list[Decision]:
+        """A robot was let go."""
+        one = self._all.get(decision_id)
+        return [] if one is None else self._change([one], lambda one: one.closed(at))
+
+    def seen(self, people: Iterable[str], at: Instant) -> None:
+        """A frame that shows these people was notified."""
+        for person_id in people:
+            self._first_reports.seen(person_id, at)
+
+    def moved(self, odometry: Odometry, at: Instant) -> list[Decision]:
+        """A robot drives."""
+        speed = odometry.twist.linear_x
+        return self._change(
+            self._open_of(odometry.robot_id), lambda one: one.moved(speed, at)
+        )
+
+    def reported(
+        self, report: SafetyReport, published_at: float, at: Instant
+    ) -> list[Decision]:
+        """A robot says what it applies; feedback last went out at ``published_at``."""
+        self._first_reports.reported(report, published_at, at)
+        return self._change(
+            self._open_of(report.robot_id), lambda one: one.reported(report, at)
+        )
+
+    def published(self, at: Instant) -> list[Decision]:
+        """Feedback was published."""
+        return self._change(self.open, lambda one: one.published(at))
+
+    def age(self, now: Instant, known: Container[str]) -> list[Decision]:
+        """Time passes; notices of persons who are no longer known are forgotten."""
+        self._first_reports.forget(known)
+        return self._change(self.open, lambda one: one.aged(now))
+
+    def break_off(self, at: Instant) -> list[Decision]:
+        """End every open one: iVeg stops."""
+        return self._change(self.open, lambda one: one.broken_off(at))
+
+    def _open_of(self, robot_id: str) -> list[Decision]:
+        return [one for one in self.open if one.crossing.robot_id == robot_id]
+
+    def _change(
+        self, some: Iterable[Decision], step: Callable[[Decision], Decision]
+    ) -> list[Decision]:
+        changed = [after for one in some if (after := step(one)) is not one]
+        self._all.update({one.decision_id: one for one in changed})
+        return changed

@@ -6,7 +6,7 @@ heartbeat to the fleet is sent from here and nowhere else, so that a loop that h
 falls silent and slows the robots.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from iveg.domain.alerts import conditions
 from iveg.domain.alerts.alert_book import Condition
@@ -36,7 +36,6 @@ from iveg.pipeline.detections import DetectionTracking
 from iveg.pipeline.event_log import EventLog
 from iveg.pipeline.evidence import places_of, record_of
 from iveg.pipeline.feedback import FeedbackPublisher
-from iveg.pipeline.first_reports import FirstReports
 from iveg.pipeline.kinds import LowValues, kind
 from iveg.pipeline.log_messages import evidence_of, speed_line
 from iveg.pipeline.ports import FleetPort, Ids
@@ -86,7 +85,6 @@ class Evaluator:
         self._event_log = event_log
         self._new_id = new_id
         self._applied: dict[str, float] = {}
-        self._first_reports = FirstReports()
         self._low = LowValues()
         self._moved: dict[str, Odometry] = {}
         self._unjudged: Instant | None = None
@@ -130,7 +128,7 @@ class Evaluator:
         observation = received.observation
         if isinstance(observation, DetectionFrame):
             self.tracking.take(observation, received, verdict, self.rule)
-            self._notice(observation.robot_id, received.at)
+            self.decisions.seen(self._people_of(observation.robot_id), received.at)
         if verdict != "new":
             return False
         row, robot_id = kind(observation), getattr(observation, "robot_id", "")
@@ -149,10 +147,10 @@ class Evaluator:
                 self._unjudged = _later(self._unjudged, received.at)
         return True
 
-    def _notice(self, robot_id: str, at: Instant) -> None:
+    def _people_of(self, robot_id: str) -> Iterator[str]:
         for one in self.tracking.placed.get(robot_id, ()):
             if one.person is not None:
-                self._first_reports.seen(one.person.person_id, at)
+                yield one.person.person_id
 
     @property
     def is_unjudged(self) -> bool:
@@ -173,16 +171,15 @@ class Evaluator:
         self._moved.clear()
 
     def _drove(self, odometry: Odometry, at: Instant) -> None:
-        for decision in self.decisions.open_of(odometry.robot_id):
-            self._advance(decision, decision.moved(odometry.twist.linear_x, at), at)
+        self._event_log.decisions(self.decisions.moved(odometry, at), at)
         self._unjudged = _later(self._unjudged, at)
         self._moved[odometry.robot_id] = odometry
 
     def _reported(self, report: SafetyReport, at: Instant) -> None:
-        for decision in self.decisions.open_of(report.robot_id):
-            self._advance(decision, decision.reported(report, at), at)
+        published_at = self._feedback_publisher.published_at
+        changed = self.decisions.reported(report, published_at, at)
+        self._event_log.decisions(changed, at)
         self._doubt_ignored_limit(report, at)
-        self._first_reports.reported(report, self._feedback_publisher.published_at, at)
         if report.speed_factor != self._applied.get(report.robot_id):
             self._applied[report.robot_id] = report.speed_factor
             self._log_speed(report, at)
@@ -195,11 +192,6 @@ class Evaluator:
             return
         if ignores_limit(report, robot.safety_received.mono, limited_at):
             robot.doubts.contradicted("limit_ignored", at)
-
-    def _advance(self, before: Decision, after: Decision, at: Instant) -> None:
-        if after is not before:
-            self.decisions.put(after)
-            self._event_log.decision(after, at)
 
     # --- judgement ----------------------------------------------------------------
 
@@ -234,30 +226,20 @@ class Evaluator:
 
     def _crossed(self, change: LimitChange, now: Instant) -> None:
         crossing = change.crossing
-        if change.began:
-            if not crossing.in_sight:
-                self.protected_unseen += 1
-            notice = self._first_reports.of(crossing)
-            decision = Decision(
-                crossing,
-                self.rule,
-                noticed=None if notice is None else notice.at,
-                answered=None if notice is None else notice.answered,
-                places=tuple(places_of(crossing, self.world)),
-            )
-            self.decisions.put(decision)
-            self._event_log.decision(decision, now)
+        if not change.began:
+            ended = self.decisions.end(crossing.decision_id, now)
+            self._event_log.decisions(ended, now)
             return
-        ended = self.decisions.get(crossing.decision_id)
-        if ended is not None:
-            self._advance(ended, ended.closed(now), now)
+        self.protected_unseen += not crossing.in_sight
+        places = places_of(crossing, self.world)
+        begun = self.decisions.begin(crossing, self.rule, places)
+        self._event_log.decisions([begun], now)
 
     def tell(self, now: Instant) -> None:
         """Publish feedback to the fleet (Algorithm 2, line 13)."""
         self._untold = False
         self._feedback_publisher.tell(self.speed_limits, self.rule, now)
-        for decision in self.decisions.every_open():
-            self._advance(decision, decision.published(now), now)
+        self._event_log.decisions(self.decisions.published(now), now)
 
     # --- time ---------------------------------------------------------------------
 
@@ -267,13 +249,12 @@ class Evaluator:
         self._staleness.tick(now)
         self._log_returned_detectors(now)
         self.tracking.forget(now)
-        self._first_reports.forget(self.people.known)
         self.settle()
         self._judge(now)
         if now.mono - self._feedback_publisher.published_at >= HEARTBEAT_S - 1e-3:
             self.tell(now)
-        for decision in self.decisions.every_open():
-            self._advance(decision, decision.aged(now), now)
+        aged = self.decisions.age(now, self.people.known)
+        self._event_log.decisions(aged, now)
         self.alerts.sync([*self._conditions(now), *more], now)
 
     def _log_returned_detectors(self, now: Instant) -> None:
@@ -285,7 +266,7 @@ class Evaluator:
         returned.clear()
 
     def _conditions(self, now: Instant) -> Iterable[Condition]:
-        for decision in self.decisions.every_open():
+        for decision in self.decisions.open:
             yield from conditions.of_decision(decision, now)
         for robot in self.world.live_robots():
             yield from conditions.of_robot(robot, now)
@@ -314,8 +295,7 @@ class Evaluator:
 
     def leave(self, now: Instant) -> None:
         """Break off open decisions when iVeg stops, so that the record says so."""
-        for decision in self.decisions.every_open():
-            self._advance(decision, decision.broken_off(now), now)
+        self._event_log.decisions(self.decisions.break_off(now), now)
 
     def leave_unsupervised(self, now: Instant) -> None:
         """Tell every robot to slow, once: a part without which nobody watches ended."""

@@ -115,9 +115,10 @@ class EventLog:
             self._hub.append(topics.EARLIER_LOG.name, before)
 
     @_guarded
-    def decision(self, decision: Decision, now: Instant) -> None:
-        """Record a decision that is new or has a new link."""
-        self._sink.offer(record_of(decision, now))
+    def decisions(self, changed: Iterable[Decision], now: Instant) -> None:
+        """Record decisions that are new or have a new link."""
+        for decision in changed:
+            self._sink.offer(record_of(decision, now))
 
     @_guarded
     def left_behind(

@@ -63,7 +63,7 @@ def evidence_of(
         return None
     ours = (
         one.decision_id
-        for one in decisions.every_open()
+        for one in decisions.open
         if (one.crossing.robot_id, one.crossing.zone.cause)
         == (robot.robot_id, found.cause)
     )

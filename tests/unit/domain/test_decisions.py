@@ -248,26 +248,35 @@ def test_the_clock_of_a_robot_that_echoes_is_not_blamed_for_a_late_transport(
 # --- the book ---------------------------------------------------------------------
 
 
-def test_decisions_are_found_by_name_by_robot_and_while_open() -> None:
+def test_decisions_are_found_by_name_and_while_open() -> None:
     book = Decisions()
-    book.put(decision())
+    begun = book.begin(crossing(), DetectionRule())
 
-    assert book.get("d-1") is not None
+    assert book.get("d-1") is begun
     assert book.get("d-2") is None
-    assert len(list(book.open_of("AGII"))) == 1
-    assert list(book.open_of("AGI")) == []
-    book.put(decision().closed(at(1)))
-    assert list(book.every_open()) == []
-    assert list(book.open_of("AGII")) == []
+    assert book.open == [begun]
+    book.end("d-1", at(1))
+    assert book.open == []
+
+
+def test_what_a_robot_does_changes_its_own_open_decisions_once() -> None:
+    book = Decisions()
+    book.begin(crossing(), DetectionRule())
+    slowed = odometry("AGII", linear=0.1, origin=origin(1))
+
+    assert book.moved(odometry("AGI", linear=0.1, origin=origin(1)), at(1)) == []
+    (changed,) = book.moved(slowed, at(1))
+    assert book.moved(slowed, at(2)) == []
+    assert book.get("d-1") is changed
 
 
 def test_old_ended_decisions_make_room_and_open_ones_never_do() -> None:
     book = Decisions(keep=2)
-    opened = replace(decision(), crossing=replace(crossing(), decision_id="open"))
-    book.put(opened)
+    opened = book.begin(replace(crossing(), decision_id="open"), DetectionRule())
     for number in range(5):
         named = replace(crossing(), decision_id=f"ended-{number}")
-        book.put(Decision(named, DetectionRule()).closed(at(number)))
+        book.begin(named, DetectionRule())
+        book.end(named.decision_id, at(number))
 
     assert book.get("open") is opened
     assert book.get("ended-0") is None

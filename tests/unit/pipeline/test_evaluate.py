@@ -185,7 +185,7 @@ async def test_the_end_of_a_crossing_ends_its_decision() -> None:
         desk.look("AGI")
         desk.look("AGII", detection("farmer", 1.5 + 0.1 * tenth))
 
-    assert list(desk.evaluator.decisions.every_open()) == []
+    assert list(desk.evaluator.decisions.open) == []
     newest = desk.records(DecisionRecord)[-1]
     assert isinstance(newest, DecisionRecord)
     assert newest.ended_at is not None
@@ -290,7 +290,7 @@ async def test_the_stored_decision_says_missing_as_soon_as_it_is() -> None:
         await desk.wait(0.45)
 
     assert "alert.person_not_slowing" in conditions_of(desk)
-    assert desk.evaluator.decisions.every_open()
+    assert desk.evaluator.decisions.open
     assert stored_verdicts(desk) == {"ok", "missing"}
 
 

@@ -11,6 +11,7 @@ same, from the newest frame that robots had been told of by then::
 from collections import deque
 from collections.abc import Container
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from iveg.domain.feedback import HALF_SPEED
 from iveg.domain.observations import Instant, SafetyReport
@@ -22,8 +23,7 @@ _KEPT = 16
 _UNTIMED = "", 0.0, 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class FirstReport:
+class FirstReport(NamedTuple):
     """The notification that an acknowledgement is timed from.
 
     Attributes:
