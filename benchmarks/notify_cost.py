@@ -17,7 +17,7 @@ import numpy as np
 import orjson
 
 from benchmarks.process import print_table
-from iveg.app.dss import Dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.lab.embedded.orion_numbers import print_value
 from iveg.ngsi.codec import read_notification
@@ -161,7 +161,7 @@ async def rows(dss: Dss) -> list[list[str]]:
 
 def main() -> None:
     with TemporaryDirectory() as directory:
-        dss = Dss(Settings(), Path(directory))
+        dss = open_dss(Settings(), Path(directory))
         told = asyncio.run(rows(dss))
     head = ("kind", "reading", "whole way", "the same of a twin")
     print_table("CPU seconds per 1,000 notifications", head, told)

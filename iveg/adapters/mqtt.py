@@ -86,12 +86,10 @@ class MqttLink:
     ) -> None:
         self._address = address
         self._name = name
-        self._subscriptions = dict(subscriptions or {})
-        self._on_message = on_message
-        self._on_connect = on_connect
-        self._on_loss = on_loss
-        self._on_passed_over = on_passed_over
         self._apart_s = apart_s
+        self.attach(
+            subscriptions or {}, on_message, on_connect, on_loss, on_passed_over
+        )
         self._client: OutboxClient | None = None
         self._offered: dict[str, tuple[bytes, int]] = {}
         self._early: deque[Qos1Message] = deque(maxlen=MOST_EARLY)
@@ -103,6 +101,29 @@ class MqttLink:
         self.replaced = 0
         """Offered messages that a newer one overtook."""
         self.connects = 0
+
+    def attach(
+        self,
+        subscriptions: Mapping[str, int],
+        on_message: Callable[[str, bytes], None],
+        on_connect: Callable[[], None] = lambda: None,
+        on_loss: Callable[[], None] = lambda: None,
+        on_passed_over: Callable[[str, int], None] = lambda _topic, _count: None,
+    ) -> None:
+        """Set the readers, before ``run``; they may be built after the link.
+
+        Args:
+            subscriptions: As above, and so for the others.
+            on_message: Called with each message.
+            on_connect: Called after every (re)connect.
+            on_loss: Called once when a connection is lost.
+            on_passed_over: Called with messages that were not handed over.
+        """
+        self._subscriptions = dict(subscriptions)
+        self._on_message = on_message
+        self._on_connect = on_connect
+        self._on_loss = on_loss
+        self._on_passed_over = on_passed_over
 
     @property
     def offered(self) -> int:

@@ -7,6 +7,7 @@ import secrets
 from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 from fastapi import FastAPI
@@ -17,35 +18,31 @@ from iveg.adapters.direct import DirectReader
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
 from iveg.adapters.ids import new_id
-from iveg.adapters.iot_agent import IotAgentClient
 from iveg.adapters.loop_watch import LoopWatch
 from iveg.adapters.mail import MailSender
-from iveg.adapters.mqtt import BrokerAddress, MqttLink
-from iveg.adapters.orion import OrionClient
-from iveg.adapters.outbound import OutboundHttp
 from iveg.adapters.provisioner import Provisioner
 from iveg.adapters.transports import MqttTransport, OrionTransport
 from iveg.adapters.web_push import PushSender
 from iveg.adapters.webhook import WebhookSender
 from iveg.adapters.worker import Worker
+from iveg.app.counts import count_all, read_queues
 from iveg.app.laboratory import find_laboratory
 from iveg.app.life import Work, live
-from iveg.app.stores import open_stores
+from iveg.app.outside import Outside, open_outside
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.errors import HopError, VitalPartError
-from iveg.domain.events import LogEvent
+from iveg.domain.fleet import FleetDescription
 from iveg.domain.latency.segments import WINDOW_S
 from iveg.domain.messages import Channel
-from iveg.domain.observations import Instant, Observation
+from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import DIRECT, FIWARE
-from iveg.pipeline.build import Choices, KeptChoices, Ports, build, build_services
+from iveg.pipeline.build import Choices, Ports, build, build_services
 from iveg.pipeline.latency import hours_of
-from iveg.pipeline.loop import reading_apart_s
 from iveg.pipeline.ports import MessageSender
 from iveg.pipeline.restore import remember
 from iveg.settings import Settings
-from iveg.web.api import messages, metrics
+from iveg.web.api import messages
 from iveg.web.build import Face
 from iveg.web.notifications import NotificationEndpoint
 from iveg.web.pages.contexts import Site
@@ -59,124 +56,107 @@ class Dss:
     """The decision-support system with all its parts, not yet running.
 
     Args:
-        settings: What an operator chose.
-        data_directory: Where the database (unless set) and the journals live.
+        settings: An operator's choices.
+        fleet: The robots.
+        outside: Ports to network and disk.
         demo: Whether the robots are emulated; shown on the page.
 
     Attributes:
         on_failure: Called when a vital part has ended.
-        failure: What ended it; None while all is well.
+        failure: The error that ended it; None while all is well.
         on_close: Called when it ends, before its own parts do.
-        counted: Counters of parts beside it, told with its own.
-        stores: What outlives a restart.
-        pipeline: Everything between the doors; ``services`` beside it.
-        face: What the web is given of it.
+        counted: Counters of parts beside the pipeline.
+        pipeline: From observations to feedback; ``services`` beside it.
+        face: The parts that the web shows.
     """
 
     def __init__(
         self,
         settings: Settings,
-        data_directory: Path,
+        fleet: FleetDescription,
+        outside: Outside,
         *,
         demo: bool = False,
     ) -> None:
-        self.settings = settings
+        self.settings, self.fleet, self.outside = settings, fleet, outside
+        self.stores = outside.stores
         self.on_failure: Callable[[], None] = lambda: None
         self.failure: VitalPartError | None = None
         self.on_close: list[Work] = []
-        self.counted: list[Counter[str]] = [log_filter.counted]
         self.sign_in_token = settings.sign_in_token or secrets.token_hex(32)
         notify_token = settings.notify_token or secrets.token_hex(32)
         previous = settings.notify_token_previous
         self.notify_secret = NotifySecret(notify_token, previous)
         self._boot, self._demo = secrets.token_hex(8), demo
-        self.fleet = load_fleet(settings.fleet, settings.robots)
-        self.stores = open_stores(settings, data_directory)
-        self.link = self._mqtt_link()
-        tenant = settings.fiware_service, settings.fiware_servicepath
-        self.orion = OrionClient(settings.orion_url, *tenant)
-        self.agent = IotAgentClient(settings.iota_url, *tenant)
-        self.outbound = OutboundHttp()
-        self.worker = Worker(lambda error: self._failed("worker", error))
-        kept = self._kept_choices()
+        kept = self.stores.kept_choices(
+            DetectionRule(
+                threshold=settings.confidence_threshold,
+                radius_m=settings.safety_radius_m,
+            )
+        )
         choices = Choices(kept.rules[-1], Drills(settings.drill_days), self._boot)
         greenhouse = load_greenhouse(settings.greenhouse)
-        self.pipeline = build(self.fleet, greenhouse, self._ports(), choices)
+        self.pipeline = build(fleet, greenhouse, self._ports(), choices)
         self.services = build_services(self.pipeline, kept, self._senders(), clock.now)
+        self.counted: list[Counter[str]] = [
+            log_filter.counted,
+            self.services.messenger.counters,
+        ]
+        self.worker = Worker(partial(self.pipeline.supervision.failed, "worker"))
+        self._attach_reader()
         self.provisioner = self._provisioner()
-        self.face = self._face(tenant)
+        self.face = self._face()
 
-    # --- what the parts are given -------------------------------------------------
+    # --- wiring -------------------------------------------------------------------
 
-    def _mqtt_link(self) -> MqttLink:
-        """The connection to the broker; what it brings is read when parts are there."""
-        settings = self.settings
+    def _ports(self) -> Ports:
+        mqtt = MqttTransport(self.outside.link, self.settings.apikey)
+        direct = DIRECT.switched(on=self.settings.stop_direct)
+        return Ports(
+            mqtt,
+            {direct: mqtt, FIWARE: OrionTransport(self.outside.orion)},
+            self.stores.journal,
+            self.stores.recorder,
+            clock.now,
+            new_id,
+            self.stores.history_state,
+        )
+
+    def _senders(self) -> dict[Channel, MessageSender]:
+        outbound, write = self.outside.outbound, messages.writer()
+        return {
+            "push": PushSender(outbound, write),
+            "email": MailSender(outbound, write),
+            "webhook": WebhookSender(outbound),
+        }
+
+    def _attach_reader(self) -> None:
+        """Have robots' own messages read from the broker."""
+        ingest, watch = self.pipeline.ingest, self.pipeline.latency.watch
         reader = DirectReader(
-            settings.apikey,
+            self.settings.apikey,
             self.fleet.ids,
             clock.now,
-            lambda received: self.pipeline.ingest.offer(received),
-            lambda *told: self.pipeline.ingest.reject(*told),
-            settings.direct_read,
-            lambda *identity: self.pipeline.ingest.is_past(*identity),
-            lambda *counted: self._passed_over(*counted),
+            ingest.offer,
+            ingest.reject,
+            self.settings.direct_read,
+            ingest.is_past,
+            self.pipeline.supervision.guard("latency", watch.passed_over),
         )
-        return MqttLink(
-            BrokerAddress.from_url(
-                settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
-            ),
-            "iveg",
+        self.outside.link.attach(
             reader.subscriptions(),
             reader.read,
             self._broker_back,
             self._broker_lost,
             reader.pass_over,
-            reading_apart_s(len(self.fleet.ids)),
         )
-
-    def _kept_choices(self) -> KeptChoices:
-        stores, settings = self.stores, self.settings
-        first = DetectionRule(
-            threshold=settings.confidence_threshold, radius_m=settings.safety_radius_m
-        )
-        return KeptChoices(
-            stores.rules,
-            stores.contacts,
-            stores.detectors,
-            stores.rules.load(first, clock.now()),
-            stores.contacts.load(),
-            stores.detectors.load(),
-        )
-
-    def _ports(self) -> Ports:
-        mqtt = MqttTransport(self.link, self.settings.apikey)
-        direct = DIRECT.switched(on=self.settings.stop_direct)
-        recorder = self.stores.recorder
-        return Ports(
-            mqtt,
-            {direct: mqtt, FIWARE: OrionTransport(self.orion)},
-            self.stores.journal,
-            recorder,
-            clock.now,
-            new_id,
-            self._rejected,
-            lambda: recorder.health(clock.now()).state,
-        )
-
-    def _senders(self) -> dict[Channel, MessageSender]:
-        write = messages.writer()
-        return {
-            "push": PushSender(self.outbound, write),
-            "email": MailSender(self.outbound, write),
-            "webhook": WebhookSender(self.outbound),
-        }
 
     def _provisioner(self) -> Provisioner:
-        settings, parts = self.settings, self.pipeline
+        settings, parts, outside = self.settings, self.pipeline, self.outside
         provisioner = Provisioner(
-            self.orion,
-            self.agent,
-            self.link,
+            outside.orion,
+            outside.agent,
+            outside.link,
             parts.health_monitor,
             parts.ingest,
             parts.world.feeds,
@@ -191,11 +171,11 @@ class Dss:
         provisioner.throttle.allowed = settings.orion_throttle
         return provisioner
 
-    def _face(self, tenant: tuple[str, str]) -> Face:
-        parts = self.pipeline
+    def _face(self) -> Face:
+        parts, settings, recorder = self.pipeline, self.settings, self.stores.recorder
         authenticator = Authenticator(
             sign_in_token=self.sign_in_token,
-            api_token=self.settings.api_token,
+            api_token=settings.api_token,
             clock=clock.now,
             store=self.stores.sessions,
         )
@@ -204,26 +184,26 @@ class Dss:
             self.notify_secret,
             clock.now,
             self.provisioner.is_ours,
-            tenant,
+            (settings.fiware_service, settings.fiware_servicepath),
             self._notified,
             self.provisioner.throttle.is_throttled,
         )
-        greenhouse = parts.evaluator.greenhouse.name
+        site = Site(
+            parts.evaluator.greenhouse.name,
+            self.fleet.ids,
+            __version__,
+            self._demo,
+            laboratory=find_laboratory("pages") is not None,
+        )
         return Face(
             pipeline=parts,
             services=self.services,
-            views=Views(parts, self.counters),
+            views=Views(parts, partial(count_all, parts, recorder, self.counted)),
             authenticator=authenticator,
             orion=orion,
-            site=Site(
-                greenhouse,
-                self.fleet.ids,
-                __version__,
-                self._demo,
-                laboratory=find_laboratory("pages") is not None,
-            ),
+            site=site,
             boot=self._boot,
-            queues=self.queues,
+            queues=partial(read_queues, parts, recorder, self.outside.link),
             clock=clock.now,
             new_id=new_id,
             worker=self.worker,
@@ -246,10 +226,7 @@ class Dss:
                 await close()
             self.pipeline.evaluator.leave(clock.now())
             await self.pipeline.commander.close()
-            await self.stores.close()
-            await self.orion.close()
-            await self.agent.close()
-            self.outbound.close()
+            await self.outside.close()
             self.worker.close()
 
     async def _live(self) -> None:
@@ -259,7 +236,7 @@ class Dss:
 
     def vital(self) -> dict[str, Work]:
         """Parts without which there is no STOP or no speed limit, by name."""
-        return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run}
+        return {"mqtt": self.outside.link.run, "rule-loop": self.pipeline.loop.run}
 
     def comfort(self) -> dict[str, Work]:
         """All other parts, by name; each may fail by itself."""
@@ -277,7 +254,7 @@ class Dss:
     async def _last_word(self) -> None:
         """Have every robot slow at once: nobody watches any more."""
         self.pipeline.evaluator.leave_unsupervised(clock.now())
-        await self.link.drained()
+        await self.outside.link.drained()
 
     async def _remember(self) -> None:
         """Take up what earlier runs left in the history, as soon as it answers."""
@@ -315,19 +292,8 @@ class Dss:
     def _broker_lost(self) -> None:
         self.pipeline.health_monitor.mqtt_connected = False
 
-    def _failed(self, part: str, error: Exception) -> None:
-        self.pipeline.supervision.failed(part, error)
-
-    def _passed_over(self, robot_id: str, kind: type[Observation], count: int) -> None:
-        supervision, watch = self.pipeline.supervision, self.pipeline.latency.watch
-        supervision.guard("latency", watch.passed_over)(robot_id, kind, count)
-
     def _notified(self, at: Instant) -> None:
         self.pipeline.health_monitor.notified_at = at.mono
-
-    def _rejected(self, source: str, reason: str) -> None:
-        event = LogEvent("system", "log.rejected", {"source": source, "reason": reason})
-        self.pipeline.event_log.log(event, clock.now())
 
     def is_robot_there(self) -> bool:
         """Whether a robot is connected that is not known to be emulated."""
@@ -336,37 +302,23 @@ class Dss:
             robot.link(now) in ("LIVE", "LATE") for robot in robots
         )
 
-    # --- what is counted ----------------------------------------------------------
 
-    def counters(self) -> Counter[str]:
-        """Everything that is counted."""
-        total = self.pipeline.counters()
-        total.update(self.stores.recorder.counters)
-        for counted in self.counted:
-            total.update(counted)
-        total.update(self.services.messenger.counters)
-        return total
+def open_dss(
+    settings: Settings,
+    data_directory: Path,
+    *,
+    demo: bool = False,
+    make: type[Dss] = Dss,
+) -> Dss:
+    """A server as the settings say.
 
-    def queues(self) -> metrics.Queues:
-        """How full the queues are, what gave way, what was done again."""
-        ingest, kept = self.pipeline.ingest, self.stores.recorder.counters
-        dropped = {
-            "ingest": sum(
-                n for name, n in ingest.counters.items() if name.startswith("dropped.")
-            ),
-            "history": kept["history_dropped"],
-            "mqtt_out": self.link.replaced,
-        }
-        machines = self.pipeline.commander.machines.values()
-        stops = [machine.stop for machine in machines]
-        retries = {
-            "broker_connect": max(0, self.link.connects - 1),
-            "stop_send": sum(max(0, one.tries - 1) for one in stops if one is not None),
-            "history_replay": kept["history_replayed"],
-        }
-        depths = {
-            "ingest": ingest.waiting,
-            "history": kept["history_waiting"],
-            "mqtt_out": self.link.offered,
-        }
-        return metrics.Queues(depths, dropped, retries)
+    Args:
+        settings: An operator's choices.
+        data_directory: Where the database (unless set) and the journals are.
+        demo: Whether the robots are emulated.
+        make: The class.
+    """
+    fleet = load_fleet(settings.fleet, settings.robots)
+    return make(
+        settings, fleet, open_outside(settings, data_directory, fleet), demo=demo
+    )

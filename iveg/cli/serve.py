@@ -18,7 +18,7 @@ from iveg.adapters.connections import (
 )
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
-from iveg.app.dss import Dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.cli.garbage_collection import tune_garbage_collection
 from iveg.cli.running import print_sign_in_link, report_ready
@@ -59,7 +59,7 @@ async def serve(
     """
     await _upgrade_history(settings, data)
     raise_descriptor_limit()
-    dss = make(settings, data, demo=demo)
+    dss = open_dss(settings, data, demo=demo, make=make)
     app = create_app(dss)
     config = _config(settings, app)
     table = ConnectionTable(

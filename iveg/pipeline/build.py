@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 
 from iveg.domain.detection_rule import DetectionRule
 from iveg.domain.detector import OutOfService
+from iveg.domain.events import LogEvent
 from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
-from iveg.domain.observations import Instant, Received
+from iveg.domain.observations import Instant
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
@@ -54,7 +55,6 @@ class Ports:
         sink: The history.
         clock: Reads both clocks.
         new_id: A new id, sortable by time.
-        rejected: Called for each new kind of unusable message.
         history_state: State of the history.
     """
 
@@ -64,7 +64,6 @@ class Ports:
     sink: RecordSink
     clock: Callable[[], Instant]
     new_id: Callable[[], str]
-    rejected: Callable[[str, str], None] = lambda _source, _reason: None
     history_state: Callable[[], HopState] = lambda: "ok"
 
 
@@ -149,7 +148,15 @@ def build(
     world = World(fleet, probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    ingest = _ingest(world, ports, guard("latency", watch.arrived))
+    ingest = Ingest(
+        world.robots.__contains__,
+        lambda source, reason: event_log.log(
+            LogEvent("system", "log.rejected", {"source": source, "reason": reason}),
+            ports.clock(),
+        ),
+        world.is_past,
+        guard("latency", watch.arrived),
+    )
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -198,10 +205,6 @@ def build(
         margins,
         ScanReader(ingest.reject),
     )
-
-
-def _ingest(world: World, ports: Ports, arrived: Callable[[Received], None]) -> Ingest:
-    return Ingest(world.robots.__contains__, ports.rejected, world.is_past, arrived)
 
 
 def build_services(

@@ -7,7 +7,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.routing import iter_route_contexts
 
-from iveg.app.dss import Dss
+from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 from iveg.web.security.authentication import Action, declared_action
@@ -23,7 +23,7 @@ scripts below `/static`, and must be at the root."""
 
 @pytest.fixture(scope="module")
 def app(tmp_path_factory: pytest.TempPathFactory) -> FastAPI:
-    return create_app(Dss(Settings(), tmp_path_factory.mktemp("data")))
+    return create_app(open_dss(Settings(), tmp_path_factory.mktemp("data")))
 
 
 def test_every_route_and_websocket_declares_a_role(app: FastAPI) -> None:
@@ -67,7 +67,7 @@ def test_every_other_route_is_in_the_contract(app: FastAPI) -> None:
 
 def test_the_settings_name_both_secrets_of_notifications(tmp_path: Path) -> None:
     settings = Settings(notify_token="ab" * 16, notify_token_previous="cd" * 16)
-    secret = Dss(settings, tmp_path).notify_secret
+    secret = open_dss(settings, tmp_path).notify_secret
 
     assert secret.current == "ab" * 16
     assert [secret.admits(one * 16) for one in ("ab", "cd", "ef")] == [

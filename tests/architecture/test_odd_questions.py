@@ -11,7 +11,7 @@ from fastapi import FastAPI
 
 from iveg.adapters.history.engine import history_url
 from iveg.adapters.history.migrate import upgrade
-from iveg.app.dss import Dss
+from iveg.app.dss import open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
 
@@ -24,7 +24,7 @@ ODD = {"since": MOMENTS, "until": MOMENTS, "day": DAYS}
 @pytest.fixture
 def app(tmp_path: Path) -> FastAPI:
     upgrade(history_url(None, tmp_path))
-    return create_app(Dss(Settings(), tmp_path))
+    return create_app(open_dss(Settings(), tmp_path))
 
 
 @pytest.fixture

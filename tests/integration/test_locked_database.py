@@ -10,7 +10,7 @@ import httpx
 import pytest
 
 from iveg.adapters import clock
-from iveg.app.dss import Dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.domain.observations import Received
 from iveg.settings import Settings
@@ -31,7 +31,7 @@ async def running(directory: Path) -> AsyncIterator[tuple[Dss, httpx.AsyncClient
         iota_url=f"http://127.0.0.1:{agent}",
         sign_in_token="ab" * 32,
     )
-    dss = Dss(settings, directory)
+    dss = open_dss(settings, directory)
     transport = httpx.ASGITransport(create_app(dss))
     browser = httpx.AsyncClient(transport=transport, base_url="http://iveg")
     async with browser, dss.running():

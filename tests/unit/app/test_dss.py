@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from iveg.app.dss import Dss
+from iveg.app.dss import Dss, open_dss
 from iveg.settings import Settings
 
 
 @pytest.fixture
 def dss(tmp_path: Path) -> Dss:
-    return Dss(Settings(), tmp_path)
+    return open_dss(Settings(), tmp_path)
 
 
 async def test_mqtt_and_the_rule_loop_alone_share_the_fate_of_the_process(

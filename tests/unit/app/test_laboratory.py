@@ -8,10 +8,10 @@ WITHOUT = "import sys; sys.modules['iveg.lab'] = None; "
 SERVER = """
 import pathlib
 from fastapi.routing import iter_route_contexts
-from iveg.app.dss import Dss
+from iveg.app.dss import Dss, open_dss
 from iveg.asgi import create_app
 from iveg.settings import Settings
-dss = Dss(Settings(), pathlib.Path(sys.argv[1]))
+dss = open_dss(Settings(), pathlib.Path(sys.argv[1]))
 paths = [str(route.path) for route in iter_route_contexts(create_app(dss).routes)]
 print("/latency" in paths, any("experiment" in path for path in paths))
 print(dss.face.site.laboratory)

@@ -54,7 +54,6 @@ class Desk:
         self.journal = FakeJournal()
         self.ids = FakeIds()
         self.sink = FakeRecorder()
-        self.rejected: list[tuple[str, str]] = []
         self.description = fleet_of(*robots)
         self.parts = parts = build(
             self.description,
@@ -70,7 +69,6 @@ class Desk:
                 self.sink,
                 self.clock,
                 self.ids,
-                lambda source, reason: self.rejected.append((source, reason)),
             ),
             Choices(),
         )

@@ -48,7 +48,10 @@ def test_f60_a_scan_that_cannot_be_read_is_refused_by_those_who_draw_it() -> Non
     assert at_once == []
     assert shown == (None, None)
     assert desk.ingest.counters["rejected.bad_lidar_points"] == 1
-    assert desk.rejected == [("AGI", "bad_lidar_points")]
+    rejected = [
+        line.slots for line in desk.event_log.lines if line.key == "log.rejected"
+    ]
+    assert rejected == [{"source": "AGI", "reason": "bad_lidar_points"}]
 
 
 def test_a_scan_whose_identity_cannot_be_read_is_refused_at_once() -> None:

@@ -1,0 +1,122 @@
+"""Ports of the server to the world outside its process: network and disk."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from iveg.adapters import clock
+from iveg.adapters.contacts import FileContacts
+from iveg.adapters.detectors import FileDetectors
+from iveg.adapters.history.engine import history_url, sqlite_file
+from iveg.adapters.history.queries import Queries
+from iveg.adapters.history.recorder import Recorder, journal_file
+from iveg.adapters.iot_agent import IotAgentClient
+from iveg.adapters.journal import FileJournal
+from iveg.adapters.mqtt import BrokerAddress, MqttLink
+from iveg.adapters.orion import OrionClient
+from iveg.adapters.outbound import OutboundHttp
+from iveg.adapters.rules import FileRules
+from iveg.adapters.sessions import FileSessions
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.fleet import FleetDescription
+from iveg.pipeline.build import KeptChoices
+from iveg.pipeline.health_monitor import HopState
+from iveg.pipeline.loop import reading_apart_s
+from iveg.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Stores:
+    """Storage that outlives a restart: the history and the files beside it.
+
+    Attributes:
+        directory: Of the files: beside the database where that is a file.
+    """
+
+    directory: Path
+    recorder: Recorder
+    queries: Queries
+    journal: FileJournal
+    rules: FileRules
+    contacts: FileContacts
+    detectors: FileDetectors
+    sessions: FileSessions
+
+    def history_state(self) -> HopState:
+        """State of the history."""
+        return self.recorder.health(clock.now()).state
+
+    def kept_choices(self, first: DetectionRule) -> KeptChoices:
+        """Choices of earlier runs; ``first`` is the rule where there is none."""
+        return KeptChoices(
+            self.rules,
+            self.contacts,
+            self.detectors,
+            self.rules.load(first, clock.now()),
+            self.contacts.load(),
+            self.detectors.load(),
+        )
+
+    async def close(self) -> None:
+        """Write what waits, and close files and database."""
+        await self.recorder.close()
+        self.queries.close()
+        self.journal.close()
+        self.sessions.close()
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """Everything outside the process that the server needs.
+
+    Attributes:
+        link: Connection to the broker, still without readers.
+        outbound: HTTP to addresses that a person has typed.
+    """
+
+    stores: Stores
+    link: MqttLink
+    orion: OrionClient
+    agent: IotAgentClient
+    outbound: OutboundHttp
+
+    async def close(self) -> None:
+        """Close all but the link, which ends with its task."""
+        await self.stores.close()
+        await self.orion.close()
+        await self.agent.close()
+        self.outbound.close()
+
+
+def open_outside(
+    settings: Settings, data_directory: Path, fleet: FleetDescription
+) -> Outside:
+    """Open the ports that the settings name; nothing is connected yet."""
+    tenant = settings.fiware_service, settings.fiware_servicepath
+    broker = BrokerAddress.from_url(
+        settings.mqtt_url, settings.mqtt_user, settings.mqtt_password
+    )
+    return Outside(
+        open_stores(settings, data_directory),
+        MqttLink(broker, "iveg", apart_s=reading_apart_s(len(fleet.ids))),
+        OrionClient(settings.orion_url, *tenant),
+        IotAgentClient(settings.iota_url, *tenant),
+        OutboundHttp(),
+    )
+
+
+def open_stores(settings: Settings, data_directory: Path) -> Stores:
+    """Open the stores; a missing directory is created."""
+    url = history_url(settings.database_url, data_directory)
+    database = sqlite_file(url)
+    directory = data_directory if database is None else database.parent
+    directory.mkdir(parents=True, exist_ok=True)
+    return Stores(
+        directory,
+        Recorder(url, journal_file(url, directory)),
+        Queries(url),
+        FileJournal(directory / "commands.jsonl"),
+        FileRules(directory / "rules.jsonl"),
+        FileContacts(directory / "contacts.jsonl"),
+        FileDetectors(directory / "detectors.jsonl"),
+        FileSessions(directory / "sessions.jsonl"),
+    )
