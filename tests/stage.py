@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.app.virtual import read_direct
 from iveg.domain.observations import Instant
 from iveg.domain.records import DecisionRecord, DetectionRecord
 from iveg.lab.emulator.camera import DETECTORS
@@ -58,7 +59,7 @@ class Stage:
         return self.now
 
     def _hear(self, topic: str, payload: bytes) -> None:
-        for received in staging.heard(topic, payload, self.now):
+        for received in read_direct(topic, payload, self.now):
             self._desk.ingest.offer(received)
 
     # --- time -------------------------------------------------------------------------

@@ -5,13 +5,12 @@ socket or a process.  Their messages are encoded and decoded by the codec, as on
 wire.  The same seed gives the same run on any machine, however busy it is.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from typing import Final
 
 from iveg.domain.feedback import Feedback
-from iveg.domain.observations import Instant, Received
-from iveg.domain.transports import DIRECT
+from iveg.domain.observations import Instant
 from iveg.lab.emulator.orders import FaultOrder
 from iveg.lab.emulator.scripts import Incident
 from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
@@ -133,14 +132,6 @@ class StagedRobot:
     def _say(self, topic: str, payload: bytes) -> None:
         if not self._faults.mute:
             self._hear(topic, payload)
-
-
-def heard(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
-    """Decode a direct message as iVeg does."""
-    reading = codec.read_measure(topic.split("/")[2], payload)
-    assert reading.problems == ()  # noqa: S101 - both ends are ours
-    for observation in reading.observations:
-        yield Received(observation, now, DIRECT.id)
 
 
 class Stage:

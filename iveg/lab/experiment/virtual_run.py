@@ -5,18 +5,14 @@ runs of one seed give the same counts on any machine.
 """
 
 import asyncio
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import count
-from typing import Literal
 
 from iveg.adapters.fleet_files import load_fleet
 from iveg.adapters.greenhouses import load_greenhouse
+from iveg.app.virtual import VirtualPipeline
 from iveg.domain.detection_rule import DetectionRule
-from iveg.domain.feedback import Feedback
-from iveg.domain.greenhouse import Greenhouse
-from iveg.domain.observations import Instant
-from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.records import DecisionRecord
 from iveg.domain.rule.zones import zones_of
 from iveg.lab.emulator.camera import DETECTORS
 from iveg.lab.emulator.layout import lay_out
@@ -26,12 +22,10 @@ from iveg.lab.emulator.world import RobotHardware, SimulatedWorld
 from iveg.lab.experiment.beliefs import Belief, belief_of
 from iveg.lab.experiment.plan import ROBOTS, PlannedRun
 from iveg.lab.experiment.scoring import Pair, Picture, SeenObject
-from iveg.lab.experiment.stage import STEP_S, Stage, heard
-from iveg.pipeline.build import Choices, Ports, build
+from iveg.lab.experiment.stage import STEP_S, Stage
 from iveg.pipeline.mapping import Mapper
 from iveg.web.views import Views
 
-_EPOCH = Instant(0.0, 1_700_000_000.0)
 _SCAN_EVERY, _BELIEVE_EVERY, _REST_EVERY = 6, 20, 20
 """Steps between two sweeps, two looks into a costmap, and two rests for others."""
 
@@ -60,53 +54,6 @@ class VirtualRunResult:
         return bool(self.pairs) and not self.touched and not self.lost
 
 
-class _Outside:
-    """Ports of a pipeline without an operator.
-
-    Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
-    """
-
-    def __init__(self) -> None:
-        self.told: list[Feedback] = []
-        self.decisions: dict[str, DecisionRecord] = {}
-
-    def tell(self, feedback: Feedback) -> None:
-        self.told.append(feedback)
-
-    def offer(self, record: Record) -> None:
-        if isinstance(record, DecisionRecord):
-            self.decisions[record.decision_id] = record
-
-    async def flushed(self) -> None:
-        """Return; nothing is stored here."""
-
-    async def set_desired_state(
-        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
-    ) -> None:
-        """Ignore; no robot is stopped here."""
-
-    async def log_desired(
-        self,
-        robot_id: str,
-        desired: Literal["stopped", "run"],
-        hold_id: str | None,
-        by: str,
-        at: Instant,
-    ) -> None:
-        """Ignore; no robot is stopped here."""
-
-    async def log_release(
-        self,
-        robot_id: str,
-        hold_id: str,
-        ids: Sequence[str],
-        challenge: str,
-        by: str,
-        at: Instant,
-    ) -> None:
-        """Ignore; no robot is released here."""
-
-
 class VirtualRun:
     """One scenario in a pipeline of its own.
 
@@ -120,65 +67,41 @@ class VirtualRun:
         scenario = scenario_named(step.family)
         greenhouse = load_greenhouse(scenario.greenhouse)
         layout = lay_out(scenario, ROBOTS, greenhouse)
-        self._now = _EPOCH
-        self._outside = _Outside()
         self._watched = watched
         self._result = VirtualRunResult()
         self._detections: list[Picture] = []
-        self._wire(greenhouse, rule)
+        self._iveg = iveg = VirtualPipeline(load_fleet(words=ROBOTS), greenhouse, rule)
+        self._mapper = Mapper(iveg.parts.world, greenhouse.bounds)
+        self._views = Views(iveg.parts)
         detector = DETECTORS[layout.detector or profile]
         self._world = SimulatedWorld(greenhouse, layout, detector, step.seed)
         self._stage = Stage(
             self._world,
             layout.incidents,
-            self._parts.ingest,
-            self._parts.loop,
-            self._outside.told,
-            self._move,
-            self._hear,
+            iveg.parts.ingest,
+            iveg.parts.loop,
+            iveg.told,
+            iveg.move,
+            iveg.hear,
             looked=self._looked,
             scan_every=_SCAN_EVERY,
         )
-
-    def _wire(self, greenhouse: Greenhouse, rule: DetectionRule) -> None:
-        ids = count(1)
-        outside = self._outside
-        ports = Ports(
-            outside,
-            {},
-            outside,
-            outside,
-            lambda: self._now,
-            lambda: f"{next(ids):026d}",
-        )
-        parts = build(load_fleet(words=ROBOTS), greenhouse, ports, Choices(rule))
-        self._parts = parts
-        self._mapper = Mapper(parts.world, greenhouse.bounds)
-        self._views = Views(parts)
 
     async def play(self, seconds: float) -> VirtualRunResult:
         """Run from the start; yields to other tasks once a virtual second."""
         for number in range(round(seconds / STEP_S)):
             self._stage.step()
-            self._mapper.tick(self._now)
+            self._mapper.tick(self._iveg.now)
             self._result.pairs += self._told()
             if number % _BELIEVE_EVERY == 1:
                 self._believe()
             self._result.touched += self._touches()
             if number % _REST_EVERY == 0:
                 await asyncio.sleep(0)
-        self._result.decisions = list(self._outside.decisions.values())
-        live = (self._views.robot(one, self._now).link for one in ROBOTS)
+        self._result.decisions = list(self._iveg.decisions.values())
+        live = (self._views.robot(one, self._iveg.now).link for one in ROBOTS)
         self._result.lost = sum(link != "LIVE" for link in live)
         return self._result
-
-    def _move(self, seconds: float) -> Instant:
-        self._now = _EPOCH.later(seconds)
-        return self._now
-
-    def _hear(self, topic: str, payload: bytes) -> None:
-        for received in heard(topic, payload, self._now):
-            self._parts.ingest.offer(received)
 
     def _looked(self, rig: RobotHardware) -> None:
         """Targets in view at the moment of the picture."""
@@ -186,13 +109,13 @@ class VirtualRun:
             SeenObject(one.key, one.class_id, one.body.pose.x, one.body.pose.y)
             for one, _ in in_view(rig, self._world)
         )
-        self._detections.append(Picture(rig.robot_id, self._now.mono, tuple(seen)))
+        self._detections.append(Picture(rig.robot_id, self._iveg.now.mono, tuple(seen)))
 
     def _told(self) -> Iterator[Pair]:
         """Detections that iVeg reports for the frames of this step."""
         looks, self._detections = self._detections, []
         for real in looks:
-            frame = self._views.frame(real.robot_id, self._now)
+            frame = self._views.frame(real.robot_id, self._iveg.now)
             items = [] if frame is None else frame.items
             seen = (
                 SeenObject(
@@ -207,7 +130,7 @@ class VirtualRun:
             yield real, Picture(real.robot_id, real.at, tuple(seen))
 
     def _believe(self) -> None:
-        evaluator, now = self._parts.evaluator, self._now
+        evaluator, now = self._iveg.parts.evaluator, self._iveg.now
         zones = zones_of(evaluator.world, evaluator.people, evaluator.rule, now)
         own = self._mapper.of(self._watched, (), now)
         told = self._mapper.of(self._watched, zones, now)

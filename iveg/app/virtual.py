@@ -1,0 +1,104 @@
+"""The pipeline on a virtual clock, without network, disk and operator.
+
+The same messages at the same times give the same decisions on any machine, so that a
+rule can be tried on what was recorded or simulated.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import count
+from typing import Literal
+
+from iveg.domain.detection_rule import DetectionRule
+from iveg.domain.feedback import Feedback
+from iveg.domain.fleet import FleetDescription
+from iveg.domain.greenhouse import Greenhouse
+from iveg.domain.observations import Instant, Received
+from iveg.domain.records import DecisionRecord, Record
+from iveg.domain.transports import DIRECT
+from iveg.ngsi import codec
+from iveg.pipeline.build import Choices, Ports, build
+
+START = Instant(0.0, 1_700_000_000.0)
+
+
+class VirtualPipeline:
+    """A pipeline of its own, and the ports that keep what it says.
+
+    Implements ``pipeline.ports.FleetPort``, ``StopJournal`` and ``RecordSink``.
+
+    Attributes:
+        now: Its time.
+        told: Feedback to robots, oldest first.
+        decisions: All decisions as they stand, by id.
+        parts: The pipeline.
+    """
+
+    def __init__(
+        self, fleet: FleetDescription, greenhouse: Greenhouse, rule: DetectionRule
+    ) -> None:
+        ids = count(1)
+        self.now = START
+        self.told: list[Feedback] = []
+        self.decisions: dict[str, DecisionRecord] = {}
+        ports = Ports(
+            self, {}, self, self, lambda: self.now, lambda: f"{next(ids):026d}"
+        )
+        self.parts = build(fleet, greenhouse, ports, Choices(rule))
+
+    def move(self, seconds: float) -> Instant:
+        """Set the clock to ``seconds`` after the start."""
+        self.now = START.later(seconds)
+        return self.now
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """Take a robot's own message as if read from the broker."""
+        for received in read_direct(topic, payload, self.now):
+            self.parts.ingest.offer(received)
+
+    # --- its ports ----------------------------------------------------------------
+
+    def tell(self, feedback: Feedback) -> None:
+        """Keep the feedback."""
+        self.told.append(feedback)
+
+    def offer(self, record: Record) -> None:
+        """Keep a decision; ignore other records."""
+        if isinstance(record, DecisionRecord):
+            self.decisions[record.decision_id] = record
+
+    async def flushed(self) -> None:
+        """Return; nothing is stored here."""
+
+    async def set_desired_state(
+        self, robot_id: str, desired: Literal["stopped", "run"], ids: Iterable[str]
+    ) -> None:
+        """Ignore; no robot is stopped here."""
+
+    async def log_desired(
+        self,
+        robot_id: str,
+        desired: Literal["stopped", "run"],
+        hold_id: str | None,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Ignore; no robot is stopped here."""
+
+    async def log_release(
+        self,
+        robot_id: str,
+        hold_id: str,
+        ids: Sequence[str],
+        challenge: str,
+        by: str,
+        at: Instant,
+    ) -> None:
+        """Ignore; no robot is released here."""
+
+
+def read_direct(topic: str, payload: bytes, now: Instant) -> Iterator[Received]:
+    """Decode a robot's own message as the server does."""
+    reading = codec.read_measure(topic.split("/")[2], payload)
+    assert reading.problems == ()  # noqa: S101 - both ends are ours
+    for observation in reading.observations:
+        yield Received(observation, now, DIRECT.id)
