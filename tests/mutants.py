@@ -285,8 +285,8 @@ MUTANTS = (
     ),
     Mutant(
         "vital: a drawing shares the fate of STOP",
-        'return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run}',
-        'return {"mqtt": self.link.run, "rule-loop": self.pipeline.loop.run, '
+        'return {"mqtt": link.run, "rule-loop": loop.run}',
+        'return {"mqtt": link.run, "rule-loop": loop.run, '
         '"costmap": lambda: self.services.mapper.run(clock.now)}',
         ("unit/app",),
     ),

@@ -236,7 +236,8 @@ class Dss:
 
     def vital(self) -> dict[str, Work]:
         """Parts without which there is no STOP or no speed limit, by name."""
-        return {"mqtt": self.outside.link.run, "rule-loop": self.pipeline.loop.run}
+        link, loop = self.outside.link, self.pipeline.loop
+        return {"mqtt": link.run, "rule-loop": loop.run}
 
     def comfort(self) -> dict[str, Work]:
         """All other parts, by name; each may fail by itself."""

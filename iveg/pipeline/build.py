@@ -11,7 +11,7 @@ from iveg.domain.fleet import FleetDescription
 from iveg.domain.greenhouse import Greenhouse
 from iveg.domain.latency.watch import LatencyWatch
 from iveg.domain.messages import Channel, Contacts
-from iveg.domain.observations import Instant
+from iveg.domain.observations import Instant, Received
 from iveg.domain.stop.drills import Drills
 from iveg.domain.transports import FIWARE, Transport
 from iveg.domain.world import World
@@ -148,15 +148,7 @@ def build(
     world = World(fleet, probe, greenhouse.bounds)
     watch = LatencyWatch(world.robots, world.ledger.composed_at)
     latency = LatencyMonitor(watch, ports.sink, event_log)
-    ingest = Ingest(
-        world.robots.__contains__,
-        lambda source, reason: event_log.log(
-            LogEvent("system", "log.rejected", {"source": source, "reason": reason}),
-            ports.clock(),
-        ),
-        world.is_past,
-        guard("latency", watch.arrived),
-    )
+    ingest = _ingest(world, event_log, ports.clock, guard("latency", watch.arrived))
     evaluator = Evaluator(
         world,
         greenhouse,
@@ -205,6 +197,19 @@ def build(
         margins,
         ScanReader(ingest.reject),
     )
+
+
+def _ingest(
+    world: World,
+    event_log: EventLog,
+    clock: Clock,
+    arrived: Callable[[Received], None],
+) -> Ingest:
+    def log_rejected(source: str, reason: str) -> None:
+        slots = {"source": source, "reason": reason}
+        event_log.log(LogEvent("system", "log.rejected", slots), clock())
+
+    return Ingest(world.robots.__contains__, log_rejected, world.is_past, arrived)
 
 
 def build_services(
